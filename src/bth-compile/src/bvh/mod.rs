@@ -1,0 +1,35 @@
+//! The binary BVH that marks, costs and tets work on, and its collapse to the wide one.
+
+/// Node of a [`BinaryBvh`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// Box, object space: exactly the bounds of the corners of the node's triangles.
+    pub lower: [f32; 3],
+    /// Upper end of the box.
+    pub upper: [f32; 3],
+    /// First row of `order`.
+    pub first: u32,
+    /// Triangles below this node, at least 1.
+    pub count: u32,
+    /// Index of the right child; 0 for a leaf. The left child is the next node.
+    pub right: u32,
+}
+
+impl Node {
+    /// Whether the node has no children.
+    #[inline]
+    pub fn is_leaf(&self) -> bool {
+        self.right == 0
+    }
+}
+
+/// A binary BVH in depth-first order: node 0 is the root, a left child follows its parent,
+/// so walking the nodes backwards visits children before parents.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BinaryBvh {
+    /// Nodes in preorder; empty when the mesh has no triangle that can be hit.
+    pub nodes: Vec<Node>,
+    /// Triangle ids; each node covers `order[first..first + count]`. Triangles of exactly zero
+    /// area are left out. A leaf of the tree holds one triangle.
+    pub order: Vec<u32>,
+}

@@ -1,0 +1,16 @@
+//! The BTH compiler: mesh → bvh → marks → costs → tets → write.
+//!
+//! Each stage is `fn(&Input, &Options, &dyn Monitor) -> Result<(Output, Report)>`,
+//! knows nothing of files or terminals, and gives the same output at any number of threads.
+#![warn(missing_docs)]
+
+pub mod bvh;
+pub mod costs;
+pub mod error;
+pub mod marks;
+pub mod mesh;
+pub mod monitor;
+pub mod tets;
+
+pub use error::{Error, Result};
+pub use monitor::{Monitor, Silent};

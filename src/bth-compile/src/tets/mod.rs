@@ -1,0 +1,43 @@
+//! Constrained tetrahedralizations of chosen nodes, by way of the TetGen worker, checked exactly.
+
+/// A checked tetrahedralization of one node's triangles inside a box slightly larger than the node's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TetMesh {
+    /// Box that the tetrahedra fill.
+    pub lower: [f32; 3],
+    /// Upper end of the box.
+    pub upper: [f32; 3],
+    /// Positions, in Hilbert order: corners of the triangles and of the box, free-space and Steiner points.
+    pub vertices: Vec<[f32; 3]>,
+    /// Vertices of each tetrahedron, in Hilbert order of the centroids, in ascending order of vertex
+    /// index; every tetrahedron has non-zero volume (its orientation sign depends on the order).
+    pub tets: Vec<[u32; 4]>,
+    /// What lies behind the face opposite to each vertex of a tetrahedron.
+    pub behind: Vec<[Behind; 4]>,
+    /// Constrained faces, in Hilbert order of their centroids: one per triangle of the node.
+    pub faces: Vec<Face>,
+    /// Points that are neither corners of triangles nor of the box.
+    pub steiner_points: u32,
+}
+
+/// What lies behind a face of a tetrahedron.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Behind {
+    /// This tetrahedron.
+    Tet(u32),
+    /// This constrained face (and beyond it its other tetrahedron).
+    Face(u32),
+    /// Nothing: a face of the hull.
+    Hull,
+}
+
+/// A constrained face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    /// Triangle id in the source.
+    pub triangle: u32,
+    /// Its vertices in source order, rows of `TetMesh::vertices`.
+    pub vertex: [u32; 3],
+    /// The tetrahedron on the side that (v1-v0)x(v2-v0) points to, and the one behind.
+    pub tet: [u32; 2],
+}

@@ -1,0 +1,1 @@
+//! src/bth-tetgen-protocol

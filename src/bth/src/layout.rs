@@ -1,0 +1,422 @@
+//! The bytes of a `.bth` file, version 1: every structure that lies on disk.
+//!
+//! `format-spec/` is normative; a test holds its tables against these structs.
+//! All numbers are little-endian. Structures have no padding and no pointers:
+//! what refers to something else is an index, and [`NONE`] is no index.
+
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+
+/// No index: an absent child, triangle, tetrahedron or surface.
+pub const NONE: u32 = u32::MAX;
+
+/// First bytes of every file. The non-ASCII byte, CR LF, 0x1A and LF catch
+/// transfers that change text; the digit is the major version.
+pub const IDENTIFIER: [u8; 16] = *b"\x89BTH1\r\n\x1a\n\0\0\0\0\0\0\0";
+/// Format version written by this library: major in the high half, minor in the low.
+pub const WRITER_VERSION: u32 = 0x0001_0000;
+/// Oldest reader version that understands what this library writes.
+pub const MINIMUM_READER_VERSION: u32 = 0x0001_0000;
+/// Every section starts at a multiple of this, and the file ends at one.
+pub const ALIGNMENT: usize = 64;
+
+/// File header, at offset 0.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Header {
+    /// [`IDENTIFIER`].
+    pub identifier: [u8; 16],
+    /// Version of the format that the writer followed.
+    pub writer_version: u32,
+    /// A reader of a lower version must refuse the file.
+    pub minimum_reader_version: u32,
+    /// Bytes of the whole file.
+    pub file_length: u64,
+    /// Offset of the section table, always 128.
+    pub section_offset: u64,
+    /// Entries of the section table.
+    pub section_count: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Bits that a reader must know to read the file.
+    pub required_features: u64,
+    /// Bits that a reader may ignore.
+    pub optional_features: u64,
+    /// BLAKE3 (256 bits) of the section entries' identity without provenance; see the specification.
+    pub content_id: [u8; 32],
+    /// BLAKE3 (first 128 bits) of the section table.
+    pub table_hash: [u8; 16],
+    /// BLAKE3 (first 128 bits) of the 112 bytes before.
+    pub header_hash: [u8; 16],
+}
+
+/// One entry of the section table. Entries are sorted by (object, kind), both ascending, each pair once.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct SectionEntry {
+    /// One of [`kind`].
+    pub kind: u32,
+    /// Bit 0: a reader that does not know the kind must refuse the file. Others zero.
+    pub flags: u32,
+    /// The object that the section belongs to.
+    pub object: u32,
+    /// Alignment of `offset`, always 64.
+    pub alignment: u32,
+    /// Bytes from the start of the file.
+    pub offset: u64,
+    /// Bytes of the section; `stride * count`.
+    pub length: u64,
+    /// Bytes of one element.
+    pub stride: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Elements.
+    pub count: u64,
+    /// BLAKE3 (first 128 bits) of the section's bytes.
+    pub hash: [u8; 16],
+}
+
+/// Flag bit of [`SectionEntry::flags`]: unknown kinds with it are refused.
+pub const SECTION_REQUIRED: u32 = 1;
+
+/// Section kinds.
+pub mod kind {
+    /// One [`super::Object`].
+    pub const OBJECT: u32 = 1;
+    /// [`super::Line`]s that hold the wide nodes and triangle leaves.
+    pub const LINES: u32 = 2;
+    /// `u32` per triangle in leaf order: its id in the source.
+    pub const TRIANGLE_IDS: u32 = 3;
+    /// [`super::TetLeaf`]s.
+    pub const TET_LEAVES: u32 = 4;
+    /// [`super::Link32`], [`super::Tet32`], [`super::Tet20`] or [`super::Tet16`] records.
+    pub const TETS: u32 = 5;
+    /// [`super::TetVertex`] positions.
+    pub const TET_VERTICES: u32 = 6;
+    /// [`super::TetFace`]s, one per constrained face.
+    pub const TET_FACES: u32 = 7;
+    /// [`super::HullFace`]s.
+    pub const HULL_FACES: u32 = 8;
+    /// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
+    pub const TRIANGLE_HOMES: u32 = 9;
+    /// `[f32; 3]` welded positions of the source.
+    pub const POSITIONS: u32 = 16;
+    /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
+    pub const TRIANGLES: u32 = 17;
+    /// `[u32; 3]` per source triangle: rows of `NORMALS` and `UVS`.
+    pub const CORNERS: u32 = 18;
+    /// `[f32; 3]` shading normals, as in the source (not normalized by us).
+    pub const NORMALS: u32 = 19;
+    /// `[f32; 2]` texture coordinates.
+    pub const UVS: u32 = 20;
+    /// UTF-8 JSON: how the file came about. Not part of the content id.
+    pub const PROVENANCE: u32 = 32;
+}
+
+/// 64 bytes: the unit in which nodes and leaves are addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C, align(64))]
+pub struct Line(pub [u32; 16]);
+
+/// An object: one geometry in its own space.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Object {
+    /// Bounds of the triangles that can be hit, object space; zero when there are none.
+    pub lower: [f32; 3],
+    /// Upper end of the bounds.
+    pub upper: [f32; 3],
+    /// [`Child`] code of the root; `NONE` when nothing can be hit.
+    pub root: u32,
+    /// Tetrahedron record: 0 none, else a [`RecordKind`].
+    pub record: u32,
+    /// Triangles of the source; ids are below this.
+    pub triangles: u32,
+    /// Zero-area triangles, which no ray can hit and no leaf holds.
+    pub dropped: u32,
+    /// Wide nodes on the longest path from the root.
+    pub depth: u32,
+    /// Zero.
+    pub reserved: [u32; 5],
+}
+
+/// Which record the `TETS` section holds (`Object::record`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum RecordKind {
+    /// [`Link32`].
+    Link32 = 1,
+    /// [`Tet32`].
+    Tet32 = 2,
+    /// [`Tet20`].
+    Tet20 = 3,
+    /// [`Tet16`].
+    Tet16 = 4,
+}
+
+impl RecordKind {
+    /// All of them, in order of their codes.
+    pub const ALL: [RecordKind; 4] = [Self::Link32, Self::Tet32, Self::Tet20, Self::Tet16];
+
+    /// The kind with this code.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|k| *k as u32 == code)
+    }
+    /// Bytes of a record.
+    pub const fn stride(self) -> usize {
+        match self {
+            Self::Link32 | Self::Tet32 => 32,
+            Self::Tet20 => 20,
+            Self::Tet16 => 16,
+        }
+    }
+    /// Lower-case name, as on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Link32 => "link32",
+            Self::Tet32 => "tet32",
+            Self::Tet20 => "tet20",
+            Self::Tet16 => "tet16",
+        }
+    }
+}
+
+/// Where a child code leads. Codes are `u32`: bit 31 set for leaves, bits 30..29
+/// the kind of leaf, the rest an index; `NONE` is an empty slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Child {
+    /// Line of a [`WideNode`].
+    Node(u32),
+    /// Line of an [`IndexedLeaf`].
+    Indexed(u32),
+    /// Line of a [`RawLeaf`].
+    Raw(u32),
+    /// Row of `TET_LEAVES`.
+    Tets(u32),
+}
+
+impl Child {
+    /// Set in the codes of leaves.
+    pub const LEAF_BIT: u32 = 1 << 31;
+    /// Indices are below this.
+    pub const INDEX_LIMIT: u32 = 1 << 29;
+
+    /// The code of this child.
+    pub const fn code(self) -> u32 {
+        match self {
+            Child::Node(i) => i,
+            Child::Indexed(i) => Self::LEAF_BIT | i,
+            Child::Raw(i) => Self::LEAF_BIT | (1 << 29) | i,
+            Child::Tets(i) => Self::LEAF_BIT | (2 << 29) | i,
+        }
+    }
+    /// The child that a code stands for; `None` for `NONE` and unassigned codes.
+    #[inline(always)]
+    pub const fn from_code(code: u32) -> Option<Self> {
+        let index = code & (Self::INDEX_LIMIT - 1);
+        match code >> 29 {
+            0 => Some(Child::Node(index)),
+            4 => Some(Child::Indexed(index)),
+            5 => Some(Child::Raw(index)),
+            6 => Some(Child::Tets(index)),
+            _ => None,
+        }
+    }
+}
+
+/// Children of a wide node, triangles and vertices of a leaf: at most 16.
+pub const WIDTH: usize = 16;
+
+/// Inner node of the wide BVH: 7 lines. Slots are filled from 0; an empty slot has
+/// lower = `f32::MAX`, upper = `-f32::MAX` and child `NONE`.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct WideNode {
+    /// Per axis: lower ends, then upper ends of the children's boxes, object space.
+    pub bounds: [[[f32; WIDTH]; 2]; 3],
+    /// Child codes; those of nodes and triangle leaves exceed the own line.
+    pub child: [u32; WIDTH],
+}
+
+/// Triangle leaf with shared vertices: 4 lines.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct IndexedLeaf {
+    /// x, y and z rows; unused slots repeat vertex 0.
+    pub vertex: [[f32; WIDTH]; 3],
+    /// First, second and third vertex of each triangle, in source orientation; unused slots 0.
+    pub corner: [[u8; WIDTH]; 3],
+    /// Row of `TRIANGLE_IDS` of the first triangle.
+    pub first: u32,
+    /// Triangles, 1 to 16.
+    pub triangles: u32,
+    /// Vertices in use, 1 to 16.
+    pub vertices: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// Triangle leaf without sharing: 10 lines.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct RawLeaf {
+    /// `[corner][axis][triangle]`; unused slots repeat triangle 0.
+    pub corner: [[[f32; WIDTH]; 3]; 3],
+    /// Row of `TRIANGLE_IDS` of the first triangle.
+    pub first: u32,
+    /// Triangles, 1 to 16.
+    pub triangles: u32,
+    /// Zero.
+    pub reserved: [u32; 14],
+}
+
+/// A node of the BVH that is a constrained tetrahedralization of its triangles within a box.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct TetLeaf {
+    /// The box that the tetrahedra fill, object space.
+    pub lower: [f32; 3],
+    /// Upper end of the box.
+    pub upper: [f32; 3],
+    /// First row of `TETS`. The ranges of successive leaves follow each other, here and below.
+    pub first_tet: u32,
+    /// Number of tetrahedra.
+    pub tets: u32,
+    /// First row of `TET_VERTICES`.
+    pub first_vertex: u32,
+    /// Number of vertices.
+    pub vertices: u32,
+    /// First row of `TET_FACES`.
+    pub first_face: u32,
+    /// Number of constrained faces.
+    pub faces: u32,
+    /// First row of `HULL_FACES`.
+    pub first_hull: u32,
+    /// Number of hull faces.
+    pub hulls: u32,
+    /// Child code of a BVH over the same triangles, for rays without a hint; `NONE` when pruned.
+    pub subtree: u32,
+    /// Zero.
+    pub flags: u32,
+}
+
+/// Position of a vertex of a tetrahedron, object space.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct TetVertex {
+    /// x, y, z.
+    pub position: [f32; 3],
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// A constrained face: a triangle of the source, whole, between two tetrahedra.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct TetFace {
+    /// Vertices (rows of `TET_VERTICES`) in source order.
+    pub vertex: [u32; 3],
+    /// Id in the source.
+    pub triangle: u32,
+    /// The tetrahedron on the side that (v1-v0)x(v2-v0) points to, then the one behind.
+    pub tet: [u32; 2],
+    /// The vertex of each of them that is not of this face.
+    pub opposite: [u32; 2],
+}
+
+/// A face of the hull: where rays enter a tet leaf from outside.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct HullFace {
+    /// Vertices; (v1-v0)x(v2-v0) points inwards, to `opposite`.
+    pub vertex: [u32; 3],
+    /// The tetrahedron inside.
+    pub tet: u32,
+    /// Its fourth vertex.
+    pub opposite: u32,
+}
+
+/// What lies behind a face of a tetrahedron, as a `u32`: below 2^31 the row of the
+/// neighbour in `TETS`, else `FACE_BIT` and a row of `TET_FACES`; `NONE` outside the hull.
+pub const FACE_BIT: u32 = 1 << 31;
+
+/// Four links in ascending order of the vertex that the link's face is opposite to.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Link32 {
+    /// The links.
+    pub link: [Link; 4],
+}
+
+/// A link of [`Link32`]. Behind a constrained face `opposite` is the vertex beyond it too; behind the hull it is `NONE`.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Link {
+    /// What lies behind the face.
+    pub next: u32,
+    /// The vertex of the next tetrahedron that is not of the face.
+    pub opposite: u32,
+}
+
+/// The paper's record of 32 bytes (Aman et al. 2021, arXiv 2103.02309).
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Tet32 {
+    /// The three lowest vertices, ascending.
+    pub vertex: [u32; 3],
+    /// Exclusive or of all four vertices.
+    pub xor: u32,
+    /// Links, in ascending order of the opposite vertex.
+    pub next: [u32; 4],
+}
+
+/// The paper's record of 20 bytes.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Tet20 {
+    /// Exclusive or of all four vertices.
+    pub xor: u32,
+    /// Links, in ascending order of the opposite vertex.
+    pub next: [u32; 4],
+}
+
+/// The paper's record of 16 bytes.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Tet16 {
+    /// Exclusive or of all four vertices.
+    pub xor: u32,
+    /// The first three links, each exclusive-or'ed with the fourth.
+    pub next: [u32; 3],
+}
+
+macro_rules! assert_layout {
+    ($($type:ident $size:literal { $($field:ident $at:literal),* })*) => { $(const _: () = {
+        assert!(size_of::<$type>() == $size);
+        $(assert!(std::mem::offset_of!($type, $field) == $at);)*
+    };)* };
+}
+assert_layout! {
+    Header 128 { writer_version 16, file_length 24, section_offset 32, section_count 40,
+        required_features 48, optional_features 56, content_id 64, table_hash 96, header_hash 112 }
+    SectionEntry 64 { kind 0, flags 4, object 8, alignment 12, offset 16, length 24, stride 32, count 40, hash 48 }
+    Line 64 {}
+    Object 64 { lower 0, upper 12, root 24, record 28, triangles 32, dropped 36, depth 40 }
+    WideNode 448 { child 384 }
+    IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }
+    RawLeaf 640 { first 576, triangles 580 }
+    TetLeaf 64 { upper 12, first_tet 24, first_vertex 32, first_face 40, first_hull 48, subtree 56, flags 60 }
+    TetVertex 16 { reserved 12 }
+    TetFace 32 { triangle 12, tet 16, opposite 24 }
+    HullFace 20 { tet 12, opposite 16 }
+    Link32 32 {}
+    Tet32 32 { xor 12, next 16 }
+    Tet20 20 { next 4 }
+    Tet16 16 { next 4 }
+}
+
+/// Lines that a [`WideNode`] takes.
+pub const NODE_LINES: usize = size_of::<WideNode>() / 64;
+/// Lines that an [`IndexedLeaf`] takes.
+pub const INDEXED_LINES: usize = size_of::<IndexedLeaf>() / 64;
+/// Lines that a [`RawLeaf`] takes.
+pub const RAW_LINES: usize = size_of::<RawLeaf>() / 64;

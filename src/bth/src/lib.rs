@@ -1,0 +1,6 @@
+//! Runtime of BTH files: opens a compiled file and traces rays, zero-copy.
+#![warn(missing_docs)]
+
+pub mod layout;
+pub mod limits;
+pub mod rays;

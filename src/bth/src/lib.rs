@@ -3,4 +3,5 @@
 
 pub mod layout;
 pub mod limits;
+pub mod object;
 pub mod rays;

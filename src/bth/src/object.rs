@@ -1,0 +1,92 @@
+//! A view of one object: the sections of a file as typed slices, zero-copy.
+
+use crate::layout::*;
+use zerocopy::{FromBytes, IntoBytes};
+
+/// The tetrahedron records, whichever kind the file holds.
+#[derive(Clone, Copy, Debug)]
+pub enum Records<'a> {
+    /// No tet leaves.
+    None,
+    /// Links with the opposite vertex.
+    Link32(&'a [Link32]),
+    /// The paper's 32 bytes.
+    Tet32(&'a [Tet32]),
+    /// The paper's 20 bytes.
+    Tet20(&'a [Tet20]),
+    /// The paper's 16 bytes.
+    Tet16(&'a [Tet16]),
+}
+
+impl Records<'_> {
+    /// Number of tetrahedra.
+    pub fn len(&self) -> usize {
+        match self {
+            Records::None => 0,
+            Records::Link32(r) => r.len(),
+            Records::Tet32(r) => r.len(),
+            Records::Tet20(r) => r.len(),
+            Records::Tet16(r) => r.len(),
+        }
+    }
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// The sections of one object. Sections that the file lacks are empty.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectView<'a> {
+    /// Bounds, root and counts.
+    pub header: &'a Object,
+    /// Nodes and triangle leaves.
+    pub lines: &'a [Line],
+    /// Source id of each triangle in leaf order.
+    pub triangle_ids: &'a [u32],
+    /// Tet leaves.
+    pub tet_leaves: &'a [TetLeaf],
+    /// Their tetrahedra.
+    pub records: Records<'a>,
+    /// Their vertices.
+    pub tet_vertices: &'a [TetVertex],
+    /// Their constrained faces.
+    pub tet_faces: &'a [TetFace],
+    /// Their hulls.
+    pub hull_faces: &'a [HullFace],
+    /// Row of `tet_faces` of each source triangle; empty when there are no tet leaves.
+    pub triangle_homes: &'a [u32],
+    /// Welded positions of the source, if kept.
+    pub positions: &'a [[f32; 3]],
+    /// Rows of `positions` of each source triangle, if kept.
+    pub triangles: &'a [[u32; 3]],
+    /// Rows of `normals` and `uvs` of each source triangle, if kept.
+    pub corners: &'a [[u32; 3]],
+    /// Shading normals, if kept.
+    pub normals: &'a [[f32; 3]],
+    /// Texture coordinates, if kept.
+    pub uvs: &'a [[f32; 2]],
+}
+
+impl<'a> ObjectView<'a> {
+    fn block<T: FromBytes + zerocopy::KnownLayout + zerocopy::Immutable>(&self, line: u32, lines: usize) -> &'a T {
+        let at = line as usize;
+        let bytes = self.lines[at..at + lines].as_bytes();
+        T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")
+    }
+    /// The node at a line. Panics when the lines end before the node does; checked files never do.
+    #[inline(always)]
+    pub fn node(&self, line: u32) -> &'a WideNode {
+        self.block(line, NODE_LINES)
+    }
+    /// The indexed leaf at a line; panics as [`Self::node`] does.
+    #[inline(always)]
+    pub fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
+        self.block(line, INDEXED_LINES)
+    }
+    /// The raw leaf at a line; panics as [`Self::node`] does.
+    #[inline(always)]
+    pub fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
+        self.block(line, RAW_LINES)
+    }
+}

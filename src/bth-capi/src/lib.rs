@@ -88,6 +88,9 @@ pub extern "C" fn bth_last_error() -> *const c_char {
     LAST_ERROR.with(|last| last.borrow().as_ptr())
 }
 
+/// Scene, rays and, unless null, the surfaces that they start on.
+type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [Surface]>);
+
 /// The arguments of a query as slices; `None` when there is nothing to do.
 ///
 /// # Safety
@@ -97,7 +100,7 @@ unsafe fn batch<'a>(
     rays: *const Ray,
     from: *const Surface,
     count: usize,
-) -> Option<(&'a Scene, &'a [Ray], Option<&'a [Surface]>)> {
+) -> Option<Batch<'a>> {
     if scene.is_null() || rays.is_null() || count == 0 {
         return None;
     }

@@ -98,7 +98,8 @@ impl Scene {
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
-            let (hit, more) = trace::nearest_counted(&self.object(instance), &ray, hint(from, instance), instance);
+            let (hit, more) =
+                trace::nearest_counted(&self.object(instance), &ray, hint(from, instance), instance);
             steps += more;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);

@@ -149,7 +149,10 @@ mod tests {
             e.add_volume(wide(o), wide(a), wide(b), wide(c));
             let p = |v: [f32; 3]| robust::Coord3D { x: v[0], y: v[1], z: v[2] };
             // robust's orient3d(a, b, c, o) is det[a-o, b-o, c-o].
-            assert_eq!(e.value().partial_cmp(&0.0), robust::orient3d(p(a), p(b), p(c), p(o)).partial_cmp(&0.0));
+            assert_eq!(
+                e.value().partial_cmp(&0.0),
+                robust::orient3d(p(a), p(b), p(c), p(o)).partial_cmp(&0.0)
+            );
         }
     }
 }

@@ -152,7 +152,11 @@ impl Line {
     /// Whether, where and how the line crosses the closed triangle with these corners: the one
     /// decision that every structure uses. `projected` are the projections of `corners`.
     #[inline(always)]
-    pub(crate) fn crossing(&self, corners: impl Fn() -> [[f32; 3]; 3], projected: [&Projected; 3]) -> Option<Crossing> {
+    pub(crate) fn crossing(
+        &self,
+        corners: impl Fn() -> [[f32; 3]; 3],
+        projected: [&Projected; 3],
+    ) -> Option<Crossing> {
         let [a, b, c] = projected;
         let weight = [cross(b, c), cross(c, a), cross(a, b)];
         // A coordinate of a point is at most its sheared one plus its depth.

@@ -6,11 +6,11 @@ mod line;
 mod query;
 mod records;
 mod slabs;
+#[cfg(test)]
+mod testing;
 mod tet_flood;
 mod tet_locate;
 mod tet_walk;
-#[cfg(test)]
-mod testing;
 
 pub use query::Steps;
 

@@ -85,7 +85,12 @@ impl<'a, R: Record> TetSpace<'a, R> {
     /// The tetrahedron on the other side of a link, with its fourth vertex, and how that one's
     /// record stores the face between; `None` outside the hull.
     #[inline(always)]
-    pub(crate) fn beyond(&self, from: u32, link: crate::layout::Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
+    pub(crate) fn beyond(
+        &self,
+        from: u32,
+        link: crate::layout::Link,
+        face: [u32; 3],
+    ) -> Option<(u32, u32, u32)> {
         if link.next == NONE {
             return None;
         }

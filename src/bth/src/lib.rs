@@ -8,6 +8,7 @@ pub mod layout;
 pub mod limits;
 pub mod object;
 pub mod rays;
+pub mod verify;
 
 pub use error::{Code, Error};
 pub use file::File;

@@ -11,6 +11,7 @@ pub mod marks;
 pub mod mesh;
 pub mod monitor;
 pub mod tets;
+pub mod write;
 
 pub use error::{Error, Result};
 pub use monitor::{Monitor, Silent};

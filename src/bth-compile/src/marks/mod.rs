@@ -15,6 +15,8 @@ mod separation;
 mod triangle_contact;
 
 #[cfg(test)]
+mod oracle;
+#[cfg(test)]
 mod testing;
 
 pub use bad_pairs::{BadPairs, bad_pairs};

@@ -26,3 +26,8 @@ pub fn worker() -> bool {
         found
     })
 }
+
+/// Compiles the Rust code of the readme.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -37,7 +37,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         return report::print(&String::from_utf8_lossy(&script));
     }
     let (file, output) = args.paths()?;
-    let scene = open(file, args.map).map_err(Failure::runtime(file))?;
+    let scene = open(file, args.map)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
         .build()

@@ -1,0 +1,48 @@
+//! A cheap proof that two triangles touch only where they must: a separating direction, with a
+//! bound on the rounding of its dot products. Saves the exact tests for most neighbours.
+
+type Point = [f32; 3];
+type Vector = [f64; 3];
+
+/// Bound on the relative rounding of `dot(p - s, d)` in f64, of the sum of the magnitudes of its
+/// terms: one rounding each for the difference, the product and two additions, doubled for safety.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+#[inline]
+fn minus(p: Point, s: Point) -> Vector {
+    [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(s[k]))
+}
+
+#[inline]
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Whether `dot(v, d)` is certainly positive, for `v` a rounded difference of f32 points.
+#[inline]
+fn certainly_positive(v: Vector, d: Vector) -> bool {
+    let magnitude = (v[0] * d[0]).abs() + (v[1] * d[1]).abs() + (v[2] * d[2]).abs();
+    dot(v, d) > ROUNDING * magnitude
+}
+
+#[inline]
+fn unit(v: Vector) -> Vector {
+    let scale = 1.0 / dot(v, v).sqrt();
+    v.map(|x| x * scale)
+}
+
+/// Whether a plane through `s` certainly has `a` strictly on one side and `b` strictly on the
+/// other, so that the triangles (s, a0, a1) and (s, b0, b1) have only `s` in common. False proves
+/// nothing. Any direction is a valid witness; the one tried runs between the corners' bisectors.
+#[inline]
+pub(super) fn fans_are_apart(s: Point, a: [Point; 2], b: [Point; 2]) -> bool {
+    let a = a.map(|p| minus(p, s));
+    let b = b.map(|p| minus(p, s));
+    let (ua, ub) = (a.map(unit), b.map(unit));
+    let d = [0, 1, 2].map(|k| (ua[0][k] + ua[1][k]) - (ub[0][k] + ub[1][k]));
+    let back = d.map(|x| -x);
+    certainly_positive(a[0], d)
+        && certainly_positive(a[1], d)
+        && certainly_positive(b[0], back)
+        && certainly_positive(b[1], back)
+}

@@ -12,6 +12,8 @@ pub(crate) enum Failure {
     Compile(bth_compile::Error),
     /// The runtime's errors: a compiled file that cannot be used.
     Runtime(bth::Error),
+    /// Arguments that do not fit together (exit code 2).
+    Usage { message: String, hint: &'static str },
     /// A check failed; what there was to say has been said on standard output.
     Check,
     /// Standard output was closed by its reader (`bthc ... | head`).
@@ -60,6 +62,7 @@ impl Failure {
         use bth_compile::Error;
         match self {
             Self::Check => 1,
+            Self::Usage { .. } => 2,
             Self::Compile(Error::Input { .. }) => 3,
             Self::Compile(Error::File { .. }) => 4,
             Self::Compile(Error::Limit { .. }) => 5,
@@ -86,6 +89,7 @@ impl Failure {
             }
             Self::Compile(Error::Cancelled) => json!({"code": "BTH-C000", "message": "cancelled"}),
             Self::Runtime(error) => runtime_json(error),
+            Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
             Self::Check | Self::ClosedOutput => serde_json::Value::Null,
         }
     }
@@ -96,6 +100,7 @@ impl Failure {
             Self::Check | Self::ClosedOutput => return ExitCode::from(self.exit_code()),
             Self::Compile(error) => error.to_string(),
             Self::Runtime(error) => error.to_string(),
+            Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
         };
         output::error(&text);
         if wants_json {

@@ -12,6 +12,7 @@ pub mod mesh;
 pub mod monitor;
 pub mod pipeline;
 pub mod tets;
+pub mod write;
 
 pub use error::{Error, Result};
 pub use monitor::{Monitor, Silent};

@@ -22,6 +22,7 @@ pub mod object;
 pub mod rays;
 mod scene;
 mod trace;
+pub mod verify;
 
 pub use error::{Code, Error};
 pub use file::File;

@@ -10,6 +10,8 @@ mod nodes;
 mod sources;
 mod tets;
 
+pub(crate) use links::Derived;
+
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::{ObjectView, Records};

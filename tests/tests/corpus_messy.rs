@@ -20,19 +20,25 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
     let Some((data, bthc)) = data_and_compiler() else { return };
     let folder = data.join("messy");
     let out = tempfile::tempdir().unwrap();
-    let (mut compiled, mut refused, mut wrong) = (0, 0, Vec::new());
+    let (mut compiled, mut refused, mut slowest, mut wrong) = (0, 0, 0.0f64, Vec::new());
     let models = models(&folder);
     for (number, model) in models.iter().enumerate() {
         let file = out.path().join(format!("{number}.bth"));
         match check(&bthc, &data, model, &file) {
-            Ok(true) => compiled += 1,
-            Ok(false) => refused += 1,
+            Ok((done, seconds)) => {
+                compiled += usize::from(done);
+                refused += usize::from(!done);
+                slowest = slowest.max(seconds);
+            }
             Err(message) => {
                 wrong.push(format!("{}: {message}", model.strip_prefix(&folder).unwrap().display()))
             }
         }
     }
-    println!("{} messy models: {compiled} compiled and verified, {refused} refused", models.len());
+    println!(
+        "{} messy models: {compiled} compiled and verified, {refused} refused; the slowest took {slowest:.1} s",
+        models.len()
+    );
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), models.len(), wrong.join("\n"));
     for (name, place) in UNUSABLE {
         let model = folder.join(name);
@@ -48,8 +54,8 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
     }
 }
 
-/// Whether the model was compiled; an error when something is not as it must be.
-fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<bool, String> {
+/// Whether the model was compiled, and in how many seconds; an error when something is not as it must be.
+fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f64), String> {
     let ended = run(Command::new(bthc).arg("compile").arg(model).arg("-o").arg(file).arg("--json"), LIMIT)?;
     if ended.stderr.contains("panicked") {
         return Err(format!("panicked: {}", ended.stderr));
@@ -68,7 +74,7 @@ fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<bool, St
             if verified.code != Some(0) {
                 return Err(format!("does not verify: {}{}", verified.stdout, verified.stderr));
             }
-            Ok(true)
+            Ok((true, ended.seconds))
         }
         Some(3 | 5) => {
             let name = model.file_name().unwrap().to_string_lossy().into_owned();
@@ -81,7 +87,7 @@ fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<bool, St
             if file.exists() {
                 return Err("refused, but a file was written".to_owned());
             }
-            Ok(false)
+            Ok((false, ended.seconds))
         }
         other => Err(format!("exit code {other:?}: {}", ended.stderr)),
     }

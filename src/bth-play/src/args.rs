@@ -57,7 +57,8 @@ pub(crate) struct Args {
     /// Threads; 0 for one per processor. The picture does not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) threads: usize,
-    /// Map the file instead of reading it. Nobody may change the file meanwhile.
+    /// Map the file instead of reading and checking it. It must be as bthc wrote it, and nobody may
+    /// change it meanwhile.
     #[arg(long)]
     pub(crate) map: bool,
     /// Print one JSON object.

@@ -26,8 +26,7 @@ impl Camera {
         let forward = forward.normalize();
         let side = forward.cross(vertical);
         // Straight up or down there is no natural right; any will do.
-        let right =
-            if side.length() > 1e-9 { side.normalize() } else { forward.any_orthonormal_vector() };
+        let right = if side.length() > 1e-9 { side.normalize() } else { forward.any_orthonormal_vector() };
         Self { eye, right, up: right.cross(forward), forward, extent }
     }
 

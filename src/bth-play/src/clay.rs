@@ -64,7 +64,13 @@ impl Studio {
     }
 
     /// The colours (linear) of a batch of samples.
-    pub(crate) fn shade(&self, frame: &Frame<'_>, samples: &[Sample], hits: &[Hit], any_rays: &mut u64) -> Vec<Vec3> {
+    pub(crate) fn shade(
+        &self,
+        frame: &Frame<'_>,
+        samples: &[Sample],
+        hits: &[Hit],
+        any_rays: &mut u64,
+    ) -> Vec<Vec3> {
         let mut colors: Vec<Vec3> = samples.iter().map(|s| background(s.at.y, s.at.length())).collect();
         let mut queue = Queue::default();
         let mut lit = Vec::new();
@@ -121,7 +127,8 @@ impl Studio {
         // A hint of gloss (Blinn), so that curvature shows in the lit parts.
         let half = (lit.to_key - direction).normalize_or(lit.normal);
         let gloss = 0.06 * facing(half).powi(24) * key;
-        let light = KEY * (key * facing(lit.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient;
+        let light =
+            KEY * (key * facing(lit.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient;
         shoulder(CLAY * light + KEY * gloss)
     }
 
@@ -134,7 +141,8 @@ impl Studio {
             return None;
         }
         let point = eye + sample.direction * (above / descent);
-        let away = (point - frame.shape.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
+        let away =
+            (point - frame.shape.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
         // Beyond a few diagonals the shadow is too faint to be seen.
         (away < 3.0).then(|| (point, (-(away / 1.1).powi(2)).exp()))
     }

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Why there is no picture.
@@ -11,7 +11,7 @@ pub(crate) enum Failure {
     /// Options that do not fit together (exit code 2).
     Usage(String),
     /// A compiled file that cannot be used (exit code 3, or 4 when it could not be read).
-    Runtime { file: PathBuf, error: bth::Error },
+    Runtime(bth::Error),
     /// A compiled file that lacks what the mode needs (exit code 3).
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
     /// The picture could not be written (exit code 4).
@@ -30,17 +30,21 @@ impl From<std::io::Error> for Failure {
     }
 }
 
-impl Failure {
-    pub(crate) fn runtime(file: &Path) -> impl FnOnce(bth::Error) -> Self + '_ {
-        move |error| Self::Runtime { file: file.into(), error }
+impl From<bth::Error> for Failure {
+    fn from(error: bth::Error) -> Self {
+        Self::Runtime(error)
     }
+}
 
+impl Failure {
     fn parts(&self) -> (&str, u8, String) {
         match self {
             Self::Usage(message) => ("BTH-U001", 2, message.clone()),
-            Self::Runtime { file, error } => {
-                (error.code(), if error.is_io() { 4 } else { 3 }, format!("{}: {error}", file.display()))
-            }
+            Self::Runtime(error) => (
+                error.code().as_str(),
+                if error.code() == bth::Code::Read { 4 } else { 3 },
+                error.to_string(),
+            ),
             Self::Lacks { file, what, hint } => {
                 ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))
             }

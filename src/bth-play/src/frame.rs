@@ -79,7 +79,7 @@ struct Tile {
 
 /// Renders a scene.
 pub(crate) fn render(scene: &Scene, file: &Path, args: &Args) -> Result<(Picture, Summary), Failure> {
-    let view = scene.object(0).map_err(Failure::runtime(file))?;
+    let view = scene.object(0);
     let shape = Shape::new(view);
     if args.mode != Mode::Steps {
         shape.require_geometry(file)?;
@@ -128,7 +128,8 @@ impl Frame<'_> {
         let sampler = Sampler::new(x, y);
         let within = if self.args.spp == 1 { DVec2::splat(0.5) } else { sampler.point(0, index) };
         let (width, height) = self.args.size;
-        let part = (DVec2::new(f64::from(x), f64::from(y)) + within) / DVec2::new(f64::from(width), f64::from(height));
+        let part = (DVec2::new(f64::from(x), f64::from(y)) + within)
+            / DVec2::new(f64::from(width), f64::from(height));
         let at = DVec2::new(2.0 * part.x - 1.0, 1.0 - 2.0 * part.y);
         Sample { sampler, index, at, direction: self.camera.direction(at) }
     }
@@ -141,7 +142,12 @@ impl Frame<'_> {
             let origin = self.camera.eye.as_vec3().to_array();
             let rays: Vec<Ray> = samples
                 .iter()
-                .map(|s| Ray { origin, tmin: 0.0, direction: s.direction.as_vec3().to_array(), tmax: f32::INFINITY })
+                .map(|s| Ray {
+                    origin,
+                    tmin: 0.0,
+                    direction: s.direction.as_vec3().to_array(),
+                    tmax: f32::INFINITY,
+                })
                 .collect();
             let colors = if self.args.mode == Mode::Steps {
                 self.count_steps(&rays, &mut tile.steps)
@@ -191,7 +197,8 @@ impl Frame<'_> {
         let mut answers = blocked.chunks(AO_RAYS as usize);
         let color = |hit: &Hit| {
             let open = if hit.is_hit() {
-                answers.next().map_or(0, |chunk| chunk.iter().filter(|b| !**b).count()) as f32 / AO_RAYS as f32
+                answers.next().map_or(0, |chunk| chunk.iter().filter(|b| !**b).count()) as f32
+                    / AO_RAYS as f32
             } else {
                 1.0
             };
@@ -236,7 +243,9 @@ impl Frame<'_> {
     fn summary(&self, tiles: &[Tile], seconds: f64) -> Summary {
         let pixels = u64::from(self.args.size.0) * u64::from(self.args.size.1);
         let nearest_rays = pixels * u64::from(self.args.spp);
-        let mean = |field: fn(&Steps) -> f64| tiles.iter().map(|t| field(&t.steps)).sum::<f64>() / nearest_rays as f64;
+        let mean = |field: fn(&Steps) -> f64| {
+            tiles.iter().map(|t| field(&t.steps)).sum::<f64>() / nearest_rays as f64
+        };
         let steps = (self.args.mode == Mode::Steps).then(|| Steps {
             nodes: mean(|s| s.nodes),
             leaves: mean(|s| s.leaves),

@@ -37,7 +37,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         return report::print(&String::from_utf8_lossy(&script));
     }
     let (file, output) = args.paths()?;
-    let scene = open(file, args.map).map_err(Failure::runtime(file))?;
+    let scene = open(file, args.map)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
         .build()
@@ -51,8 +51,9 @@ fn run(args: &args::Args) -> Result<(), Failure> {
 #[allow(unsafe_code)]
 fn open(file: &std::path::Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
-        // SAFETY: the contract of `map` is that nobody changes or shrinks the file while it is
-        // mapped. The user takes that over with `--map`, whose help says so.
+        // SAFETY: the contract of `map` is that the file is one that bthc wrote, and that nobody
+        // changes or shrinks it while it is mapped. The user takes that over with `--map`, whose
+        // help says so.
         unsafe { bth::map(file) }
     } else {
         bth::open(file)

@@ -14,7 +14,11 @@ pub(crate) struct Picture {
 
 /// A linear component in sRGB (IEC 61966-2-1).
 pub(crate) fn srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { linear.max(0.0) * 12.92 } else { 1.055 * linear.min(1.0).powf(1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 {
+        linear.max(0.0) * 12.92
+    } else {
+        1.055 * linear.min(1.0).powf(1.0 / 2.4) - 0.055
+    }
 }
 
 /// Rounds a component from 0 to 1 to 8 bits.

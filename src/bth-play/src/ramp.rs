@@ -27,7 +27,8 @@ mod tests {
 
     #[test]
     fn brightness_rises_all_the_way() {
-        let brightness = |v: f32| color(v).iter().zip([0.2126, 0.7152, 0.0722]).map(|(c, w)| c * w).sum::<f32>();
+        let brightness =
+            |v: f32| color(v).iter().zip([0.2126, 0.7152, 0.0722]).map(|(c, w)| c * w).sum::<f32>();
         for i in 0..100 {
             assert!(brightness(i as f32 / 100.0) < brightness((i + 1) as f32 / 100.0));
         }

@@ -293,10 +293,11 @@ impl Compile {
         };
         self.selection.apply(&mut options);
         if let Some(seconds) = self.tet_deadline {
-            options.tets.deadline = Some(std::time::Duration::from_secs(seconds));
+            options.tets.deadline = std::time::Duration::from_secs(seconds);
+            options.tets.deadline_per_triangle = std::time::Duration::ZERO;
         }
         if let Some(mib) = self.tet_memory {
-            options.tets.memory_bytes = mib << 20;
+            options.tets.memory = mib << 20;
         }
         options
     }

@@ -11,7 +11,9 @@ pub(crate) enum Failure {
     /// The compiler's own errors.
     Compile(bth_compile::Error),
     /// The runtime's errors: a compiled file that cannot be used.
-    Runtime { file: std::path::PathBuf, error: bth::Error },
+    Runtime(bth::Error),
+    /// Arguments that do not fit together (exit code 2).
+    Usage { message: String, hint: &'static str },
     /// A check failed; what there was to say has been said on standard output.
     Check,
     /// Standard output was closed by its reader (`bthc ... | head`).
@@ -35,14 +37,16 @@ impl From<std::io::Error> for Failure {
     }
 }
 
+impl From<bth::Error> for Failure {
+    fn from(error: bth::Error) -> Self {
+        Self::Runtime(error)
+    }
+}
+
 impl Failure {
     /// A file that could not be read or written.
     pub(crate) fn file(code: &'static str, path: &Path, message: &dyn std::fmt::Display) -> Self {
         Self::Compile(bth_compile::Error::File { code, path: path.into(), message: message.to_string() })
-    }
-    /// A compiled file that cannot be used.
-    pub(crate) fn runtime(file: &Path) -> impl FnOnce(bth::Error) -> Self + '_ {
-        move |error| Self::Runtime { file: file.into(), error }
     }
     /// A ray file that cannot be used.
     pub(crate) fn ray_file(path: &Path, byte: u64, message: String, hint: &str) -> Self {
@@ -58,13 +62,14 @@ impl Failure {
         use bth_compile::Error;
         match self {
             Self::Check => 1,
+            Self::Usage { .. } => 2,
             Self::Compile(Error::Input { .. }) => 3,
             Self::Compile(Error::File { .. }) => 4,
             Self::Compile(Error::Limit { .. }) => 5,
             Self::Compile(Error::Internal { .. }) => 70,
             Self::Compile(Error::Cancelled) => 130,
-            Self::Runtime { error, .. } if error.is_io() => 4,
-            Self::Runtime { .. } => 3,
+            Self::Runtime(error) if error.code() == bth::Code::Read => 4,
+            Self::Runtime(_) => 3,
             Self::ClosedOutput => 0,
         }
     }
@@ -83,9 +88,8 @@ impl Failure {
                 json!({"code": code, "message": message})
             }
             Self::Compile(Error::Cancelled) => json!({"code": "BTH-C000", "message": "cancelled"}),
-            Self::Runtime { file, error } => {
-                json!({"code": error.code(), "place": file.to_string_lossy(), "message": error.to_string()})
-            }
+            Self::Runtime(error) => runtime_json(error),
+            Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
             Self::Check | Self::ClosedOutput => serde_json::Value::Null,
         }
     }
@@ -95,7 +99,8 @@ impl Failure {
         let text = match self {
             Self::Check | Self::ClosedOutput => return ExitCode::from(self.exit_code()),
             Self::Compile(error) => error.to_string(),
-            Self::Runtime { file, error } => format!("{}: {error}", file.display()),
+            Self::Runtime(error) => error.to_string(),
+            Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
         };
         output::error(&text);
         if wants_json {
@@ -103,6 +108,19 @@ impl Failure {
         }
         ExitCode::from(self.exit_code())
     }
+}
+
+/// An error of the runtime as JSON.
+pub(crate) fn runtime_json(error: &bth::Error) -> serde_json::Value {
+    json!({
+        "code": error.code().as_str(),
+        "place": error.path().map(|p| p.to_string_lossy()),
+        "byte": error.offset(),
+        "message": error.to_string(),
+        "expected": error.expected(),
+        "found": error.found(),
+        "hint": error.hint(),
+    })
 }
 
 fn print_json_error(mut error: serde_json::Value, exit_code: u8) {

@@ -5,21 +5,21 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Folder of the test models: `BTH_DATA`, else `../shared/data` beside the checkout.
-pub fn data() -> Option<PathBuf> {
+pub(crate) fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("BTH_DATA")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
     folder.is_dir().then_some(folder)
 }
 
 /// A program of the workspace, from the build that this test belongs to.
-pub fn program(name: &str) -> Option<PathBuf> {
+pub(crate) fn program(name: &str) -> Option<PathBuf> {
     let test = std::env::current_exe().ok()?;
     let file = test.parent()?.parent()?.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     file.is_file().then_some(file)
 }
 
 /// The test models and the compiler, or a line that says what is missing.
-pub fn data_and_compiler() -> Option<(PathBuf, PathBuf)> {
+pub(crate) fn data_and_compiler() -> Option<(PathBuf, PathBuf)> {
     match (data(), program("bthc")) {
         (Some(data), Some(bthc)) => Some((data, bthc)),
         (None, _) => {
@@ -35,19 +35,19 @@ pub fn data_and_compiler() -> Option<(PathBuf, PathBuf)> {
 
 /// How a program ended.
 #[derive(Debug)]
-pub struct Ended {
+pub(crate) struct Ended {
     /// Exit code; none when a signal ended it.
-    pub code: Option<i32>,
+    pub(crate) code: Option<i32>,
     /// Standard output.
-    pub stdout: String,
+    pub(crate) stdout: String,
     /// Standard error.
-    pub stderr: String,
+    pub(crate) stderr: String,
     /// Seconds on the wall clock.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 /// Runs a program; one that takes longer than `limit` is ended and reported as an error.
-pub fn run(command: &mut Command, limit: Duration) -> Result<Ended, String> {
+pub(crate) fn run(command: &mut Command, limit: Duration) -> Result<Ended, String> {
     // Files instead of pipes: a pipe that nobody reads while we wait would block the program.
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let (out, err) = (folder.path().join("out"), folder.path().join("err"));
@@ -84,7 +84,7 @@ pub fn run(command: &mut Command, limit: Duration) -> Result<Ended, String> {
 }
 
 /// All files below a folder with an extension that the compiler reads, sorted.
-pub fn models(folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn models(folder: &Path) -> Vec<PathBuf> {
     let (mut folders, mut found) = (vec![folder.to_path_buf()], Vec::new());
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).into_iter().flatten().flatten() {
@@ -102,7 +102,7 @@ pub fn models(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Triangles of a model according to the table of the corpus; none where it lists no number.
-pub fn listed_triangles(data: &Path, section: &str, model: &Path) -> Option<u64> {
+pub(crate) fn listed_triangles(data: &Path, section: &str, model: &Path) -> Option<u64> {
     let index = std::fs::read_to_string(data.join("INDEX.md")).ok()?;
     let name = model.strip_prefix(data.join(section)).ok()?.to_str()?;
     let part = index.split("\n## ").find(|part| part.starts_with(section))?;

@@ -1,6 +1,7 @@
 //! The compiler: calls the stages in order.
 
 mod options;
+mod parts;
 mod provenance;
 mod structure;
 
@@ -8,7 +9,7 @@ pub use options::{Options, Structure};
 
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::{bvh, costs, marks, mesh, tets, write};
+use crate::{bvh, costs, marks, mesh, tets};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -25,8 +26,8 @@ pub struct Compiled {
 pub struct Report {
     /// BLAKE3 of the source file's bytes, hexadecimal.
     pub source_blake3: String,
-    /// Seconds of each stage on the wall clock, in order.
-    pub seconds: Vec<(&'static str, f64)>,
+    /// What each stage took, in order.
+    pub seconds: Vec<StageTime>,
     /// Import.
     pub mesh: mesh::Report,
     /// Binary BVH.
@@ -41,6 +42,15 @@ pub struct Report {
     pub collapse: bvh::CollapseReport,
     /// The compiled file.
     pub file: FileReport,
+}
+
+/// What a stage took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StageTime {
+    /// Name of the stage.
+    pub name: &'static str,
+    /// Seconds on the wall clock.
+    pub seconds: f64,
 }
 
 /// Size of the compiled file.
@@ -88,10 +98,10 @@ pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Resul
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
 
-    let provenance = provenance::json(&source_blake3, &mesh_report.format, options)?;
-    let (bytes, resident_bytes) = clock.time("write", || {
-        structure::file(&mesh, &tree, &wide, encoded.as_ref(), options, provenance.as_bytes(), monitor)
-    })?;
+    let provenance = provenance::json(&source_blake3, &mesh_report.format, reports.2.as_ref(), options)?;
+    let stages =
+        parts::Stages { mesh: &mesh, tree: &tree, wide: &wide, encoded: encoded.as_ref(), provenance };
+    let (bytes, resident_bytes) = clock.time("file", || parts::file(stages, options))?;
 
     let triangles = mesh.triangles.len();
     let file = FileReport {
@@ -118,13 +128,13 @@ pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Resul
 
 /// Times the stages on the wall clock.
 #[derive(Default)]
-struct Clock(Vec<(&'static str, f64)>);
+struct Clock(Vec<StageTime>);
 
 impl Clock {
-    fn time<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+    fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
-        self.0.push((stage, start.elapsed().as_secs_f64()));
+        self.0.push(StageTime { name, seconds: start.elapsed().as_secs_f64() });
         result
     }
 }

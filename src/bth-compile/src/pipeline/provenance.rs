@@ -3,6 +3,7 @@
 
 use super::Options;
 use crate::error::{Error, Result};
+use crate::tets;
 use serde_json::json;
 use std::path::Path;
 
@@ -15,10 +16,20 @@ pub(super) fn hash(source: &Path) -> Result<String> {
 }
 
 /// The text of the provenance section.
-pub(super) fn json(source_blake3: &str, format: &str, options: &Options) -> Result<String> {
+pub(super) fn json(
+    source_blake3: &str,
+    format: &str,
+    tets: Option<&tets::Report>,
+    options: &Options,
+) -> Result<String> {
+    let tetgen = match tets.map(|t| &t.worker) {
+        Some(tets::WorkerStatus::Ready { tetgen }) => Some(tetgen),
+        _ => None,
+    };
     let value = json!({
         "tool": "bthc",
         "version": env!("CARGO_PKG_VERSION"),
+        "tetgen": tetgen,
         "source": {"format": format, "blake3": source_blake3},
         "options": {
             "structure": options.structure,

@@ -1,9 +1,9 @@
-//! What differs between the structures, and the parts of the file.
+//! What differs between the structures: which nodes to tetrahedralize.
 
 use super::{Options, Structure};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
-use crate::{bvh, costs, marks, mesh, tets, write};
+use crate::{bvh, costs, marks, mesh, tets};
 use std::path::Path;
 
 /// The nodes to tetrahedralize, in ascending order.

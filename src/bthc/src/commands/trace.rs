@@ -16,7 +16,7 @@ const CHUNK: usize = 4096;
 pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
     let rays = ray_files::read_rays(&args.rays)?;
     let from = args.from.as_ref().map(|path| ray_files::read_from(path, rays.len())).transpose()?;
-    let scene = bth::open(&args.file).map_err(Failure::runtime(&args.file))?;
+    let scene = bth::open(&args.file)?;
     let hint = |i: usize, n: usize| from.as_ref().map(|f| &f[i * CHUNK..i * CHUNK + n]);
 
     let (hits, seconds) = with_threads(args.threads, || {

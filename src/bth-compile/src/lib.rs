@@ -10,7 +10,9 @@ pub mod error;
 pub mod marks;
 pub mod mesh;
 pub mod monitor;
+pub mod pipeline;
 pub mod tets;
+pub mod write;
 
 pub use error::{Error, Result};
 pub use monitor::{Monitor, Silent};

@@ -69,7 +69,11 @@ pub struct ObjectView<'a> {
 }
 
 impl<'a> ObjectView<'a> {
-    fn block<T: FromBytes + zerocopy::KnownLayout + zerocopy::Immutable>(&self, line: u32, lines: usize) -> &'a T {
+    fn block<T: FromBytes + zerocopy::KnownLayout + zerocopy::Immutable>(
+        &self,
+        line: u32,
+        lines: usize,
+    ) -> &'a T {
         let at = line as usize;
         let bytes = self.lines[at..at + lines].as_bytes();
         T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")

@@ -1,0 +1,198 @@
+//! Lays sections out behind header and table. The same sections give the same bytes in whatever
+//! order they are added.
+
+use crate::error::{Error, Result};
+use bth::file::{content_id, hash128};
+use bth::layout::*;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Write;
+use zerocopy::IntoBytes;
+
+/// Collects the sections of a file.
+#[derive(Clone, Debug, Default)]
+pub struct FileBuilder<'a> {
+    /// By (object, kind), the order of the table.
+    sections: BTreeMap<(u32, u32), Section<'a>>,
+}
+
+#[derive(Clone, Debug)]
+struct Section<'a> {
+    flags: u32,
+    stride: u32,
+    hash: [u8; 16],
+    bytes: Cow<'a, [u8]>,
+}
+
+impl<'a> FileBuilder<'a> {
+    /// A file without sections.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a section of elements of `stride` bytes; `object` is `NONE` for sections of the whole file.
+    /// What tracing reads is flagged as required.
+    ///
+    /// # Errors
+    /// `BTH-X031` when the bytes are not whole elements or the section is there already.
+    pub fn section(
+        &mut self,
+        kind: u32,
+        object: u32,
+        stride: u32,
+        bytes: impl Into<Cow<'a, [u8]>>,
+    ) -> Result<&mut Self> {
+        let bytes = bytes.into();
+        if stride == 0 || !bytes.len().is_multiple_of(stride as usize) {
+            return Err(defect(format!(
+                "section {kind}: {} bytes are not whole elements of {stride}",
+                bytes.len()
+            )));
+        }
+        let flags = if kind <= kind::TRIANGLE_HOMES { SECTION_REQUIRED } else { 0 };
+        let hash = hash128(&bytes);
+        let before = self.sections.insert((object, kind), Section { flags, stride, hash, bytes });
+        match before {
+            None => Ok(self),
+            Some(_) => Err(defect(format!("section {kind} of object {object} twice"))),
+        }
+    }
+
+    /// Adds a section of structures; one without elements is left out.
+    ///
+    /// # Errors
+    /// As [`Self::section`].
+    pub fn rows<T: IntoBytes + zerocopy::Immutable>(
+        &mut self,
+        kind: u32,
+        object: u32,
+        rows: &'a [T],
+    ) -> Result<&mut Self> {
+        if rows.is_empty() {
+            return Ok(self);
+        }
+        self.section(kind, object, size_of::<T>() as u32, rows.as_bytes())
+    }
+
+    /// Adds how the file came about, UTF-8 JSON that is no part of the content id. No times, no paths.
+    ///
+    /// # Errors
+    /// As [`Self::section`].
+    pub fn provenance(&mut self, json: String) -> Result<&mut Self> {
+        self.section(kind::PROVENANCE, NONE, 1, json.into_bytes())
+    }
+
+    /// The content id of the file.
+    pub fn content_id(&self) -> [u8; 32] {
+        content_id(&self.entries())
+    }
+
+    /// Bytes of the file.
+    pub fn file_length(&self) -> u64 {
+        let end = self.entries().last().map_or(self.table_end(), |e| e.offset + e.length);
+        end.next_multiple_of(ALIGNMENT as u64)
+    }
+
+    /// The whole file in memory.
+    pub fn finish(&self) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(self.file_length() as usize);
+        self.write_to(&mut bytes).expect("a vector takes all bytes");
+        bytes
+    }
+
+    /// Writes the whole file.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_to(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        let entries = self.entries();
+        let mut header = Header {
+            identifier: IDENTIFIER,
+            writer_version: WRITER_VERSION,
+            minimum_reader_version: MINIMUM_READER_VERSION,
+            file_length: self.file_length(),
+            section_offset: size_of::<Header>() as u64,
+            section_count: entries.len() as u32,
+            reserved: 0,
+            required_features: 0,
+            optional_features: 0,
+            content_id: content_id(&entries),
+            table_hash: hash128(entries.as_bytes()),
+            header_hash: [0; 16],
+        };
+        header.header_hash = hash128(&header.as_bytes()[..std::mem::offset_of!(Header, header_hash)]);
+        out.write_all(header.as_bytes())?;
+        out.write_all(entries.as_bytes())?;
+        let mut at = self.table_end();
+        let zeros = [0; ALIGNMENT];
+        for (entry, section) in entries.iter().zip(self.sections.values()) {
+            out.write_all(&zeros[..(entry.offset - at) as usize])?;
+            out.write_all(&section.bytes)?;
+            at = entry.offset + entry.length;
+        }
+        out.write_all(&zeros[..(header.file_length - at) as usize])
+    }
+
+    fn table_end(&self) -> u64 {
+        (size_of::<Header>() + self.sections.len() * size_of::<SectionEntry>()) as u64
+    }
+
+    fn entries(&self) -> Vec<SectionEntry> {
+        let mut end = self.table_end();
+        let entry = |(&(object, kind), section): (&(u32, u32), &Section)| {
+            let offset = end.next_multiple_of(ALIGNMENT as u64);
+            let length = section.bytes.len() as u64;
+            end = offset + length;
+            SectionEntry {
+                kind,
+                flags: section.flags,
+                object,
+                alignment: ALIGNMENT as u32,
+                offset,
+                length,
+                stride: section.stride,
+                reserved: 0,
+                count: length / section.stride as u64,
+                hash: section.hash,
+            }
+        };
+        self.sections.iter().map(entry).collect()
+    }
+}
+
+pub(super) fn defect(message: String) -> Error {
+    Error::Internal { code: "BTH-X031", message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_of_adding_does_not_matter_and_provenance_is_not_content() {
+        let mut a = FileBuilder::new();
+        a.section(100, 0, 1, b"abc".as_slice()).unwrap().section(99, 0, 4, b"defg".as_slice()).unwrap();
+        let mut b = FileBuilder::new();
+        b.section(99, 0, 4, b"defg".as_slice()).unwrap().section(100, 0, 1, b"abc".as_slice()).unwrap();
+        assert_eq!(a.finish(), b.finish());
+        let id = a.content_id();
+        a.provenance("{}".into()).unwrap();
+        assert_eq!(id, a.content_id());
+        assert_ne!(a.finish(), b.finish());
+    }
+
+    #[test]
+    fn file_without_sections_opens() {
+        let bytes = FileBuilder::new().finish();
+        assert_eq!(bytes.len(), 128);
+        assert_eq!(bth::File::from_bytes(&bytes).unwrap().object_count(), 0);
+    }
+
+    #[test]
+    fn partial_elements_and_repeated_sections_are_refused() {
+        assert!(FileBuilder::new().section(1, 0, 4, vec![0; 6]).is_err());
+        let mut twice = FileBuilder::new();
+        twice.section(1, 0, 4, vec![0; 4]).unwrap();
+        assert!(twice.section(1, 0, 4, vec![0; 4]).is_err());
+    }
+}

@@ -1,0 +1,26 @@
+//! From sections to the bytes of a file, and from bytes to a file that is whole or absent.
+
+mod atomic;
+mod builder;
+mod object;
+
+pub use atomic::{write_atomically, write_atomically_with};
+pub use builder::FileBuilder;
+pub use object::{ObjectParts, Source, object};
+
+use crate::error::{Error, Result};
+
+/// Checks bytes that were just written as a reader will: header, table and every index.
+/// `deep` adds what `bthc verify` looks at.
+///
+/// # Errors
+/// `BTH-X030`: what was written is not what the format demands, a defect of the compiler.
+pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
+    let defect =
+        |e: bth::Error| Error::Internal { code: "BTH-X030", message: format!("the written file fails: {e}") };
+    let file = bth::File::from_bytes(bytes).map_err(defect)?;
+    if deep {
+        return bth::verify::verify(&file).map(|_| ()).map_err(|mut all| defect(all.swap_remove(0)));
+    }
+    (0..file.object_count()).try_for_each(|i| file.check(i).map(|_| ()).map_err(defect))
+}

@@ -1,0 +1,133 @@
+//! The sections of an object.
+
+use super::FileBuilder;
+use super::builder::defect;
+use crate::error::{Error, Result};
+use bth::layout::*;
+use std::borrow::Cow;
+use zerocopy::{FromBytes, IntoBytes};
+
+/// What the stages made of a mesh, as it goes into the file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ObjectParts<'a> {
+    /// Bounds of the triangles that can be hit; `None` without any.
+    pub bounds: Option<([f32; 3], [f32; 3])>,
+    /// Child code of the root; `NONE` when nothing can be hit.
+    pub root: u32,
+    /// Triangles of the source.
+    pub triangles: u32,
+    /// Triangles of zero area, which no leaf holds.
+    pub dropped: u32,
+    /// Nodes and triangle leaves.
+    pub lines: &'a [Line],
+    /// Source id of each triangle in leaf order.
+    pub triangle_ids: &'a [u32],
+    /// Record of the tetrahedra; `None` without tet leaves.
+    pub record: Option<RecordKind>,
+    /// Tet leaves.
+    pub tet_leaves: &'a [TetLeaf],
+    /// The records' bytes.
+    pub tets: &'a [u8],
+    /// Vertices of the tetrahedra.
+    pub tet_vertices: &'a [TetVertex],
+    /// Constrained faces.
+    pub tet_faces: &'a [TetFace],
+    /// Hull faces.
+    pub hull_faces: &'a [HullFace],
+    /// Row of `tet_faces` per source triangle; empty without tet leaves.
+    pub triangle_homes: &'a [u32],
+    /// Positions and attributes to keep.
+    pub source: Option<Source<'a>>,
+}
+
+/// Positions and attributes of the source; empty slices are left out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Source<'a> {
+    /// Welded positions.
+    pub positions: &'a [[f32; 3]],
+    /// Rows of `positions` per triangle.
+    pub triangles: &'a [[u32; 3]],
+    /// Rows of `normals` and `uvs` per triangle.
+    pub corners: &'a [[u32; 3]],
+    /// Shading normals.
+    pub normals: &'a [[f32; 3]],
+    /// Texture coordinates.
+    pub uvs: &'a [[f32; 2]],
+}
+
+/// Adds the sections of an object; its depth is measured here.
+///
+/// # Errors
+/// `BTH-L031` when a path has more nodes than the format allows; `BTH-X031` when the parts do not fit together.
+pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts<'a>) -> Result<()> {
+    let depth = depth(parts)?;
+    if depth > bth::limits::MAX_DEPTH as u32 {
+        let message = format!(
+            "the hierarchy has {depth} nodes on a path; the format allows {}",
+            bth::limits::MAX_DEPTH
+        );
+        return Err(Error::Limit { code: "BTH-L031", message });
+    }
+    let (lower, upper) = parts.bounds.unwrap_or_default();
+    let header = Object {
+        lower,
+        upper,
+        root: parts.root,
+        record: parts.record.map_or(0, |r| r as u32),
+        triangles: parts.triangles,
+        dropped: parts.dropped,
+        depth,
+        reserved: [0; 5],
+    };
+    let row: Cow<'a, [u8]> = header.as_bytes().to_vec().into();
+    builder.section(kind::OBJECT, index, size_of::<Object>() as u32, row)?;
+    builder.rows(kind::LINES, index, parts.lines)?;
+    builder.rows(kind::TRIANGLE_IDS, index, parts.triangle_ids)?;
+    builder.rows(kind::TET_LEAVES, index, parts.tet_leaves)?;
+    if let Some(record) = parts.record {
+        builder.section(kind::TETS, index, record.stride() as u32, parts.tets)?;
+    }
+    builder.rows(kind::TET_VERTICES, index, parts.tet_vertices)?;
+    builder.rows(kind::TET_FACES, index, parts.tet_faces)?;
+    builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
+    builder.rows(kind::TRIANGLE_HOMES, index, parts.triangle_homes)?;
+    if let Some(source) = &parts.source {
+        builder.rows(kind::POSITIONS, index, source.positions)?;
+        builder.rows(kind::TRIANGLES, index, source.triangles)?;
+        builder.rows(kind::CORNERS, index, source.corners)?;
+        builder.rows(kind::NORMALS, index, source.normals)?;
+        builder.rows(kind::UVS, index, source.uvs)?;
+    }
+    Ok(())
+}
+
+/// Wide nodes on the longest path, through the subtrees beside tet leaves too.
+fn depth(parts: &ObjectParts) -> Result<u32> {
+    let mut deepest = 0;
+    let mut stack = vec![(parts.root, 0)];
+    let mut visits = 0;
+    while let Some((code, above)) = stack.pop() {
+        match Child::from_code(code) {
+            Some(Child::Node(line)) => {
+                let range = line as usize..line as usize + NODE_LINES;
+                let lines =
+                    parts.lines.get(range).ok_or_else(|| defect(format!("no node at line {line}")))?;
+                let node = WideNode::ref_from_bytes(lines.as_bytes()).expect("a node is whole lines");
+                deepest = deepest.max(above + 1);
+                visits += 1;
+                // In a tree every node has lines of its own.
+                if visits > parts.lines.len() {
+                    return Err(defect("the hierarchy is no tree".into()));
+                }
+                stack.extend(node.child.iter().map(|&c| (c, above + 1)));
+            }
+            Some(Child::Tets(row)) => {
+                let leaf =
+                    parts.tet_leaves.get(row as usize).ok_or_else(|| defect(format!("no tet leaf {row}")))?;
+                stack.push((leaf.subtree, above));
+            }
+            Some(Child::Indexed(_) | Child::Raw(_)) | None => {}
+        }
+    }
+    Ok(deepest)
+}

@@ -1,0 +1,109 @@
+//! Triangle leaves and the ids that they refer to.
+
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+/// Checks an indexed leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
+pub(super) fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
+    let fail = |code, offset: usize, expected: &str, found: String| {
+        Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
+    };
+    counts(leaf.triangles, start + offset_of!(IndexedLeaf, triangles) as u64)?;
+    counts(leaf.vertices, start + offset_of!(IndexedLeaf, vertices) as u64)?;
+    range(leaf.first, leaf.triangles, rows, start + offset_of!(IndexedLeaf, first) as u64)?;
+    let (triangles, vertices) = (leaf.triangles as usize, leaf.vertices as usize);
+    for (k, corners) in leaf.corner.iter().enumerate() {
+        for (i, &corner) in corners.iter().enumerate() {
+            let offset = offset_of!(IndexedLeaf, corner) + WIDTH * k + i;
+            if i < triangles && corner as usize >= vertices {
+                return fail(
+                    Code::Corner,
+                    offset,
+                    "a corner below the number of vertices",
+                    corner.to_string(),
+                );
+            }
+            if i >= triangles && corner != 0 {
+                return fail(Code::LeafUnused, offset, "0 in an unused slot", corner.to_string());
+            }
+        }
+    }
+    for (axis, row) in leaf.vertex.iter().enumerate() {
+        for (i, x) in row.iter().enumerate() {
+            vertex(*x, row[0], i < vertices, start + (4 * (WIDTH * axis + i)) as u64)?;
+        }
+    }
+    if leaf.reserved != 0 {
+        return fail(Code::LeafUnused, offset_of!(IndexedLeaf, reserved), "0", leaf.reserved.to_string());
+    }
+    Ok(())
+}
+
+/// Checks a raw leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
+pub(super) fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
+    counts(leaf.triangles, start + offset_of!(RawLeaf, triangles) as u64)?;
+    range(leaf.first, leaf.triangles, rows, start + offset_of!(RawLeaf, first) as u64)?;
+    for (k, row) in leaf.corner.iter().flatten().enumerate() {
+        for (i, x) in row.iter().enumerate() {
+            vertex(*x, row[0], i < leaf.triangles as usize, start + (4 * (WIDTH * k + i)) as u64)?;
+        }
+    }
+    if leaf.reserved != [0; 14] {
+        let at = start + offset_of!(RawLeaf, reserved) as u64;
+        return Err(Error::within(
+            Code::LeafUnused,
+            kind::LINES,
+            at,
+            "zeros",
+            format!("{:?}", leaf.reserved),
+        ));
+    }
+    Ok(())
+}
+
+fn counts(count: u32, at: u64) -> Result<()> {
+    if (1..=WIDTH as u32).contains(&count) {
+        return Ok(());
+    }
+    Err(Error::within(Code::LeafCounts, kind::LINES, at, "1 to 16", count.to_string()))
+}
+
+fn range(first: u32, count: u32, rows: usize, at: u64) -> Result<()> {
+    if first as u64 + count as u64 <= rows as u64 {
+        return Ok(());
+    }
+    Err(Error::within(
+        Code::LeafIds,
+        kind::LINES,
+        at,
+        format!("{count} rows below {rows}"),
+        format!("row {first}"),
+    ))
+}
+
+/// A coordinate in use is finite; an unused one repeats that of slot 0.
+fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
+    if used && !x.is_finite() {
+        return Err(Error::within(Code::LeafVertices, kind::LINES, at, "a finite coordinate", x.to_string()));
+    }
+    if !used && x.to_bits() != of_slot_0.to_bits() {
+        let expected = format!("{of_slot_0}, as in slot 0");
+        return Err(Error::within(Code::LeafUnused, kind::LINES, at, expected, x.to_string()));
+    }
+    Ok(())
+}
+
+/// Checks the rows of TRIANGLE_IDS.
+pub(super) fn ids(view: &ObjectView) -> Result<()> {
+    let triangles = view.header.triangles;
+    match view.triangle_ids.iter().position(|id| *id >= triangles) {
+        None => Ok(()),
+        Some(row) => {
+            let expected = format!("an id below {triangles}");
+            let found = view.triangle_ids[row].to_string();
+            Err(Error::within(Code::TriangleId, kind::TRIANGLE_IDS, 4 * row as u64, expected, found))
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The tree: wide nodes, leaves, and the subtrees beside tet leaves.
+
+use super::{Bits, is_box, leaves};
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::limits;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+/// A reference to a child that is still to be visited.
+struct Visit {
+    code: u32,
+    /// Wide nodes above it.
+    depth: u32,
+    /// Line of the node that refers to it, if one does.
+    parent: Option<u32>,
+    /// Whether it lies in the subtree beside a tet leaf.
+    in_subtree: bool,
+    /// Where the reference stands: section and byte of it.
+    place: (u32, u64),
+}
+
+/// Checks that the blocks of LINES and the tet leaves form one tree that covers both.
+///
+/// A block is claimed when it is reached; claiming a line twice is an error. So every block is
+/// visited once, the work is O(lines) and there is no cycle.
+pub(super) fn check(view: &ObjectView) -> Result<()> {
+    let mut claimed = Bits::new(view.lines.len());
+    let mut referenced = Bits::new(view.tet_leaves.len());
+    let root = Visit {
+        code: view.header.root,
+        depth: 0,
+        parent: None,
+        in_subtree: false,
+        place: (kind::OBJECT, offset_of!(Object, root) as u64),
+    };
+    let mut stack = vec![root];
+    while let Some(visit) = stack.pop() {
+        if visit.code == NONE {
+            continue;
+        }
+        let (section, at) = visit.place;
+        let fail =
+            |code, expected: String, found: String| Err(Error::within(code, section, at, expected, found));
+        let child = match Child::from_code(visit.code) {
+            Some(Child::Tets(_)) if visit.in_subtree => None,
+            child => child,
+        };
+        let Some(child) = child else {
+            return fail(
+                Code::ChildCode,
+                "a child code that may stand here".into(),
+                format!("{:#010x}", visit.code),
+            );
+        };
+        let (line, lines) = match child {
+            Child::Node(line) => (line, NODE_LINES),
+            Child::Indexed(line) => (line, INDEXED_LINES),
+            Child::Raw(line) => (line, RAW_LINES),
+            Child::Tets(row) => {
+                let rows = view.tet_leaves.len();
+                if row as usize >= rows {
+                    return fail(Code::ChildRange, format!("a row below {rows}"), row.to_string());
+                }
+                if referenced.set(row as usize) {
+                    return fail(
+                        Code::TetReferences,
+                        "one reference to each tet leaf".into(),
+                        format!("row {row} again"),
+                    );
+                }
+                let at = row as u64 * size_of::<TetLeaf>() as u64 + offset_of!(TetLeaf, subtree) as u64;
+                stack.push(Visit {
+                    code: view.tet_leaves[row as usize].subtree,
+                    depth: visit.depth,
+                    parent: None,
+                    in_subtree: true,
+                    place: (kind::TET_LEAVES, at),
+                });
+                continue;
+            }
+        };
+        if line as usize + lines > view.lines.len() {
+            let expected = format!("{lines} lines below {}", view.lines.len());
+            return fail(Code::ChildRange, expected, format!("line {line}"));
+        }
+        if visit.parent.is_some_and(|parent| line <= parent) {
+            return fail(Code::ChildOrder, "a line behind the parent's".into(), format!("line {line}"));
+        }
+        for l in line..line + lines as u32 {
+            if claimed.set(l as usize) {
+                return fail(
+                    Code::Overlap,
+                    "a block of its own".into(),
+                    format!("line {l}, which another block has"),
+                );
+            }
+        }
+        let start = line as u64 * size_of::<Line>() as u64;
+        match child {
+            Child::Node(_) => {
+                let depth = visit.depth + 1;
+                if depth > view.header.depth.min(limits::MAX_DEPTH as u32) {
+                    let expected = format!(
+                        "at most {} (header) and {} nodes on a path",
+                        view.header.depth,
+                        limits::MAX_DEPTH
+                    );
+                    return fail(Code::Depth, expected, depth.to_string());
+                }
+                let node = view.node(line);
+                slots(node, start)?;
+                for (i, &code) in node.child.iter().enumerate().rev() {
+                    let at = start + (offset_of!(WideNode, child) + 4 * i) as u64;
+                    let place = (kind::LINES, at);
+                    stack.push(Visit {
+                        code,
+                        depth,
+                        parent: Some(line),
+                        in_subtree: visit.in_subtree,
+                        place,
+                    });
+                }
+            }
+            Child::Indexed(_) => leaves::indexed(view.indexed_leaf(line), start, view.triangle_ids.len())?,
+            Child::Raw(_) => leaves::raw(view.raw_leaf(line), start, view.triangle_ids.len())?,
+            Child::Tets(_) => unreachable!("handled above"),
+        }
+    }
+    if let Some(line) = (0..view.lines.len()).find(|&l| !claimed.get(l)) {
+        let at = (line * size_of::<Line>()) as u64;
+        return Err(Error::within(
+            Code::Unclaimed,
+            kind::LINES,
+            at,
+            "a line of a block",
+            "no reference to it",
+        ));
+    }
+    if let Some(row) = (0..view.tet_leaves.len()).find(|&r| !referenced.get(r)) {
+        let at = (row * size_of::<TetLeaf>()) as u64;
+        let expected = "a reference to each tet leaf";
+        return Err(Error::within(
+            Code::TetReferences,
+            kind::TET_LEAVES,
+            at,
+            expected,
+            format!("none to row {row}"),
+        ));
+    }
+    leaves::ids(view)
+}
+
+/// Checks which slots of a node are used, and their boxes; `start` is the node's byte.
+fn slots(node: &WideNode, start: u64) -> Result<()> {
+    let used = node.child.iter().take_while(|c| **c != NONE).count();
+    let fail = |code, offset: usize, expected: &str, found: String| {
+        Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
+    };
+    if used == 0 {
+        return fail(Code::Slots, offset_of!(WideNode, child), "at least one child", "none".into());
+    }
+    for i in 0..WIDTH {
+        let lower = [0, 1, 2].map(|a| node.bounds[a][0][i]);
+        let upper = [0, 1, 2].map(|a| node.bounds[a][1][i]);
+        if i < used {
+            if !is_box(lower, upper) {
+                return fail(Code::ChildBounds, 4 * i, "a finite box", format!("{lower:?} to {upper:?}"));
+            }
+        } else if node.child[i] != NONE || lower != [f32::MAX; 3] || upper != [-f32::MAX; 3] {
+            let found = format!("child {:#010x} with {lower:?} to {upper:?} in slot {i}", node.child[i]);
+            return fail(Code::Slots, 4 * i, "an empty slot behind the used ones", found);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,101 @@
+//! Tet leaves, their vertices, and where their triangles are at home.
+
+use super::is_box;
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+pub(super) fn check(view: &ObjectView) -> Result<()> {
+    ranges(view)?;
+    vertices(view)?;
+    homes(view)
+}
+
+/// Checks boxes, counts and ranges of the tet leaves.
+fn ranges(view: &ObjectView) -> Result<()> {
+    let rows = [view.records.len(), view.tet_vertices.len(), view.tet_faces.len(), view.hull_faces.len()];
+    let names = ["TETS", "TET_VERTICES", "TET_FACES", "HULL_FACES"];
+    let mut end = [0u64; 4];
+    for (i, leaf) in view.tet_leaves.iter().enumerate() {
+        let start = (i * size_of::<TetLeaf>()) as u64;
+        let fail = |code, offset: usize, expected: String, found: String| {
+            Err(Error::within(code, kind::TET_LEAVES, start + offset as u64, expected, found))
+        };
+        if !is_box(leaf.lower, leaf.upper) || (0..3).any(|a| leaf.lower[a] >= leaf.upper[a]) {
+            let found = format!("{:?} to {:?}", leaf.lower, leaf.upper);
+            return fail(Code::TetBox, 0, "a finite box, lower < upper".into(), found);
+        }
+        if leaf.flags != 0 {
+            return fail(
+                Code::TetBox,
+                offset_of!(TetLeaf, flags),
+                "flags of 0".into(),
+                leaf.flags.to_string(),
+            );
+        }
+        let first = [leaf.first_tet, leaf.first_vertex, leaf.first_face, leaf.first_hull];
+        let count = [leaf.tets, leaf.vertices, leaf.faces, leaf.hulls];
+        let least = [1, 4, 1, 4];
+        for k in 0..4 {
+            let offset = offset_of!(TetLeaf, first_tet) + 8 * k;
+            let last = first[k] as u64 + count[k] as u64;
+            if first[k] as u64 != end[k] || last > rows[k] as u64 {
+                let expected = format!("rows of {} from {} to {}", names[k], end[k], rows[k]);
+                return fail(Code::TetRanges, offset, expected, format!("{} to {last}", first[k]));
+            }
+            if count[k] < least[k] {
+                let expected = format!("at least {} rows of {}", least[k], names[k]);
+                return fail(Code::TetCounts, offset + 4, expected, count[k].to_string());
+            }
+            end[k] = last;
+        }
+    }
+    for k in 0..4 {
+        if end[k] != rows[k] as u64 {
+            let expected = format!("tet leaves with {} rows of {}", rows[k], names[k]);
+            let at = size_of_val(view.tet_leaves) as u64;
+            return Err(Error::within(Code::TetRanges, kind::TET_LEAVES, at, expected, end[k].to_string()));
+        }
+    }
+    Ok(())
+}
+
+fn vertices(view: &ObjectView) -> Result<()> {
+    let bad = |v: &TetVertex| v.reserved != 0 || !v.position.iter().all(|x| x.is_finite());
+    match view.tet_vertices.iter().position(bad) {
+        None => Ok(()),
+        Some(row) => {
+            let at = (row * size_of::<TetVertex>()) as u64;
+            let found = format!("{:?}", view.tet_vertices[row]);
+            Err(Error::within(Code::TetVertices, kind::TET_VERTICES, at, "a finite position and 0", found))
+        }
+    }
+}
+
+/// Checks that TRIANGLE_HOMES and the triangles of TET_FACES are inverse to each other.
+fn homes(view: &ObjectView) -> Result<()> {
+    let fail = |kind, at: usize, expected: String, found: String| {
+        Err(Error::within(Code::Homes, kind, at as u64, expected, found))
+    };
+    let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };
+    if view.triangle_homes.len() != expected {
+        let found = view.triangle_homes.len().to_string();
+        return fail(kind::TRIANGLE_HOMES, 0, format!("{expected} rows"), found);
+    }
+    for (row, face) in view.tet_faces.iter().enumerate() {
+        if view.triangle_homes.get(face.triangle as usize) != Some(&(row as u32)) {
+            let at = row * size_of::<TetFace>() + offset_of!(TetFace, triangle);
+            let expected = "a triangle whose home is this face".into();
+            return fail(kind::TET_FACES, at, expected, format!("triangle {}", face.triangle));
+        }
+    }
+    for (triangle, &home) in view.triangle_homes.iter().enumerate() {
+        let named = view.tet_faces.get(home as usize).map(|f| f.triangle);
+        if home != NONE && named != Some(triangle as u32) {
+            let expected = format!("NONE or the face of triangle {triangle}");
+            return fail(kind::TRIANGLE_HOMES, 4 * triangle, expected, format!("row {home}"));
+        }
+    }
+    Ok(())
+}

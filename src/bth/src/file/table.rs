@@ -1,0 +1,258 @@
+//! Checks of the header and the section table: O(sections).
+
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::limits;
+use std::mem::offset_of;
+use zerocopy::{FromBytes, IntoBytes};
+
+/// Bytes of the header.
+pub(super) const HEADER: usize = size_of::<Header>();
+/// Bytes of a section entry.
+const ENTRY: u64 = size_of::<SectionEntry>() as u64;
+/// Required feature bits that this library knows.
+const KNOWN_FEATURES: u64 = 0;
+
+/// The first 128 bits of the BLAKE3 hash.
+pub fn hash128(bytes: &[u8]) -> [u8; 16] {
+    blake3::hash(bytes).as_bytes()[..16].try_into().expect("32 bytes hold 16")
+}
+
+/// The content id of a section table: BLAKE3 of the identifier and, in the table's order without
+/// PROVENANCE, each entry's kind, flags, object, stride, count and hash.
+pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&IDENTIFIER);
+    for e in entries.iter().filter(|e| e.kind != kind::PROVENANCE) {
+        for field in [e.kind, e.flags, e.object, e.stride] {
+            hasher.update(&field.to_le_bytes());
+        }
+        hasher.update(&e.count.to_le_bytes()).update(&e.hash);
+    }
+    *hasher.finalize().as_bytes()
+}
+
+/// Bytes of an element of a section; `None` for unknown kinds, 0 where several are allowed (TETS).
+pub fn kind_stride(kind: u32) -> Option<usize> {
+    Some(match kind {
+        kind::OBJECT => size_of::<Object>(),
+        kind::LINES => size_of::<Line>(),
+        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES => 4,
+        kind::TET_LEAVES => size_of::<TetLeaf>(),
+        kind::TETS => 0,
+        kind::TET_VERTICES => size_of::<TetVertex>(),
+        kind::TET_FACES => size_of::<TetFace>(),
+        kind::HULL_FACES => size_of::<HullFace>(),
+        kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
+        kind::UVS => 8,
+        kind::PROVENANCE => 1,
+        _ => return None,
+    })
+}
+
+/// Most elements of a section of an object.
+fn most(kind: u32) -> u64 {
+    match kind {
+        kind::OBJECT => 1,
+        kind::LINES => Child::INDEX_LIMIT as u64,
+        kind::TETS => limits::MAX_TETS as u64,
+        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES | kind::TRIANGLES | kind::CORNERS => {
+            limits::MAX_TRIANGLES as u64
+        }
+        kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
+        // Rows are referred to by 31 bits in links and by u32 elsewhere; NONE is no row.
+        kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES => (FACE_BIT - 1) as u64,
+        kind::POSITIONS | kind::NORMALS | kind::UVS => (NONE - 1) as u64,
+        _ => u64::MAX,
+    }
+}
+
+/// Checks the header against the length of the file; `bytes` are at least its first 128.
+pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
+    let fail = |code, offset: usize, expected: String, found: String| {
+        Err(Error::at(code, offset as u64, expected, found))
+    };
+    let Ok((header, _)) = Header::ref_from_prefix(bytes) else {
+        return fail(Code::HeaderSize, 0, format!("{HEADER} bytes"), bytes.len().to_string());
+    };
+    if header.identifier != IDENTIFIER {
+        return fail(Code::Identifier, 0, hex(&IDENTIFIER), hex(&header.identifier));
+    }
+    let (writer, reader) = (header.writer_version, header.minimum_reader_version);
+    if writer >> 16 != 1 || reader >> 16 != 1 || reader > writer || reader > WRITER_VERSION {
+        let expected = format!("versions 1.x that a reader of {} may read", version(WRITER_VERSION));
+        let found = format!("writer {}, minimum reader {}", version(writer), version(reader));
+        return fail(Code::Version, offset_of!(Header, writer_version), expected, found);
+    }
+    let at = offset_of!(Header, header_hash);
+    let hash = hash128(&bytes[..at]);
+    if header.header_hash != hash {
+        return fail(Code::HeaderHash, at, hex(&hash), hex(&header.header_hash));
+    }
+    if header.file_length != length {
+        let at = offset_of!(Header, file_length);
+        return fail(Code::Length, at, format!("{} bytes", header.file_length), format!("{length} bytes"));
+    }
+    if header.reserved != 0 {
+        return fail(Code::Reserved, offset_of!(Header, reserved), "0".into(), header.reserved.to_string());
+    }
+    let unknown = header.required_features & !KNOWN_FEATURES;
+    if unknown != 0 {
+        let at = offset_of!(Header, required_features);
+        return fail(Code::Features, at, "known feature bits".into(), format!("unknown {unknown:#x}"));
+    }
+    let room = (length - HEADER as u64) / ENTRY;
+    if header.section_offset != HEADER as u64
+        || header.section_count > limits::MAX_SECTIONS
+        || header.section_count as u64 > room
+    {
+        let at = offset_of!(Header, section_offset);
+        let expected = format!("at most {} entries at byte {HEADER}", room.min(limits::MAX_SECTIONS as u64));
+        let found = format!("{} entries at byte {}", header.section_count, header.section_offset);
+        return fail(Code::Table, at, expected, found);
+    }
+    Ok(header)
+}
+
+/// The entries of a file whose header has been checked.
+pub(super) fn entries<'a>(bytes: &'a [u8], header: &Header) -> &'a [SectionEntry] {
+    let end = HEADER + header.section_count as usize * ENTRY as usize;
+    <[SectionEntry]>::ref_from_bytes(&bytes[HEADER..end])
+        .expect("the buffer is aligned and a table is whole entries")
+}
+
+/// Checks header and table of a whole file; returns the number of objects.
+pub(super) fn check(bytes: &[u8]) -> Result<u32> {
+    let header = check_header(bytes, bytes.len() as u64)?;
+    let entries = entries(bytes, header);
+    let hash = hash128(entries.as_bytes());
+    if header.table_hash != hash {
+        let at = offset_of!(Header, table_hash) as u64;
+        return Err(Error::at(Code::TableHash, at, hex(&hash), hex(&header.table_hash)));
+    }
+    let mut end = HEADER as u64 + entries.len() as u64 * ENTRY;
+    for (i, e) in entries.iter().enumerate() {
+        let previous = i.checked_sub(1).map(|p| &entries[p]);
+        end =
+            check_entry(e, previous, end, header.file_length).map_err(|(code, field, expected, found)| {
+                let at = HEADER as u64 + i as u64 * ENTRY + field as u64;
+                Error::within(code, e.kind, at, expected, found).in_object(e.object)
+            })?;
+    }
+    let objects = check_objects(entries)?;
+    let id = content_id(entries);
+    if header.content_id != id {
+        let at = offset_of!(Header, content_id) as u64;
+        return Err(Error::at(Code::ContentId, at, hex(&id), hex(&header.content_id)));
+    }
+    // The file's length is a multiple of 64 by this, so the sum does not overflow.
+    if end.checked_next_multiple_of(ALIGNMENT as u64) != Some(header.file_length) {
+        let at = offset_of!(Header, file_length) as u64;
+        let expected = format!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
+        return Err(Error::at(Code::Tail, at, expected, header.file_length.to_string()));
+    }
+    Ok(objects)
+}
+
+/// What an entry should hold: the code, the field's offset, expected and found.
+type Mismatch = (Code, usize, String, String);
+
+/// Checks an entry; `end` is where the one before ends. Returns where this one does.
+fn check_entry(
+    e: &SectionEntry,
+    previous: Option<&SectionEntry>,
+    end: u64,
+    length: u64,
+) -> std::result::Result<u64, Mismatch> {
+    if let Some(p) = previous
+        && (p.object, p.kind) >= (e.object, e.kind)
+    {
+        let expected = format!("an entry behind object {}, kind {}", p.object, p.kind);
+        return Err((Code::Order, 0, expected, format!("object {}, kind {}", e.object, e.kind)));
+    }
+    if e.reserved != 0 {
+        return Err((Code::Reserved, offset_of!(SectionEntry, reserved), "0".into(), e.reserved.to_string()));
+    }
+    if e.flags & !SECTION_REQUIRED != 0 {
+        return Err((Code::Flags, offset_of!(SectionEntry, flags), "0 or 1".into(), e.flags.to_string()));
+    }
+    if e.alignment as usize != ALIGNMENT || !e.offset.is_multiple_of(ALIGNMENT as u64) {
+        let found = format!("alignment {} at offset {}", e.alignment, e.offset);
+        return Err((
+            Code::Alignment,
+            offset_of!(SectionEntry, alignment),
+            format!("multiples of {ALIGNMENT}"),
+            found,
+        ));
+    }
+    let last = e.offset.checked_add(e.length).filter(|last| e.offset >= end && *last <= length);
+    let Some(last) = last else {
+        let found = format!("{} bytes at {}", e.length, e.offset);
+        return Err((
+            Code::Bounds,
+            offset_of!(SectionEntry, offset),
+            format!("bytes from {end} to {length}"),
+            found,
+        ));
+    };
+    if (e.stride as u64).checked_mul(e.count) != Some(e.length) {
+        let found = format!("{} bytes", e.length);
+        return Err((
+            Code::Count,
+            offset_of!(SectionEntry, length),
+            format!("{} times {} bytes", e.count, e.stride),
+            found,
+        ));
+    }
+    match kind_stride(e.kind) {
+        None if e.flags & SECTION_REQUIRED != 0 => {
+            return Err((Code::UnknownKind, 0, "a known kind".into(), e.kind.to_string()));
+        }
+        None => {}
+        Some(0) if RecordKind::ALL.iter().any(|r| r.stride() == e.stride as usize) => {}
+        Some(stride) if stride == e.stride as usize && stride != 0 => {}
+        Some(stride) => {
+            let expected = if stride == 0 { "16, 20 or 32".into() } else { stride.to_string() };
+            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, e.stride.to_string()));
+        }
+    }
+    if e.kind != kind::OBJECT && e.count > most(e.kind) {
+        let expected = format!("at most {}", most(e.kind));
+        return Err((Code::Limit, offset_of!(SectionEntry, count), expected, e.count.to_string()));
+    }
+    Ok(last)
+}
+
+/// Checks which objects there are; returns their number. The entries are sorted.
+fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
+    let mut objects = 0;
+    for (i, e) in entries.iter().enumerate() {
+        let whole_file = e.object == NONE;
+        let first = !whole_file && e.object == objects;
+        let wrong = if whole_file {
+            kind_stride(e.kind).is_some() && e.kind != kind::PROVENANCE
+        } else if e.kind == kind::OBJECT {
+            !first || e.count != 1
+        } else {
+            // Kind 1 sorts first (kind 0 is not assigned), so an object's other sections follow its OBJECT.
+            e.object + 1 != objects || e.kind == kind::PROVENANCE || e.kind == 0
+        };
+        if wrong {
+            let at = HEADER as u64 + i as u64 * ENTRY + offset_of!(SectionEntry, object) as u64;
+            let expected =
+                format!("the one OBJECT row of object {objects}, or a section that fits its object");
+            let found = format!("{} rows of kind {} in object {}", e.count, e.kind, e.object);
+            return Err(Error::within(Code::Objects, e.kind, at, expected, found).in_object(e.object));
+        }
+        objects += u32::from(first && e.kind == kind::OBJECT);
+    }
+    Ok(objects)
+}
+
+fn version(v: u32) -> String {
+    format!("{}.{}", v >> 16, v & 0xffff)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}

@@ -1,1 +1,3 @@
-//! tests
+//! What the end-to-end, conformance and corruption tests share.
+
+pub mod conformance;

@@ -10,6 +10,7 @@ pub mod error;
 pub mod marks;
 pub mod mesh;
 pub mod monitor;
+pub mod pipeline;
 pub mod tets;
 pub mod write;
 

@@ -1,1 +1,61 @@
-fn main() {}
+//! `bth-play`: renders compiled BTH files to PNG.
+
+mod args;
+mod camera;
+mod clay;
+mod failure;
+mod frame;
+mod inside;
+mod legend;
+mod occlusion;
+mod picture;
+mod ramp;
+mod report;
+mod sampling;
+mod surface;
+
+use clap::{CommandFactory, Parser};
+use failure::Failure;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let wants_json = std::env::args_os().skip(1).take_while(|a| a != "--").any(|a| a == "--json");
+    let args = match args::Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => return failure::usage(&error, wants_json),
+    };
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(wants_json),
+    }
+}
+
+fn run(args: &args::Args) -> Result<(), Failure> {
+    if let Some(shell) = args.completions {
+        let mut script = Vec::new();
+        clap_complete::generate(shell, &mut args::Args::command(), "bth-play", &mut script);
+        return report::print(&String::from_utf8_lossy(&script));
+    }
+    let (file, output) = args.paths()?;
+    let scene = open(file, args.map)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads)
+        .build()
+        .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
+    let threads = pool.current_num_threads();
+    let (picture, summary) = pool.install(|| frame::render(&scene, file, args))?;
+    picture.write(output)?;
+    report::show(args, &scene, &summary, threads)
+}
+
+#[allow(unsafe_code)]
+fn open(file: &std::path::Path, map: bool) -> Result<bth::Scene, bth::Error> {
+    if map {
+        // SAFETY: the contract of `map` is that the file is one that bthc wrote, and that nobody
+        // changes or shrinks it while it is mapped. The user takes that over with `--map`, whose
+        // help says so.
+        unsafe { bth::map(file) }
+    } else {
+        bth::open(file)
+    }
+}

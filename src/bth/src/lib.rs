@@ -1,4 +1,16 @@
 //! Runtime of BTH files: opens a compiled file and traces rays, zero-copy.
+//!
+//! ```no_run
+//! use bth::rays::{Ray, Surface};
+//!
+//! let scene = bth::open("bunny.bth")?;
+//! let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+//! let hit = scene.nearest(&ray, Surface::NONE);
+//! if hit.is_hit() {
+//!     println!("triangle {} at t = {}", hit.surface.triangle, hit.t);
+//! }
+//! # Ok::<(), bth::Error>(())
+//! ```
 #![warn(missing_docs)]
 
 pub mod check;
@@ -8,7 +20,11 @@ pub mod layout;
 pub mod limits;
 pub mod object;
 pub mod rays;
+mod scene;
+mod trace;
 pub mod verify;
 
 pub use error::{Code, Error};
 pub use file::File;
+pub use scene::{Scene, from_bytes, map, open};
+pub use trace::Steps;

@@ -1,1 +1,24 @@
-fn main() {}
+//! `bthc`, the BTH compiler: compiles models, inspects and verifies compiled files, traces rays.
+
+mod args;
+mod commands;
+mod failure;
+mod output;
+mod progress;
+mod ray_files;
+mod table;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let wants_json = std::env::args_os().skip(1).take_while(|a| a != "--").any(|a| a == "--json");
+    let args = match args::Args::try_parse() {
+        Ok(args) => args,
+        Err(error) => return failure::usage(&error, wants_json),
+    };
+    match commands::run(args.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(wants_json),
+    }
+}

@@ -1,0 +1,87 @@
+//! The slow, obvious pair test that the fast one is checked against: the common part of two
+//! triangles by clipping one with the other in rational arithmetic, on small integer coordinates.
+
+use super::triangle_contact::Triangle;
+
+type Vector = [i128; 3];
+
+/// A rational point: `n / w`, `w > 0`, in lowest terms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Point {
+    n: Vector,
+    w: i128,
+}
+
+fn gcd(a: i128, b: i128) -> i128 {
+    if b == 0 { a.abs() } else { gcd(b, a % b) }
+}
+
+impl Point {
+    fn new(n: Vector, w: i128) -> Self {
+        let d = n.iter().fold(w, |d, &x| gcd(d, x)) * w.signum();
+        Self { n: n.map(|x| x / d), w: w / d }
+    }
+}
+
+fn minus(a: Vector, b: Vector) -> Vector {
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+fn cross(a: Vector, b: Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+fn dot(a: Vector, b: Vector) -> i128 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Keeps the part of a convex polygon (or segment, or point) where `normal . (x - origin) >= 0`.
+fn clip(polygon: &[Point], normal: Vector, origin: Vector) -> Vec<Point> {
+    let height = |p: &Point| dot(normal, p.n) - dot(normal, origin) * p.w;
+    let mut kept: Vec<Point> = Vec::new();
+    let mut keep = |p: Point| {
+        if !kept.contains(&p) {
+            kept.push(p);
+        }
+    };
+    for (i, p) in polygon.iter().enumerate() {
+        let q = &polygon[(i + 1) % polygon.len()];
+        let (hp, hq) = (height(p), height(q));
+        if hp >= 0 {
+            keep(*p);
+        }
+        if (hp > 0 && hq < 0) || (hp < 0 && hq > 0) {
+            // The heights are scaled by w: the crossing is p/w_p + hp/w_p / (hp/w_p - hq/w_q) (q - p).
+            let n = [0, 1, 2].map(|k| hp * q.n[k] - hq * p.n[k]);
+            keep(Point::new(n, hp * q.w - hq * p.w));
+        }
+    }
+    kept
+}
+
+/// Corners of the convex hull of the points that two triangles have in common.
+fn common_part(a: [Vector; 3], b: [Vector; 3]) -> Vec<Point> {
+    let normal = cross(minus(b[1], b[0]), minus(b[2], b[0]));
+    let mut polygon: Vec<Point> = a.iter().map(|&n| Point::new(n, 1)).collect();
+    polygon = clip(&polygon, normal, b[0]);
+    polygon = clip(&polygon, normal.map(|x| -x), b[0]);
+    for k in 0..3 {
+        polygon = clip(&polygon, cross(normal, minus(b[(k + 1) % 3], b[k])), b[k]);
+    }
+    polygon
+}
+
+/// Whether two triangles with small integer coordinates touch beyond the vertices they share.
+pub(crate) fn oracle(a: &Triangle, b: &Triangle) -> bool {
+    let integer = |t: &Triangle| t.corners.map(|p| p.map(|x| x as i128));
+    let shared: Vec<Vector> = (0..3)
+        .filter(|&i| b.vertices.contains(&a.vertices[i]))
+        .map(|i| a.corners[i].map(|x| x as i128))
+        .collect();
+    let common = common_part(integer(a), integer(b));
+    let allowed = |p: &Point| match shared[..] {
+        [s] => *p == Point::new(s, 1),
+        // Within triangle a, so collinear with the edge is enough.
+        [s, t] => cross(minus(t, s), [0, 1, 2].map(|k| p.n[k] - s[k] * p.w)) == [0; 3],
+        _ => false,
+    };
+    !common.iter().all(allowed)
+}

@@ -1,0 +1,140 @@
+//! The compiler: calls the stages in order.
+
+mod options;
+mod parts;
+mod provenance;
+mod structure;
+
+pub use options::{Options, Structure};
+
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::{bvh, costs, marks, mesh, tets};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// A compiled file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Compiled {
+    /// Its bytes. They depend on the source's content and the options only.
+    pub bytes: Vec<u8>,
+}
+
+/// What the stages found and did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// BLAKE3 of the source file's bytes, hexadecimal.
+    pub source_blake3: String,
+    /// What each stage took, in order.
+    pub seconds: Vec<StageTime>,
+    /// Import.
+    pub mesh: mesh::Report,
+    /// Binary BVH.
+    pub bvh: bvh::Report,
+    /// Marking; absent when no tetrahedra were asked for, as the next two.
+    pub marks: Option<marks::Report>,
+    /// Selection.
+    pub costs: Option<costs::Report>,
+    /// Tetrahedralization.
+    pub tets: Option<tets::Report>,
+    /// Wide BVH.
+    pub collapse: bvh::CollapseReport,
+    /// The compiled file.
+    pub file: FileReport,
+}
+
+/// What a stage took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StageTime {
+    /// Name of the stage.
+    pub name: &'static str,
+    /// Seconds on the wall clock.
+    pub seconds: f64,
+}
+
+/// Size of the compiled file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FileReport {
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Tet leaves.
+    pub tet_leaves: u64,
+    /// Triangles in tet leaves.
+    pub tet_triangles: u64,
+    /// Bytes of the sections that traversal reads.
+    pub resident_bytes: u64,
+    /// The same for each triangle of the source; 0 when it has none.
+    pub resident_bytes_per_triangle: f64,
+}
+
+/// Compiles a model.
+///
+/// # Errors
+/// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
+pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
+    let mut clock = Clock::default();
+
+    let (mesh, mesh_report) = clock.time("mesh", || mesh::import(source, options.attributes, monitor))?;
+    let source_blake3 = clock.time("hash", || provenance::hash(source))?;
+    let (tree, bvh_report) = clock.time("bvh", || bvh::build(&mesh, &options.bvh, monitor))?;
+
+    let (mut meshes, mut reports) = (Vec::new(), (None, None, None));
+    if options.structure != Structure::Bvh {
+        let (marks, marks_report) = clock.time("marks", || marks::mark(&mesh, &tree, monitor))?;
+        let (chosen, costs_report) =
+            clock.time("costs", || structure::choose(source, &mesh, &tree, &marks, options, monitor))?;
+        let (built, tets_report) =
+            clock.time("tets", || tets::build(&mesh, &tree, &chosen, &options.tets, monitor))?;
+        structure::check_built(source, &tree, &built, options)?;
+        meshes = built;
+        reports = (Some(marks_report), costs_report, Some(tets_report));
+    }
+
+    let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = meshes.into_iter().unzip();
+    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
+    let (wide, collapse) =
+        clock.time("collapse", || bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor))?;
+    let encoded = (!meshes.is_empty())
+        .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
+
+    let provenance = provenance::json(&source_blake3, &mesh_report.format, reports.2.as_ref(), options)?;
+    let stages =
+        parts::Stages { mesh: &mesh, tree: &tree, wide: &wide, encoded: encoded.as_ref(), provenance };
+    let (bytes, resident_bytes) = clock.time("file", || parts::file(stages, options))?;
+
+    let triangles = mesh.triangles.len();
+    let file = FileReport {
+        bytes: bytes.len() as u64,
+        tet_leaves: meshes.len() as u64,
+        tet_triangles: meshes.iter().map(|m| m.faces.len() as u64).sum(),
+        resident_bytes,
+        resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
+    };
+    let (marks, costs, tets) = reports;
+    let report = Report {
+        source_blake3,
+        seconds: clock.0,
+        mesh: mesh_report,
+        bvh: bvh_report,
+        marks,
+        costs,
+        tets,
+        collapse,
+        file,
+    };
+    Ok((Compiled { bytes }, report))
+}
+
+/// Times the stages on the wall clock.
+#[derive(Default)]
+struct Clock(Vec<StageTime>);
+
+impl Clock {
+    fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.0.push(StageTime { name, seconds: start.elapsed().as_secs_f64() });
+        result
+    }
+}

@@ -1,0 +1,57 @@
+//! The options of a compilation.
+
+use crate::{bvh, costs, mesh, tets};
+use bth::layout::RecordKind;
+use serde::Serialize;
+
+/// What to build.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Structure {
+    /// A BVH, some nodes of which are tetrahedralized where the cost model says that it pays.
+    #[default]
+    Bth,
+    /// A BVH only.
+    Bvh,
+    /// One tetrahedralization of the whole model.
+    Tets,
+}
+
+/// The options of all stages.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// What to build.
+    pub structure: Structure,
+    /// Shading attributes to keep.
+    pub attributes: mesh::Keep,
+    /// Builder of the binary BVH.
+    pub bvh: bvh::Options,
+    /// Collapse to the wide BVH; `keep_subtrees` below overrules the one in here.
+    pub collapse: bvh::CollapseOptions,
+    /// Selection of the nodes to tetrahedralize.
+    pub costs: costs::Options,
+    /// Tetrahedralization.
+    pub tets: tets::Options,
+    /// Record that stores a tetrahedron.
+    pub record: RecordKind,
+    /// Whether to keep a BVH under each tet leaf.
+    pub keep_subtrees: bool,
+    /// Whether to store the positions and triangles of the source.
+    pub geometry: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            structure: Structure::default(),
+            attributes: mesh::Keep::default(),
+            bvh: bvh::Options::default(),
+            collapse: bvh::CollapseOptions::default(),
+            costs: costs::Options::default(),
+            tets: tets::Options::default(),
+            record: RecordKind::Link32,
+            keep_subtrees: false,
+            geometry: true,
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The file, from what the stages made.
+
+use super::Options;
+use crate::error::Result;
+use crate::{bvh, mesh, tets, write};
+use bth::layout::Object;
+
+/// What goes into the file.
+pub(super) struct Stages<'a> {
+    pub(super) mesh: &'a mesh::Mesh,
+    pub(super) tree: &'a bvh::BinaryBvh,
+    pub(super) wide: &'a bvh::Wide,
+    /// Absent without tet leaves.
+    pub(super) encoded: Option<&'a tets::Encoded>,
+    pub(super) provenance: String,
+}
+
+/// The bytes of the file, checked as a reader will, and how many of them tracing reads.
+pub(super) fn file(stages: Stages<'_>, options: &Options) -> Result<(Vec<u8>, u64)> {
+    let parts = parts(&stages, options);
+    let mut builder = write::FileBuilder::new();
+    write::object(&mut builder, 0, &parts)?;
+    builder.provenance(stages.provenance)?;
+    let bytes = builder.finish();
+    write::self_check(&bytes, false)?;
+    Ok((bytes, resident_bytes(&parts)))
+}
+
+fn parts<'a>(stages: &Stages<'a>, options: &Options) -> write::ObjectParts<'a> {
+    let Stages { mesh, tree, wide, .. } = stages;
+    let mut parts = write::ObjectParts {
+        bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
+        root: wide.root,
+        triangles: mesh.triangles.len() as u32,
+        dropped: (mesh.triangles.len() - tree.order.len()) as u32,
+        lines: &wide.lines,
+        triangle_ids: &wide.triangle_ids,
+        ..Default::default()
+    };
+    if let Some(encoded) = stages.encoded {
+        parts.record = Some(options.record);
+        parts.tet_leaves = &encoded.leaves;
+        parts.tets = &encoded.tets;
+        parts.tet_vertices = &encoded.vertices;
+        parts.tet_faces = &encoded.faces;
+        parts.hull_faces = &encoded.hulls;
+        parts.triangle_homes = &encoded.homes;
+    }
+    let mut source = write::Source::default();
+    if options.geometry {
+        (source.positions, source.triangles) = (&mesh.positions, &mesh.triangles);
+    }
+    if let Some(attributes) = &mesh.attributes {
+        source.corners = &attributes.corners;
+        source.normals = &attributes.normals;
+        source.uvs = &attributes.uvs;
+    }
+    parts.source = Some(source);
+    parts
+}
+
+/// Bytes of the sections that tracing reads.
+fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
+    let bytes = size_of::<Object>()
+        + size_of_val(parts.lines)
+        + size_of_val(parts.triangle_ids)
+        + size_of_val(parts.tet_leaves)
+        + size_of_val(parts.tets)
+        + size_of_val(parts.tet_vertices)
+        + size_of_val(parts.tet_faces)
+        + size_of_val(parts.hull_faces)
+        + size_of_val(parts.triangle_homes);
+    bytes as u64
+}

@@ -1,0 +1,55 @@
+//! What differs between the structures: which nodes to tetrahedralize.
+
+use super::{Options, Structure};
+use crate::error::{Error, Place, Result};
+use crate::monitor::Monitor;
+use crate::{bvh, costs, marks, mesh, tets};
+use std::path::Path;
+
+/// The nodes to tetrahedralize, in ascending order.
+pub(super) fn choose(
+    source: &Path,
+    mesh: &mesh::Mesh,
+    tree: &bvh::BinaryBvh,
+    marks: &marks::Marks,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<u32>, Option<costs::Report>)> {
+    match (options.structure, marks.suitable.first()) {
+        (Structure::Bvh, _) | (Structure::Tets, None) => Ok((Vec::new(), None)),
+        (Structure::Tets, Some(true)) => Ok((vec![0], None)),
+        (Structure::Tets, Some(false)) => {
+            let contacts = marks::bad_pairs(mesh, tree, monitor)?;
+            let message = format!(
+                "the model cannot be tetrahedralized whole: {} of its {} triangles are in {} bad contacts (they cross, overlap or touch other than at common vertices and edges)",
+                contacts.triangles.len(),
+                mesh.triangles.len(),
+                contacts.pairs
+            );
+            Err(unusable(source, message, "repair the model (`bthc marks` lists the triangles), or use --structure bth"))
+        }
+        (Structure::Bth, _) => {
+            let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
+            Ok((choice.chosen, Some(report)))
+        }
+    }
+}
+
+/// Fails when a whole tetrahedralization was asked for and did not come about.
+pub(super) fn check_built(
+    source: &Path,
+    tree: &bvh::BinaryBvh,
+    built: &[(u32, tets::TetMesh)],
+    options: &Options,
+) -> Result<()> {
+    let whole = matches!(built, [(0, _)]);
+    if options.structure == Structure::Tets && !tree.nodes.is_empty() && !whole {
+        let message = "the model could not be tetrahedralized whole".to_owned();
+        return Err(unusable(source, message, "is the worker bth-tetgen installed? Else use --structure bth"));
+    }
+    Ok(())
+}
+
+fn unusable(source: &Path, message: String, hint: &str) -> Error {
+    Error::Input { code: "BTH-I080", place: Place::File(source.into()), message, hint: hint.into() }
+}

@@ -1,0 +1,87 @@
+//! How the program ends when something goes wrong.
+
+use serde_json::json;
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Why there is no picture.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Options that do not fit together (exit code 2).
+    Usage(String),
+    /// A compiled file that cannot be used (exit code 3, or 4 when it could not be read).
+    Runtime(bth::Error),
+    /// A compiled file that lacks what the mode needs (exit code 3).
+    Lacks { file: PathBuf, what: &'static str, hint: &'static str },
+    /// The picture could not be written (exit code 4).
+    File { path: PathBuf, message: String },
+    /// Standard output was closed by its reader.
+    ClosedOutput,
+}
+
+impl From<std::io::Error> for Failure {
+    /// Errors of standard output.
+    fn from(error: std::io::Error) -> Self {
+        match error.kind() {
+            std::io::ErrorKind::BrokenPipe => Self::ClosedOutput,
+            _ => Self::File { path: "standard output".into(), message: error.to_string() },
+        }
+    }
+}
+
+impl From<bth::Error> for Failure {
+    fn from(error: bth::Error) -> Self {
+        Self::Runtime(error)
+    }
+}
+
+impl Failure {
+    fn parts(&self) -> (&str, u8, String) {
+        match self {
+            Self::Usage(message) => ("BTH-U001", 2, message.clone()),
+            Self::Runtime(error) => (
+                error.code().as_str(),
+                if error.code() == bth::Code::Read { 4 } else { 3 },
+                error.to_string(),
+            ),
+            Self::Lacks { file, what, hint } => {
+                ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))
+            }
+            Self::File { path, message } => {
+                ("BTH-P002", 4, format!("{}: BTH-P002: {message}", path.display()))
+            }
+            Self::ClosedOutput => ("", 0, String::new()),
+        }
+    }
+
+    /// Says what went wrong and gives the exit code.
+    pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
+        let (code, exit_code, message) = self.parts();
+        if exit_code != 0 {
+            // Nothing can be done when the output is closed: the exit code tells.
+            let _ = writeln!(std::io::stderr().lock(), "error: {message}");
+            if wants_json {
+                let error = json!({"error": {"code": code, "message": message, "exit_code": exit_code}});
+                let _ = writeln!(std::io::stdout().lock(), "{error:#}");
+            }
+        }
+        ExitCode::from(exit_code)
+    }
+}
+
+/// Reports a wrong command line, or shows help or the version.
+pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
+    // As above for a closed output.
+    let _ = error.print();
+    if !error.use_stderr() {
+        return ExitCode::SUCCESS;
+    }
+    if wants_json {
+        let text = error.to_string();
+        let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+        let error = json!({"error": {"code": "BTH-U001", "message": first, "exit_code": 2}});
+        let _ = writeln!(std::io::stdout().lock(), "{error:#}");
+    }
+    ExitCode::from(2)
+}

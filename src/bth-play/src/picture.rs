@@ -1,0 +1,71 @@
+//! The finished picture and its PNG file.
+
+use crate::failure::Failure;
+use std::io::Write;
+use std::path::Path;
+
+/// A picture, sRGB, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Picture {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) pixels: Vec<[u8; 3]>,
+}
+
+/// A linear component in sRGB (IEC 61966-2-1).
+pub(crate) fn srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        linear.max(0.0) * 12.92
+    } else {
+        1.055 * linear.min(1.0).powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Rounds a component from 0 to 1 to 8 bits.
+pub(crate) fn quantized(color: [f32; 3]) -> [u8; 3] {
+    color.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
+impl Picture {
+    /// Sets a pixel; outside the picture nothing happens.
+    pub(crate) fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
+        if x < self.width && y < self.height {
+            self.pixels[y as usize * self.width as usize + x as usize] = color;
+        }
+    }
+
+    /// The bytes of a PNG file.
+    fn encoded(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(self.pixels.as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
+    /// Writes a PNG file that is whole or absent.
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
+        let failed = |e: &dyn std::fmt::Display| Failure::File { path: path.into(), message: e.to_string() };
+        let bytes = self.encoded().map_err(|e| failed(&e))?;
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".bth-play-").suffix(".png.tmp");
+        #[cfg(unix)]
+        {
+            // As for any new file: what the umask leaves of these.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
+        file.write_all(&bytes).map_err(|e| failed(&e))?;
+        file.persist(path).map_err(|e| failed(&e.error))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,163 @@
+//! A scene: what callers open and trace.
+
+use crate::error::Error;
+use crate::file::File;
+use crate::layout::NONE;
+use crate::object::ObjectView;
+use crate::rays::{Hit, Ray, Surface};
+use crate::trace::{self, Steps};
+use std::path::Path;
+
+/// An open file, ready to trace. Each object stands once in the world, untransformed: instance
+/// and object numbers are the same.
+///
+/// Queries take `&self` and may run on any number of threads. A ray whose origin or direction is not
+/// finite, whose direction is zero or whose `tmin` exceeds its `tmax` hits nothing.
+///
+/// Answers are exact: a ray hits a closed triangle if and only if its real line meets it within
+/// [`tmin`, `tmax`] (t as reported, rounded to f32), lines within the plane of a triangle excepted; of equal
+/// hits the triangle of least id is reported. They depend neither on hints nor on the structure in the file.
+#[derive(Debug)]
+pub struct Scene {
+    file: File,
+}
+
+/// Reads a compiled file into memory and checks every index, so that tracing is safe whatever the
+/// file holds. Costs O(file); hashes and geometry are [`mod@crate::verify`]'s business.
+///
+/// # Errors
+/// `BTH-O…` when it cannot be read, `BTH-F0…` when header or table, `BTH-F1…` when contents break the
+/// specification; the error names the section and byte.
+pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    let path = path.as_ref();
+    Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
+}
+
+/// As [`open`], from bytes, which are copied.
+///
+/// # Errors
+/// As [`open`].
+pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
+    Scene::checked(File::from_bytes(bytes)?)
+}
+
+/// Maps a compiled file and checks header and section table only: ready at once whatever its size.
+///
+/// # Safety
+/// Until the scene is dropped nobody may write to the file or truncate it (see [`File::map`]).
+/// The contents must be such that [`open`] accepts them: files that `bthc` wrote and nobody changed. With
+/// others, tracing may panic or never end; it does not read out of bounds.
+///
+/// # Errors
+/// As [`open`], without those about contents.
+#[allow(unsafe_code)]
+pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
+    // SAFETY: the caller's contract includes that of `File::map`.
+    let file = unsafe { File::map(path.as_ref())? };
+    Ok(Scene { file })
+}
+
+impl Scene {
+    fn checked(file: File) -> Result<Scene, Error> {
+        for object in 0..file.object_count() {
+            file.check(object)?;
+        }
+        Ok(Scene { file })
+    }
+
+    /// The file behind the scene.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Objects in the scene.
+    pub fn object_count(&self) -> u32 {
+        self.file.object_count()
+    }
+
+    /// The sections of an object.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn object(&self, object: u32) -> ObjectView<'_> {
+        self.file.object(object).expect("an object below object_count, checked when opened")
+    }
+
+    /// Bytes of the sections that traversal reads.
+    pub fn resident_bytes(&self) -> u64 {
+        self.file.resident_bytes()
+    }
+
+    /// Nearest hit of a ray. `from` is the surface that it starts on, or [`Surface::NONE`]: a hint,
+    /// which makes it faster and never changes the answer.
+    pub fn nearest(&self, ray: &Ray, from: Surface) -> Hit {
+        self.nearest_counted(ray, from).0
+    }
+
+    /// As [`Self::nearest`], with a count of the work.
+    pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
+        let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
+        for instance in 0..self.object_count() {
+            let (hit, more) =
+                trace::nearest_counted(&self.object(instance), &ray, hint(from, instance), instance);
+            steps += more;
+            if hit.t < best.t {
+                (best, ray.tmax) = (hit, hit.t);
+            }
+        }
+        (best, steps)
+    }
+
+    /// Whether a ray hits anything; `from` as for [`Self::nearest`].
+    pub fn any(&self, ray: &Ray, from: Surface) -> bool {
+        (0..self.object_count()).any(|i| trace::any(&self.object(i), ray, hint(from, i)))
+    }
+
+    /// Nearest hits of many rays; `from`, if given, names the surface that each starts on.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
+        check_lengths(rays, from, hits.len());
+        hits.fill(Hit::MISS);
+        for instance in 0..self.object_count() {
+            let object = self.object(instance);
+            for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
+                let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
+                let hit = trace::nearest(&object, &ray, hint(surface(from, i), instance), instance);
+                if hit.t < best.t {
+                    *best = hit;
+                }
+            }
+        }
+    }
+
+    /// Whether each of many rays hits anything.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
+        check_lengths(rays, from, found.len());
+        found.fill(false);
+        for instance in 0..self.object_count() {
+            let object = self.object(instance);
+            for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
+                *found = *found || trace::any(&object, ray, hint(surface(from, i), instance));
+            }
+        }
+    }
+}
+
+fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
+    assert_eq!(rays.len(), results, "as many results as rays");
+    assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
+}
+
+fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
+    from.map_or(Surface::NONE, |f| f[ray])
+}
+
+/// The triangle of an object that a ray starts on, or `NONE`.
+fn hint(from: Surface, instance: u32) -> u32 {
+    if from.instance == instance { from.triangle } else { NONE }
+}

@@ -1,0 +1,136 @@
+//! The walk through the wide BVH, nearest child first, one ray at a time.
+
+use super::line::{Line, Projected};
+use super::query::{Count, Query};
+use super::slabs::Slabs;
+use crate::layout::{Child, IndexedLeaf, NONE, RawLeaf, WIDTH};
+use crate::limits::STACK;
+use crate::object::ObjectView;
+
+/// Children that wait, the nearest on top.
+struct Stack {
+    entry: [(f32, u32); STACK],
+    len: usize,
+}
+
+/// Walks from `root`. Tet leaves are handed to `tets` with their row; it returns true to end the
+/// traversal, or the code of a subtree to walk instead.
+pub(crate) fn walk<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    root: u32,
+    line: &Line,
+    slabs: &Slabs,
+    query: &mut Q,
+    count: &mut C,
+    mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
+) -> bool {
+    let mut stack = Stack { entry: [(0.0, NONE); STACK], len: 1 };
+    stack.entry[0] = (f32::NEG_INFINITY, root);
+    let mut limit = slabs.limit(query.limit());
+    while stack.len > 0 {
+        stack.len -= 1;
+        let (enter, code) = stack.entry[stack.len];
+        if enter > limit {
+            continue;
+        }
+        let done = match Child::from_code(code) {
+            Some(Child::Node(at)) => {
+                count.node();
+                let mut found = [(0.0, NONE); WIDTH];
+                let hits = slabs.children(object.node(at), limit, &mut found);
+                push_nearest_last(&mut stack, &found[..hits]);
+                continue;
+            }
+            Some(Child::Indexed(at)) => indexed_leaf(object, object.indexed_leaf(at), line, query, count),
+            Some(Child::Raw(at)) => raw_leaf(object, object.raw_leaf(at), line, query, count),
+            Some(Child::Tets(row)) => match tets(row, query, count) {
+                TetOutcome::Done => true,
+                TetOutcome::GoOn => false,
+                TetOutcome::Instead(code) => {
+                    stack.entry[stack.len] = (enter, code);
+                    stack.len += 1;
+                    false
+                }
+            },
+            None => false,
+        };
+        if done {
+            return true;
+        }
+        limit = slabs.limit(query.limit());
+    }
+    false
+}
+
+/// What a tet leaf made of a ray.
+pub(crate) enum TetOutcome {
+    /// The query has what it wants.
+    Done,
+    /// The walk goes on with the other children.
+    GoOn,
+    /// This subtree over the same triangles is to be walked.
+    Instead(u32),
+}
+
+fn push_nearest_last(stack: &mut Stack, found: &[(f32, u32)]) {
+    let base = stack.len;
+    for &child in found {
+        // Insertion into descending order; at most sixteen, usually two or three.
+        let mut at = stack.len;
+        while at > base && stack.entry[at - 1].0 < child.0 {
+            stack.entry[at] = stack.entry[at - 1];
+            at -= 1;
+        }
+        stack.entry[at] = child;
+        stack.len += 1;
+    }
+}
+
+const ORIGIN: Projected = Projected { x: 0.0, y: 0.0, depth: 0.0 };
+
+fn indexed_leaf<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    leaf: &IndexedLeaf,
+    line: &Line,
+    query: &mut Q,
+    count: &mut C,
+) -> bool {
+    count.leaf();
+    count.triangles(leaf.triangles);
+    let point = |i: usize| leaf.vertex.map(|row| row[i]);
+    let mut projected = [ORIGIN; WIDTH];
+    for (i, p) in projected.iter_mut().enumerate().take(leaf.vertices as usize) {
+        *p = line.project(point(i));
+    }
+    for i in 0..(leaf.triangles as usize).min(WIDTH) {
+        let corner = leaf.corner.map(|row| usize::from(row[i]) % WIDTH);
+        let crossing = line.crossing(|| corner.map(point), corner.each_ref().map(|&c| &projected[c]));
+        if let Some(crossing) = crossing
+            && query.offer(object.triangle_ids[leaf.first as usize + i], crossing)
+        {
+            return true;
+        }
+    }
+    false
+}
+
+fn raw_leaf<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    leaf: &RawLeaf,
+    line: &Line,
+    query: &mut Q,
+    count: &mut C,
+) -> bool {
+    count.leaf();
+    count.triangles(leaf.triangles);
+    for i in 0..(leaf.triangles as usize).min(WIDTH) {
+        let corners = leaf.corner.map(|axes| axes.map(|row| row[i]));
+        let projected = corners.map(|p| line.project(p));
+        if let Some(crossing) = line.crossing(|| corners, projected.each_ref())
+            && query.offer(object.triangle_ids[leaf.first as usize + i], crossing)
+        {
+            return true;
+        }
+    }
+    false
+}

@@ -1,0 +1,158 @@
+//! Exact sums of products of f32 values, for the few decisions that f64 rounding leaves open.
+//!
+//! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+//! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
+//! three f32 values lie between 2^-447 and 2^384, so nothing here over- or underflows.
+
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    (sum, (a - (sum - b_part)) + (b - b_part))
+}
+
+/// Exact product as a rounded value and its error (Dekker's splitting: no fused
+/// multiply-add, which not every target has in hardware).
+fn two_product(a: f64, b: f64) -> (f64, f64) {
+    fn split(x: f64) -> (f64, f64) {
+        let c = 134_217_729.0 * x;
+        let high = c - (c - x);
+        (high, x - high)
+    }
+    let product = a * b;
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    (product, al * bl - (((product - ah * bh) - al * bh) - ah * bl))
+}
+
+/// Room in an [`Expansion`]. Each addition makes at most one part more; the largest sum here is of
+/// three edges of 18 products, two additions each.
+const PARTS: usize = 128;
+
+/// An exact sum.
+pub(crate) struct Expansion {
+    part: [f64; PARTS],
+    len: usize,
+}
+
+impl Expansion {
+    pub(crate) fn new() -> Self {
+        Expansion { part: [0.0; PARTS], len: 0 }
+    }
+
+    fn add(&mut self, x: f64) {
+        let (mut carry, mut kept) = (x, 0);
+        for i in 0..self.len {
+            let (sum, error) = two_sum(carry, self.part[i]);
+            carry = sum;
+            if error != 0.0 {
+                self.part[kept] = error;
+                kept += 1;
+            }
+        }
+        if carry != 0.0 {
+            self.part[kept] = carry;
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    /// Adds a·b·c for values of f32 precision (a·b is then exact in f64).
+    fn add_product(&mut self, a: f64, b: f64, c: f64) {
+        let (product, error) = two_product(a * b, c);
+        self.add(error);
+        self.add(product);
+    }
+
+    /// Adds sign · det[a, b, c].
+    pub(crate) fn add_determinant(&mut self, sign: f64, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+        for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+            self.add_product(sign * a[i], b[j], c[k]);
+            self.add_product(-sign * a[i], b[k], c[j]);
+        }
+    }
+
+    /// Adds det[d, a-o, b-o], multiplied out so that each product is of three inputs.
+    pub(crate) fn add_edge(&mut self, o: [f64; 3], d: [f64; 3], a: [f64; 3], b: [f64; 3]) {
+        self.add_determinant(1.0, d, a, b);
+        self.add_determinant(-1.0, d, o, b);
+        self.add_determinant(-1.0, d, a, o);
+    }
+
+    /// Adds det[a-o, b-o, c-o].
+    pub(crate) fn add_volume(&mut self, o: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+        self.add_determinant(1.0, a, b, c);
+        self.add_determinant(-1.0, o, b, c);
+        self.add_determinant(-1.0, a, o, c);
+        self.add_determinant(-1.0, a, b, o);
+    }
+
+    /// The sum, rounded; its sign is exact.
+    pub(crate) fn value(&self) -> f64 {
+        self.part[..self.len].iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::testing::Rng;
+
+    fn wide(v: [f32; 3]) -> [f64; 3] {
+        v.map(f64::from)
+    }
+
+    #[test]
+    fn products_are_exact_where_integers_can_tell() {
+        let mut rng = Rng(7);
+        for _ in 0..10_000 {
+            let [a, b, c] = [(); 3].map(|()| rng.below(1 << 24) as f64 - (1 << 23) as f64);
+            let mut e = Expansion::new();
+            e.add_product(a, b, c);
+            let want = a as i128 * b as i128 * c as i128;
+            let got: i128 = e.part[..e.len].iter().map(|&x| x as i128).sum();
+            assert_eq!(got, want);
+        }
+    }
+
+    #[test]
+    fn edge_signs_agree_with_integer_arithmetic() {
+        let mut rng = Rng(11);
+        let mut zeros = 0;
+        for round in 0..20_000 {
+            let range = if round % 2 == 0 { 5 } else { 1 << 22 };
+            let mut draw = || [(); 3].map(|()| rng.below(2 * range) as i64 as f32 - range as f32);
+            let [o, d, a, b] = [draw(), draw(), draw(), draw()];
+            let int = |v: [f32; 3]| v.map(|x| x as i128);
+            let sub = |p: [i128; 3], q: [i128; 3]| [0, 1, 2].map(|k| p[k] - q[k]);
+            let (p, q, d1) = (sub(int(a), int(o)), sub(int(b), int(o)), int(d));
+            let want: i128 = (0..3)
+                .map(|i| {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    d1[i] * (p[j] * q[k] - p[k] * q[j])
+                })
+                .sum();
+            let mut e = Expansion::new();
+            e.add_edge(wide(o), wide(d), wide(a), wide(b));
+            assert_eq!(e.value().partial_cmp(&0.0), Some(want.cmp(&0)));
+            zeros += (want == 0) as u32;
+        }
+        assert!(zeros > 100, "the degenerate case must be among the tests");
+    }
+
+    #[test]
+    fn volume_signs_agree_with_orient3d() {
+        let mut rng = Rng(13);
+        for round in 0..20_000 {
+            let range = if round % 2 == 0 { 3 } else { 1 << 24 };
+            let mut draw = || [(); 3].map(|()| (rng.below(2 * range) as i64 - range as i64) as f32);
+            let [o, a, b, c] = [draw(), draw(), draw(), draw()];
+            let mut e = Expansion::new();
+            e.add_volume(wide(o), wide(a), wide(b), wide(c));
+            let p = |v: [f32; 3]| robust::Coord3D { x: v[0], y: v[1], z: v[2] };
+            // robust's orient3d(a, b, c, o) is det[a-o, b-o, c-o].
+            assert_eq!(
+                e.value().partial_cmp(&0.0),
+                robust::orient3d(p(a), p(b), p(c), p(o)).partial_cmp(&0.0)
+            );
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What a traversal looks for: the nearest hit or any hit; and what it counts.
+
+use super::line::Crossing;
+use crate::layout::NONE;
+use crate::rays::{Hit, Ray, Surface};
+
+/// A query in progress over one ray.
+pub(crate) trait Query {
+    /// Offers a crossing within the object; true ends the traversal.
+    fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    /// Nothing beyond this t is of interest.
+    fn limit(&self) -> f64;
+}
+
+/// Least t, then least triangle id: an order that does not depend on the traversal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nearest {
+    tmin: f32,
+    tmax: f32,
+    triangle: u32,
+    best: Crossing,
+}
+
+impl Nearest {
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let best = Crossing { t: f64::from(ray.tmax), u: 0.0, v: 0.0 };
+        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
+    }
+
+    pub(crate) fn hit(&self, instance: u32) -> Hit {
+        if self.triangle == NONE {
+            return Hit::MISS;
+        }
+        let surface = Surface { instance, triangle: self.triangle };
+        // + 0.0 turns -0.0 into 0.0.
+        Hit { t: self.best.t as f32 + 0.0, u: self.best.u + 0.0, v: self.best.v + 0.0, surface }
+    }
+}
+
+/// Whether a t, rounded as it will be reported, lies in the ray's range.
+fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
+    let t = t as f32;
+    tmin <= t && t <= tmax && t < f32::INFINITY
+}
+
+impl Query for Nearest {
+    #[inline(always)]
+    fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool {
+        let nearer = self.triangle == NONE
+            || crossing.t < self.best.t
+            || (crossing.t == self.best.t && triangle < self.triangle);
+        if nearer && in_range(crossing.t, self.tmin, self.tmax) {
+            self.triangle = triangle;
+            self.best = crossing;
+        }
+        false
+    }
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.best.t
+    }
+}
+
+/// Ends at the first crossing in range.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Any {
+    tmin: f32,
+    tmax: f32,
+    pub(crate) found: bool,
+}
+
+impl Any {
+    pub(crate) fn new(ray: &Ray) -> Self {
+        Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
+    }
+}
+
+impl Query for Any {
+    #[inline(always)]
+    fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
+        self.found |= in_range(crossing.t, self.tmin, self.tmax);
+        self.found
+    }
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        f64::from(self.tmax)
+    }
+}
+
+/// Counts the work of a traversal, or nothing at all.
+pub(crate) trait Count {
+    fn node(&mut self) {}
+    fn leaf(&mut self) {}
+    fn triangles(&mut self, _n: u32) {}
+    fn tet(&mut self) {}
+    fn flood(&mut self) {}
+}
+
+impl Count for () {}
+
+/// Work that one ray took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Steps {
+    /// Wide nodes entered.
+    pub nodes: u32,
+    /// Triangle and tet leaves entered.
+    pub leaves: u32,
+    /// Triangles tested in leaves.
+    pub triangles: u32,
+    /// Tetrahedra walked through.
+    pub tets: u32,
+    /// Walks that met a tie (a ray through a vertex, edge or face plane) and were done again exactly.
+    pub floods: u32,
+}
+
+impl std::ops::AddAssign for Steps {
+    fn add_assign(&mut self, other: Steps) {
+        self.nodes += other.nodes;
+        self.leaves += other.leaves;
+        self.triangles += other.triangles;
+        self.tets += other.tets;
+        self.floods += other.floods;
+    }
+}
+
+impl Count for Steps {
+    fn node(&mut self) {
+        self.nodes += 1;
+    }
+    fn leaf(&mut self) {
+        self.leaves += 1;
+    }
+    fn triangles(&mut self, n: u32) {
+        self.triangles += n;
+    }
+    fn tet(&mut self) {
+        self.tets += 1;
+    }
+    fn flood(&mut self) {
+        self.floods += 1;
+    }
+}

@@ -1,0 +1,117 @@
+//! `bthc info`: what a compiled file contains.
+
+use crate::args::Info;
+use crate::failure::Failure;
+use crate::output;
+use crate::table::{Table, bytes, count};
+use bth::File;
+use bth::error::kind_name;
+use bth::layout::{NONE, RecordKind};
+use bth::object::ObjectView;
+use serde_json::{Value, json};
+
+pub(crate) fn run(args: &Info) -> Result<(), Failure> {
+    let file = args.file.as_ref().map(File::read).transpose()?;
+    if args.json {
+        let mut value = file.as_ref().map_or_else(|| Ok(json!({})), describe)?;
+        if args.cpu {
+            value["cpu"] = cpu();
+        }
+        return Ok(output::json(&value)?);
+    }
+    let mut text = file.as_ref().map_or_else(|| Ok(String::new()), summary)?;
+    if args.cpu {
+        text.push_str(&format!("{:#}\n", cpu()));
+    }
+    Ok(output::text(&text)?)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+fn record(view: &ObjectView<'_>) -> &'static str {
+    RecordKind::from_code(view.header.record).map_or("none", RecordKind::name)
+}
+
+/// How the file came about, as JSON if it is that.
+fn provenance(file: &File) -> Value {
+    file.provenance().map_or(Value::Null, |text| serde_json::from_str(text).unwrap_or_else(|_| text.into()))
+}
+
+fn describe(file: &File) -> Result<Value, Failure> {
+    let section = |s: bth::file::SectionView<'_>| {
+        let e = s.entry;
+        let object = (e.object != NONE).then_some(e.object);
+        json!({"kind": kind_name(e.kind), "object": object, "offset": e.offset, "bytes": e.length,
+            "stride": e.stride, "count": e.count, "hash": hex(&e.hash)})
+    };
+    let object = |i: u32| -> Result<Value, Failure> {
+        let view = file.object(i)?;
+        let h = view.header;
+        Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
+            "depth": h.depth, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
+            "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
+            "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
+    };
+    let header = file.header();
+    Ok(json!({
+        "bytes": header.file_length,
+        "resident_bytes": file.resident_bytes(),
+        "format_version": version(header.writer_version),
+        "minimum_reader_version": version(header.minimum_reader_version),
+        "content_id": hex(&file.content_id()),
+        "objects": (0..file.object_count()).map(object).collect::<Result<Vec<_>, _>>()?,
+        "sections": file.sections().map(section).collect::<Vec<_>>(),
+        "provenance": provenance(file),
+    }))
+}
+
+fn version(code: u32) -> String {
+    format!("{}.{}", code >> 16, code & 0xffff)
+}
+
+fn summary(file: &File) -> Result<String, Failure> {
+    let header = file.header();
+    let mut facts = Table::default();
+    facts.row(["format", &version(header.writer_version)]);
+    facts.row(["content id", &hex(&file.content_id()[..16])]);
+    facts.row(["file", &bytes(header.file_length)]);
+    facts.row(["traversal reads", &bytes(file.resident_bytes())]);
+    for i in 0..file.object_count() {
+        let view = file.object(i)?;
+        facts.row(["triangles", &count(view.header.triangles.into())]);
+        facts.row(["dropped", &count(view.header.dropped.into())]);
+        facts.row(["depth", &count(view.header.depth.into())]);
+        facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
+        facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
+        facts.row(["tetrahedra", &count(view.records.len() as u64)]);
+        facts.row(["record", record(&view)]);
+        let per_triangle = file.resident_bytes() as f64 / f64::from(view.header.triangles.max(1));
+        facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);
+    }
+    let mut sections = Table::default();
+    sections.row(["section", "rows", "size"]);
+    for section in file.sections() {
+        let e = section.entry;
+        sections.row([kind_name(e.kind), &count(e.count), &bytes(e.length)]);
+    }
+    let made = file.provenance().map_or(String::new(), |text| format!("\n{text}\n"));
+    Ok(format!("{}\n{}{made}", facts.render(), sections.render()))
+}
+
+/// The processor's features that kernels may use.
+fn cpu() -> Value {
+    #[cfg(target_arch = "x86_64")]
+    let features = json!({
+        "avx2": is_x86_feature_detected!("avx2"),
+        "fma": is_x86_feature_detected!("fma"),
+        "avx512f": is_x86_feature_detected!("avx512f"),
+        "avx512vl": is_x86_feature_detected!("avx512vl"),
+        "avx512dq": is_x86_feature_detected!("avx512dq"),
+        "avx512bw": is_x86_feature_detected!("avx512bw"),
+    });
+    #[cfg(not(target_arch = "x86_64"))]
+    let features = json!({});
+    json!({"architecture": std::env::consts::ARCH, "features": features})
+}

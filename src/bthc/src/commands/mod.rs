@@ -1,0 +1,58 @@
+//! The subcommands.
+
+mod compile;
+mod explain;
+mod info;
+mod marks;
+mod trace;
+mod verify;
+
+use crate::args::{Args, Command};
+use crate::failure::Failure;
+use crate::output;
+use clap::CommandFactory;
+
+/// Runs a subcommand.
+pub(crate) fn run(command: Command) -> Result<(), Failure> {
+    crate::progress::listen_for_interrupts();
+    match command {
+        Command::Compile(args) => compile::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::Marks(args) => marks::run(&args),
+        Command::Trace(args) => trace::run(&args),
+        Command::Completions(args) => {
+            let mut script = Vec::new();
+            clap_complete::generate(args.shell, &mut Args::command(), "bthc", &mut script);
+            Ok(output::text(&String::from_utf8_lossy(&script))?)
+        }
+        Command::Man => manual(),
+    }
+}
+
+/// Prints the manual page, subcommands included, as roff.
+fn manual() -> Result<(), Failure> {
+    let mut page = Vec::new();
+    let mut command = Args::command();
+    command.build();
+    clap_mangen::Man::new(command.clone()).render(&mut page)?;
+    for sub in command.get_subcommands().filter(|s| s.get_name() != "help") {
+        let man = clap_mangen::Man::new(sub.clone());
+        man.render_synopsis_section(&mut page)?;
+        man.render_description_section(&mut page)?;
+        man.render_options_section(&mut page)?;
+    }
+    Ok(output::text(&String::from_utf8_lossy(&page))?)
+}
+
+/// Runs work with a number of threads (0: one per processor).
+fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
+        Failure::Compile(bth_compile::Error::Limit {
+            code: "BTH-L090",
+            message: format!("cannot start {threads} threads: {e}"),
+        })
+    })?;
+    Ok(pool.install(work))
+}

@@ -1,0 +1,52 @@
+//! `bthc trace`: the rays of a file, traced.
+
+use super::with_threads;
+use crate::args::Trace;
+use crate::failure::Failure;
+use crate::table::count;
+use crate::{output, ray_files};
+use bth::rays::Hit;
+use rayon::prelude::*;
+use serde_json::json;
+use std::time::Instant;
+
+/// Rays per task: enough to pay for starting one.
+const CHUNK: usize = 4096;
+
+pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
+    let rays = ray_files::read_rays(&args.rays)?;
+    let from = args.from.as_ref().map(|path| ray_files::read_from(path, rays.len())).transpose()?;
+    let scene = bth::open(&args.file)?;
+    let hint = |i: usize, n: usize| from.as_ref().map(|f| &f[i * CHUNK..i * CHUNK + n]);
+
+    let (hits, seconds) = with_threads(args.threads, || {
+        let start = Instant::now();
+        let hits = if args.any {
+            let mut found = vec![false; rays.len()];
+            let tasks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).enumerate();
+            tasks.for_each(|(i, (rays, found))| scene.any_batch(rays, hint(i, rays.len()), found));
+            ray_files::answers(&found)
+        } else {
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let tasks = rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).enumerate();
+            tasks.for_each(|(i, (rays, hits))| scene.nearest_batch(rays, hint(i, rays.len()), hits));
+            hits
+        };
+        (hits, start.elapsed().as_secs_f64())
+    })?;
+
+    bth_compile::write::write_atomically(&args.output, &ray_files::hits(&hits))?;
+    let found = hits.iter().filter(|h| h.is_hit()).count();
+    if args.json {
+        let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "hints": from.is_some()});
+        output::json(&report)?;
+    } else {
+        let rate = rays.len() as f64 / seconds.max(1e-9) / 1e6;
+        output::text(&format!(
+            "{} rays, {} hits, {seconds:.3} s, {rate:.2} million rays/s\n",
+            count(rays.len() as u64),
+            count(found as u64)
+        ))?;
+    }
+    Ok(())
+}

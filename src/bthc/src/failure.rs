@@ -1,0 +1,141 @@
+//! How the program ends when something goes wrong: exit code, message, and JSON when asked for.
+
+use crate::output;
+use serde_json::json;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Why a command did not succeed.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The compiler's own errors.
+    Compile(bth_compile::Error),
+    /// The runtime's errors: a compiled file that cannot be used.
+    Runtime(bth::Error),
+    /// Arguments that do not fit together (exit code 2).
+    Usage { message: String, hint: &'static str },
+    /// A check failed; what there was to say has been said on standard output.
+    Check,
+    /// Standard output was closed by its reader (`bthc ... | head`).
+    ClosedOutput,
+}
+
+impl From<bth_compile::Error> for Failure {
+    fn from(error: bth_compile::Error) -> Self {
+        Self::Compile(error)
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    /// Errors of standard output; those of files are made with [`Failure::file`].
+    fn from(error: std::io::Error) -> Self {
+        if error.kind() == std::io::ErrorKind::BrokenPipe {
+            Self::ClosedOutput
+        } else {
+            Self::file("BTH-O091", Path::new("standard output"), &error)
+        }
+    }
+}
+
+impl From<bth::Error> for Failure {
+    fn from(error: bth::Error) -> Self {
+        Self::Runtime(error)
+    }
+}
+
+impl Failure {
+    /// A file that could not be read or written.
+    pub(crate) fn file(code: &'static str, path: &Path, message: &dyn std::fmt::Display) -> Self {
+        Self::Compile(bth_compile::Error::File { code, path: path.into(), message: message.to_string() })
+    }
+    /// A ray file that cannot be used.
+    pub(crate) fn ray_file(path: &Path, byte: u64, message: String, hint: &str) -> Self {
+        Self::Compile(bth_compile::Error::Input {
+            code: "BTH-I090",
+            place: bth_compile::error::Place::Byte(path.into(), byte),
+            message,
+            hint: hint.into(),
+        })
+    }
+
+    fn exit_code(&self) -> u8 {
+        use bth_compile::Error;
+        match self {
+            Self::Check => 1,
+            Self::Usage { .. } => 2,
+            Self::Compile(Error::Input { .. }) => 3,
+            Self::Compile(Error::File { .. }) => 4,
+            Self::Compile(Error::Limit { .. }) => 5,
+            Self::Compile(Error::Internal { .. }) => 70,
+            Self::Compile(Error::Cancelled) => 130,
+            Self::Runtime(error) if error.code() == bth::Code::Read => 4,
+            Self::Runtime(_) => 3,
+            Self::ClosedOutput => 0,
+        }
+    }
+
+    /// The error as JSON: `code`, `message`, and where known `place` and `hint`.
+    fn json(&self) -> serde_json::Value {
+        use bth_compile::Error;
+        match self {
+            Self::Compile(Error::Input { code, place, message, hint }) => {
+                json!({"code": code, "place": place.to_string(), "message": message, "hint": hint})
+            }
+            Self::Compile(Error::File { code, path, message }) => {
+                json!({"code": code, "place": path.to_string_lossy(), "message": message})
+            }
+            Self::Compile(Error::Limit { code, message } | Error::Internal { code, message }) => {
+                json!({"code": code, "message": message})
+            }
+            Self::Compile(Error::Cancelled) => json!({"code": "BTH-C000", "message": "cancelled"}),
+            Self::Runtime(error) => runtime_json(error),
+            Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
+            Self::Check | Self::ClosedOutput => serde_json::Value::Null,
+        }
+    }
+
+    /// Says what went wrong and gives the exit code.
+    pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
+        let text = match self {
+            Self::Check | Self::ClosedOutput => return ExitCode::from(self.exit_code()),
+            Self::Compile(error) => error.to_string(),
+            Self::Runtime(error) => error.to_string(),
+            Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
+        };
+        output::error(&text);
+        if wants_json {
+            print_json_error(self.json(), self.exit_code());
+        }
+        ExitCode::from(self.exit_code())
+    }
+}
+
+/// An error of the runtime as JSON.
+pub(crate) fn runtime_json(error: &bth::Error) -> serde_json::Value {
+    json!({
+        "code": error.code().as_str(),
+        "place": error.path().map(|p| p.to_string_lossy()),
+        "byte": error.offset(),
+        "message": error.to_string(),
+        "expected": error.expected(),
+        "found": error.found(),
+        "hint": error.hint(),
+    })
+}
+
+fn print_json_error(mut error: serde_json::Value, exit_code: u8) {
+    error["exit_code"] = exit_code.into();
+    // Nothing is left to do when standard output is closed: the exit code tells.
+    let _ = output::json(&json!({ "error": error }));
+}
+
+/// Reports a wrong command line, or shows help or the version.
+pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
+    // As above for a closed output.
+    let _ = error.print();
+    if error.use_stderr() && wants_json {
+        let first = error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        print_json_error(json!({"code": "BTH-U001", "message": first}), 2);
+    }
+    ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+}

@@ -1,0 +1,72 @@
+//! Progress on a terminal, and cancellation by Ctrl-C.
+
+use bth_compile::Monitor;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Set by Ctrl-C; stages look at it a few times a second.
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+
+/// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once.
+pub(crate) fn listen_for_interrupts() {
+    // Fails only when a handler is there already, and then Ctrl-C works anyway.
+    let _ = ctrlc::set_handler(|| {
+        if CANCELLED.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
+}
+
+/// Shows stage, count, rate and remaining time on standard error if that is a terminal.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    quiet: bool,
+}
+
+impl Progress {
+    pub(crate) fn new(quiet: bool) -> Self {
+        let visible = !quiet && std::io::stderr().is_terminal();
+        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Monitor for Progress {
+    fn stage(&self, name: &'static str, total: Option<u64>) {
+        let template = match total {
+            Some(_) => "{msg:<12} {bar:30} {human_pos}/{human_len}  {per_sec}  {eta} left",
+            None => "{msg:<12} {spinner} {human_pos}  {elapsed}",
+        };
+        self.bar.reset();
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style);
+        }
+        match total {
+            Some(total) => self.bar.set_length(total),
+            None => self.bar.unset_length(),
+        }
+        self.bar.set_message(name);
+    }
+    fn advance(&self, units: u64) {
+        self.bar.inc(units);
+    }
+    fn cancelled(&self) -> bool {
+        CANCELLED.load(Ordering::Relaxed)
+    }
+    fn warn(&self, message: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| {
+                use std::io::Write;
+                // Nothing can be done when standard error is closed.
+                let _ = writeln!(std::io::stderr().lock(), "warning: {message}");
+            });
+        }
+    }
+}

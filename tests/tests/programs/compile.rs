@@ -1,0 +1,88 @@
+use crate::support::{bthc, crossing, folder, sphere};
+
+#[test]
+fn writes_a_file_beside_the_model_that_verifies() {
+    let folder = folder(&[("ball.obj", &sphere(12))]);
+    let run = bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    assert!(run.stdout.contains("triangles") && run.stdout.contains("wrote ball.bth"), "{run:?}");
+    assert_eq!(run.stderr, "", "no progress in a pipe");
+    bthc(folder.path(), &["verify", "ball.bth"]).expect(0);
+}
+
+#[test]
+fn json_holds_the_reports_of_all_stages() {
+    let folder = folder(&[("ball.obj", &sphere(12))]);
+    let run = bthc(folder.path(), &["compile", "ball.obj", "-o", "out.bth", "--json"]).expect(0);
+    let json = run.json();
+    assert_eq!(json["output"], "out.bth");
+    assert_eq!(json["report"]["mesh"]["triangles"], 4 * 12 * 11);
+    for stage in ["mesh", "bvh", "marks", "costs", "tets", "collapse", "file", "seconds"] {
+        assert!(!json["report"][stage].is_null(), "{stage} in {json:#}");
+    }
+    let length = std::fs::metadata(folder.path().join("out.bth")).unwrap().len();
+    assert_eq!(json["report"]["file"]["bytes"], length);
+}
+
+#[test]
+fn quiet_prints_nothing() {
+    let folder = folder(&[("ball.obj", &sphere(8))]);
+    let run = bthc(folder.path(), &["compile", "ball.obj", "--quiet"]).expect(0);
+    assert_eq!((run.stdout.as_str(), run.stderr.as_str()), ("", ""));
+}
+
+#[test]
+fn bytes_depend_on_neither_threads_nor_folder_nor_name() {
+    let model = sphere(24);
+    let first = folder(&[("ball.obj", &model)]);
+    let second = folder(&[("other.obj", &model)]);
+    for options in [["--structure", "bth"], ["--structure", "bvh"], ["--quality", "best"]] {
+        let compile = |folder: &std::path::Path, name: &str, threads: &str| {
+            let mut args = vec!["compile", name, "-o", "out.bth", "--threads", threads, "--min-tet-triangles", "64"];
+            args.extend(options);
+            bthc(folder, &args).expect(0);
+            std::fs::read(folder.join("out.bth")).unwrap()
+        };
+        let one = compile(first.path(), "ball.obj", "1");
+        assert!(one == compile(first.path(), "ball.obj", "2"), "threads, {options:?}");
+        assert!(one == compile(second.path(), "other.obj", "2"), "folder, {options:?}");
+    }
+}
+
+#[test]
+fn structure_bvh_has_no_tet_leaves() {
+    let folder = folder(&[("ball.obj", &sphere(24))]);
+    let run = bthc(folder.path(), &["compile", "ball.obj", "--structure", "bvh", "--json"]).expect(0);
+    let report = &run.json()["report"];
+    assert_eq!(report["file"]["tet_leaves"], 0);
+    assert!(report["marks"].is_null() && report["tets"].is_null());
+}
+
+#[test]
+fn structure_tets_refuses_crossing_triangles_and_says_how_many() {
+    let folder = folder(&[("crossing.obj", &crossing())]);
+    let run = bthc(folder.path(), &["compile", "crossing.obj", "--structure", "tets", "--json"]).expect(3);
+    assert!(run.stderr.contains("2 of its 3 triangles are in 1 bad contact"), "{run:?}");
+    assert!(run.stderr.contains("hint"), "{run:?}");
+    assert_eq!(run.json()["error"]["code"], "BTH-I080");
+    assert!(!folder.path().join("crossing.bth").exists());
+}
+
+#[test]
+fn geometry_is_left_out_on_request() {
+    let folder = folder(&[("ball.obj", &sphere(8))]);
+    bthc(folder.path(), &["compile", "ball.obj", "--no-geometry"]).expect(0);
+    let json = bthc(folder.path(), &["info", "ball.bth", "--json"]).expect(0).json();
+    assert_eq!(json["objects"][0]["geometry"], false);
+    bthc(folder.path(), &["verify", "ball.bth"]).expect(0);
+}
+
+#[test]
+fn degenerate_triangles_are_counted_and_keep_their_ids() {
+    let model = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 4\nf 1 2 3\n";
+    let folder = folder(&[("flat.obj", model)]);
+    let json = bthc(folder.path(), &["compile", "flat.obj", "--json"]).expect(0).json();
+    assert_eq!(json["report"]["mesh"]["degenerate"], 1);
+    let scene = bth::open(folder.path().join("flat.bth")).unwrap();
+    let ray = bth::rays::Ray { origin: [0.2, 0.2, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+    assert_eq!(scene.nearest(&ray, bth::rays::Surface::NONE).surface.triangle, 1);
+}

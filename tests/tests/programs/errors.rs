@@ -1,0 +1,87 @@
+use crate::support::{bthc, folder, run, sphere};
+
+#[test]
+fn wrong_usage_exits_2() {
+    let folder = folder(&[]);
+    for args in [
+        &[][..],
+        &["compile"],
+        &["compile", "a.obj", "--quality", "superb"],
+        &["compile", "a.obj", "--min-tet-triangles", "-3"],
+        &["compile", "a.obj", "--threads", "many"],
+        &["unknown"],
+    ] {
+        let run = bthc(folder.path(), args).expect(2);
+        assert!(!run.stderr.is_empty());
+    }
+    run("bth-play", folder.path(), &["a.bth", "-o", "a.png", "--size", "0x10"]).expect(2);
+    run("bth-play", folder.path(), &["a.bth", "-o", "a.png", "--camera", "1,2,3"]).expect(2);
+}
+
+#[test]
+fn wrong_usage_is_json_when_asked_for() {
+    let folder = folder(&[]);
+    let json = bthc(folder.path(), &["compile", "a.obj", "--structure", "x", "--json"]).expect(2).json();
+    assert_eq!((&json["error"]["code"], &json["error"]["exit_code"]), (&"BTH-U001".into(), &2.into()));
+}
+
+#[test]
+fn help_and_version_exit_0_and_help_lists_the_exit_codes() {
+    let folder = folder(&[]);
+    for args in [&["--help"][..], &["compile", "--help"], &["verify", "--help"]] {
+        let run = bthc(folder.path(), args).expect(0);
+        assert!(run.stdout.contains("130  cancelled"), "{run:?}");
+    }
+    bthc(folder.path(), &["--version"]).expect(0);
+    run("bth-play", folder.path(), &["--help"]).expect(0);
+}
+
+#[test]
+fn missing_files_exit_4() {
+    let folder = folder(&[("ball.obj", &sphere(4))]);
+    for args in [
+        &["compile", "missing.obj"][..],
+        &["compile", "ball.obj", "-o", "missing/ball.bth"],
+        &["info", "missing.bth"],
+        &["verify", "missing.bth"],
+        &["trace", "missing.bth", "missing.rays", "-o", "x.hits"],
+        &["explain", "missing.obj"],
+        &["marks", "missing.obj"],
+    ] {
+        let run = bthc(folder.path(), args).expect(4);
+        assert!(run.stderr.starts_with("error: ") && run.stderr.contains("missing"), "{run:?}");
+    }
+    run("bth-play", folder.path(), &["missing.bth", "-o", "x.png"]).expect(4);
+}
+
+#[test]
+fn errors_name_file_and_line() {
+    let folder = folder(&[
+        ("nan.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n"),
+        ("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 7\n"),
+        ("word.off", "OFF\n3 1 0\n0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"),
+    ]);
+    for (name, line) in [("nan.obj", 3), ("index.obj", 5), ("word.off", 4)] {
+        let run = bthc(folder.path(), &["compile", name]).expect(3);
+        assert!(run.stderr.contains(&format!("{name}:{line}")), "{run:?}");
+    }
+}
+
+#[test]
+fn unknown_formats_and_foreign_files_exit_3() {
+    let folder = folder(&[("model.txt", "hello"), ("foreign.bth", "hello")]);
+    bthc(folder.path(), &["compile", "model.txt"]).expect(3);
+    for args in [&["info", "foreign.bth"][..], &["trace", "foreign.bth", "model.txt", "-o", "x.hits"]] {
+        let run = bthc(folder.path(), args).expect(3);
+        assert!(run.stderr.starts_with("error: "), "{run:?}");
+    }
+    run("bth-play", folder.path(), &["foreign.bth", "-o", "x.png"]).expect(3);
+    assert!(!folder.path().join("x.hits").exists() && !folder.path().join("x.png").exists());
+}
+
+#[test]
+fn model_is_never_overwritten_by_its_own_output() {
+    let folder = folder(&[("model.bth", "v 0 0 0\n")]);
+    bthc(folder.path(), &["compile", "model.bth"]).expect(2);
+    assert_eq!(std::fs::read(folder.path().join("model.bth")).unwrap(), b"v 0 0 0\n");
+}

@@ -1,0 +1,68 @@
+use crate::support::{bthc, crossing, folder, sphere};
+
+#[test]
+fn info_shows_sections_and_provenance_without_paths() {
+    let folder = folder(&[("ball.obj", &sphere(12))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let json = bthc(folder.path(), &["info", "ball.bth", "--json"]).expect(0).json();
+    assert_eq!(json["objects"][0]["triangles"], 4 * 12 * 11);
+    assert!(json["sections"].as_array().is_some_and(|s| s.len() > 3), "{json:#}");
+    let source = blake3_of(folder.path().join("ball.obj"));
+    assert_eq!(json["provenance"]["source"]["blake3"], source);
+    assert!(!json.to_string().contains("ball"), "{json:#}");
+    let text = bthc(folder.path(), &["info", "ball.bth", "--cpu"]).expect(0).stdout;
+    assert!(text.contains("LINES") && text.contains("architecture"), "{text}");
+}
+
+fn blake3_of(path: std::path::PathBuf) -> String {
+    blake3::hash(&std::fs::read(path).unwrap()).to_hex().to_string()
+}
+
+#[test]
+fn verify_finds_a_damaged_byte() {
+    let folder = folder(&[("ball.obj", &sphere(12))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let path = folder.path().join("ball.bth");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let run = bthc(folder.path(), &["verify", "ball.bth"]).expect(1);
+    assert!(run.stderr.contains("BTH-F"), "{run:?}");
+    let json = bthc(folder.path(), &["verify", "ball.bth", "--json"]).expect(1).json();
+    assert_eq!(json["verified"], false);
+    assert!(json["errors"][0]["code"].as_str().is_some_and(|c| c.starts_with("BTH-F")), "{json:#}");
+}
+
+#[test]
+fn marks_lists_crossing_triangles() {
+    let folder = folder(&[("crossing.obj", &crossing())]);
+    let json = bthc(folder.path(), &["marks", "crossing.obj", "--json", "--tris", "x.tris"]).expect(0).json();
+    assert_eq!(json["bad_triangles"], serde_json::json!([0, 1]));
+    assert_eq!(json["bad_pairs"], 1);
+    let tris = std::fs::read(folder.path().join("x.tris")).unwrap();
+    assert_eq!((&tris[..4], tris.len()), (&b"TRIS"[..], 16 + 3 * 36));
+    let text = bthc(folder.path(), &["marks", "crossing.obj"]).expect(0).stdout;
+    assert_eq!(text.lines().last(), Some("2 of 3 triangles in 1 bad contacts"));
+}
+
+#[test]
+fn explain_tells_why_nodes_were_chosen_or_refused() {
+    let folder = folder(&[("ball.obj", &sphere(32)), ("crossing.obj", &crossing())]);
+    let json = bthc(folder.path(), &["explain", "ball.obj", "--json"]).expect(0).json();
+    let first = &json["nodes"][0];
+    assert_eq!((&first["node"], &first["count"]), (&0.into(), &(4 * 32 * 31).into()), "{json:#}");
+    assert!(first["decision"].is_string() || first["decision"].is_object(), "{json:#}");
+    let text = bthc(folder.path(), &["explain", "crossing.obj"]).expect(0).stdout;
+    assert!(text.contains("triangles"), "{text}");
+}
+
+#[test]
+fn completions_and_manual_are_printed() {
+    let folder = folder(&[]);
+    for shell in ["bash", "zsh", "fish"] {
+        let run = bthc(folder.path(), &["completions", shell]).expect(0);
+        assert!(run.stdout.contains("bthc"), "{shell}");
+    }
+    assert!(bthc(folder.path(), &["man"]).expect(0).stdout.contains(".TH"));
+}

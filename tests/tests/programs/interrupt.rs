@@ -1,0 +1,60 @@
+//! Whenever the compiler is stopped, its output is whole or absent.
+
+use crate::support::{bthc, command, folder, sphere, wait};
+use std::path::Path;
+use std::time::Duration;
+
+/// Files of a folder other than these.
+fn litter(folder: &Path, expected: &[&str]) -> Vec<String> {
+    let names = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    names.filter(|name| !expected.contains(&name.as_str())).collect()
+}
+
+fn check_output(folder: &Path) {
+    if folder.join("ball.bth").exists() {
+        bthc(folder, &["verify", "ball.bth"]).expect(0);
+    }
+}
+
+#[test]
+fn killed_compilation_leaves_a_whole_output_or_none() {
+    let folder = folder(&[("ball.obj", &sphere(64))]);
+    // From before the program has started to after it has ended.
+    for milliseconds in [0, 3, 10, 20, 40, 60, 90, 130, 200, 300, 500, 800] {
+        let mut child = command("bthc", folder.path(), &["compile", "ball.obj", "--quiet"]).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        check_output(folder.path());
+        let _ = std::fs::remove_file(folder.path().join("ball.bth"));
+    }
+    // At worst a hidden unfinished file stays behind, which the next run removes.
+    bthc(folder.path(), &["compile", "ball.obj", "--quiet"]).expect(0);
+    assert_eq!(litter(folder.path(), &["ball.obj", "ball.bth"]), [""; 0]);
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_compilation_exits_130_and_leaves_nothing() {
+    let folder = folder(&[("ball.obj", &sphere(160))]);
+    let mut interrupted = 0;
+    for milliseconds in [40, 80, 120, 160, 200, 300] {
+        let mut child = command("bthc", folder.path(), &["compile", "ball.obj", "--quiet", "--quality", "best"]);
+        let mut child = child.stderr(std::process::Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        let pid = child.id().to_string();
+        let sent = std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap();
+        let status = wait(&mut child, Duration::from_secs(60)).expect("ends soon after Ctrl-C");
+        if status.code() == Some(130) {
+            interrupted += 1;
+            assert_eq!(litter(folder.path(), &["ball.obj"]), [""; 0]);
+        } else {
+            // It had ended before, or the signal came before the program listened.
+            let unheard = std::os::unix::process::ExitStatusExt::signal(&status) == Some(2);
+            assert!(status.success() || unheard || !sent.success(), "{status:?}");
+            check_output(folder.path());
+            let _ = std::fs::remove_file(folder.path().join("ball.bth"));
+        }
+    }
+    assert!(interrupted > 0, "no interrupt met the compiler at work");
+}

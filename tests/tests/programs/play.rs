@@ -1,0 +1,87 @@
+use crate::support::{bthc, folder, run, sphere};
+use std::path::Path;
+
+fn play(folder: &Path, args: &[&str]) -> crate::support::Run {
+    let mut all = vec!["ball.bth", "-o", "out.png", "--size", "50x37", "--spp", "2"];
+    all.extend(args);
+    run("bth-play", folder, &all)
+}
+
+fn picture(folder: &Path, args: &[&str]) -> Vec<u8> {
+    play(folder, args).expect(0);
+    std::fs::read(folder.join("out.png")).unwrap()
+}
+
+/// Width and height in the header of a PNG file.
+fn size(png: &[u8]) -> (u32, u32) {
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    let number = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+    (number(16), number(20))
+}
+
+#[test]
+fn picture_has_the_right_size_and_does_not_depend_on_threads() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let mut pictures = Vec::new();
+    for mode in ["shaded", "normals", "ao", "steps"] {
+        let one = picture(folder.path(), &["--mode", mode, "--threads", "1"]);
+        assert_eq!(size(&one), (50, 37));
+        assert!(one == picture(folder.path(), &["--mode", mode, "--threads", "2"]), "{mode}");
+        assert!(!pictures.contains(&one), "{mode} looks like another mode");
+        pictures.push(one);
+    }
+    let mapped = picture(folder.path(), &["--map"]);
+    assert!(mapped == pictures[0]);
+    let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 3, "{names:?}");
+}
+
+#[test]
+fn cameras_differ_and_look_from_inside_too() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let cameras = [
+        &[][..],
+        &["--yaw", "-120", "--pitch", "60"],
+        &["--inside"],
+        &["--camera", "0,0,3,0,0,-1"],
+        &["--zoom", "3"],
+        &["--up", "z"],
+        &["--pitch", "90"],
+    ];
+    let mut pictures: Vec<Vec<u8>> = cameras.iter().map(|args| picture(folder.path(), args)).collect();
+    pictures.sort();
+    pictures.dedup();
+    assert_eq!(pictures.len(), cameras.len());
+}
+
+#[test]
+fn json_reports_time_and_rays() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let json = play(folder.path(), &["--mode", "steps", "--json"]).expect(0).json();
+    assert_eq!(json["frame"]["nearest_rays"], 50 * 37 * 2);
+    assert!(json["frame"]["steps"]["nodes"].as_f64().is_some_and(|n| n > 0.0), "{json:#}");
+    assert!(json["rays_per_second"].as_f64().is_some_and(|n| n > 0.0), "{json:#}");
+}
+
+#[test]
+fn modes_that_need_normals_say_that_the_file_has_no_geometry() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj", "--no-geometry"]).expect(0);
+    let refused = play(folder.path(), &[]).expect(3);
+    assert!(refused.stderr.contains("--no-geometry") && refused.stderr.contains("BTH-P001"), "{refused:?}");
+    assert!(!folder.path().join("out.png").exists());
+    play(folder.path(), &["--mode", "steps"]).expect(0);
+}
+
+#[test]
+fn model_without_triangles_gives_an_empty_picture() {
+    let folder = folder(&[("ball.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    for mode in ["shaded", "normals", "ao", "steps"] {
+        play(folder.path(), &["--mode", mode]).expect(0);
+        play(folder.path(), &["--mode", mode, "--inside"]).expect(0);
+    }
+}

@@ -1,0 +1,70 @@
+use crate::support::{bthc, folder, sphere};
+use bth::rays::{Ray, Surface};
+
+/// Rays of a grid in front of the unit sphere, some past it.
+fn rays() -> Vec<Ray> {
+    let at = |i: i32| i as f32 / 20.0 - 1.25;
+    let ray = |x, y| Ray { origin: [x, y, 3.0], tmin: 0.0, direction: [0.01, -0.02, -1.0], tmax: 10.0 };
+    (0..50 * 50).map(|i| ray(at(i % 50), at(i / 50))).collect()
+}
+
+fn file(tag: &[u8; 4], rows: impl Iterator<Item = Vec<u8>>) -> Vec<u8> {
+    let rows: Vec<Vec<u8>> = rows.collect();
+    let header = [&tag[..], &1u32.to_le_bytes(), &(rows.len() as u64).to_le_bytes()].concat();
+    [header, rows.concat()].concat()
+}
+
+fn ray_bytes(ray: &Ray) -> Vec<u8> {
+    let ([ox, oy, oz], [dx, dy, dz]) = (ray.origin, ray.direction);
+    [ox, oy, oz, ray.tmin, dx, dy, dz, ray.tmax].iter().flat_map(|f| f.to_le_bytes()).collect()
+}
+
+#[test]
+fn hits_are_those_of_the_library_bit_for_bit() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let scene = bth::open(folder.path().join("ball.bth")).unwrap();
+    let rays = rays();
+    std::fs::write(folder.path().join("x.rays"), file(b"RAYS", rays.iter().map(ray_bytes))).unwrap();
+    let from = rays.iter().map(|_| u32::MAX.to_le_bytes().to_vec());
+    std::fs::write(folder.path().join("x.from"), file(b"FROM", from)).unwrap();
+
+    let expected = file(
+        b"HITS",
+        rays.iter().map(|ray| {
+            let hit = scene.nearest(ray, Surface::NONE);
+            let values: Vec<u8> = [hit.t, hit.u, hit.v].iter().flat_map(|f| f.to_le_bytes()).collect();
+            [values, hit.surface.triangle.to_le_bytes().to_vec()].concat()
+        }),
+    );
+    for extra in [&[][..], &["--threads", "1"], &["--threads", "2", "--from", "x.from"]] {
+        let mut args = vec!["trace", "ball.bth", "x.rays", "-o", "x.hits"];
+        args.extend(extra);
+        bthc(folder.path(), &args).expect(0);
+        assert!(std::fs::read(folder.path().join("x.hits")).unwrap() == expected, "{extra:?}");
+    }
+
+    let args = ["trace", "ball.bth", "x.rays", "-o", "x.hits", "--any", "--json"];
+    let json = bthc(folder.path(), &args).expect(0).json();
+    let hits = std::fs::read(folder.path().join("x.hits")).unwrap();
+    let found: Vec<bool> = hits[16..].chunks(16).map(|hit| hit[12..] != [0xff; 4]).collect();
+    let any: Vec<bool> = rays.iter().map(|ray| scene.any(ray, Surface::NONE)).collect();
+    assert_eq!(found, any);
+    assert_eq!(json["hits"], any.iter().filter(|b| **b).count());
+}
+
+#[test]
+fn rejects_ray_files_that_are_cut_or_of_another_kind() {
+    let folder = folder(&[("ball.obj", &sphere(8)), ("text.rays", "not rays, but long enough for a header")]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    let whole = file(b"RAYS", rays().iter().map(ray_bytes));
+    std::fs::write(folder.path().join("cut.rays"), &whole[..whole.len() - 1]).unwrap();
+    std::fs::write(folder.path().join("whole.rays"), &whole).unwrap();
+    std::fs::write(folder.path().join("short.from"), file(b"FROM", std::iter::once(vec![0; 4]))).unwrap();
+    for rays in ["text.rays", "cut.rays"] {
+        let run = bthc(folder.path(), &["trace", "ball.bth", rays, "-o", "x.hits"]).expect(3);
+        assert!(run.stderr.contains(rays) && run.stderr.contains("BTH-I090"), "{run:?}");
+    }
+    bthc(folder.path(), &["trace", "ball.bth", "whole.rays", "--from", "short.from", "-o", "x.hits"]).expect(3);
+    assert!(!folder.path().join("x.hits").exists());
+}

@@ -1,4 +1,27 @@
 //! The binary BVH that marks, costs and tets work on, and its collapse to the wide one.
+//!
+//! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to better places.
+//! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
+
+mod binned_split;
+mod bounds;
+mod build;
+mod collapse;
+mod linked_tree;
+mod plan;
+mod reinsertion;
+mod sweep_split;
+mod wide_lines;
+mod zero_area;
+
+#[cfg(test)]
+mod samples;
+#[cfg(test)]
+mod validate;
+
+pub use build::{MAX_LEVELS, Options, Quality, Report, build};
+pub use collapse::{CollapseOptions, CollapseReport, Wide, collapse};
+pub use plan::Costs;
 
 /// Node of a [`BinaryBvh`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,336 @@
+//! Top-down construction of the binary BVH.
+
+use super::bounds::Bounds;
+use super::zero_area::is_zero_area;
+use super::{BinaryBvh, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::monitor::Monitor;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Edges on the longest path of a binary BVH that [`build`] makes; below `bth::limits::MAX_DEPTH`,
+/// since a wide node takes at least one level of the binary tree.
+pub const MAX_LEVELS: u32 = 90;
+
+/// Subtrees of more triangles are built as separate tasks, between which cancellation is looked for.
+const TASK: usize = 1 << 12;
+
+/// How much time to spend on the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Quality {
+    /// Binned SAH with 16 bins.
+    Fast,
+    /// Binned SAH with 32 bins, full sweep in small nodes, one pass of reinsertion.
+    #[default]
+    Balanced,
+    /// Full-sweep SAH but in the topmost nodes (where 32 bins are as good), two passes of reinsertion.
+    Best,
+}
+
+/// What a [`Quality`] stands for.
+struct Effort {
+    bins: usize,
+    /// Nodes of at most this many triangles are split by a full sweep.
+    sweep_count: usize,
+    /// Share of the nodes, largest first, that each pass of reinsertion tries to move.
+    reinsertion: &'static [f64],
+}
+
+impl Quality {
+    fn effort(self) -> Effort {
+        match self {
+            Quality::Fast => Effort { bins: 16, sweep_count: 8, reinsertion: &[] },
+            Quality::Balanced => Effort { bins: 32, sweep_count: 64, reinsertion: &[0.05] },
+            Quality::Best => Effort { bins: 32, sweep_count: 1 << 14, reinsertion: &[0.5, 0.5] },
+        }
+    }
+}
+
+/// Options of [`build`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// How much time to spend on the tree.
+    pub quality: Quality,
+}
+
+/// What [`build`] did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Triangles in the tree.
+    pub triangles: u64,
+    /// Triangles of exactly zero area, which are not in the tree.
+    pub dropped: u64,
+    /// Nodes of the tree, leaves included.
+    pub nodes: u64,
+    /// Edges on the longest path from the root.
+    pub levels: u32,
+    /// Nodes that a random line through the root's box meets, on average, after the top-down build
+    /// and then after each pass of reinsertion: the sum of the nodes' areas over the root's.
+    pub visits: Vec<f64>,
+    /// Subtrees that each pass of reinsertion moved.
+    pub moved: Vec<u64>,
+    /// Wall-clock time of the whole stage, seconds.
+    pub seconds: f64,
+}
+
+/// A triangle during the build.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    pub(super) bounds: Bounds,
+    pub(super) id: u32,
+}
+
+/// The best split found so far.
+#[derive(Clone, Copy)]
+pub(super) struct Split {
+    cost: f64,
+    imbalance: usize,
+    pub(super) axis: usize,
+    /// First position (bin or rank) of the right side.
+    pub(super) position: usize,
+    /// Triangles of the left side.
+    pub(super) left: usize,
+}
+
+impl Split {
+    pub(super) const NONE: Split =
+        Split { cost: f64::INFINITY, imbalance: usize::MAX, axis: 0, position: 0, left: 0 };
+
+    pub(super) fn is_some(&self) -> bool {
+        self.left > 0
+    }
+
+    /// Takes the split if it is cheaper, or as cheap and better balanced, so that stacks of equal
+    /// triangles do not become long chains.
+    #[inline(always)]
+    pub(super) fn improve(&mut self, cost: f64, axis: usize, position: usize, left: usize, total: usize) {
+        if cost <= self.cost {
+            let imbalance = left.abs_diff(total - left);
+            if cost < self.cost || imbalance < self.imbalance {
+                *self = Split { cost, imbalance, axis, position, left };
+            }
+        }
+    }
+}
+
+/// Builds the binary BVH of all triangles of non-zero area, down to single triangles. The result
+/// depends on mesh and options alone, not on the number of threads.
+///
+/// # Errors
+/// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
+/// [`Error::Limit`] beyond `bth::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
+pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
+    let start = Instant::now();
+    check_mesh(mesh)?;
+    let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
+        .into_par_iter()
+        .filter_map(|id| {
+            let corners = mesh.corners(id);
+            (!is_zero_area(corners)).then(|| Reference { bounds: Bounds::of_points(&corners), id })
+        })
+        .collect();
+    let mut report = Report {
+        triangles: references.len() as u64,
+        dropped: (mesh.triangles.len() - references.len()) as u64,
+        ..Report::default()
+    };
+    if references.is_empty() {
+        report.seconds = start.elapsed().as_secs_f64();
+        return Ok((BinaryBvh::default(), report));
+    }
+
+    monitor.stage("build", Some(references.len() as u64));
+    let effort = options.quality.effort();
+    let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
+    let mut nodes = vec![blank; 2 * references.len() - 1];
+    let builder = Builder { effort: &effort, monitor };
+    builder.subtree(&mut references, &mut nodes, Place::ROOT, &mut sweep_split::Scratch::default())?;
+    let order = references.iter().map(|r| r.id).collect();
+    drop(references);
+    let mut bvh = BinaryBvh { nodes, order };
+    report.visits.push(visits(&bvh));
+
+    if !effort.reinsertion.is_empty() && bvh.nodes.len() > 3 {
+        monitor.stage("reinsertion", None);
+        let mut tree = LinkedTree::new(&bvh);
+        for &share in effort.reinsertion {
+            report.moved.push(reinsertion::pass(&mut tree, share, monitor)?);
+            report.visits.push(tree.visits());
+        }
+        bvh = tree.into_preorder(bvh);
+    }
+    report.nodes = bvh.nodes.len() as u64;
+    report.levels = levels(&bvh);
+    report.seconds = start.elapsed().as_secs_f64();
+    Ok((bvh, report))
+}
+
+fn check_mesh(mesh: &Mesh) -> Result<()> {
+    let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
+    if mesh.triangles.len() > bth::limits::MAX_TRIANGLES as usize {
+        return Err(Error::Limit {
+            code: "BTH-L201",
+            message: format!(
+                "the mesh has {} triangles; an object can have {}",
+                mesh.triangles.len(),
+                bth::limits::MAX_TRIANGLES
+            ),
+        });
+    }
+    let rows = mesh.positions.len();
+    if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= rows)) {
+        return internal(format!("triangle {t} refers to a position beyond the last ({rows} positions)"));
+    }
+    if let Some(v) = mesh.positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return internal(format!("position {v} is not finite"));
+    }
+    Ok(())
+}
+
+/// Where a subtree goes.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Index of its root.
+    node: u32,
+    /// First row of `order`.
+    first: u32,
+    /// Edges from the root.
+    level: u32,
+}
+
+impl Place {
+    const ROOT: Place = Place { node: 0, first: 0, level: 0 };
+}
+
+struct Builder<'a> {
+    effort: &'a Effort,
+    monitor: &'a dyn Monitor,
+}
+
+impl Builder<'_> {
+    /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references, in preorder.
+    fn subtree(
+        &self,
+        references: &mut [Reference],
+        nodes: &mut [Node],
+        place: Place,
+        scratch: &mut sweep_split::Scratch,
+    ) -> Result<()> {
+        let count = references.len();
+        let task = count > TASK;
+        if task {
+            self.monitor.check()?;
+        }
+        let (bounds, centers) = binned_split::measure(references);
+        nodes[0] = Node {
+            lower: bounds.lower,
+            upper: bounds.upper,
+            first: place.first,
+            count: count as u32,
+            right: 0,
+        };
+        if count == 1 {
+            return Ok(());
+        }
+        let left = self.split(references, &centers, place.level, scratch);
+        let right = place.node + 2 * left as u32;
+        nodes[0].right = right;
+        let (left_references, right_references) = references.split_at_mut(left);
+        let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left - 1);
+        let level = place.level + 1;
+        let left_place = Place { node: place.node + 1, first: place.first, level };
+        let right_place = Place { node: right, first: place.first + left as u32, level };
+        if !task {
+            self.subtree(left_references, left_nodes, left_place, scratch)?;
+            return self.subtree(right_references, right_nodes, right_place, scratch);
+        }
+        let (a, b) = rayon::join(
+            || self.task(left_references, left_nodes, left_place),
+            || self.task(right_references, right_nodes, right_place),
+        );
+        a.and(b)
+    }
+
+    /// A subtree with buffers of its own.
+    fn task(&self, references: &mut [Reference], nodes: &mut [Node], place: Place) -> Result<()> {
+        self.subtree(references, nodes, place, &mut sweep_split::Scratch::default())?;
+        if references.len() <= TASK {
+            self.monitor.advance(references.len() as u64);
+        }
+        Ok(())
+    }
+
+    /// Partitions the references and returns the size of the left side, 1 to one less than all.
+    fn split(
+        &self,
+        references: &mut [Reference],
+        centers: &Bounds,
+        level: u32,
+        scratch: &mut sweep_split::Scratch,
+    ) -> usize {
+        let count = references.len();
+        if count == 2 {
+            return 1;
+        }
+        // Halving needs ceil(log2(count)) levels; any split is fine as long as that stays possible below it.
+        let halvings = usize::BITS - (count - 1).leading_zeros();
+        if level + 1 + halvings > MAX_LEVELS {
+            return split_median(references, centers);
+        }
+        if centers.lower == centers.upper {
+            return split_by_id(references);
+        }
+        if count <= self.effort.sweep_count {
+            return sweep_split::split(references, scratch);
+        }
+        binned_split::split(references, centers, self.effort.bins)
+            .unwrap_or_else(|| split_median(references, centers))
+    }
+}
+
+/// Halves by the order of the centres along their widest axis.
+fn split_median(references: &mut [Reference], centers: &Bounds) -> usize {
+    let extent = |k: usize| centers.upper[k] - centers.lower[k];
+    let axis = (1..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by(middle, |a, b| {
+        let (x, y) = (a.bounds.half_center()[axis], b.bounds.half_center()[axis]);
+        x.total_cmp(&y).then(a.id.cmp(&b.id))
+    });
+    middle
+}
+
+/// Halves by id what no plane can separate.
+fn split_by_id(references: &mut [Reference]) -> usize {
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by_key(middle, |r| r.id);
+    middle
+}
+
+/// See [`Report::visits`].
+fn visits(bvh: &BinaryBvh) -> f64 {
+    let area = |node: &Node| Bounds::of_node(node).half_area();
+    bvh.nodes.iter().map(area).sum::<f64>() / area(&bvh.nodes[0])
+}
+
+/// Edges on the longest path.
+fn levels(bvh: &BinaryBvh) -> u32 {
+    let mut deepest = 0;
+    let mut stack = vec![(0u32, 0u32)];
+    while let Some((at, level)) = stack.pop() {
+        let node = &bvh.nodes[at as usize];
+        deepest = deepest.max(level);
+        if !node.is_leaf() {
+            stack.push((node.right, level + 1));
+            stack.push((at + 1, level + 1));
+        }
+    }
+    deepest
+}
+
+#[cfg(test)]
+#[path = "build_tests.rs"]
+mod tests;

@@ -1,0 +1,280 @@
+//! The wide BVH: from plan to lines.
+
+use super::bounds::Bounds;
+use super::plan::{Costs, Decision, Planner, Role, children};
+use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
+use super::{BinaryBvh, MAX_LEVELS};
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::monitor::Monitor;
+use bth::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES};
+use serde::Serialize;
+use std::time::Instant;
+
+/// Options of [`collapse`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CollapseOptions {
+    /// Keep the BVH below tet leaves beside them.
+    pub keep_subtrees: bool,
+    /// Costs that the tree is chosen by.
+    pub costs: Costs,
+}
+
+/// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wide {
+    /// Nodes in depth-first order, then leaves; after them the same for each kept subtree.
+    pub lines: Vec<Line>,
+    /// Ids of the leaves' triangles, in order of the leaves' lines.
+    pub triangle_ids: Vec<u32>,
+    /// [`Child`] code of the root, `NONE` when no triangle can be hit.
+    pub root: u32,
+    /// Wide nodes on the longest path from the root; subtrees count as below their tet leaf.
+    pub depth: u32,
+    /// Per cut node: [`Child`] code of the subtree's root, or `NONE` if subtrees are not kept.
+    pub subtrees: Vec<u32>,
+}
+
+/// What [`collapse`] did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CollapseReport {
+    /// Wide nodes.
+    pub nodes: u64,
+    /// Children of the wide nodes.
+    pub children: u64,
+    /// Leaves with shared vertices.
+    pub indexed_leaves: u64,
+    /// Triangles in them.
+    pub indexed_triangles: u64,
+    /// Leaves without sharing.
+    pub raw_leaves: u64,
+    /// Triangles in them.
+    pub raw_triangles: u64,
+    /// Tet leaves.
+    pub tet_leaves: u64,
+    /// Wide nodes on the longest path.
+    pub depth: u32,
+    /// Wide nodes that a random line through the root's box meets on average, kept subtrees not counted.
+    pub node_visits: f64,
+    /// The same for triangle leaves.
+    pub leaf_visits: f64,
+    /// Bytes of lines and triangle ids.
+    pub bytes: u64,
+    /// These per triangle in a triangle leaf.
+    pub bytes_per_triangle: f64,
+    /// Wall-clock time, seconds.
+    pub seconds: f64,
+}
+
+/// Collapses a binary BVH to the nodes and leaves of the file. The nodes in `cut` (ascending, none
+/// below another) become tet leaves: the i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
+///
+/// # Errors
+/// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
+/// [`Error::Internal`] when `cut` is not as described, [`Error::Cancelled`].
+pub fn collapse(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    cut: &[u32],
+    options: &CollapseOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Wide, CollapseReport)> {
+    let start = Instant::now();
+    check_cut(bvh, cut)?;
+    monitor.stage("collapse", None);
+    let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], ..Wide::default() };
+    let mut report = CollapseReport::default();
+    if bvh.nodes.is_empty() {
+        return Ok((wide, report));
+    }
+    let decisions = Planner::new(mesh, bvh, options.costs, options.keep_subtrees, monitor).run(cut)?;
+    let root_area = Bounds::of_node(&bvh.nodes[0]).half_area();
+    let mut writer =
+        Writer { mesh, bvh, cut, decisions: &decisions, monitor, wide: &mut wide, report: &mut report };
+    let (root, tets) = writer.tree(0, 0, true)?;
+    if options.keep_subtrees {
+        for (at, level) in tets {
+            let (code, _) = writer.tree(at, level, false)?;
+            let row = cut.binary_search(&at).expect("tet leaves are cut nodes");
+            writer.wide.subtrees[row] = code;
+        }
+    }
+    wide.root = root;
+    check_depth(wide.depth)?;
+
+    report.depth = wide.depth;
+    report.node_visits /= root_area;
+    report.leaf_visits /= root_area;
+    report.bytes = 64 * wide.lines.len() as u64 + 4 * wide.triangle_ids.len() as u64;
+    report.bytes_per_triangle = report.bytes as f64 / (wide.triangle_ids.len() as f64).max(1.0);
+    report.seconds = start.elapsed().as_secs_f64();
+    Ok((wide, report))
+}
+
+fn check_cut(bvh: &BinaryBvh, cut: &[u32]) -> Result<()> {
+    let mut free = 0u64;
+    for &at in cut {
+        let node = bvh.nodes.get(at as usize);
+        let Some(node) = node.filter(|_| u64::from(at) >= free) else {
+            return Err(Error::Internal {
+                code: "BTH-X202",
+                message: format!(
+                    "tet leaf {at} is no node, not in ascending order or below another tet leaf"
+                ),
+            });
+        };
+        free = u64::from(at) + 2 * u64::from(node.count) - 1;
+    }
+    Ok(())
+}
+
+fn check_depth(depth: u32) -> Result<()> {
+    const { assert!(MAX_LEVELS as usize <= bth::limits::MAX_DEPTH) };
+    if depth as usize <= bth::limits::MAX_DEPTH {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        code: "BTH-L203",
+        message: format!("the BVH is {depth} nodes deep; {} can be traversed", bth::limits::MAX_DEPTH),
+    })
+}
+
+fn check_lines(lines: usize) -> Result<()> {
+    if lines <= Child::INDEX_LIMIT as usize {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        code: "BTH-L202",
+        message: format!(
+            "the BVH needs {lines} lines of 64 bytes; an object can have {}",
+            Child::INDEX_LIMIT
+        ),
+    })
+}
+
+/// A wide node before its lines are written.
+struct Inner {
+    /// Its slots in `Writer::tree`'s list.
+    first: usize,
+    count: usize,
+}
+
+/// A slot of a wide node.
+struct Slot {
+    /// Node of the binary BVH.
+    node: u32,
+    /// Child code, once known.
+    code: u32,
+}
+
+struct Writer<'a> {
+    mesh: &'a Mesh,
+    bvh: &'a BinaryBvh,
+    cut: &'a [u32],
+    decisions: &'a [Decision],
+    monitor: &'a dyn Monitor,
+    wide: &'a mut Wide,
+    report: &'a mut CollapseReport,
+}
+
+impl Writer<'_> {
+    /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
+    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each.
+    fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
+        let base = self.wide.lines.len();
+        // Settle the shape: slot 0 holds the root, every other slot belongs to a node.
+        let mut slots = vec![Slot { node: root, code: NONE }];
+        let mut inner: Vec<Inner> = Vec::new();
+        let mut leaves: Vec<usize> = Vec::new();
+        let mut tets = Vec::new();
+        let mut pending = vec![(0usize, level)];
+        while let Some((slot, level)) = pending.pop() {
+            let at = slots[slot].node;
+            let decision = self.decisions[at as usize];
+            if outer && decision.is_cut() {
+                let row = self.cut.binary_search(&at).expect("only cut nodes are marked so");
+                slots[slot].code = Child::Tets(row as u32).code();
+                self.report.tet_leaves += 1;
+                tets.push((at, level));
+                continue;
+            }
+            if decision.role() != Role::Node {
+                leaves.push(slot);
+                continue;
+            }
+            slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
+            let first = slots.len();
+            slots.extend(
+                children(self.bvh, self.decisions, at).into_iter().map(|node| Slot { node, code: NONE }),
+            );
+            inner.push(Inner { first, count: slots.len() - first });
+            self.wide.depth = self.wide.depth.max(level + 1);
+            if outer {
+                self.report.node_visits += self.area(at);
+            }
+            pending.extend((first..slots.len()).rev().map(|slot| (slot, level + 1)));
+        }
+
+        // Leaves follow the nodes.
+        let mut next = base + inner.len() * NODE_LINES;
+        for &slot in &leaves {
+            let role = self.decisions[slots[slot].node as usize].role();
+            let (child, lines) = match role {
+                Role::Raw => (Child::Raw(next as u32), RAW_LINES),
+                _ => (Child::Indexed(next as u32), INDEXED_LINES),
+            };
+            slots[slot].code = child.code();
+            next += lines;
+            check_lines(next)?;
+        }
+        check_lines(next)?;
+
+        self.wide.lines.resize(next, Line([0; 16]));
+        for (i, Inner { first, count }) in inner.iter().enumerate() {
+            let slots =
+                slots[*first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
+            put(&mut self.wide.lines, base + i * NODE_LINES, &wide_node(slots));
+        }
+        for (done, &slot) in leaves.iter().enumerate() {
+            if done % 4096 == 0 {
+                self.monitor.check()?;
+            }
+            self.leaf(&slots[slot], outer);
+        }
+        self.report.nodes += inner.len() as u64;
+        self.report.children += slots.len() as u64 - 1;
+        Ok((slots[0].code, tets))
+    }
+
+    /// Writes a triangle leaf at the line of its code.
+    fn leaf(&mut self, slot: &Slot, outer: bool) {
+        let node = &self.bvh.nodes[slot.node as usize];
+        let ids = &self.bvh.order[node.first as usize..][..node.count as usize];
+        let first = self.wide.triangle_ids.len() as u32;
+        self.wide.triangle_ids.extend_from_slice(ids);
+        match Child::from_code(slot.code) {
+            Some(Child::Raw(line)) => {
+                put(&mut self.wide.lines, line as usize, &raw_leaf(self.mesh, ids, first));
+                self.report.raw_leaves += 1;
+                self.report.raw_triangles += u64::from(node.count);
+            }
+            Some(Child::Indexed(line)) => {
+                put(&mut self.wide.lines, line as usize, &indexed_leaf(self.mesh, ids, first));
+                self.report.indexed_leaves += 1;
+                self.report.indexed_triangles += u64::from(node.count);
+            }
+            _ => unreachable!("leaf slots have leaf codes"),
+        }
+        if outer {
+            self.report.leaf_visits += self.area(slot.node);
+        }
+    }
+
+    fn area(&self, at: u32) -> f64 {
+        Bounds::of_node(&self.bvh.nodes[at as usize]).half_area()
+    }
+}
+
+#[cfg(test)]
+#[path = "collapse_tests.rs"]
+mod tests;

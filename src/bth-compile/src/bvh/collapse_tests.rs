@@ -1,0 +1,210 @@
+use super::super::samples::{Random, clutter, exponential, grid, model, soup};
+use super::super::validate::validate_wide;
+use super::super::{Options, Quality, build};
+use super::*;
+use crate::monitor::Silent;
+use proptest::prelude::*;
+
+fn built(mesh: &Mesh, quality: Quality) -> BinaryBvh {
+    build(mesh, &Options { quality }, &Silent).expect("builds").0
+}
+
+fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool) -> (Wide, CollapseReport) {
+    let options = CollapseOptions { keep_subtrees, ..CollapseOptions::default() };
+    let (wide, report) = collapse(mesh, bvh, cut, &options, &Silent).expect("collapses");
+    validate_wide(mesh, bvh, cut, keep_subtrees, &wide);
+    assert_eq!(report.tet_leaves as usize, cut.len());
+    (wide, report)
+}
+
+/// Disjoint nodes, each taken with probability 1 in `odds`, walking down from the root.
+fn random_cut(bvh: &BinaryBvh, odds: usize, random: &mut Random) -> Vec<u32> {
+    let mut cut = Vec::new();
+    let mut at = 0;
+    while at < bvh.nodes.len() {
+        let taken = random.below(odds) == 0;
+        if taken {
+            cut.push(at as u32);
+        }
+        at += if taken { 2 * bvh.nodes[at].count as usize - 1 } else { 1 };
+    }
+    cut
+}
+
+#[test]
+fn an_empty_tree_has_no_root() {
+    let (wide, report) = collapsed(&Mesh::default(), &BinaryBvh::default(), &[], false);
+    assert_eq!((wide.root, wide.depth, report.bytes), (NONE, 0, 0));
+}
+
+#[test]
+fn a_single_triangle_is_a_leaf_as_root() {
+    let mesh = soup(1, 1);
+    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Fast), &[], false);
+    assert_eq!((wide.root, wide.depth), (Child::Indexed(0).code(), 0));
+    assert_eq!(wide.lines.len(), INDEXED_LINES);
+}
+
+#[test]
+fn a_cut_root_is_the_whole_tree() {
+    let mesh = grid(10, 1.0, 2);
+    let bvh = built(&mesh, Quality::Fast);
+    let (wide, _) = collapsed(&mesh, &bvh, &[0], false);
+    assert_eq!((wide.root, wide.depth, wide.lines.len()), (Child::Tets(0).code(), 0, 0));
+    let (kept, _) = collapsed(&mesh, &bvh, &[0], true);
+    let (plain, _) = collapsed(&mesh, &bvh, &[], false);
+    assert_eq!(kept.root, Child::Tets(0).code());
+    assert_eq!(kept.lines, plain.lines, "the kept subtree is the tree without the cut");
+    assert_eq!((kept.subtrees, kept.depth), (vec![plain.root], plain.depth));
+}
+
+#[test]
+fn a_cut_leaf_is_atomic_too() {
+    let mesh = soup(40, 3);
+    let bvh = built(&mesh, Quality::Fast);
+    let cut: Vec<u32> = (0..bvh.nodes.len() as u32).filter(|&i| bvh.nodes[i as usize].is_leaf()).collect();
+    for keep in [false, true] {
+        let (wide, report) = collapsed(&mesh, &bvh, &cut, keep);
+        assert_eq!(report.tet_leaves, 40);
+        assert_eq!(wide.triangle_ids.len(), if keep { 40 } else { 0 });
+    }
+}
+
+#[test]
+fn cut_nodes_out_of_order_out_of_range_or_nested_are_refused() {
+    let mesh = soup(40, 3);
+    let bvh = built(&mesh, Quality::Fast);
+    for cut in [vec![0, 1], vec![5, 3], vec![4, 4], vec![bvh.nodes.len() as u32]] {
+        let result = collapse(&mesh, &bvh, &cut, &CollapseOptions::default(), &Silent);
+        assert!(matches!(result, Err(Error::Internal { .. })), "{cut:?}");
+    }
+}
+
+#[test]
+fn too_many_lines_or_levels_are_refused() {
+    assert!(check_lines(Child::INDEX_LIMIT as usize).is_ok());
+    assert!(matches!(check_lines(Child::INDEX_LIMIT as usize + 1), Err(Error::Limit { .. })));
+    assert!(check_depth(96).is_ok());
+    assert!(matches!(check_depth(97), Err(Error::Limit { .. })));
+}
+
+#[test]
+fn chains_collapse_within_the_depth_limit() {
+    let mesh = exponential(3000);
+    let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Best), &[], false);
+    assert!(wide.depth as usize <= bth::limits::MAX_DEPTH);
+}
+
+#[test]
+fn the_lines_are_the_same_at_any_number_of_threads() {
+    let mesh = grid(120, 10.0, 4);
+    let bvh = built(&mesh, Quality::Fast);
+    let cut = random_cut(&bvh, 200, &mut Random(9));
+    let at = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
+        pool.install(|| collapsed(&mesh, &bvh, &cut, true).0)
+    };
+    let one = at(1);
+    assert!(one == at(2) && one == at(5));
+}
+
+/// Least cost of a subtree in at most `slots` slots, straight from the definition and without vertices' limits.
+fn cost_by_definition(bvh: &BinaryBvh, costs: &Costs, at: u32, slots: usize) -> f64 {
+    let node = &bvh.nodes[at as usize];
+    let area = Bounds::of_node(node).half_area() / Bounds::of_node(&bvh.nodes[0]).half_area();
+    let leaf = |c: [f32; 2]| area * (f64::from(c[0]) + f64::from(c[1]) * f64::from(node.count));
+    if node.is_leaf() {
+        return leaf(costs.indexed);
+    }
+    let spread = |slots: usize| {
+        (1..slots)
+            .map(|j| {
+                cost_by_definition(bvh, costs, at + 1, j)
+                    + cost_by_definition(bvh, costs, node.right, slots - j)
+            })
+            .fold(f64::INFINITY, f64::min)
+    };
+    let mut best = area * f64::from(costs.node) + spread(16);
+    if node.count <= 16 {
+        best = best.min(leaf(costs.raw));
+    }
+    (2..=slots).map(spread).fold(best, f64::min)
+}
+
+#[test]
+fn the_plan_has_the_least_cost_by_definition() {
+    // Separate triangles: an indexed leaf of several would need count * 3 <= 16 vertices, so price it out.
+    let costs = Costs { node: 1.0, indexed: [1.0, 9.0], raw: [2.5, 0.1] };
+    for seed in 0..4 {
+        let mesh = soup(7, seed);
+        let bvh = built(&mesh, Quality::Best);
+        let options = CollapseOptions { keep_subtrees: false, costs };
+        let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
+        let least = cost_by_definition(&bvh, &costs, 0, 1);
+        // With one price per visit the report gives the cost back up to the triangles' part, which
+        // the leaf kinds decide: a root that is one raw leaf is checked exactly, others from below.
+        if report.raw_leaves == 1 && report.nodes == 0 {
+            let cost = f64::from(costs.raw[0]) + 7.0 * f64::from(costs.raw[1]);
+            assert!((cost - least).abs() <= 1e-5 * least, "{cost} {least}");
+        } else {
+            assert!(report.node_visits * f64::from(costs.node) <= least);
+        }
+    }
+}
+
+#[test]
+fn leaves_are_small_on_disk() {
+    let mut cases = vec![
+        ("soup".to_string(), Some(soup(50_000, 5)), 110.0),
+        ("grid".to_string(), Some(grid(200, 5.0, 6)), 45.0),
+    ];
+    let models = [
+        ("stanford-bunny.ply", 45.0),
+        ("armadillo86k.ply", 45.0),
+        ("nefertiti.ply", 45.0),
+        ("fandisk.ply", 45.0),
+        ("sanmiguel_leaves.ply", 110.0),
+        ("sponza_dabrovic.ply", 60.0),
+    ];
+    cases.extend(models.iter().map(|&(name, limit)| (name.to_string(), model(name), limit)));
+    for (name, mesh, limit) in cases {
+        let Some(mesh) = mesh else {
+            println!("skipped {name}: the shared test data is absent");
+            continue;
+        };
+        let bvh = built(&mesh, Quality::Balanced);
+        let (_, report) = collapsed(&mesh, &bvh, &[], false);
+        println!(
+            "{name}: {:.1} bytes a triangle, {} nodes of {:.1} children, {} indexed leaves of {:.1}, {} raw of {:.1}, visits {:.2} + {:.2}",
+            report.bytes_per_triangle,
+            report.nodes,
+            report.children as f64 / report.nodes as f64,
+            report.indexed_leaves,
+            report.indexed_triangles as f64 / report.indexed_leaves as f64,
+            report.raw_leaves,
+            report.raw_triangles as f64 / report.raw_leaves as f64,
+            report.node_visits,
+            report.leaf_visits,
+        );
+        assert!(report.bytes_per_triangle <= limit, "{name}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn random_meshes_and_cuts_collapse_to_valid_trees(
+        count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60, keep: bool,
+    ) {
+        let mut random = Random(seed);
+        let mesh = match kind {
+            0 => soup(count, seed),
+            1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),
+            _ => grid(1 + random.below(14), random.unit(), seed),
+        };
+        let bvh = built(&mesh, Quality::Balanced);
+        let cut = random_cut(&bvh, odds, &mut random);
+        collapsed(&mesh, &bvh, &cut, keep);
+        collapsed(&mesh, &bvh, &[], false);
+    }
+}

@@ -1,0 +1,255 @@
+//! Which nodes of the binary BVH become wide nodes and leaves, by dynamic programming over SAH.
+//!
+//! As in "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (Ylitie et al.
+//! 2017, §3.1): `cost[k]` of a node is the least cost of its subtree as at most `k` children of one
+//! wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
+
+use super::bounds::Bounds;
+use super::{BinaryBvh, Node};
+use crate::error::Result;
+use crate::mesh::Mesh;
+use crate::monitor::Monitor;
+use bth::layout::WIDTH;
+
+/// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's area over the root's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Costs {
+    /// A wide node.
+    pub node: f32,
+    /// A leaf with shared vertices, which is 4 lines, and each of its triangles.
+    pub indexed: [f32; 2],
+    /// A leaf without sharing, which is 10 lines, and each of its triangles.
+    pub raw: [f32; 2],
+}
+
+impl Default for Costs {
+    /// A leaf tests its triangles together, so that it costs about as much as a node whatever their
+    /// number; a raw leaf reads 2.5 times the memory.
+    fn default() -> Self {
+        Costs { node: 1.0, indexed: [1.0, 0.02], raw: [2.5, 0.02] }
+    }
+}
+
+/// What a node is when it takes one slot of a wide node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    Node,
+    Indexed,
+    Raw,
+}
+
+/// A node's decisions in 4 bits each: at 4 k for k in 2..16, how many of k slots its left child
+/// takes, 0 for "as with k - 1"; at 0, how many of 16 when it is itself a wide node; at 4, its role.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Decision(u64);
+
+impl Decision {
+    const CUT: u64 = 8 << 4;
+
+    fn share(self, slots: usize) -> usize {
+        (self.0 >> (4 * (slots % WIDTH)) & 15) as usize
+    }
+
+    fn set_share(&mut self, slots: usize, left: usize) {
+        self.0 |= (left as u64) << (4 * (slots % WIDTH));
+    }
+
+    pub(super) fn role(self) -> Role {
+        match self.0 >> 4 & 7 {
+            0 => Role::Node,
+            1 => Role::Indexed,
+            _ => Role::Raw,
+        }
+    }
+
+    /// Whether the node is a tet leaf; its role is then that of the subtree kept beside it.
+    pub(super) fn is_cut(self) -> bool {
+        self.0 & Self::CUT != 0
+    }
+}
+
+/// What a parent needs to know of a subtree.
+struct Summary {
+    /// Least cost in at most so many slots; rows 1 to 15.
+    cost: [f32; WIDTH],
+    /// Distinct vertices, ascending, when there are at most 16.
+    vertices: Option<Vertices>,
+}
+
+/// Ascending vertex indices.
+#[derive(Clone, Copy)]
+struct Vertices {
+    index: [u32; WIDTH],
+    count: usize,
+}
+
+impl Vertices {
+    fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
+        triangle.sort_unstable();
+        let mut vertices = Vertices { index: [0; WIDTH], count: 0 };
+        for v in triangle {
+            if vertices.count == 0 || vertices.index[vertices.count - 1] != v {
+                vertices.index[vertices.count] = v;
+                vertices.count += 1;
+            }
+        }
+        vertices
+    }
+
+    /// The union, if it fits.
+    fn join(&self, other: &Vertices) -> Option<Vertices> {
+        let mut joined = Vertices { index: [0; WIDTH], count: 0 };
+        let (a, b) = (&self.index[..self.count], &other.index[..other.count]);
+        let (mut i, mut j) = (0, 0);
+        while i < a.len() || j < b.len() {
+            let next = match (a.get(i), b.get(j)) {
+                (Some(&x), Some(&y)) => x.min(y),
+                (Some(&x), None) | (None, Some(&x)) => x,
+                (None, None) => break,
+            };
+            i += usize::from(a.get(i) == Some(&next));
+            j += usize::from(b.get(j) == Some(&next));
+            *joined.index.get_mut(joined.count)? = next;
+            joined.count += 1;
+        }
+        Some(joined)
+    }
+}
+
+/// Inputs of the planning.
+pub(super) struct Planner<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) bvh: &'a BinaryBvh,
+    pub(super) costs: Costs,
+    /// Whether what lies below cut nodes is planned, too.
+    pub(super) below_cut: bool,
+    pub(super) monitor: &'a dyn Monitor,
+    inverse_area: f64,
+}
+
+/// Subtrees of more triangles are planned as separate tasks.
+const TASK: u32 = 1 << 13;
+
+impl<'a> Planner<'a> {
+    /// The BVH has at least one node.
+    pub(super) fn new(
+        mesh: &'a Mesh,
+        bvh: &'a BinaryBvh,
+        costs: Costs,
+        below_cut: bool,
+        monitor: &'a dyn Monitor,
+    ) -> Self {
+        let inverse_area = 1.0 / Bounds::of_node(&bvh.nodes[0]).half_area();
+        Planner { mesh, bvh, costs, below_cut, monitor, inverse_area }
+    }
+
+    /// Decisions for all nodes; `cut` holds the tet leaves, ascending.
+    pub(super) fn run(&self, cut: &[u32]) -> Result<Vec<Decision>> {
+        let mut decisions = vec![Decision::default(); self.bvh.nodes.len()];
+        self.subtree(0, cut, &mut decisions)?;
+        Ok(decisions)
+    }
+
+    fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
+        let node = &self.bvh.nodes[at as usize];
+        if cut.first() != Some(&at) {
+            return self.plain(at, node, cut, decisions);
+        }
+        if self.below_cut {
+            self.plain(at, node, &[], decisions)?;
+        }
+        decisions[0].0 |= Decision::CUT;
+        // Cut or not is not ours to weigh, and the slot's own cost is the same everywhere.
+        Ok(Summary { cost: [0.0; WIDTH], vertices: None })
+    }
+
+    /// A node that is not cut.
+    fn plain(&self, at: u32, node: &Node, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
+        let area = (Bounds::of_node(node).half_area() * self.inverse_area) as f32;
+        if node.is_leaf() {
+            let triangle = self.bvh.order[node.first as usize];
+            let vertices = Vertices::of_triangle(self.mesh.triangles[triangle as usize]);
+            decisions[0].0 = Role::Indexed as u64 * 16;
+            let cost = area * (self.costs.indexed[0] + self.costs.indexed[1]);
+            return Ok(Summary { cost: [cost; WIDTH], vertices: Some(vertices) });
+        }
+        let (own, below) = decisions.split_at_mut(1);
+        let (left_below, right_below) = below.split_at_mut((node.right - at - 1) as usize);
+        let (left_cut, right_cut) = cut.split_at(cut.partition_point(|&c| c < node.right));
+        let (left, right) = if node.count > TASK {
+            self.monitor.check()?;
+            let (left, right) = rayon::join(
+                || self.subtree(at + 1, left_cut, left_below),
+                || self.subtree(node.right, right_cut, right_below),
+            );
+            (left?, right?)
+        } else {
+            (self.subtree(at + 1, left_cut, left_below)?, self.subtree(node.right, right_cut, right_below)?)
+        };
+
+        let decision = &mut own[0];
+        *decision = Decision::default();
+        let distribute = |slots: usize| {
+            let mut best = (f32::INFINITY, 1);
+            for j in 1..slots {
+                let cost = left.cost[j] + right.cost[slots - j];
+                if cost < best.0 {
+                    best = (cost, j);
+                }
+            }
+            best
+        };
+        let (children, share) = distribute(WIDTH);
+        decision.set_share(WIDTH, share);
+        let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
+        let mut role = (area * self.costs.node + children, Role::Node);
+        // A subtree with a cut node has no vertices and at least one cut.
+        if node.count as usize <= WIDTH && cut.is_empty() {
+            if let (Some(a), Some(b)) = (&left.vertices, &right.vertices) {
+                summary.vertices = a.join(b);
+            }
+            let leaf = |[entry, each]: [f32; 2]| area * (entry + each * node.count as f32);
+            let indexed = leaf(self.costs.indexed);
+            if summary.vertices.is_some() && indexed <= role.0 {
+                role = (indexed, Role::Indexed);
+            }
+            let raw = leaf(self.costs.raw);
+            if raw < role.0 {
+                role = (raw, Role::Raw);
+            }
+        }
+        decision.0 |= role.1 as u64 * 16;
+        summary.cost[1] = role.0;
+        for slots in 2..WIDTH {
+            let (cost, share) = distribute(slots);
+            summary.cost[slots] = summary.cost[slots - 1];
+            if cost < summary.cost[slots] {
+                summary.cost[slots] = cost;
+                decision.set_share(slots, share);
+            }
+        }
+        Ok(summary)
+    }
+}
+
+/// The children, as nodes of the binary BVH, of a node that is a wide node.
+pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32) -> Vec<u32> {
+    let mut children = Vec::with_capacity(WIDTH);
+    let share = decisions[at as usize].share(WIDTH);
+    gather(bvh, decisions, at + 1, share, &mut children);
+    gather(bvh, decisions, bvh.nodes[at as usize].right, WIDTH - share, &mut children);
+    children
+}
+
+fn gather(bvh: &BinaryBvh, decisions: &[Decision], at: u32, slots: usize, children: &mut Vec<u32>) {
+    let decision = decisions[at as usize];
+    let used = (2..=slots).rev().find(|&k| decision.share(k) != 0);
+    match used {
+        Some(used) if !decision.is_cut() => {
+            let share = decision.share(used);
+            gather(bvh, decisions, at + 1, share, children);
+            gather(bvh, decisions, bvh.nodes[at as usize].right, used - share, children);
+        }
+        _ => children.push(at),
+    }
+}

@@ -1,0 +1,118 @@
+//! Insertion-based optimization: subtrees move to where they cost least.
+//!
+//! After "Parallel Reinsertion for Bounding Volume Hierarchy Optimization" (Meister and Bittner
+//! 2018): the best places of a batch of subtrees are searched in parallel in the unchanged tree.
+//! The moves are then made one after the other, each undone if it no longer pays after the ones
+//! before it, so that the cost never rises and the result is the same at any number of threads.
+
+use super::bounds::Bounds;
+use super::linked_tree::LinkedTree;
+use crate::error::Result;
+use crate::monitor::Monitor;
+use bth::layout::NONE;
+use rayon::prelude::*;
+
+/// Batches of a pass: the more, the fresher the tree that a search sees.
+const BATCHES: usize = 64;
+
+/// Tries to move the given share of the nodes, largest area first. Returns how many moved.
+pub(super) fn pass(tree: &mut LinkedTree, share: f64, monitor: &dyn Monitor) -> Result<u64> {
+    let candidates = largest(tree, share);
+    let batch = candidates.len().div_ceil(BATCHES).max(1);
+    let mut moved = 0;
+    for batch in candidates.chunks(batch) {
+        monitor.check()?;
+        let mut moves: Vec<Move> = batch
+            .par_iter()
+            .with_min_len(16)
+            .map_init(Vec::new, |stack, &subtree| search(tree, subtree, stack))
+            .flatten_iter()
+            .collect();
+        moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.subtree.cmp(&b.subtree)));
+        for Move { subtree, target, .. } in moves {
+            if !tree.can_move(subtree, target) {
+                continue;
+            }
+            let sibling = tree.sibling(subtree);
+            if tree.move_beside(subtree, target) < 0.0 {
+                moved += 1;
+            } else {
+                tree.move_beside(subtree, sibling);
+            }
+        }
+        monitor.advance(batch.len() as u64);
+    }
+    Ok(moved)
+}
+
+/// The nodes with a grandparent of the largest areas.
+fn largest(tree: &LinkedTree, share: f64) -> Vec<u32> {
+    let mut keyed: Vec<(f32, u32)> = (0..tree.len() as u32)
+        .filter(|&at| {
+            let parent = tree.node(at).parent;
+            parent != NONE && tree.node(parent).parent != NONE
+        })
+        .map(|at| (tree.node(at).bounds.half_area() as f32, at))
+        .collect();
+    let by_area = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    let wanted = (keyed.len() as f64 * share).ceil() as usize;
+    if wanted < keyed.len() {
+        keyed.select_nth_unstable_by(wanted, by_area);
+        keyed.truncate(wanted);
+    }
+    keyed.par_sort_unstable_by(by_area);
+    keyed.into_iter().map(|(_, at)| at).collect()
+}
+
+/// A move that pays: the sum of all areas falls by `gain`.
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    subtree: u32,
+    target: u32,
+    gain: f64,
+}
+
+/// The best new sibling of a subtree that has a grandparent.
+fn search(tree: &LinkedTree, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Option<Move> {
+    let bounds = tree.node(subtree).bounds;
+    let area = bounds.half_area();
+    let parent = tree.node(subtree).parent;
+    let mut best = Move { subtree, target: NONE, gain: 0.0 };
+    // What is won by taking the subtree out: its parent, and the shrinking of each ancestor below
+    // the one under which it goes back in.
+    let mut saved = tree.node(parent).bounds.half_area();
+    let mut remaining = Bounds::EMPTY;
+    let mut below = subtree;
+    loop {
+        let beside = tree.sibling(below);
+        stack.push((beside, saved));
+        while let Some((at, saved)) = stack.pop() {
+            // A new parent has at least the area of what moves.
+            if saved - area <= best.gain {
+                continue;
+            }
+            let node = tree.node(at);
+            let joined = node.bounds.union(&bounds).half_area();
+            if saved - joined > best.gain {
+                best.target = at;
+                best.gain = saved - joined;
+            }
+            let further = saved - (joined - node.bounds.half_area());
+            if !node.is_leaf() && further - area > best.gain {
+                stack.push((node.left, further));
+                stack.push((node.right, further));
+            }
+        }
+        remaining.grow(&tree.node(beside).bounds);
+        let ancestor = tree.node(below).parent;
+        if ancestor != parent {
+            saved += tree.node(ancestor).bounds.half_area() - remaining.half_area();
+        }
+        if tree.node(ancestor).parent == NONE {
+            break;
+        }
+        below = ancestor;
+    }
+    // The present place wins nothing but rounding.
+    (best.target != NONE && best.target != tree.sibling(subtree)).then_some(best)
+}

@@ -1,0 +1,64 @@
+//! Full-sweep SAH: every split between neighbours in the order of the centres, on each axis.
+
+use super::bounds::Bounds;
+use super::build::{Reference, Split};
+
+/// Buffers of [`split`], kept between nodes.
+#[derive(Default)]
+pub(super) struct Scratch {
+    /// Per axis: order-preserving bits of the centre in the high half, index in the low.
+    keys: [Vec<u64>; 3],
+    right_cost: Vec<f64>,
+    sorted: Vec<Reference>,
+}
+
+/// Bits that compare as unsigned integers like the finite floats do.
+fn ordered_bits(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
+}
+
+/// Sorts the references along the best axis and returns the size of the best left side. At least two references.
+pub(super) fn split(references: &mut [Reference], scratch: &mut Scratch) -> usize {
+    let total = references.len();
+    let Scratch { keys, right_cost, sorted } = scratch;
+    right_cost.clear();
+    right_cost.resize(total, 0.0);
+    let mut best = Split::NONE;
+    for (axis, keys) in keys.iter_mut().enumerate() {
+        keys.clear();
+        keys.extend(
+            references
+                .iter()
+                .enumerate()
+                .map(|(i, r)| u64::from(ordered_bits(r.bounds.half_center()[axis])) << 32 | i as u64),
+        );
+        keys.sort_unstable();
+        let at = |i: usize| &references[keys[i] as u32 as usize].bounds;
+        let mut bounds = Bounds::EMPTY;
+        for i in (1..total).rev() {
+            bounds.grow(at(i));
+            right_cost[i] = bounds.half_area() * (total - i) as f64;
+        }
+        let mut bounds = Bounds::EMPTY;
+        for left in 1..total {
+            bounds.grow(at(left - 1));
+            best.improve(bounds.half_area() * left as f64 + right_cost[left], axis, left, left, total);
+        }
+    }
+    sorted.clear();
+    sorted.extend(keys[best.axis].iter().map(|&key| references[key as u32 as usize]));
+    references.copy_from_slice(sorted);
+    best.left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ordered_bits_sort_like_floats() {
+        let values = [-f32::MAX, -1.5, -f32::MIN_POSITIVE, 0.0, f32::from_bits(1), 1.0, f32::MAX];
+        assert!(values.windows(2).all(|w| ordered_bits(w[0]) < ordered_bits(w[1])));
+    }
+}

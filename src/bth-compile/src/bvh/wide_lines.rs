@@ -1,0 +1,55 @@
+//! Contents of the wide BVH's nodes and leaves.
+
+use super::Node;
+use crate::mesh::Mesh;
+use bth::layout::{IndexedLeaf, Line, NONE, RawLeaf, WIDTH, WideNode};
+use zerocopy::{Immutable, IntoBytes};
+
+/// Writes a structure at a line.
+pub(super) fn put<T: IntoBytes + Immutable>(lines: &mut [Line], at: usize, value: &T) {
+    let bytes = value.as_bytes();
+    lines[at..at + bytes.len() / size_of::<Line>()].as_mut_bytes().copy_from_slice(bytes);
+}
+
+/// A wide node over at most 16 nodes of the binary BVH and their child codes.
+pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>) -> WideNode {
+    let empty = [[f32::MAX; WIDTH], [-f32::MAX; WIDTH]];
+    let mut wide = WideNode { bounds: [empty; 3], child: [NONE; WIDTH] };
+    for (slot, (node, code)) in children.enumerate() {
+        for k in 0..3 {
+            wide.bounds[k][0][slot] = node.lower[k];
+            wide.bounds[k][1][slot] = node.upper[k];
+        }
+        wide.child[slot] = code;
+    }
+    wide
+}
+
+/// A leaf over 1 to 16 triangles of at most 16 distinct vertices.
+pub(super) fn indexed_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> IndexedLeaf {
+    let mut rows = [0u32; WIDTH];
+    let mut vertices = 0;
+    let mut corner = [[0u8; WIDTH]; 3];
+    for (slot, &id) in ids.iter().enumerate() {
+        for (c, &row) in mesh.triangles[id as usize].iter().enumerate() {
+            let at = rows[..vertices].iter().position(|&r| r == row).unwrap_or_else(|| {
+                rows[vertices] = row;
+                vertices += 1;
+                vertices - 1
+            });
+            corner[c][slot] = at as u8;
+        }
+    }
+    let unused = rows[0];
+    rows[vertices..].fill(unused);
+    let positions = rows.map(|row| mesh.positions[row as usize]);
+    let vertex = std::array::from_fn(|k| positions.map(|p| p[k]));
+    IndexedLeaf { vertex, corner, first, triangles: ids.len() as u32, vertices: vertices as u32, reserved: 0 }
+}
+
+/// A leaf over 1 to 16 triangles.
+pub(super) fn raw_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> RawLeaf {
+    let corners: [_; WIDTH] = std::array::from_fn(|slot| mesh.corners(*ids.get(slot).unwrap_or(&ids[0])));
+    let corner = std::array::from_fn(|c| std::array::from_fn(|k| corners.map(|triangle| triangle[c][k])));
+    RawLeaf { corner, first, triangles: ids.len() as u32, reserved: [0; 14] }
+}

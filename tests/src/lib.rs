@@ -1,3 +1,4 @@
-//! What the end-to-end tests share.
+//! What the end-to-end, conformance and corruption tests share.
 
+pub mod conformance;
 pub mod oracle;

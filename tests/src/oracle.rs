@@ -22,7 +22,7 @@ pub struct Truth {
 impl Truth {
     /// t rounded to f64.
     pub fn t_f64(&self) -> f64 {
-        self.t.to_f64().expect("t of f32 input is within the range of f64")
+        to_f64(&self.t)
     }
 }
 
@@ -106,4 +106,9 @@ pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Option<Truth> {
         }
     }
     best
+}
+
+/// A t rounded to f64.
+pub fn to_f64(t: &BigRational) -> f64 {
+    t.to_f64().expect("t of f32 input is within the range of f64")
 }

@@ -162,5 +162,6 @@ impl<'a> Gathered<'a> {
 /// Whether two closed boxes have a point in common. Exact: the boxes are bounds of f32 corners.
 #[inline]
 fn overlap(a: &Node, b: &Node) -> bool {
-    (0..3).all(|k| a.lower[k] <= b.upper[k] && b.lower[k] <= a.upper[k])
+    let axis = |k: usize| (a.lower[k] <= b.upper[k]) & (b.lower[k] <= a.upper[k]);
+    axis(0) & axis(1) & axis(2)
 }

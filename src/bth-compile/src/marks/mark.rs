@@ -203,7 +203,8 @@ mod tests {
     use crate::monitor::Silent;
 
     fn brute_force(mesh: &Mesh, bvh: &BinaryBvh) -> Vec<bool> {
-        let triangle = |&id: &u32| Triangle { corners: mesh.corners(id), vertices: mesh.triangles[id as usize] };
+        let triangle =
+            |&id: &u32| Triangle { corners: mesh.corners(id), vertices: mesh.triangles[id as usize] };
         bvh.nodes
             .iter()
             .map(|n| {

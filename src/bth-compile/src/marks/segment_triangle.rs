@@ -21,7 +21,13 @@ pub(super) fn same_strict_sign(x: f64, y: f64) -> bool {
 
 /// Whether the closed segment `p`, `q` meets the closed triangle, which has a non-zero area.
 /// `side_p` and `side_q` are the signs of `orient3d(triangle, p)` and `orient3d(triangle, q)`.
-pub(super) fn segment_meets_triangle(p: Point, q: Point, side_p: f64, side_q: f64, triangle: [Point; 3]) -> bool {
+pub(super) fn segment_meets_triangle(
+    p: Point,
+    q: Point,
+    side_p: f64,
+    side_q: f64,
+    triangle: [Point; 3],
+) -> bool {
     if same_strict_sign(side_p, side_q) {
         return false;
     }

@@ -10,7 +10,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 #[inline]
 fn minus(p: Point, s: Point) -> Vector {
-    [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(s[k]))
+    [f64::from(p[0]) - f64::from(s[0]), f64::from(p[1]) - f64::from(s[1]), f64::from(p[2]) - f64::from(s[2])]
 }
 
 #[inline]
@@ -28,7 +28,7 @@ fn certainly_positive(v: Vector, d: Vector) -> bool {
 #[inline]
 fn unit(v: Vector) -> Vector {
     let scale = 1.0 / dot(v, v).sqrt();
-    v.map(|x| x * scale)
+    [v[0] * scale, v[1] * scale, v[2] * scale]
 }
 
 /// Whether a plane through `s` certainly has `a` strictly on one side and `b` strictly on the
@@ -36,13 +36,14 @@ fn unit(v: Vector) -> Vector {
 /// nothing. Any direction is a valid witness; the one tried runs between the corners' bisectors.
 #[inline]
 pub(super) fn fans_are_apart(s: Point, a: [Point; 2], b: [Point; 2]) -> bool {
-    let a = a.map(|p| minus(p, s));
-    let b = b.map(|p| minus(p, s));
-    let (ua, ub) = (a.map(unit), b.map(unit));
-    let d = [0, 1, 2].map(|k| (ua[0][k] + ua[1][k]) - (ub[0][k] + ub[1][k]));
-    let back = d.map(|x| -x);
-    certainly_positive(a[0], d)
-        && certainly_positive(a[1], d)
-        && certainly_positive(b[0], back)
-        && certainly_positive(b[1], back)
+    // Written out: `map` on arrays of arrays is not always inlined, and this runs for most pairs.
+    let (a0, a1, b0, b1) = (minus(a[0], s), minus(a[1], s), minus(b[0], s), minus(b[1], s));
+    let (ua0, ua1, ub0, ub1) = (unit(a0), unit(a1), unit(b0), unit(b1));
+    let between = |k: usize| (ua0[k] + ua1[k]) - (ub0[k] + ub1[k]);
+    let d = [between(0), between(1), between(2)];
+    let back = [-d[0], -d[1], -d[2]];
+    certainly_positive(a0, d)
+        && certainly_positive(a1, d)
+        && certainly_positive(b0, back)
+        && certainly_positive(b1, back)
 }

@@ -53,11 +53,12 @@ fn from_corner(c: [Point; 3], first: u32) -> [Point; 3] {
 
 /// Triangles without a common vertex: if they meet, an edge of one meets the other.
 fn disjoint_meet(a: [Point; 3], b: [Point; 3]) -> bool {
-    let b_sides = b.map(|p| orient3d(a[0], a[1], a[2], p));
+    let side_of = |t: [Point; 3], p: Point| orient3d(t[0], t[1], t[2], p);
+    let b_sides = [side_of(a, b[0]), side_of(a, b[1]), side_of(a, b[2])];
     if all_strictly_on_one_side(b_sides) {
         return false;
     }
-    let a_sides = a.map(|p| orient3d(b[0], b[1], b[2], p));
+    let a_sides = [side_of(b, a[0]), side_of(b, a[1]), side_of(b, a[2])];
     if all_strictly_on_one_side(a_sides) {
         return false;
     }
@@ -77,11 +78,12 @@ fn vertex_neighbours_meet(a: [Point; 3], b: [Point; 3]) -> bool {
     if fans_are_apart(a[0], [a[1], a[2]], [b[1], b[2]]) {
         return false;
     }
-    let b_sides = [b[1], b[2]].map(|p| orient3d(a[0], a[1], a[2], p));
+    let side_of = |t: [Point; 3], p: Point| orient3d(t[0], t[1], t[2], p);
+    let b_sides = [side_of(a, b[1]), side_of(a, b[2])];
     if same_strict_sign(b_sides[0], b_sides[1]) {
         return false;
     }
-    let a_sides = [a[1], a[2]].map(|p| orient3d(b[0], b[1], b[2], p));
+    let a_sides = [side_of(b, a[1]), side_of(b, a[2])];
     if same_strict_sign(a_sides[0], a_sides[1]) {
         return false;
     }
@@ -143,7 +145,10 @@ mod tests {
                 }
                 // Both answers are exercised, but that duplicates are always bad.
                 let always_bad = shared == 3;
-                assert!(verdicts[1] > 500 && (always_bad || verdicts[0] > 500), "{shared} {flat} {verdicts:?}");
+                assert!(
+                    verdicts[1] > 500 && (always_bad || verdicts[0] > 500),
+                    "{shared} {flat} {verdicts:?}"
+                );
             }
         }
     }
@@ -199,7 +204,12 @@ mod tests {
                 .filter(|t| Projection::of(t.corners).is_some())
                 .collect();
             let pairs = (0..t.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-            assert_eq!(pairs.filter(|&(i, j)| oracle(&t[i], &t[j])).count() as u64, case.pairs, "{}", case.name);
+            assert_eq!(
+                pairs.filter(|&(i, j)| oracle(&t[i], &t[j])).count() as u64,
+                case.pairs,
+                "{}",
+                case.name
+            );
             checked += 1;
         }
         assert!(checked > 30);

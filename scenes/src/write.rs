@@ -1,0 +1,68 @@
+//! Writers: OBJ, binary little-endian PLY and binary STL.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+use crate::Model;
+use crate::math::{cross, dot, sub};
+
+/// Text of a Wavefront OBJ file; each number is the shortest that reads back as the same `f32`.
+pub fn obj(model: &Model) -> String {
+    let mut text = String::new();
+    for [x, y, z] in &model.positions {
+        writeln!(text, "v {x} {y} {z}").expect("writing to a string");
+    }
+    for [a, b, c] in model.triangles.iter().map(|t| t.map(|v| v + 1)) {
+        writeln!(text, "f {a} {b} {c}").expect("writing to a string");
+    }
+    text
+}
+
+/// Bytes of a binary little-endian PLY file.
+pub fn ply(model: &Model) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        model.positions.len(),
+        model.triangles.len()
+    )
+    .into_bytes();
+    bytes.extend(model.positions.iter().flatten().flat_map(|x| x.to_le_bytes()));
+    for t in &model.triangles {
+        bytes.push(3);
+        bytes.extend(t.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    bytes
+}
+
+/// Bytes of a binary STL file. The normal of a triangle without area is zero.
+pub fn stl(model: &Model) -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend((model.triangles.len() as u32).to_le_bytes());
+    for index in 0..model.triangles.len() {
+        let corners = model.corners(index);
+        let [a, b, c] = corners.map(|p| p.map(f64::from));
+        let normal = cross(sub(b, a), sub(c, a));
+        let length = dot(normal, normal).sqrt();
+        let unit = normal.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 });
+        bytes.extend(unit.iter().chain(corners.iter().flatten()).flat_map(|x| x.to_le_bytes()));
+        bytes.extend([0, 0]);
+    }
+    bytes
+}
+
+/// Writes a model in the format that the extension names: `.obj`, `.ply` or `.stl`.
+///
+/// # Errors
+/// Fails on another extension, or when the file cannot be written.
+pub fn file(model: &Model, path: &Path) -> Result<()> {
+    let bytes = match path.extension().and_then(|e| e.to_str()) {
+        Some("obj") => obj(model).into_bytes(),
+        Some("ply") => ply(model),
+        Some("stl") => stl(model),
+        _ => bail!("{}: expected a name that ends in .obj, .ply or .stl", path.display()),
+    };
+    std::fs::write(path, bytes).with_context(|| path.display().to_string())
+}

@@ -1,0 +1,99 @@
+//! Every messy model ends in a compiled file that verifies, or in an error that a person can act on.
+#![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
+
+mod corpus_support;
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use corpus_support::{data_and_compiler, listed_triangles, models, run};
+
+/// No messy model has as many as 70,000 triangles; a busy machine and a debug build are slow.
+const LIMIT: Duration = Duration::from_secs(300);
+
+/// Models that are not usable, and where the error must point.
+const UNUSABLE: [(&str, &str); 2] = [("tinyobj/test-nan.obj", ""), ("tobj/invalid_index.obj", "")];
+
+#[test]
+fn every_messy_model_compiles_or_is_refused_with_a_reason() {
+    let Some((data, bthc)) = data_and_compiler() else { return };
+    let folder = data.join("messy");
+    let out = tempfile::tempdir().unwrap();
+    let (mut compiled, mut refused, mut slowest, mut wrong) = (0, 0, 0.0f64, Vec::new());
+    let models = models(&folder);
+    for (number, model) in models.iter().enumerate() {
+        let file = out.path().join(format!("{number}.bth"));
+        match check(&bthc, &data, model, &file) {
+            Ok((done, seconds)) => {
+                compiled += usize::from(done);
+                refused += usize::from(!done);
+                slowest = slowest.max(seconds);
+            }
+            Err(message) => {
+                wrong.push(format!("{}: {message}", model.strip_prefix(&folder).unwrap().display()))
+            }
+        }
+    }
+    println!(
+        "{} messy models: {compiled} compiled and verified, {refused} refused; the slowest took {slowest:.1} s",
+        models.len()
+    );
+    assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), models.len(), wrong.join("\n"));
+    for (name, place) in UNUSABLE {
+        let model = folder.join(name);
+        if model.exists() {
+            let ended = run(
+                Command::new(&bthc).arg("compile").arg(&model).arg("-o").arg(out.path().join("x.bth")),
+                LIMIT,
+            );
+            let ended = ended.unwrap();
+            assert_eq!(ended.code, Some(3), "{name}: {}", ended.stderr);
+            assert!(ended.stderr.contains(place), "{name}: {}", ended.stderr);
+        }
+    }
+}
+
+/// Whether the model was compiled, and in how many seconds; an error when something is not as it must be.
+fn check(bthc: &Path, data: &Path, model: &Path, file: &Path) -> Result<(bool, f64), String> {
+    let ended = run(Command::new(bthc).arg("compile").arg(model).arg("-o").arg(file).arg("--json"), LIMIT)?;
+    if ended.stderr.contains("panicked") {
+        return Err(format!("panicked: {}", ended.stderr));
+    }
+    let json: serde_json::Value = serde_json::from_str(&ended.stdout)
+        .map_err(|e| format!("no JSON ({e}): {} {}", ended.stdout, ended.stderr))?;
+    match ended.code {
+        Some(0) => {
+            if let Some(listed) = listed_triangles(data, "messy", model) {
+                let found = json["mesh"]["triangles"].as_u64();
+                if found != Some(listed) && !differently_counted(model) {
+                    return Err(format!("{found:?} triangles instead of {listed}"));
+                }
+            }
+            let verified = run(Command::new(bthc).arg("verify").arg(file), LIMIT)?;
+            if verified.code != Some(0) {
+                return Err(format!("does not verify: {}{}", verified.stdout, verified.stderr));
+            }
+            Ok((true, ended.seconds))
+        }
+        Some(3 | 5) => {
+            let name = model.file_name().unwrap().to_string_lossy().into_owned();
+            if !ended.stderr.contains("error: ") || !ended.stderr.contains("BTH-") {
+                return Err(format!("an error without a code: {}", ended.stderr));
+            }
+            if !ended.stderr.contains(&name) {
+                return Err(format!("an error that does not name the file: {}", ended.stderr));
+            }
+            if file.exists() {
+                return Err("refused, but a file was written".to_owned());
+            }
+            Ok((false, ended.seconds))
+        }
+        other => Err(format!("exit code {other:?}: {}", ended.stderr)),
+    }
+}
+
+/// Models whose triangles the table counts by rules of its own.
+fn differently_counted(_model: &Path) -> bool {
+    false
+}

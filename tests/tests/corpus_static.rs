@@ -1,0 +1,112 @@
+//! The static models compile, verify, and answer rays alike with and without tetrahedra.
+#![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
+
+mod corpus_support;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program, run};
+
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// Models with at most so many triangles are tried: all when `BTH_CORPUS` is `all`.
+fn most_triangles() -> u64 {
+    match std::env::var("BTH_CORPUS").as_deref() {
+        Ok("all") => u64::MAX,
+        _ if cfg!(debug_assertions) => 15_000,
+        _ => 300_000,
+    }
+}
+
+/// The models to try, with their triangles; says which are left out.
+fn chosen(data: &Path) -> Vec<(PathBuf, u64)> {
+    let mut chosen = Vec::new();
+    for model in models(&data.join("static")) {
+        let name = model.file_name().unwrap().to_string_lossy().into_owned();
+        match listed_triangles(data, "static", &model) {
+            Some(triangles) if triangles <= most_triangles() => chosen.push((model, triangles)),
+            Some(triangles) => {
+                println!("SKIPPED: {name} has {triangles} triangles (BTH_CORPUS=all takes it)")
+            }
+            None => println!("SKIPPED: {name} is not listed"),
+        }
+    }
+    chosen
+}
+
+fn bthc(program: &Path, arguments: &[&std::ffi::OsStr]) -> Ended {
+    let ended =
+        run(Command::new(program).args(arguments), LIMIT).unwrap_or_else(|e| panic!("{arguments:?}: {e}"));
+    assert_eq!(ended.code, Some(0), "{arguments:?}: {}{}", ended.stdout, ended.stderr);
+    ended
+}
+
+#[test]
+fn static_models_verify_and_answer_alike_with_and_without_tetrahedra() {
+    let Some((data, compiler)) = data_and_compiler() else { return };
+    if program("bth-tetgen").is_none() {
+        println!("NOTE: bth-tetgen is not built, so there are no tetrahedra to compare");
+    }
+    let out = tempfile::tempdir().unwrap();
+    for (model, triangles) in chosen(&data) {
+        let mut scenes = Vec::new();
+        let mut said = String::new();
+        for structure in ["bth", "bvh"] {
+            let file = out.path().join(structure);
+            let ended = bthc(
+                &compiler,
+                &[
+                    "compile".as_ref(),
+                    model.as_os_str(),
+                    "-o".as_ref(),
+                    file.as_os_str(),
+                    "--structure".as_ref(),
+                    structure.as_ref(),
+                    "--json".as_ref(),
+                ],
+            );
+            let report: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
+            assert_eq!(report["mesh"]["triangles"].as_u64(), Some(triangles), "{}", model.display());
+            bthc(&compiler, &["verify".as_ref(), file.as_os_str()]);
+            said += &format!(", {structure} in {:.1} s", ended.seconds);
+            if structure == "bth" {
+                said += &format!(" with {} tet leaves", report["file"]["tet_leaves"]);
+            }
+            scenes.push(bth::open(&file).unwrap());
+        }
+        let hits = compare(&scenes[0], &scenes[1], &model);
+        println!("{}: {triangles} triangles{said}, {hits} hits", model.file_name().unwrap().display());
+    }
+}
+
+/// Traces random rays through both; returns the number of hits.
+fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
+    let object = *bvh.object(0).header;
+    let (lower, upper) = (object.lower, object.upper);
+    let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f32::max);
+    let mut state = 1u64;
+    let mut unit = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let mut hits = 0;
+    for _ in 0..20_000 {
+        let mut point =
+            || [0, 1, 2].map(|k| lower[k] - 0.1 * size + (upper[k] - lower[k] + 0.2 * size) * unit());
+        let (origin, target) = (point(), point());
+        let ray = bth::rays::Ray {
+            origin,
+            tmin: 0.0,
+            direction: [0, 1, 2].map(|k| target[k] - origin[k]),
+            tmax: f32::INFINITY,
+        };
+        let (a, b) =
+            (tets.nearest(&ray, bth::rays::Surface::NONE), bvh.nearest(&ray, bth::rays::Surface::NONE));
+        assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
+        // Where triangles meet either may be named; the distance is what must agree.
+        hits += usize::from(a.t.is_finite());
+    }
+    hits
+}

@@ -1,0 +1,219 @@
+//! Every structure and record against the exact oracle, and against each other bit for bit.
+
+use bth::layout::RecordKind;
+use bth::rays::{Hit, Ray, Surface};
+use bth::{Scene, Steps};
+use bth_compile::Silent;
+use bth_compile::pipeline::{Options, Structure, compile};
+use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
+use bth_tests::oracle;
+use bth_tests::rays::{assorted, onward};
+
+type Corners = Vec<[[f32; 3]; 3]>;
+
+/// A structure compiled from a model.
+struct Traced {
+    name: String,
+    scene: Scene,
+}
+
+fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> Options {
+    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
+    // So cheap that these small models get tet leaves wherever they can.
+    options.costs.minimum_triangles = 32;
+    options.costs.c_tet = 1e-3;
+    options
+}
+
+/// The model in every structure. Those with tetrahedra only when the worker program is there.
+fn structures(model: &Model, whole: bool) -> Vec<Traced> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("model.ply");
+    bth_scenes::write::file(model, &path).expect("a model file");
+    let mut wanted = vec![("bvh".to_string(), options(Structure::Bvh, RecordKind::Link32, false))];
+    if bth_tests::worker() {
+        for record in RecordKind::ALL {
+            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));
+            if whole {
+                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
+            }
+        }
+        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
+    }
+    let compile = |(name, options): (String, Options)| {
+        let (compiled, _) = compile(&path, &options, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let scene = bth::from_bytes(&compiled.bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        Traced { name, scene }
+    };
+    wanted.into_iter().map(compile).collect()
+}
+
+fn bits(hit: &Hit) -> [u32; 5] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
+}
+
+fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
+    let truth = oracle::nearest(corners, ray);
+    let context = || format!("{ray:?}: {hit:?}, exactly {truth:?}");
+    let Some(truth) = &truth else {
+        if hit.is_hit() {
+            // t is compared with tmin and tmax as reported, so a hit less than half an ulp outside counts.
+            let near = Ray { tmin: ray.tmin.next_down(), tmax: ray.tmax.next_up(), ..*ray };
+            assert!(oracle::nearest(corners, &near).is_some(), "ghost: {}", context());
+        }
+        return;
+    };
+    assert!(hit.is_hit(), "miss: {}", context());
+    let t = truth.t_f64() as f32;
+    assert!(hit.t.to_bits().abs_diff(t.to_bits()) <= 1 || hit.t == t, "t: {}", context());
+    let id = hit.surface.triangle;
+    if !truth.triangles.contains(&id) {
+        // Another triangle at the same t but for less than the rounding of f64.
+        let other = oracle::crossing(ray, corners[id as usize]).map(|t| oracle::to_f64(&t));
+        let gap = other.map(|t| (t - truth.t_f64()).abs());
+        assert!(gap.is_some_and(|g| g <= truth.t_f64().abs() * 1e-12), "other triangle: {}", context());
+    }
+    assert!(hit.u >= 0.0 && hit.v >= 0.0 && hit.u + hit.v <= 1.0 + f32::EPSILON, "weights: {}", context());
+}
+
+fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
+    let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let rays = assorted(&corners, ray_count, seed);
+    let traced = structures(model, whole);
+    let plain = &traced[0].scene;
+    let mut expected = vec![Hit::MISS; rays.len()];
+    plain.nearest_batch(&rays, None, &mut expected);
+    for (ray, hit) in rays.iter().zip(&expected) {
+        check_against_oracle(&corners, ray, hit);
+    }
+    let onward = onward(&rays, &expected, corners.len(), seed + 1);
+    for Traced { name, scene } in &traced {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        scene.nearest_batch(&rays, None, &mut hits);
+        let mut any = vec![false; rays.len()];
+        scene.any_batch(&rays, None, &mut any);
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!(bits(&hits[i]), bits(&expected[i]), "{name}: {ray:?}: {:?}, {:?}", hits[i], expected[i]);
+            assert_eq!(any[i], expected[i].is_hit(), "{name}: any hit of {ray:?}");
+            assert_eq!(bits(&scene.nearest(ray, Surface::NONE)), bits(&hits[i]), "{name}: one ray at a time");
+        }
+        for (ray, from) in &onward {
+            let (without, with) = (scene.nearest(ray, Surface::NONE), scene.nearest(ray, *from));
+            assert_eq!(bits(&without), bits(&with), "{name}: a hint, {from:?}, changed {ray:?}: {without:?} {with:?}");
+            assert_eq!(scene.any(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
+            assert_eq!(bits(&plain.nearest(ray, Surface::NONE)), bits(&with), "{name}: {ray:?} differs from the BVH");
+        }
+    }
+}
+
+#[test]
+fn a_closed_knot_is_traced_exactly_by_every_structure() {
+    check(&torus_knot(720), true, 2000, 1);
+}
+
+#[test]
+fn an_organic_surface_is_traced_exactly_by_every_structure() {
+    check(&gyroid(1500), true, 1500, 2);
+}
+
+#[test]
+fn a_bumpy_sphere_far_from_the_origin_is_traced_exactly() {
+    let mut model = blob(800);
+    for p in &mut model.positions {
+        *p = [p[0] + 300.0, p[1] - 700.0, p[2] + 1100.0];
+    }
+    check(&model, false, 1500, 3);
+}
+
+#[test]
+fn scales_of_1e30_and_1e_minus_30_are_traced_exactly() {
+    for scale in [1e30_f32, 1e-30] {
+        let mut model = torus_knot(400);
+        for p in &mut model.positions {
+            *p = p.map(|x| x * scale);
+        }
+        check(&model, false, 800, 4);
+    }
+}
+
+#[test]
+fn soup_that_intersects_itself_is_traced_exactly() {
+    check(&soup(600), false, 1200, 5);
+}
+
+#[test]
+fn a_hall_with_long_thin_triangles_is_traced_exactly() {
+    check(&hall(900), false, 1200, 6);
+}
+
+/// The surface of a cube of `n` cells, with integer coordinates.
+fn integer_cube(n: i32) -> Model {
+    let mut model = Model::default();
+    let mut rows = std::collections::BTreeMap::new();
+    for axis in 0..3 {
+        for (side, i, j) in [0, n].into_iter().flat_map(|s| (0..n * n).map(move |c| (s, c / n, c % n))) {
+            let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| {
+                let mut p = [side; 3];
+                p[(axis + 1) % 3] = i + di;
+                p[(axis + 2) % 3] = j + dj;
+                *rows.entry(p).or_insert_with(|| {
+                    model.positions.push(p.map(|x| x as f32));
+                    model.positions.len() as u32 - 1
+                })
+            });
+            model.triangles.extend(if side == 0 { [[a, c, b], [a, d, c]] } else { [[a, b, c], [a, c, d]] });
+        }
+    }
+    model
+}
+
+#[test]
+fn a_cube_of_integers_where_all_is_degenerate_is_traced_exactly() {
+    check(&integer_cube(4), true, 3000, 7);
+}
+
+#[test]
+fn rays_without_a_line_hit_nothing() {
+    let ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0, 0.0, 1.0], tmax: f32::INFINITY };
+    let bad = [
+        Ray { direction: [0.0; 3], ..ray },
+        Ray { direction: [f32::NAN, 0.0, 1.0], ..ray },
+        Ray { direction: [f32::INFINITY, 0.0, 1.0], ..ray },
+        Ray { origin: [f32::NAN; 3], ..ray },
+        Ray { origin: [f32::INFINITY, 0.0, 0.0], ..ray },
+        Ray { tmin: f32::NAN, ..ray },
+        Ray { tmax: f32::NAN, ..ray },
+        Ray { tmin: 2.0, tmax: 1.0, ..ray },
+        Ray { tmin: f32::INFINITY, ..ray },
+        Ray { tmax: f32::NEG_INFINITY, ..ray },
+    ];
+    for Traced { name, scene } in &structures(&torus_knot(400), true) {
+        for ray in &bad {
+            assert_eq!(scene.nearest(ray, Surface::NONE), Hit::MISS, "{name}: {ray:?}");
+            assert!(!scene.any(ray, Surface { instance: 0, triangle: 0 }), "{name}: {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn tets_are_really_walked_and_hints_save_steps() {
+    if !bth_tests::worker() {
+        return;
+    }
+    let model = gyroid(3000);
+    let traced = structures(&model, true);
+    let tets = &traced.iter().find(|t| t.name == "tets link32").expect("compiled above").scene;
+    let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let first = assorted(&corners, 4000, 9);
+    let mut hits = vec![Hit::MISS; first.len()];
+    tets.nearest_batch(&first, None, &mut hits);
+    let (mut plain, mut hinted, mut rays) = (Steps::default(), Steps::default(), 0);
+    for (ray, from) in onward(&first, &hits, corners.len(), 10) {
+        plain += tets.nearest_counted(&ray, Surface::NONE).1;
+        hinted += tets.nearest_counted(&ray, from).1;
+        rays += 1;
+    }
+    assert!(plain.tets > 0 && hinted.tets > 0 && plain.nodes == 0, "{plain:?} {hinted:?}");
+    assert!(hinted.tets * 4 < plain.tets * 3, "{hinted:?} is little less than {plain:?}");
+    assert!(hinted.floods * 3 < rays, "most rays need no exact fall-back: {hinted:?} of {rays}");
+}

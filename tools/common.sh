@@ -1,0 +1,53 @@
+# What the scripts in tools/ share; to be sourced, not run.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root" || exit 2
+target_dir=${CARGO_TARGET_DIR:-$root/target}
+
+note() { printf '%s\n' "$*" >&2; }
+
+# Ends with a hint when there is no Rust; finds one that rustup has put into the home folder.
+need_rust() {
+    command -v cargo >/dev/null || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+    if ! command -v cargo >/dev/null; then
+        note "Rust is missing. Install it from https://rustup.rs:"
+        note "    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh"
+        exit 2
+    fi
+}
+
+have_cxx() { command -v "${CXX:-c++}" >/dev/null; }
+have_tetgen() {
+    [ -n "${TETGEN_DIR:-}" ] || { have_cxx && echo '#include <tetgen.h>' | "${CXX:-c++}" -E -x c++ - >/dev/null 2>&1; }
+}
+have_venv() { command -v python3 >/dev/null && python3 -c 'import venv, ensurepip' 2>/dev/null; }
+
+# install_missing python|plain: installs the system packages that are missing, where that is possible.
+# Says what stays missing and goes on: everything but the TetGen worker builds without them.
+install_missing() {
+    local packages=()
+    command -v cc >/dev/null || packages+=(gcc libc6-dev)
+    have_cxx || packages+=(g++)
+    have_tetgen || packages+=(libtet1.5-dev)
+    [ "$1" = plain ] || have_venv || packages+=(python3 python3-venv)
+    [ ${#packages[@]} -eq 0 ] && return 0
+
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then as_root=(sudo -n); fi
+    if command -v apt-get >/dev/null && "${as_root[@]}" true 2>/dev/null; then
+        note "Installing ${packages[*]}"
+        "${as_root[@]}" apt-get update -qq >/dev/null 2>&1 || note "apt-get update failed; trying with the lists at hand"
+        # One by one: one that cannot be had does not keep the others away.
+        local package
+        for package in "${packages[@]}"; do
+            "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+                apt-get install -y -qq --no-install-recommends "$package" >/dev/null 2>&1 \
+                || note "could not install $package"
+        done
+    else
+        note "Missing and not installable from here (no apt-get, or not root): ${packages[*]}"
+    fi
+    command -v cc >/dev/null || note "No C compiler: Rust needs one to link. Install gcc or clang."
+    have_tetgen || note "No TetGen: the worker is not built, and compiled files hold BVHs only."
+    [ "$1" = plain ] || have_venv || note "No python3 with venv: the Python cross-checks are skipped."
+}

@@ -1,5 +1,6 @@
-//! What the end-to-end tests share.
+//! What the end-to-end, conformance and corruption tests share.
 
+pub mod conformance;
 pub mod oracle;
 pub mod rays;
 pub mod rng;

@@ -12,13 +12,6 @@ impl Table {
         self.rows.push(cells.iter().map(|c| (*c).to_owned()).collect());
     }
 
-    /// Adds a row of two cells unless the value is empty.
-    pub(crate) fn fact(&mut self, name: &str, value: impl Into<String>) {
-        let value = value.into();
-        if !value.is_empty() {
-            self.rows.push(vec![name.to_owned(), value]);
-        }
-    }
 
     /// The text, one line a row.
     pub(crate) fn render(&self) -> String {

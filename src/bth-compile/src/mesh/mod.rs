@@ -1,4 +1,32 @@
 //! Triangle meshes: import, weld, report.
+//!
+//! A reader per format (`obj`, `gltf`, `ply`, `stl`, `off`) turns a file into a [`raw::Raw`] mesh with the
+//! source's own rows; `weld` merges its positions, `attributes` its shading rows, and `topology` counts
+//! what the report tells.
+
+mod attributes;
+mod gltf;
+mod gltf_accessor;
+mod gltf_buffer;
+mod gltf_json;
+mod gltf_transform;
+mod import;
+mod number;
+mod obj;
+mod off;
+mod ply;
+mod ply_ascii;
+mod ply_binary;
+mod ply_header;
+mod raw;
+mod source;
+mod stl;
+mod topology;
+mod weld;
+mod zero_area;
+
+pub use import::import;
+pub use zero_area::is_zero_area;
 
 use serde::Serialize;
 

@@ -1,4 +1,27 @@
 //! Constrained tetrahedralizations of chosen nodes, by way of the TetGen worker, checked exactly.
+//!
+//! gather (triangles, box) → free_space (extra points) → worker (TetGen, a process of its own) →
+//! check (with nudge) → order (Hilbert) → encode (the file's sections). `build` schedules the
+//! nodes over a pool of workers and replaces a node that fails by smaller ones.
+
+mod build;
+mod check;
+mod encode;
+mod faces;
+mod free_space;
+mod gather;
+mod node;
+mod nudge;
+mod options;
+mod order;
+mod pool;
+mod report;
+mod worker;
+
+pub use build::build;
+pub use encode::{Encoded, encode};
+pub use options::Options;
+pub use report::{NodeReport, Outcome, Report, WorkerStatus};
 
 /// A checked tetrahedralization of one node's triangles inside a box slightly larger than the node's.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,0 +1,51 @@
+//! Options of the tets stage.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use bth_tetgen_protocol::Fault;
+
+/// How to tetrahedralize.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// The worker program; looked for when absent: `BTH_TETGEN`, beside this program, `PATH`.
+    pub worker: Option<PathBuf>,
+    /// Worker processes; 0 for one per thread of the pool that calls. The result is the same for any number.
+    pub workers: usize,
+    /// Vertices of the mesh that an octree cell may hold before it is split; a point goes into the
+    /// centre of every empty cell. 16 suits scans, 64 rooms; 0 adds no points.
+    pub free_space: u32,
+    /// By how much the box exceeds the triangles on every side, relative to the diagonal of their
+    /// bounds (and at least by one unit in the last place).
+    pub inflation: f32,
+    /// Time for one attempt at a node, whatever its size.
+    pub deadline: Duration,
+    /// Time for one attempt, in addition, per triangle.
+    pub deadline_per_triangle: Duration,
+    /// Address space of a worker, bytes.
+    pub memory: u64,
+    /// Triangles of the cells that replace a node that fails: the largest size below its own, then the next.
+    pub cells: Vec<u32>,
+    /// Cells with fewer triangles than this stay in the BVH.
+    pub minimum: u32,
+    /// Plants a fault at a node, for tests.
+    #[doc(hidden)]
+    pub planted: Option<(u32, Fault)>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            worker: None,
+            workers: 0,
+            free_space: 16,
+            inflation: 1.0 / 128.0,
+            deadline: Duration::from_secs(20),
+            deadline_per_triangle: Duration::from_millis(1),
+            memory: 4 << 30,
+            cells: vec![16384, 4096, 1024],
+            minimum: 256,
+            planted: None,
+        }
+    }
+}

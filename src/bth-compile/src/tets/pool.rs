@@ -1,0 +1,98 @@
+//! Where the worker program is, and a place for a worker that is replaced after any failure.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use bth_tetgen_protocol::{Request, Tetrahedra};
+
+use crate::error::Result;
+use crate::monitor::Monitor;
+
+use super::Options;
+use super::report::Trouble;
+use super::worker::{Setup, Worker};
+
+/// File name of the worker program.
+const PROGRAM: &str = if cfg!(windows) { "bth-tetgen.exe" } else { "bth-tetgen" };
+
+/// The worker program: as the options or `BTH_TETGEN` say, else beside this program, else on the `PATH`.
+///
+/// # Errors
+/// A hint for the user, when there is none.
+pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
+    let named = options.worker.clone().or_else(|| std::env::var_os("BTH_TETGEN").map(PathBuf::from));
+    if let Some(named) = named {
+        // The worker starts in another folder, so a relative path must not stay one.
+        return std::path::absolute(&named).ok().filter(|p| p.is_file()).ok_or_else(|| {
+            format!(
+                "the tetrahedralization worker {} does not exist; everything stays in the BVH",
+                named.display()
+            )
+        });
+    }
+    let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(PROGRAM)));
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = beside.into_iter().chain(std::env::split_paths(&path).map(|folder| folder.join(PROGRAM)));
+    found.filter_map(|p| std::path::absolute(p).ok()).find(|p| p.is_file()).ok_or_else(|| {
+        format!(
+            "no tetrahedralization worker {PROGRAM} was found beside this program or on the PATH, so everything stays in \
+             the BVH; build it with `cargo build --release -p bth-tetgen` (it needs TetGen, on Debian and Ubuntu \
+             libtet1.5-dev), or let BTH_TETGEN name it"
+        )
+    })
+}
+
+/// A place for one worker.
+pub(super) struct Slot<'a> {
+    setup: &'a Setup,
+    worker: Option<Worker>,
+    /// Workers started in this place.
+    pub(super) started: u64,
+}
+
+impl<'a> Slot<'a> {
+    /// An empty place.
+    pub(super) fn new(setup: &'a Setup) -> Self {
+        Self { setup, worker: None, started: 0 }
+    }
+
+    /// The version of TetGen; starts a worker if there is none.
+    ///
+    /// # Errors
+    /// As [`Worker::start`].
+    pub(super) fn tetgen(&mut self, monitor: &dyn Monitor) -> Result<std::result::Result<&str, Trouble>> {
+        if self.worker.is_none() {
+            match Worker::start(self.setup, monitor)? {
+                Ok(worker) => {
+                    self.started += 1;
+                    self.worker = Some(worker);
+                }
+                Err(trouble) => return Ok(Err(trouble)),
+            }
+        }
+        Ok(Ok(self.worker.as_ref().map_or("", |w| w.tetgen.as_str())))
+    }
+
+    /// Has the worker do a job. One that fails in any way is gone afterwards.
+    ///
+    /// # Errors
+    /// As [`Worker::ask`].
+    pub(super) fn ask(
+        &mut self,
+        request: &Request,
+        deadline: Duration,
+        monitor: &dyn Monitor,
+    ) -> Result<std::result::Result<Tetrahedra, Trouble>> {
+        if let Err(trouble) = self.tetgen(monitor)? {
+            return Ok(Err(trouble));
+        }
+        let Some(mut worker) = self.worker.take() else {
+            return Ok(Err(Trouble::Start("no worker".into())));
+        };
+        let answer = worker.ask(request, deadline, monitor)?;
+        if answer.is_ok() {
+            self.worker = Some(worker);
+        }
+        Ok(answer)
+    }
+}

@@ -1,0 +1,169 @@
+//! What the tets stage did, and why a node failed.
+
+use std::collections::BTreeMap;
+
+use bth_tetgen_protocol::Failure;
+use serde::Serialize;
+
+/// What became of the chosen nodes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// The worker that was used, or why there was none.
+    pub worker: WorkerStatus,
+    /// Nodes that were asked for.
+    pub chosen: u64,
+    /// Triangles below them.
+    pub chosen_triangles: u64,
+    /// Nodes that were tetrahedralized, cells of failed nodes included.
+    pub built: u64,
+    /// Triangles in them.
+    pub built_triangles: u64,
+    /// Nodes that failed and were replaced by cells.
+    pub split: u64,
+    /// Nodes that failed and stay in the BVH.
+    pub given_up: u64,
+    /// Triangles that stay in the BVH although they were chosen.
+    pub given_up_triangles: u64,
+    /// Jobs that were sent to workers.
+    pub attempts: u64,
+    /// Attempts that failed, by reason.
+    pub failures: BTreeMap<&'static str, u64>,
+    /// Tetrahedra.
+    pub tets: u64,
+    /// Their vertices.
+    pub vertices: u64,
+    /// Vertices that are neither corners of triangles nor of boxes: free-space points and TetGen's.
+    pub steiner_points: u64,
+    /// Of these, the free-space points.
+    pub free_points: u64,
+    /// Points that were moved by a few units in the last place after rounding.
+    pub nudged: u64,
+    /// Worker processes that were started.
+    pub workers_started: u64,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+    /// Every node that was tried, ascending by node.
+    pub nodes: Vec<NodeReport>,
+}
+
+/// The worker program.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WorkerStatus {
+    /// No node was chosen, so none was looked for.
+    #[default]
+    NotNeeded,
+    /// It works.
+    Ready {
+        /// TetGen's version.
+        tetgen: String,
+    },
+    /// None was found; all triangles stay in the BVH.
+    Missing {
+        /// How to get one.
+        hint: String,
+    },
+    /// One was found that does not work; all triangles stay in the BVH.
+    Unusable {
+        /// Which, and why.
+        reason: String,
+    },
+}
+
+/// What became of one node.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NodeReport {
+    /// Index in the binary BVH.
+    pub node: u32,
+    /// Triangles below it.
+    pub triangles: u32,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Why attempts failed, in order.
+    pub failures: Vec<String>,
+    /// Tetrahedra.
+    pub tets: u32,
+    /// Their vertices.
+    pub vertices: u32,
+    /// Free-space points and TetGen's.
+    pub steiner_points: u32,
+    /// Free-space points.
+    pub free_points: u32,
+    /// Points moved after rounding.
+    pub nudged: u32,
+    /// Wall-clock seconds of all attempts.
+    pub seconds: f64,
+}
+
+/// How a node ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It is a tet leaf.
+    Built,
+    /// It was replaced by cells.
+    Split,
+    /// It stays in the BVH.
+    GivenUp,
+}
+
+/// Why an attempt failed.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Trouble {
+    /// The worker did not start or speaks another language.
+    Start(String),
+    /// The worker died.
+    Died(String),
+    /// The deadline passed.
+    TimedOut,
+    /// The worker said so.
+    Failed(Failure, String),
+    /// The worker answered what is no answer.
+    Answer(String),
+    /// The triangles or their box are no input for TetGen.
+    Unfit(&'static str),
+    /// The result does not hold.
+    Defect(super::check::Defect),
+}
+
+impl Trouble {
+    /// Stable name, for counting.
+    pub(super) fn name(&self) -> &'static str {
+        match self {
+            Trouble::Start(_) => "worker_did_not_start",
+            Trouble::Died(_) => "worker_died",
+            Trouble::TimedOut => "timed_out",
+            Trouble::Failed(Failure::Memory, _) => "out_of_memory",
+            Trouble::Failed(Failure::Internal, _) => "tetgen_internal",
+            Trouble::Failed(Failure::Intersection, _) => "tetgen_intersection",
+            Trouble::Failed(Failure::TooSmall, _) => "tetgen_too_small",
+            Trouble::Failed(..) => "tetgen_other",
+            Trouble::Answer(_) => "bad_answer",
+            Trouble::Unfit(_) => "unfit_input",
+            Trouble::Defect(defect) => defect.name(),
+        }
+    }
+
+    /// Whether another attempt with other points may succeed.
+    pub(super) fn retry(&self) -> bool {
+        match self {
+            Trouble::Died(_) | Trouble::Answer(_) | Trouble::Defect(_) => true,
+            Trouble::Failed(failure, _) => *failure != Failure::Memory,
+            Trouble::Start(_) | Trouble::TimedOut | Trouble::Unfit(_) => false,
+        }
+    }
+}
+
+impl std::fmt::Display for Trouble {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())?;
+        match self {
+            Trouble::Start(text) | Trouble::Died(text) | Trouble::Failed(_, text) | Trouble::Answer(text) => {
+                write!(f, ": {text}")
+            }
+            Trouble::Unfit(text) => write!(f, ": {text}"),
+            Trouble::Defect(defect) => write!(f, ": {defect}"),
+            Trouble::TimedOut => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Requests in, replies out.
+
+use std::io::{self, BufWriter, Read, Write};
+
+use bth_tetgen_protocol::{Error, Failure, Fault, PROTOCOL, Reply, Request, read_frame, write_frame};
+
+use crate::tetgen;
+
+/// Answers requests until the input ends.
+///
+/// # Errors
+/// When the compiler is gone, or sends what is no frame.
+pub(crate) fn serve(mut input: impl Read, output: impl Write) -> io::Result<()> {
+    let mut output = BufWriter::with_capacity(1 << 16, output);
+    let mut send = |reply: &Reply| write_frame(&mut output, &reply.to_bytes()).map_err(io::Error::other);
+    send(&Reply::Hello { protocol: PROTOCOL, tetgen: tetgen::VERSION.into() })?;
+    loop {
+        let frame = match read_frame(&mut input) {
+            Ok(frame) => frame,
+            Err(Error::End) => return Ok(()),
+            Err(error) => return Err(io::Error::other(error)),
+        };
+        let reply = match Request::from_bytes(&frame) {
+            Ok(Request::Job(job)) => {
+                drop(frame);
+                match tetgen::tetrahedralize(&job) {
+                    Ok(done) => Reply::Done(done),
+                    Err((failure, text)) => Reply::Failed { failure, text },
+                }
+            }
+            Ok(Request::Fault(fault)) => misbehave(fault),
+            Err(error) => Reply::Failed { failure: Failure::Request, text: error.to_string() },
+        };
+        match send(&reply) {
+            Ok(()) => {}
+            // A reply that no frame can hold is a failed job; the pipe still works.
+            Err(error) if reply_is_too_long(&error) => {
+                send(&Reply::Failed { failure: Failure::Memory, text: error.to_string() })?;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn reply_is_too_long(error: &io::Error) -> bool {
+    error.get_ref().and_then(|e| e.downcast_ref::<Error>()).is_some_and(|e| matches!(e, Error::TooLong(_)))
+}
+
+fn misbehave(fault: Fault) -> Reply {
+    match fault {
+        Fault::Crash => std::process::abort(),
+        Fault::Hang => loop {
+            std::thread::park();
+        },
+        Fault::Hog => {
+            let mut hoard: Vec<Vec<u8>> = Vec::new();
+            loop {
+                let mut block = Vec::new();
+                if block.try_reserve_exact(1 << 24).is_err() {
+                    break;
+                }
+                block.resize(1 << 24, 1);
+                hoard.push(block);
+            }
+            Reply::Failed { failure: Failure::Memory, text: format!("took {} blocks", hoard.len()) }
+        }
+    }
+}

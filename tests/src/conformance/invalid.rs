@@ -1,0 +1,310 @@
+//! Files that break one rule each.
+
+use super::{Case, Editor, Seal, valid};
+use bth::layout::*;
+use std::mem::offset_of;
+
+/// Files that fail when they are opened, checked or verified, by the code that they fail with.
+pub fn invalid() -> Vec<Case> {
+    let mut cases = container();
+    cases.extend(tree());
+    cases.extend(tets());
+    cases.extend(geometry());
+    cases.sort_by(|a, b| a.name.cmp(&b.name));
+    cases
+}
+
+/// Changes a valid file and seals it again.
+fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
+    let base = valid().into_iter().find(|c| c.name == base).expect("a valid file of that name");
+    let mut editor = Editor::new(&base.bytes);
+    change(&mut editor);
+    Case::new(name, editor.seal(seal))
+}
+
+/// Changes a 32-bit field of a section of object 0.
+fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
+    broken(name, base, Seal::Sections, |e| {
+        e.put_u32(kind, at, value);
+    })
+}
+
+fn container() -> Vec<Case> {
+    let one = 1u32.to_le_bytes();
+    let entry = |name, base, seal, kind, field: usize, value: u64, bytes: usize| {
+        broken(name, base, seal, |e| {
+            e.put(e.entry_at(0, kind) + field, &value.to_le_bytes()[..bytes]);
+        })
+    };
+    let mut cases = vec![
+        broken("F001-header-cut", "no-objects", Seal::None, |e| e.bytes.truncate(100)),
+        broken("F002-text-transfer", "triangle", Seal::Header, |e| {
+            e.put(5, b"\n");
+        }),
+        broken("F003-newer-minimum", "triangle", Seal::Header, |e| {
+            e.put(16, &0x0001_0001u32.to_le_bytes()).put(20, &0x0001_0001u32.to_le_bytes());
+        }),
+        broken("F003-minimum-above-writer", "triangle", Seal::Header, |e| {
+            e.put(20, &0x0001_0001u32.to_le_bytes());
+        }),
+        broken("F004-header-changed", "triangle", Seal::None, |e| {
+            e.put(offset_of!(Header, optional_features), &one);
+        }),
+        broken("F005-file-cut", "triangle", Seal::None, |e| e.bytes.truncate(e.bytes.len() - 64)),
+        broken("F006-header-reserved", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, reserved), &one);
+        }),
+        entry(
+            "F006-entry-reserved",
+            "triangle",
+            Seal::Table,
+            kind::LINES,
+            offset_of!(SectionEntry, reserved),
+            1,
+            4,
+        ),
+        broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, required_features), &one);
+        }),
+        broken("F008-table-too-long", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, section_count), &1000u32.to_le_bytes());
+        }),
+        broken("F008-table-elsewhere", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, section_offset), &192u64.to_le_bytes());
+        }),
+        broken("F009-table-changed", "triangle", Seal::None, |e| {
+            e.put(128 + offset_of!(SectionEntry, hash), &one);
+        }),
+        broken("F010-entries-swapped", "triangle", Seal::Table, |e| {
+            let (a, b) = (e.bytes[128..192].to_vec(), e.bytes[192..256].to_vec());
+            e.put(128, &b).put(192, &a);
+        }),
+        entry(
+            "F011-alignment",
+            "triangle",
+            Seal::Table,
+            kind::LINES,
+            offset_of!(SectionEntry, alignment),
+            32,
+            4,
+        ),
+        entry(
+            "F012-overlap",
+            "triangle",
+            Seal::Sections,
+            kind::OBJECT,
+            offset_of!(SectionEntry, offset),
+            128,
+            8,
+        ),
+        entry(
+            "F012-beyond-the-end",
+            "triangle",
+            Seal::Table,
+            kind::LINES,
+            offset_of!(SectionEntry, length),
+            1 << 40,
+            8,
+        ),
+        entry(
+            "F012-offset-overflow",
+            "triangle",
+            Seal::Table,
+            kind::LINES,
+            offset_of!(SectionEntry, offset),
+            !63,
+            8,
+        ),
+        entry("F013-count", "triangle", Seal::Table, kind::LINES, offset_of!(SectionEntry, count), 5, 8),
+        broken("F014-stride", "triangle", Seal::Table, |e| {
+            let at = e.entry_at(0, kind::TRIANGLE_IDS);
+            e.put(at + offset_of!(SectionEntry, stride), &2u32.to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &2u64.to_le_bytes());
+        }),
+        broken("F015-unknown-kind", "unknown-optional-section", Seal::Table, |e| {
+            e.put(128 + offset_of!(SectionEntry, flags), &one);
+        }),
+        entry("F016-flags", "triangle", Seal::Table, kind::LINES, offset_of!(SectionEntry, flags), 3, 4),
+        broken("F017-no-object-0", "triangle-bare", Seal::Table, |e| {
+            for i in 0..e.entries().len() {
+                e.put(128 + 64 * i + offset_of!(SectionEntry, object), &one);
+            }
+        }),
+        broken("F017-provenance-of-an-object", "triangle", Seal::Table, |e| {
+            e.put(e.entry_at(NONE, kind::PROVENANCE) + offset_of!(SectionEntry, object), &[0; 4]);
+        }),
+        broken("F018-content-id", "triangle", Seal::Header, |e| {
+            e.put(offset_of!(Header, content_id), &one);
+        }),
+        broken("F019-bytes-at-the-end", "triangle", Seal::Header, |e| {
+            e.bytes.extend([0; 64]);
+            let length = e.bytes.len() as u64;
+            e.put(offset_of!(Header, file_length), &length.to_le_bytes());
+        }),
+        broken("F020-gap", "triangle", Seal::None, |e| {
+            e.put(e.section_at(kind::TRIANGLE_IDS) + 4, &[1]);
+        }),
+        broken("F021-section-changed", "triangle", Seal::None, |e| {
+            e.put(e.section_at(kind::POSITIONS), &[1]);
+        }),
+    ];
+    cases.push(field(
+        "F022-too-many-triangles",
+        "triangle-bare",
+        kind::OBJECT,
+        offset_of!(Object, triangles),
+        (1 << 30) + 1,
+    ));
+    cases
+}
+
+/// Bytes of LINES where the blocks of `two-levels` start.
+const INNER: usize = 448;
+const LEAF: usize = 896;
+const RAW: usize = 1152;
+/// Byte of a node's child code.
+const fn child(slot: usize) -> usize {
+    384 + 4 * slot
+}
+
+fn tree() -> Vec<Case> {
+    let base = "two-levels";
+    let object = |name, at, value| field(name, base, kind::OBJECT, at, value);
+    let line = |name, at, value| field(name, base, kind::LINES, at, value);
+    let nan = f32::NAN.to_bits();
+    vec![
+        object("F101-record-without-tets", offset_of!(Object, record), 1),
+        field("F101-other-record", "tets-tet20", kind::OBJECT, offset_of!(Object, record), 4),
+        object("F102-triangles", offset_of!(Object, triangles), 42),
+        object("F102-dropped", offset_of!(Object, dropped), 42),
+        object("F103-nan", offset_of!(Object, lower), nan),
+        field(
+            "F103-bounds-of-nothing",
+            "nothing-to-hit",
+            kind::OBJECT,
+            offset_of!(Object, upper),
+            1f32.to_bits(),
+        ),
+        object("F104-reserved", offset_of!(Object, reserved), 1),
+        line("F105-unassigned", child(0), 7 << 29),
+        object("F105-root", offset_of!(Object, root), 1 << 29),
+        line("F106-node", child(0), Child::Node(10_000).code()),
+        line("F106-last-leaf", child(2), Child::Raw(37).code()),
+        object("F106-root", offset_of!(Object, root), Child::Indexed(Child::INDEX_LIMIT - 1).code()),
+        line("F106-no-tet-leaves", child(0), Child::Tets(0).code()),
+        line("F107-cycle", INNER + child(0), Child::Node(0).code()),
+        line("F107-itself", child(0), Child::Node(0).code()),
+        line("F108-two-parents", child(1), Child::Node(INNER as u32 / 64).code()),
+        line("F108-within-a-block", child(1), Child::Indexed(INNER as u32 / 64 + 1).code()),
+        broken("F109-nobody-refers", base, Seal::Sections, |e| {
+            for axis in 0..3 {
+                e.put_f32(kind::LINES, 128 * axis + 8, f32::MAX).put_f32(
+                    kind::LINES,
+                    128 * axis + 72,
+                    -f32::MAX,
+                );
+            }
+            e.put_u32(kind::LINES, child(2), NONE);
+        }),
+        object("F110-deeper-than-said", offset_of!(Object, depth), 1),
+        object("F110-too-deep", offset_of!(Object, depth), 97),
+        line("F111-hole", child(4), Child::Node(7).code()),
+        line("F111-no-children", INNER + child(0), NONE),
+        line("F112-nan", 0, nan),
+        line("F112-inside-out", 64, (-1f32).to_bits()),
+        line("F113-no-triangles", LEAF + offset_of!(IndexedLeaf, triangles), 0),
+        line("F113-17-triangles", RAW + offset_of!(RawLeaf, triangles), 17),
+        line("F113-17-vertices", LEAF + offset_of!(IndexedLeaf, vertices), 17),
+        line("F114-corner", LEAF + offset_of!(IndexedLeaf, corner), 0xff),
+        line("F115-rows", LEAF + offset_of!(IndexedLeaf, first), 40),
+        line("F115-overflow", RAW + offset_of!(RawLeaf, first), u32::MAX - 1),
+        field("F116-id", base, kind::TRIANGLE_IDS, 0, 41),
+        line("F117-infinite", LEAF + 4, f32::INFINITY.to_bits()),
+        line("F117-raw-nan", RAW + 4, nan),
+        line("F118-vertex", LEAF + 60, nan),
+        line("F118-corner", LEAF + 192 + 12, 1),
+        line("F118-reserved", LEAF + offset_of!(IndexedLeaf, reserved), 1),
+        line("F118-raw-reserved", RAW + offset_of!(RawLeaf, reserved), 1),
+        field("F140-triangles", base, kind::TRIANGLES, 0, 30),
+        field("F140-corners", base, kind::CORNERS, 8, NONE),
+        field("F141-nan", base, kind::POSITIONS, 4, nan),
+    ]
+}
+
+fn tets() -> Vec<Case> {
+    let base = "tets-link32";
+    let leaf = |name, row: usize, at: usize, value| field(name, base, kind::TET_LEAVES, 64 * row + at, value);
+    // The middle tetrahedron of the first cube has neighbours behind slots 0 (tetrahedron 4) and 1 (3),
+    // and constrained faces behind the others.
+    let middle = 2;
+    vec![
+        leaf("F105-tets-below-tets", 0, offset_of!(TetLeaf, subtree), Child::Tets(1).code()),
+        leaf("F108-subtree-twice", 1, offset_of!(TetLeaf, subtree), Child::Indexed(11).code()),
+        leaf("F120-flags", 0, offset_of!(TetLeaf, flags), 1),
+        leaf("F120-flat-box", 0, offset_of!(TetLeaf, upper), 0),
+        leaf("F121-hole", 1, offset_of!(TetLeaf, first_tet), 6),
+        leaf("F121-beyond-the-end", 1, offset_of!(TetLeaf, vertices), NONE),
+        leaf("F121-rows-left", 1, offset_of!(TetLeaf, hulls), 11),
+        leaf("F122-no-tets", 0, offset_of!(TetLeaf, tets), 0),
+        leaf("F122-no-faces", 1, offset_of!(TetLeaf, faces), 0),
+        field("F123-twice", base, kind::LINES, child(2), Child::Tets(0).code()),
+        field("F124-nan", base, kind::TET_VERTICES, 8, f32::NAN.to_bits()),
+        field("F124-reserved", base, kind::TET_VERTICES, 12, 1),
+        field("F125-tet-of-another-leaf", base, kind::HULL_FACES, 20 + 12, 7),
+        field("F125-vertex-of-another-leaf", base, kind::HULL_FACES, 0, 8),
+        broken("F125-twice", base, Seal::Sections, |e| {
+            let at = e.section_at(kind::HULL_FACES);
+            let first = e.bytes[at..at + 20].to_vec();
+            e.put(at + 20, &first);
+        }),
+        broken("F126-tets-swapped", base, Seal::Sections, |e| {
+            let tets = [16, 20].map(|at| e.get_u32(kind::TET_FACES, at));
+            e.put_u32(kind::TET_FACES, 16, tets[1]).put_u32(kind::TET_FACES, 20, tets[0]);
+        }),
+        field("F126-vertex", base, kind::TET_FACES, 0, 3),
+        field("F127-tet-of-another-leaf", base, kind::TETS, 32 * middle, 9),
+        field("F127-face-of-another-leaf", base, kind::TETS, 32 * middle + 16, FACE_BIT | 2),
+        field("F127-itself", base, kind::TETS, 32 * middle, middle as u32),
+        field("F128-other-neighbour", base, kind::TETS, 32 * middle, 3),
+        field("F128-vertex-of-another-leaf", base, kind::TETS, 32 * middle + 4, 8),
+        field("F128-tet16-xor", "tets-tet16", kind::TETS, 16 * 4, 8),
+        field("F128-tet20-xor", "tets-tet20", kind::TETS, 20 * 4, 8),
+        field("F129-opposite-beyond-the-hull", base, kind::TETS, 12, 0),
+        field("F129-tet32-vertex", "tets-tet32", kind::TETS, 32 * 4, 0),
+        broken("F130-nobody-leads-there", base, Seal::Sections, |e| {
+            e.put_u32(kind::TETS, 32 * middle, NONE).put_u32(kind::TETS, 32 * middle + 4, NONE);
+        }),
+        field("F131-home-of-another", base, kind::TRIANGLE_HOMES, 16, 0),
+        field("F131-home-missing", base, kind::TRIANGLE_HOMES, 0, NONE),
+        field("F131-face-of-nothing", base, kind::TET_FACES, 12, 1000),
+    ]
+}
+
+fn geometry() -> Vec<Case> {
+    let (base, tets) = ("two-levels", "tets-tet16");
+    let half = 0.5f32.to_bits();
+    vec![
+        field("F201-other-vertex", base, kind::LINES, LEAF + 132, half),
+        field("F202-other-vertex", tets, kind::TET_VERTICES, 16, half),
+        field("F203-triangle-twice", base, kind::TRIANGLE_IDS, 4, 0),
+        field("F203-subtree-of-others", tets, kind::TRIANGLE_IDS, 4, 4),
+        field("F203-more-dropped", base, kind::OBJECT, offset_of!(Object, dropped), 2),
+        field("F204-small-box", base, kind::LINES, 64, half),
+        field("F204-small-bounds", base, kind::OBJECT, offset_of!(Object, upper), half),
+        field("F205-small-tet-box", tets, kind::TET_LEAVES, offset_of!(TetLeaf, upper), half),
+        broken("F206-turned-over", tets, Seal::Sections, |e| {
+            for axis in 0..3 {
+                e.put_f32(kind::TET_VERTICES, 4 * axis, 0.75);
+            }
+        }),
+        broken("F206-hull-outwards", tets, Seal::Sections, |e| {
+            let swapped = [4, 8].map(|at| e.get_u32(kind::HULL_FACES, at));
+            e.put_u32(kind::HULL_FACES, 4, swapped[1]).put_u32(kind::HULL_FACES, 8, swapped[0]);
+        }),
+        broken("F207-dropped-with-area", base, Seal::Sections, |e| {
+            for (k, v) in [7, 8, 13].into_iter().enumerate() {
+                e.put_u32(kind::TRIANGLES, 12 * 40 + 4 * k, v);
+            }
+        }),
+    ]
+}

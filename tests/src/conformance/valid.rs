@@ -1,0 +1,369 @@
+//! Small valid files.
+
+use super::Case;
+use bth::layout::*;
+use bth_compile::write::{FileBuilder, ObjectParts, Source, object};
+use zerocopy::IntoBytes;
+
+/// Every valid file.
+pub fn valid() -> Vec<Case> {
+    let mut cases = vec![
+        Case::new("no-objects", FileBuilder::new().finish()),
+        Case::new("nothing-to-hit", nothing_to_hit()),
+        Case::new("triangle", triangle()),
+        Case::new("triangle-bare", triangle_bare()),
+        Case::new("two-levels", two_levels()),
+        Case::new("two-objects", two_objects()),
+        Case::new("unknown-optional-section", unknown_section()),
+    ];
+    cases.extend(RecordKind::ALL.map(|r| Case::new(&format!("tets-{}", r.name()), tets(r))));
+    cases
+}
+
+/// An indexed leaf of these triangles; at most 16 distinct corners.
+fn indexed(corners: &[[[f32; 3]; 3]], first: u32) -> IndexedLeaf {
+    let mut points: Vec<[f32; 3]> = Vec::new();
+    let mut corner = [[0; WIDTH]; 3];
+    for (t, triangle) in corners.iter().enumerate() {
+        for (k, p) in triangle.iter().enumerate() {
+            let i = points.iter().position(|q| q == p).unwrap_or_else(|| {
+                points.push(*p);
+                points.len() - 1
+            });
+            corner[k][t] = i as u8;
+        }
+    }
+    let row = |axis: usize| std::array::from_fn(|i| points.get(i).unwrap_or(&points[0])[axis]);
+    let (triangles, vertices) = (corners.len() as u32, points.len() as u32);
+    IndexedLeaf { vertex: [0, 1, 2].map(row), corner, first, triangles, vertices, reserved: 0 }
+}
+
+/// A raw leaf of these triangles.
+fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
+    let row = |k: usize, axis: usize| std::array::from_fn(|i| corners.get(i).unwrap_or(&corners[0])[k][axis]);
+    let corner = [0, 1, 2].map(|k| [0, 1, 2].map(|axis| row(k, axis)));
+    RawLeaf { corner, first, triangles: corners.len() as u32, reserved: [0; 14] }
+}
+
+type Bounds = ([f32; 3], [f32; 3]);
+
+fn bounds<'a>(points: impl IntoIterator<Item = &'a [f32; 3]>) -> Bounds {
+    let start = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    points
+        .into_iter()
+        .fold(start, |(l, u), p| ([0, 1, 2].map(|a| l[a].min(p[a])), [0, 1, 2].map(|a| u[a].max(p[a]))))
+}
+
+fn node(children: &[(Child, Bounds)]) -> WideNode {
+    let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
+    for (i, (child, (lower, upper))) in children.iter().enumerate() {
+        node.child[i] = child.code();
+        for a in 0..3 {
+            node.bounds[a][0][i] = lower[a];
+            node.bounds[a][1][i] = upper[a];
+        }
+    }
+    node
+}
+
+fn lines(block: &[u8]) -> Vec<Line> {
+    let word = |b: &[u8]| u32::from_le_bytes(b.try_into().unwrap());
+    block.chunks_exact(64).map(|b| Line(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
+}
+
+fn file(parts: &ObjectParts) -> Vec<u8> {
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, parts).expect("the parts fit together");
+    builder.finish()
+}
+
+const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+fn nothing_to_hit() -> Vec<u8> {
+    let positions = [[0.0; 3], [1.0; 3], [2.0; 3]];
+    let source = Source { positions: &positions, triangles: &[[0, 1, 2]], ..Source::default() };
+    file(&ObjectParts {
+        root: NONE,
+        triangles: 1,
+        dropped: 1,
+        source: Some(source),
+        ..ObjectParts::default()
+    })
+}
+
+fn triangle() -> Vec<u8> {
+    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
+    let source = Source { positions: &CORNERS, triangles: &[[0, 1, 2]], ..Source::default() };
+    let parts = ObjectParts {
+        bounds: Some(bounds(&CORNERS)),
+        root: Child::Indexed(0).code(),
+        triangles: 1,
+        lines: &lines,
+        triangle_ids: &[0],
+        source: Some(source),
+        ..ObjectParts::default()
+    };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &parts).unwrap();
+    builder.provenance("{\"tool\":\"conformance\"}".into()).unwrap();
+    builder.finish()
+}
+
+fn triangle_bare() -> Vec<u8> {
+    let lines = lines(raw(&[CORNERS], 0).as_bytes());
+    file(&ObjectParts {
+        bounds: Some(bounds(&CORNERS)),
+        root: Child::Raw(0).code(),
+        triangles: 1,
+        lines: &lines,
+        triangle_ids: &[0],
+        ..ObjectParts::default()
+    })
+}
+
+/// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
+/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept.
+fn two_levels() -> Vec<u8> {
+    let mut positions = Vec::new();
+    for y in 0..6 {
+        for x in 0..5 {
+            positions.push([x as f32, y as f32, 0.25 * (x * y) as f32]);
+        }
+    }
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    for y in 0..5 {
+        for x in 0..4 {
+            let v = 5 * y + x;
+            triangles.push([v, v + 1, v + 6]);
+            triangles.push([v, v + 6, v + 5]);
+        }
+    }
+    triangles.push([7, 7, 8]);
+    let corners = |t: u32| triangles[t as usize].map(|v| positions[v as usize]);
+    let range = |from: u32, to: u32| (from..to).map(corners).collect::<Vec<_>>();
+    let of = |from: u32, to: u32| bounds(range(from, to).iter().flatten().collect::<Vec<_>>());
+    // Root, inner node, then the leaves.
+    let (inner, leaf) = (NODE_LINES as u32, 2 * NODE_LINES as u32);
+    let at = |indexed: u32, raw: u32| leaf + indexed * INDEXED_LINES as u32 + raw * RAW_LINES as u32;
+    let root = node(&[
+        (Child::Node(inner), of(0, 24)),
+        (Child::Indexed(at(2, 1)), of(24, 32)),
+        (Child::Raw(at(3, 1)), of(32, 40)),
+    ]);
+    let second = node(&[
+        (Child::Indexed(at(0, 0)), of(0, 8)),
+        (Child::Raw(at(1, 0)), of(8, 16)),
+        (Child::Indexed(at(1, 1)), of(16, 24)),
+    ]);
+    let mut all = lines(root.as_bytes());
+    all.extend(lines(second.as_bytes()));
+    all.extend(lines(indexed(&range(0, 8), 0).as_bytes()));
+    all.extend(lines(raw(&range(8, 16), 8).as_bytes()));
+    all.extend(lines(indexed(&range(16, 24), 16).as_bytes()));
+    all.extend(lines(indexed(&range(24, 32), 24).as_bytes()));
+    all.extend(lines(raw(&range(32, 40), 32).as_bytes()));
+    let normals = vec![[0.0, 0.0, 1.0]; positions.len()];
+    let uvs: Vec<_> = positions.iter().map(|p| [p[0] / 4.0, p[1] / 5.0]).collect();
+    let source = Source {
+        positions: &positions,
+        triangles: &triangles,
+        corners: &triangles,
+        normals: &normals,
+        uvs: &uvs,
+    };
+    file(&ObjectParts {
+        bounds: Some(bounds(&positions)),
+        root: Child::Node(0).code(),
+        triangles: 41,
+        dropped: 1,
+        lines: &all,
+        triangle_ids: &(0..40).collect::<Vec<_>>(),
+        source: Some(source),
+        ..ObjectParts::default()
+    })
+}
+
+fn two_objects() -> Vec<u8> {
+    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
+    let parts = ObjectParts {
+        bounds: Some(bounds(&CORNERS)),
+        root: Child::Indexed(0).code(),
+        triangles: 1,
+        lines: &lines,
+        triangle_ids: &[0],
+        ..ObjectParts::default()
+    };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 1, &parts).unwrap();
+    object(&mut builder, 0, &parts).unwrap();
+    builder.finish()
+}
+
+fn unknown_section() -> Vec<u8> {
+    let mut builder = FileBuilder::new();
+    builder.section(1000, NONE, 3, b"abcdef".as_slice()).unwrap();
+    builder.finish()
+}
+
+/// Vertices of the five tetrahedra that fill a cube whose corner i is at (i & 1, i >> 1 & 1, i >> 2).
+const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7], [1, 4, 5, 7], [2, 4, 6, 7]];
+/// Two faces of the middle one.
+const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
+
+/// Two cubes as tet leaves, each around two triangles, the first with a subtree beside it; a triangle
+/// leaf; and a triangle without area.
+fn tets(record: RecordKind) -> Vec<u8> {
+    let mut positions: Vec<[f32; 3]> = Vec::new();
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    let mut parts = TetParts::default();
+    for cube in 0..2u32 {
+        let point = |i: u32| [(4 * cube + (i & 1)) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32];
+        let base = positions.len() as u32;
+        let rows = [1, 2, 4, 7];
+        positions.extend(rows.map(point));
+        let ids = triangles.len() as u32;
+        let row = |v: u32| base + rows.iter().position(|r| *r == v).unwrap() as u32;
+        triangles.extend(FACES.map(|f| f.map(row)));
+        parts.add(record, &[0, 1, 2, 3, 4, 5, 6, 7].map(point), &CUBE, &FACES, ids);
+    }
+    let base = positions.len() as u32;
+    positions.extend([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.5]]);
+    triangles.extend([[base, base + 1, base + 2], [base, base, base + 1]]);
+    let corners = |t: usize| triangles[t].map(|v| positions[v as usize]);
+    let beside: Vec<_> = (0..2).map(corners).collect();
+
+    let leaf = NODE_LINES as u32;
+    let subtree = leaf + INDEXED_LINES as u32;
+    parts.leaves[0].subtree = Child::Indexed(subtree).code();
+    let root = node(&[
+        (Child::Tets(0), ([0.0; 3], [1.0; 3])),
+        (Child::Indexed(leaf), bounds(&corners(4))),
+        (Child::Tets(1), ([4.0, 0.0, 0.0], [5.0, 1.0, 1.0])),
+    ]);
+    let mut all = lines(root.as_bytes());
+    all.extend(lines(indexed(&[corners(4)], 0).as_bytes()));
+    all.extend(lines(indexed(&beside, 1).as_bytes()));
+    let mut homes: Vec<u32> = (0..4).collect();
+    homes.extend([NONE, NONE]);
+    let source = Source { positions: &positions, triangles: &triangles, ..Source::default() };
+    file(&ObjectParts {
+        bounds: Some(bounds(&positions)),
+        root: Child::Node(0).code(),
+        triangles: 6,
+        dropped: 1,
+        lines: &all,
+        triangle_ids: &[4, 0, 1],
+        record: Some(record),
+        tet_leaves: &parts.leaves,
+        tets: &parts.records,
+        tet_vertices: &parts.vertices,
+        tet_faces: &parts.faces,
+        hull_faces: &parts.hulls,
+        triangle_homes: &homes,
+        source: Some(source),
+    })
+}
+
+#[derive(Default)]
+struct TetParts {
+    leaves: Vec<TetLeaf>,
+    records: Vec<u8>,
+    vertices: Vec<TetVertex>,
+    faces: Vec<TetFace>,
+    hulls: Vec<HullFace>,
+}
+
+impl TetParts {
+    /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles number from `ids`.
+    fn add(
+        &mut self,
+        record: RecordKind,
+        points: &[[f32; 3]],
+        tets: &[[u32; 4]],
+        faces: &[[u32; 3]],
+        ids: u32,
+    ) {
+        let (first_tet, first_vertex) =
+            ((self.records.len() / record.stride()) as u32, self.vertices.len() as u32);
+        let (first_face, first_hull) = (self.faces.len() as u32, self.hulls.len() as u32);
+        let (lower, upper) = bounds(points);
+        self.vertices.extend(points.iter().map(|p| TetVertex { position: *p, reserved: 0 }));
+
+        let without = |tet: [u32; 4], slot: usize| -> Vec<u32> {
+            tet.into_iter().filter(|v| *v != tet[slot]).collect()
+        };
+        let in_front = |face: &[u32; 3], v: u32| {
+            let [a, b, c, d] = [face[0], face[1], face[2], v].map(|v| points[v as usize].map(f64::from));
+            let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+            let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
+            minor(1, 2) * w[0] + minor(2, 0) * w[1] + minor(0, 1) * w[2] > 0.0
+        };
+        self.faces.extend(faces.iter().enumerate().map(|(i, f)| TetFace {
+            vertex: f.map(|v| first_vertex + v),
+            triangle: ids + i as u32,
+            tet: [NONE; 2],
+            opposite: [NONE; 2],
+        }));
+        for (t, &tet) in tets.iter().enumerate() {
+            let mut next = [NONE; 4];
+            let mut opposite = [NONE; 4];
+            for slot in 0..4 {
+                let face = without(tet, slot);
+                let beyond = tets
+                    .iter()
+                    .enumerate()
+                    .find(|(o, other)| *o != t && face.iter().all(|v| other.contains(v)));
+                let Some((other, vertices)) = beyond else {
+                    let mut vertex: [u32; 3] = face.try_into().unwrap();
+                    if !in_front(&vertex, tet[slot]) {
+                        vertex.swap(1, 2);
+                    }
+                    self.hulls.push(HullFace {
+                        vertex: vertex.map(|v| first_vertex + v),
+                        tet: first_tet + t as u32,
+                        opposite: first_vertex + tet[slot],
+                    });
+                    continue;
+                };
+                let fourth = vertices.iter().find(|v| !face.contains(v)).unwrap();
+                opposite[slot] = first_vertex + fourth;
+                next[slot] = match faces.iter().position(|f| f.iter().all(|v| face.contains(v))) {
+                    None => first_tet + other as u32,
+                    Some(f) => {
+                        let side = usize::from(!in_front(&faces[f], tet[slot]));
+                        let row = first_face as usize + f;
+                        self.faces[row].tet[side] = first_tet + t as u32;
+                        self.faces[row].opposite[side] = first_vertex + tet[slot];
+                        FACE_BIT | row as u32
+                    }
+                };
+            }
+            let [a, b, c, d] = tet.map(|v| first_vertex + v);
+            let xor = a ^ b ^ c ^ d;
+            let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
+            match record {
+                RecordKind::Link32 => self.records.extend(Link32 { link }.as_bytes()),
+                RecordKind::Tet32 => self.records.extend(Tet32 { vertex: [a, b, c], xor, next }.as_bytes()),
+                RecordKind::Tet20 => self.records.extend(Tet20 { xor, next }.as_bytes()),
+                RecordKind::Tet16 => {
+                    let next = [0, 1, 2].map(|i| next[i] ^ next[3]);
+                    self.records.extend(Tet16 { xor, next }.as_bytes());
+                }
+            }
+        }
+        self.leaves.push(TetLeaf {
+            lower,
+            upper,
+            first_tet,
+            tets: tets.len() as u32,
+            first_vertex,
+            vertices: points.len() as u32,
+            first_face,
+            faces: faces.len() as u32,
+            first_hull,
+            hulls: self.hulls.len() as u32 - first_hull,
+            subtree: NONE,
+            flags: 0,
+        });
+    }
+}

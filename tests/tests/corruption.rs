@@ -1,0 +1,69 @@
+//! Whatever happens to a file, opening and checking it ends in a result.
+
+use bth_tests::conformance::{Editor, Seal, valid};
+
+/// Opens a file and checks all objects; true if it passes.
+fn passes(bytes: &[u8]) -> bool {
+    let Ok(file) = bth::File::from_bytes(bytes) else { return false };
+    let good = (0..file.object_count()).all(|i| file.check(i).is_ok());
+    if good {
+        // Verifying must end too; it may find fault.
+        let _ = bth::verify::verify(&file);
+    }
+    good
+}
+
+#[test]
+fn every_truncation_is_refused() {
+    for case in valid() {
+        for length in 0..case.bytes.len() {
+            assert!(!passes(&case.bytes[..length]), "{} cut to {length} bytes", case.name);
+        }
+    }
+}
+
+#[test]
+fn every_flipped_byte_is_found() {
+    for case in valid() {
+        let mut bytes = case.bytes.clone();
+        for i in 0..bytes.len() {
+            bytes[i] ^= 0xff;
+            let found =
+                bth::File::from_bytes(&bytes).map_or(true, |file| bth::verify::verify(&file).is_err());
+            assert!(found, "{} with byte {i} flipped", case.name);
+            bytes[i] ^= 0xff;
+        }
+    }
+}
+
+/// With all hashes made right again the flips reach the checks of table and indices.
+#[test]
+fn flips_behind_right_hashes_end_in_a_result() {
+    let (mut passed, mut refused) = (0, 0);
+    for case in valid() {
+        for i in 0..case.bytes.len() {
+            for mask in [1, 0x80, 0xff] {
+                let mut editor = Editor::new(&case.bytes);
+                editor.bytes[i] ^= mask;
+                let good = passes(&editor.seal(Seal::Sections));
+                passed += u32::from(good);
+                refused += u32::from(!good);
+            }
+        }
+    }
+    assert!(passed > 0 && refused > passed / 4, "{passed} passed, {refused} were refused");
+}
+
+/// Words that break arithmetic, in every place, behind right hashes.
+#[test]
+fn extreme_words_behind_right_hashes_end_in_a_result() {
+    for case in valid() {
+        for i in (0..case.bytes.len()).step_by(4) {
+            for word in [0, 1, 1 << 29, 5 << 29, 1 << 31, u32::MAX - 1, u32::MAX, f32::NAN.to_bits()] {
+                let mut editor = Editor::new(&case.bytes);
+                editor.put(i, &word.to_le_bytes());
+                passes(&editor.seal(Seal::Sections));
+            }
+        }
+    }
+}

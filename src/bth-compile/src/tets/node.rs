@@ -87,9 +87,10 @@ pub(super) fn tetrahedralize(
                 break;
             }
             Err(trouble) => {
-                let retry = trouble.retry();
+                let retry = trouble.retry(triangles);
+                let again = troubles.last() == Some(&Trouble::TimedOut) && trouble == Trouble::TimedOut;
                 troubles.push(trouble);
-                if !retry {
+                if !retry || again {
                     break;
                 }
             }

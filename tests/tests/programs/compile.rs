@@ -37,7 +37,8 @@ fn bytes_depend_on_neither_threads_nor_folder_nor_name() {
     let second = folder(&[("other.obj", &model)]);
     for options in [["--structure", "bth"], ["--structure", "bvh"], ["--quality", "best"]] {
         let compile = |folder: &std::path::Path, name: &str, threads: &str| {
-            let mut args = vec!["compile", name, "-o", "out.bth", "--threads", threads, "--min-tet-triangles", "64"];
+            let mut args =
+                vec!["compile", name, "-o", "out.bth", "--threads", threads, "--min-tet-triangles", "64"];
             args.extend(options);
             bthc(folder, &args).expect(0);
             std::fs::read(folder.join("out.bth")).unwrap()
@@ -83,6 +84,11 @@ fn degenerate_triangles_are_counted_and_keep_their_ids() {
     let json = bthc(folder.path(), &["compile", "flat.obj", "--json"]).expect(0).json();
     assert_eq!(json["report"]["mesh"]["degenerate"], 1);
     let scene = bth::open(folder.path().join("flat.bth")).unwrap();
-    let ray = bth::rays::Ray { origin: [0.2, 0.2, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+    let ray = bth::rays::Ray {
+        origin: [0.2, 0.2, 1.0],
+        tmin: 0.0,
+        direction: [0.0, 0.0, -1.0],
+        tmax: f32::INFINITY,
+    };
     assert_eq!(scene.nearest(&ray, bth::rays::Surface::NONE).surface.triangle, 1);
 }

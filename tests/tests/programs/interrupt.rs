@@ -39,7 +39,8 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
     let folder = folder(&[("ball.obj", &sphere(160))]);
     let mut interrupted = 0;
     for milliseconds in [40, 80, 120, 160, 200, 300] {
-        let mut child = command("bthc", folder.path(), &["compile", "ball.obj", "--quiet", "--quality", "best"]);
+        let mut child =
+            command("bthc", folder.path(), &["compile", "ball.obj", "--quiet", "--quality", "best"]);
         let mut child = child.stderr(std::process::Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
         let pid = child.id().to_string();

@@ -40,7 +40,9 @@ fn messy_files_compile_or_are_refused_with_a_reason() {
                 let file = bth::File::from_bytes(&bytes).unwrap();
                 bth::verify::verify(&file).unwrap_or_else(|e| panic!("{model}: {e:?}"));
             }
-            Some(3 | 5) => assert!(message.starts_with("error: ") && message.contains("BTH-"), "{model}: {message}"),
+            Some(3 | 5) => {
+                assert!(message.starts_with("error: ") && message.contains("BTH-"), "{model}: {message}")
+            }
             _ => panic!("{model}: {status:?}: {message}"),
         }
         let _ = std::fs::remove_file(folder.path().join("out.bth"));

@@ -65,6 +65,7 @@ fn rejects_ray_files_that_are_cut_or_of_another_kind() {
         let run = bthc(folder.path(), &["trace", "ball.bth", rays, "-o", "x.hits"]).expect(3);
         assert!(run.stderr.contains(rays) && run.stderr.contains("BTH-I090"), "{run:?}");
     }
-    bthc(folder.path(), &["trace", "ball.bth", "whole.rays", "--from", "short.from", "-o", "x.hits"]).expect(3);
+    bthc(folder.path(), &["trace", "ball.bth", "whole.rays", "--from", "short.from", "-o", "x.hits"])
+        .expect(3);
     assert!(!folder.path().join("x.hits").exists());
 }

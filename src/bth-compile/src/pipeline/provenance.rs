@@ -9,7 +9,8 @@ use std::path::Path;
 
 /// BLAKE3 of a file's bytes, hexadecimal.
 pub(super) fn hash(source: &Path) -> Result<String> {
-    let failed = |e: std::io::Error| Error::File { code: "BTH-O080", path: source.into(), message: e.to_string() };
+    let failed =
+        |e: std::io::Error| Error::File { code: "BTH-O080", path: source.into(), message: e.to_string() };
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(std::fs::File::open(source).map_err(failed)?).map_err(failed)?;
     Ok(hasher.finalize().to_hex().to_string())
@@ -42,6 +43,8 @@ pub(super) fn json(
             "geometry": options.geometry,
         },
     });
-    serde_json::to_string(&value)
-        .map_err(|e| Error::Internal { code: "BTH-X080", message: format!("provenance cannot be written: {e}") })
+    serde_json::to_string(&value).map_err(|e| Error::Internal {
+        code: "BTH-X080",
+        message: format!("provenance cannot be written: {e}"),
+    })
 }

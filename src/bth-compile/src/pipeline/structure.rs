@@ -26,7 +26,11 @@ pub(super) fn choose(
                 mesh.triangles.len(),
                 contacts.pairs
             );
-            Err(unusable(source, message, "repair the model (`bthc marks` lists the triangles), or use --structure bth"))
+            Err(unusable(
+                source,
+                message,
+                "repair the model (`bthc marks` lists the triangles), or use --structure bth",
+            ))
         }
         (Structure::Bth, _) => {
             let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
@@ -45,7 +49,11 @@ pub(super) fn check_built(
     let whole = matches!(built, [(0, _)]);
     if options.structure == Structure::Tets && !tree.nodes.is_empty() && !whole {
         let message = "the model could not be tetrahedralized whole".to_owned();
-        return Err(unusable(source, message, "is the worker bth-tetgen installed? Else use --structure bth"));
+        return Err(unusable(
+            source,
+            message,
+            "is the worker bth-tetgen installed? Else use --structure bth",
+        ));
     }
     Ok(())
 }

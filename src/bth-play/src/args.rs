@@ -55,7 +55,7 @@ pub(crate) struct Args {
     #[arg(long)]
     pub(crate) no_ground: bool,
     /// Threads; 0 for one per processor. The picture does not depend on it.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = parse_threads)]
     pub(crate) threads: usize,
     /// Map the file instead of reading and checking it. It must be as bthc wrote it, and nobody may
     /// change it meanwhile.
@@ -106,6 +106,13 @@ impl Mode {
             Mode::Ao => "ao",
             Mode::Steps => "steps",
         }
+    }
+}
+
+fn parse_threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= 4096 => Ok(n),
+        _ => Err("expected a number from 0 to 4096".to_owned()),
     }
 }
 

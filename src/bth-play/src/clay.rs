@@ -11,11 +11,11 @@ use glam::{DVec3, Vec3};
 const AMBIENT_RAYS: u32 = 2;
 /// Radius of the key light at distance 1: the softness of its shadows.
 const KEY_RADIUS: f64 = 0.16;
-const CLAY: Vec3 = Vec3::new(0.60, 0.555, 0.51);
-const KEY: Vec3 = Vec3::new(1.02, 0.97, 0.88);
-const FILL: Vec3 = Vec3::new(0.17, 0.20, 0.26);
-const SKY: Vec3 = Vec3::new(0.46, 0.50, 0.56);
-const BOUNCE: Vec3 = Vec3::new(0.26, 0.235, 0.21);
+const CLAY: Vec3 = Vec3::new(0.57, 0.515, 0.465);
+const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
+const FILL: Vec3 = Vec3::new(0.12, 0.145, 0.19);
+const SKY: Vec3 = Vec3::new(0.33, 0.37, 0.43);
+const BOUNCE: Vec3 = Vec3::new(0.22, 0.20, 0.18);
 const BACKGROUND_TOP: Vec3 = Vec3::new(0.52, 0.56, 0.62);
 const BACKGROUND_BOTTOM: Vec3 = Vec3::new(0.80, 0.81, 0.82);
 

@@ -62,7 +62,7 @@ pub(crate) struct Compile {
     #[arg(long)]
     pub(crate) no_geometry: bool,
     /// Threads; 0 for one per processor. The result does not depend on it.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
     /// Seconds that the tetrahedralization of one node may take; by default according to its size.
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
@@ -98,7 +98,7 @@ pub(crate) struct Info {
     /// The compiled file.
     #[arg(required_unless_present = "cpu")]
     pub(crate) file: Option<PathBuf>,
-    /// Show the processor's features and the kernel that tracing uses here.
+    /// Show the processor's features that tracing may use.
     #[arg(long)]
     pub(crate) cpu: bool,
     /// Print one JSON object.
@@ -128,7 +128,7 @@ pub(crate) struct Explain {
     #[arg(long, default_value_t = 20, value_name = "N")]
     pub(crate) top: usize,
     /// Threads; 0 for one per processor.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
     /// Print one JSON object.
     #[arg(long)]
@@ -145,7 +145,7 @@ pub(crate) struct Marks {
     #[arg(long, value_name = "FILE")]
     pub(crate) tris: Option<PathBuf>,
     /// Threads; 0 for one per processor.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
     /// Print one JSON object, with the ids as `bad_triangles`.
     #[arg(long)]
@@ -169,7 +169,7 @@ pub(crate) struct Trace {
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
     /// Threads; 0 for one per processor.
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
     /// Print one JSON object.
     #[arg(long)]
@@ -228,6 +228,14 @@ pub(crate) enum Attributes {
     Normals,
     /// Shading normals and texture coordinates.
     All,
+}
+
+/// A number of threads that a machine may have.
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= 4096 => Ok(n),
+        _ => Err("expected a number from 0 to 4096".to_owned()),
+    }
 }
 
 impl From<Attributes> for Keep {

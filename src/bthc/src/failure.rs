@@ -134,7 +134,8 @@ pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
     // As above for a closed output.
     let _ = error.print();
     if error.use_stderr() && wants_json {
-        let first = error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+        let first =
+            error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
         print_json_error(json!({"code": "BTH-U001", "message": first}), 2);
     }
     ExitCode::from(if error.use_stderr() { 2 } else { 0 })

@@ -15,7 +15,9 @@ pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
     Ok(rays
         .iter()
         .map(|bytes| {
-            let f = |i: usize| f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]]);
+            let f = |i: usize| {
+                f32::from_le_bytes([bytes[4 * i], bytes[4 * i + 1], bytes[4 * i + 2], bytes[4 * i + 3]])
+            };
             Ray { origin: [f(0), f(1), f(2)], tmin: f(3), direction: [f(4), f(5), f(6)], tmax: f(7) }
         })
         .collect())
@@ -85,7 +87,10 @@ fn read(path: &Path, tag: &[u8; 4], stride: u64) -> Result<Vec<u8>, Failure> {
     let [tag_found @ .., _, _, _, _, _, _, _, _, _, _, _, _] = start;
     let version = u32::from_le_bytes([start[4], start[5], start[6], start[7]]);
     if tag_found != tag || version != 1 {
-        let message = format!("expected the tag {name} and version 1, found {:?} and {version}", tag_found.escape_ascii().to_string());
+        let message = format!(
+            "expected the tag {name} and version 1, found {:?} and {version}",
+            tag_found.escape_ascii().to_string()
+        );
         return Err(Failure::ray_file(path, 0, message, ""));
     }
     let mut count = [0; 8];

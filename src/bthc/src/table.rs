@@ -12,18 +12,12 @@ impl Table {
         self.rows.push(cells.iter().map(|c| (*c).to_owned()).collect());
     }
 
-    /// Adds a row of two cells unless the value is empty.
-    pub(crate) fn fact(&mut self, name: &str, value: impl Into<String>) {
-        let value = value.into();
-        if !value.is_empty() {
-            self.rows.push(vec![name.to_owned(), value]);
-        }
-    }
-
     /// The text, one line a row.
     pub(crate) fn render(&self) -> String {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+        let width = |c: usize| {
+            self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
+        };
         let widths: Vec<usize> = (0..columns).map(width).collect();
         let mut text = String::new();
         for row in &self.rows {

@@ -63,7 +63,13 @@ fn summary(path: &Path, report: &Report) -> String {
     facts.row(["file", &bytes(file.bytes)]);
     facts.row(["traversal reads", &bytes(file.resident_bytes)]);
     facts.row(["bytes a triangle", &format!("{:.1}", file.resident_bytes_per_triangle)]);
-    format!("{}\n{}{}\n{}", stages.render(), facts.render(), worker_note(report), format_args!("wrote {}\n", path.display()))
+    format!(
+        "{}\n{}{}\n{}",
+        stages.render(),
+        facts.render(),
+        worker_note(report),
+        format_args!("wrote {}\n", path.display())
+    )
 }
 
 fn nonzero(table: &mut Table, name: &str, n: u64) {
@@ -76,7 +82,9 @@ fn nonzero(table: &mut Table, name: &str, n: u64) {
 fn worker_note(report: &Report) -> String {
     match report.tets.as_ref().map(|t| &t.worker) {
         Some(WorkerStatus::Missing { hint }) => format!("note: no tetrahedralization worker: {hint}\n"),
-        Some(WorkerStatus::Unusable { reason }) => format!("note: tetrahedralization worker unusable: {reason}\n"),
+        Some(WorkerStatus::Unusable { reason }) => {
+            format!("note: tetrahedralization worker unusable: {reason}\n")
+        }
         _ => String::new(),
     }
 }

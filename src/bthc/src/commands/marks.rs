@@ -26,7 +26,8 @@ pub(crate) fn run(args: &Marks) -> Result<(), Failure> {
     }
     let triangles = mesh.triangles.len();
     if args.json {
-        let report = json!({"triangles": triangles, "bad_pairs": contacts.pairs, "bad_triangles": contacts.triangles});
+        let report =
+            json!({"triangles": triangles, "bad_pairs": contacts.pairs, "bad_triangles": contacts.triangles});
         output::json(&report)?;
     } else {
         let mut text = String::new();

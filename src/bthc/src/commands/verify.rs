@@ -14,7 +14,9 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         Err(error) => Err(vec![error]),
     };
     match result {
-        Ok(report) => Ok(if args.json { output::json(&passed(&report))? } else { output::text(&summary(&report))? }),
+        Ok(report) => {
+            Ok(if args.json { output::json(&passed(&report))? } else { output::text(&summary(&report))? })
+        }
         Err(errors) => {
             if args.json {
                 let errors: Vec<_> = errors.iter().map(runtime_json).collect();
@@ -51,6 +53,10 @@ fn summary(report: &Report) -> String {
     table.row(["tet leaves", &count(report.tet_leaves)]);
     table.row(["tetrahedra", &count(report.tets)]);
     let compared = report.compared_with_source == report.objects;
-    let source = if compared { "compared with the source's triangles" } else { "the file keeps no source to compare with" };
+    let source = if compared {
+        "compared with the source's triangles"
+    } else {
+        "the file keeps no source to compare with"
+    };
     format!("{}verified; {source}\n", table.render())
 }

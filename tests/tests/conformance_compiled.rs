@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// Compiles a model; `None` when the worker that it needs is missing.
 fn compiled(model: &bth_scenes::Model, options: &Options) -> Option<Vec<u8>> {
-    if options.structure != Structure::Bvh && !bth_tests::worker() {
+    if options.structure != Structure::Bvh && bth_tests::worker().is_none() {
         return None;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -12,10 +12,12 @@ fn compiled(model: &bth_scenes::Model, options: &Options) -> Option<Vec<u8>> {
     if options.structure != Structure::Bvh && bth_tests::worker().is_none() {
         return None;
     }
+    let mut options = options.clone();
+    options.tets.worker = bth_tests::worker().map(Into::into);
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("model.ply");
     bth_scenes::write::file(model, &source).unwrap();
-    let (compiled, _) = compile(&source, options, &Silent).unwrap();
+    let (compiled, _) = compile(&source, &options, &Silent).unwrap();
     Some(compiled.bytes)
 }
 

@@ -43,7 +43,7 @@ impl Quality {
     fn effort(self) -> Effort {
         match self {
             Quality::Fast => Effort { bins: 16, sweep_count: 8, reinsertion: &[] },
-            Quality::Balanced => Effort { bins: 32, sweep_count: 64, reinsertion: &[0.05] },
+            Quality::Balanced => Effort { bins: 32, sweep_count: 64, reinsertion: &[0.15] },
             Quality::Best => Effort { bins: 32, sweep_count: 1 << 14, reinsertion: &[0.5, 0.5] },
         }
     }

@@ -54,6 +54,8 @@ pub struct CollapseReport {
     pub tet_leaves: u64,
     /// Wide nodes on the longest path.
     pub depth: u32,
+    /// The least cost, which the tree was chosen by, without that of tet leaves; see [`Costs`].
+    pub cost: f64,
     /// Wide nodes that a random line through the root's box meets on average, kept subtrees not counted.
     pub node_visits: f64,
     /// The same for triangle leaves.
@@ -87,7 +89,9 @@ pub fn collapse(
     if bvh.nodes.is_empty() {
         return Ok((wide, report));
     }
-    let decisions = Planner::new(mesh, bvh, options.costs, options.keep_subtrees, monitor).run(cut)?;
+    let planner = Planner::new(mesh, bvh, options.costs, options.keep_subtrees, monitor);
+    let (decisions, cost) = planner.run(cut)?;
+    report.cost = f64::from(cost);
     let root_area = Bounds::of_node(&bvh.nodes[0]).half_area();
     let mut writer =
         Writer { mesh, bvh, cut, decisions: &decisions, monitor, wide: &mut wide, report: &mut report };

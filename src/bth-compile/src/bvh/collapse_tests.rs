@@ -108,47 +108,67 @@ fn the_lines_are_the_same_at_any_number_of_threads() {
     assert!(one == at(2) && one == at(5));
 }
 
-/// Least cost of a subtree in at most `slots` slots, straight from the definition and without vertices' limits.
-fn cost_by_definition(bvh: &BinaryBvh, costs: &Costs, at: u32, slots: usize) -> f64 {
+/// Least cost of a subtree in at most `slots` slots, straight from the definition.
+fn cost_by_definition(mesh: &Mesh, bvh: &BinaryBvh, planner: &Planner, at: u32, slots: usize) -> f64 {
     let node = &bvh.nodes[at as usize];
+    let Costs { node: node_cost, indexed, raw, .. } = planner.costs;
     let area = Bounds::of_node(node).half_area() / Bounds::of_node(&bvh.nodes[0]).half_area();
-    let leaf = |c: [f32; 2]| area * (f64::from(c[0]) + f64::from(c[1]) * f64::from(node.count));
-    if node.is_leaf() {
-        return leaf(costs.indexed);
-    }
-    let spread = |slots: usize| {
-        (1..slots)
-            .map(|j| {
-                cost_by_definition(bvh, costs, at + 1, j)
-                    + cost_by_definition(bvh, costs, node.right, slots - j)
-            })
-            .fold(f64::INFINITY, f64::min)
+    let line = f64::from(planner.line);
+    let leaf = |c: [f32; 2], lines: usize| {
+        area * (f64::from(c[0]) + f64::from(c[1]) * f64::from(node.count)) + line * lines as f64
     };
-    let mut best = area * f64::from(costs.node) + spread(16);
-    if node.count <= 16 {
-        best = best.min(leaf(costs.raw));
+    let ids = &bvh.order[node.first as usize..][..node.count as usize];
+    let vertices: std::collections::BTreeSet<u32> =
+        ids.iter().flat_map(|&id| mesh.triangles[id as usize]).collect();
+    let mut best = f64::INFINITY;
+    if ids.len() <= 16 && vertices.len() <= 16 {
+        best = best.min(leaf(indexed, INDEXED_LINES));
     }
-    (2..=slots).map(spread).fold(best, f64::min)
+    if ids.len() <= 16 && ids.len() > 1 {
+        best = best.min(leaf(raw, RAW_LINES));
+    }
+    if !node.is_leaf() {
+        let part = |at, slots| cost_by_definition(mesh, bvh, planner, at, slots);
+        let spread = |slots: usize| {
+            let split = |j| part(at + 1, j) + part(node.right, slots - j);
+            (1..slots).map(split).fold(f64::INFINITY, f64::min)
+        };
+        best = best.min(area * f64::from(node_cost) + line * NODE_LINES as f64 + spread(16));
+        best = (2..=slots).map(spread).fold(best, f64::min);
+    }
+    best
 }
 
 #[test]
 fn the_plan_has_the_least_cost_by_definition() {
-    // Separate triangles: an indexed leaf of several would need count * 3 <= 16 vertices, so price it out.
-    let costs = Costs { node: 1.0, indexed: [1.0, 9.0], raw: [2.5, 0.1] };
-    for seed in 0..4 {
-        let mesh = soup(7, seed);
-        let bvh = built(&mesh, Quality::Best);
-        let options = CollapseOptions { keep_subtrees: false, costs };
-        let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-        let least = cost_by_definition(&bvh, &costs, 0, 1);
-        // With one price per visit the report gives the cost back up to the triangles' part, which
-        // the leaf kinds decide: a root that is one raw leaf is checked exactly, others from below.
-        if report.raw_leaves == 1 && report.nodes == 0 {
-            let cost = f64::from(costs.raw[0]) + 7.0 * f64::from(costs.raw[1]);
-            assert!((cost - least).abs() <= 1e-5 * least, "{cost} {least}");
-        } else {
-            assert!(report.node_visits * f64::from(costs.node) <= least);
+    let tables = [
+        Costs::default(),
+        Costs { node: 0.2, indexed: [1.0, 0.0], raw: [1.2, 0.0], line: 0.0 },
+        Costs { node: 1.0, indexed: [0.5, 0.5], raw: [0.1, 1.0], line: 0.01 },
+    ];
+    for costs in tables {
+        for mesh in [soup(4, 1), soup(5, 2), grid(1, 0.5, 3), clutter(6, &[0.0, 1.0, 0.25], 4)] {
+            let bvh = built(&mesh, Quality::Best);
+            let options = CollapseOptions { keep_subtrees: false, costs };
+            let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
+            let planner = Planner::new(&mesh, &bvh, costs, false, &Silent);
+            let least = cost_by_definition(&mesh, &bvh, &planner, 0, 1);
+            assert!((report.cost - least).abs() <= 1e-5 * least, "{} {least}", report.cost);
         }
+    }
+}
+
+#[test]
+fn the_written_tree_costs_what_the_plan_says() {
+    // With one price for all leaves the cost follows from the visits and the lines.
+    let costs = Costs { node: 1.3, indexed: [0.9, 0.0], raw: [0.9, 0.0], line: 0.03 };
+    for mesh in [soup(3000, 1), grid(60, 4.0, 2), clutter(3000, &[0.0, 1.0, 2.0, 4.0, 8.0, 9.0], 3)] {
+        let bvh = built(&mesh, Quality::Balanced);
+        let options = CollapseOptions { keep_subtrees: false, costs };
+        let (wide, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
+        let line = f64::from(Planner::new(&mesh, &bvh, costs, false, &Silent).line);
+        let cost = 1.3 * report.node_visits + 0.9 * report.leaf_visits + line * wide.lines.len() as f64;
+        assert!((report.cost - cost).abs() <= 1e-3 * cost, "{} {cost}", report.cost);
     }
 }
 

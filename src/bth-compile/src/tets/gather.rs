@@ -3,7 +3,6 @@
 use crate::bvh::BinaryBvh;
 use crate::mesh::Mesh;
 
-use super::Options;
 use super::report::Trouble;
 
 /// What is tetrahedralized.
@@ -21,11 +20,12 @@ pub(super) struct Input {
     pub(super) ids: Vec<u32>,
 }
 
-/// Gathers a node's triangles.
+/// Gathers a node's triangles, and puts a box around them that exceeds their bounds by `inflation`
+/// times their diagonal.
 ///
 /// # Errors
 /// When the box leaves the range of `f32`.
-pub(super) fn gather(mesh: &Mesh, bvh: &BinaryBvh, node: u32, options: &Options) -> Result<Input, Trouble> {
+pub(super) fn gather(mesh: &Mesh, bvh: &BinaryBvh, node: u32, inflation: f32) -> Result<Input, Trouble> {
     let node = &bvh.nodes[node as usize];
     let mut ids = bvh.order[node.first as usize..][..node.count as usize].to_vec();
     ids.sort_unstable();
@@ -39,7 +39,7 @@ pub(super) fn gather(mesh: &Mesh, bvh: &BinaryBvh, node: u32, options: &Options)
 
     let (lower, upper) = bounds(&vertices);
     let diagonal = (0..3).map(|k| (f64::from(upper[k]) - f64::from(lower[k])).powi(2)).sum::<f64>().sqrt();
-    let margin = diagonal * f64::from(options.inflation);
+    let margin = diagonal * f64::from(inflation);
     let lower = lower.map(|x| ((f64::from(x) - margin) as f32).min(x.next_down()));
     let upper = upper.map(|x| ((f64::from(x) + margin) as f32).max(x.next_up()));
     if lower.iter().chain(&upper).any(|x| !x.is_finite()) {
@@ -67,14 +67,6 @@ impl Input {
         std::array::from_fn(|i| {
             std::array::from_fn(|k| if i >> k & 1 == 1 { self.upper[k] } else { self.lower[k] })
         })
-    }
-
-    /// Whether the box lies many of its diagonals away from the origin, where coordinates have
-    /// few digits left for the shape.
-    pub(super) fn far(&self) -> bool {
-        let size = (0..3).map(|k| f64::from(self.upper[k]) - f64::from(self.lower[k])).fold(0.0, f64::max);
-        let away = self.lower.iter().chain(&self.upper).map(|x| f64::from(x.abs())).fold(0.0, f64::max);
-        away > 16.0 * size
     }
 }
 
@@ -108,7 +100,7 @@ mod tests {
             };
             let node = crate::bvh::Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 1, right: 0 };
             let bvh = BinaryBvh { nodes: vec![node], order: vec![0] };
-            let input = gather(&mesh, &bvh, 0, &Options { inflation: 0.0, ..Options::default() }).unwrap();
+            let input = gather(&mesh, &bvh, 0, 0.0).unwrap();
             for p in &mesh.positions {
                 assert!((0..3).all(|k| input.lower[k] < p[k] && p[k] < input.upper[k]));
             }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bth_tetgen_protocol::{Job, Request};
 
-use crate::bvh::BinaryBvh;
+use crate::bvh::{BinaryBvh, Node};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
@@ -22,16 +22,21 @@ struct Attempt {
     seed: u64,
     /// Whether TetGen sees coordinates relative to the box.
     local: bool,
+    /// As [`Options::inflation`]: TetGen takes points that nearly touch the box for coplanar with it.
+    inflation: f32,
 }
 
 /// Attempts in order. Near the origin TetGen first sees the coordinates as they are.
 fn attempts(options: &Options, far: bool) -> [Attempt; 4] {
     let m = options.free_space;
+    let more = if m == 0 { 64 } else { m.saturating_mul(4) };
+    let wide = options.inflation.max(1.0 / 256.0);
+    let inflation = options.inflation;
     [
-        Attempt { free_space: m, seed: 0, local: far },
-        Attempt { free_space: m, seed: 1, local: !far },
-        Attempt { free_space: if m == 0 { 64 } else { m.saturating_mul(4) }, seed: 2, local: far },
-        Attempt { free_space: 0, seed: 3, local: true },
+        Attempt { free_space: m, seed: 0, local: far, inflation },
+        Attempt { free_space: m, seed: 1, local: !far, inflation },
+        Attempt { free_space: more, seed: 2, local: far, inflation: 2.0 * wide },
+        Attempt { free_space: 0, seed: 3, local: true, inflation: 4.0 * wide },
     ]
 }
 
@@ -63,29 +68,29 @@ pub(super) fn tetrahedralize(
     };
     let mut troubles = Vec::new();
     let mut built = None;
-    match gather(mesh, bvh, node, options) {
-        Err(trouble) => troubles.push(trouble),
-        Ok(input) => {
-            let deadline = options.deadline + options.deadline_per_triangle.saturating_mul(triangles);
-            for attempt in attempts(options, input.far()) {
-                match run(slot, &input, &attempt, deadline, options, node, monitor)? {
-                    Ok((tets, free_points, nudged)) => {
-                        report.outcome = Outcome::Built;
-                        report.tets = tets.tets.len() as u32;
-                        report.vertices = tets.vertices.len() as u32;
-                        report.steiner_points = tets.steiner_points;
-                        report.free_points = free_points;
-                        report.nudged = nudged;
-                        built = Some(tets);
-                        break;
-                    }
-                    Err(trouble) => {
-                        let retry = trouble.retry();
-                        troubles.push(trouble);
-                        if !retry {
-                            break;
-                        }
-                    }
+    let deadline = options.deadline + options.deadline_per_triangle.saturating_mul(triangles);
+    let far = far(&bvh.nodes[node as usize]);
+    for attempt in attempts(options, far) {
+        let done = match gather(mesh, bvh, node, attempt.inflation) {
+            Ok(input) => run(slot, &input, &attempt, deadline, options, node, monitor)?,
+            Err(trouble) => Err(trouble),
+        };
+        match done {
+            Ok((tets, free_points, nudged)) => {
+                report.outcome = Outcome::Built;
+                report.tets = tets.tets.len() as u32;
+                report.vertices = tets.vertices.len() as u32;
+                report.steiner_points = tets.steiner_points;
+                report.free_points = free_points;
+                report.nudged = nudged;
+                built = Some(tets);
+                break;
+            }
+            Err(trouble) => {
+                let retry = trouble.retry();
+                troubles.push(trouble);
+                if !retry {
+                    break;
                 }
             }
         }
@@ -95,6 +100,15 @@ pub(super) fn tetrahedralize(
     Ok((built, report, troubles))
 }
 
+/// Whether the node lies many times its size away from the origin, where coordinates have few
+/// digits left for the shape.
+fn far(node: &Node) -> bool {
+    let size = (0..3).map(|k| f64::from(node.upper[k]) - f64::from(node.lower[k])).fold(0.0, f64::max);
+    let away = node.lower.iter().chain(&node.upper).map(|x| f64::from(x.abs())).fold(0.0, f64::max);
+    away > 16.0 * size
+}
+
+/// A tetrahedralization, its free-space points and its nudged points.
 type Built = (TetMesh, u32, u32);
 
 fn run(

@@ -1,0 +1,97 @@
+//! Workers that die, hang, devour memory or are not there.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use bth_compile::tets::{Options, Report, WorkerStatus, build};
+use bth_compile::{Error, Monitor, Silent};
+use bth_tetgen_protocol::Fault;
+
+use crate::meshes::{bvh, cube, nodes_of_at_most, torus};
+use crate::oracle::assert_holds;
+use crate::with_worker;
+
+/// Plants a fault at one node of several; the others must come out whole.
+fn one_node_is_lost(options: Options, fault: Fault) -> Report {
+    let mesh = torus(40, 20);
+    let bvh = bvh(&mesh);
+    let chosen = nodes_of_at_most(&bvh, 250);
+    let options = Options { planted: Some((chosen[3], fault)), workers: 2, ..options };
+    let (built, report) = build(&mesh, &bvh, &chosen, &options, &Silent).unwrap();
+    assert_eq!(built.len(), chosen.len() - 1);
+    assert!(built.iter().all(|(node, _)| *node != chosen[3]));
+    for (node, tets) in &built {
+        assert_holds(&mesh, &bvh, *node, tets);
+    }
+    assert_eq!((report.given_up, report.split), (1, 0));
+    report
+}
+
+#[test]
+fn a_crash_costs_one_node() {
+    let Some(options) = with_worker("crash") else { return };
+    let report = one_node_is_lost(options, Fault::Crash);
+    assert_eq!(report.failures["worker_died"], 4);
+    let text = &report.nodes.iter().find(|n| !n.failures.is_empty()).unwrap().failures[0];
+    assert!(text.contains("signal"), "{text}");
+}
+
+#[test]
+fn a_hang_costs_one_node_and_its_deadline() {
+    let Some(options) = with_worker("hang") else { return };
+    let options = Options { deadline: Duration::from_secs(2), ..options };
+    let report = one_node_is_lost(options, Fault::Hang);
+    assert_eq!(report.failures["timed_out"], 1);
+}
+
+#[test]
+fn a_memory_hog_costs_one_node() {
+    let Some(options) = with_worker("hog") else { return };
+    let report = one_node_is_lost(Options { memory: 512 << 20, ..options }, Fault::Hog);
+    assert_eq!(report.failures["out_of_memory"], 1);
+}
+
+#[test]
+fn no_worker_is_no_error_and_tells_how_to_get_one() {
+    let options = Options { worker: Some("does/not/exist".into()), ..Options::default() };
+    let mesh = cube();
+    let (built, report) = build(&mesh, &bvh(&mesh), &[0], &options, &Silent).unwrap();
+    assert!(built.is_empty());
+    let WorkerStatus::Missing { hint } = report.worker else { panic!("{report:?}") };
+    assert!(hint.contains("does/not/exist"));
+    assert_eq!((report.given_up, report.given_up_triangles), (1, 12));
+}
+
+#[test]
+fn a_program_that_is_no_worker_is_unusable() {
+    for program in ["/bin/true", "/bin/cat", "/bin/echo"] {
+        if !std::path::Path::new(program).is_file() {
+            continue;
+        }
+        let options = Options { worker: Some(program.into()), ..Options::default() };
+        let mesh = cube();
+        let (built, report) = build(&mesh, &bvh(&mesh), &[0], &options, &Silent).unwrap();
+        assert!(built.is_empty());
+        assert!(matches!(report.worker, WorkerStatus::Unusable { .. }), "{:?}", report.worker);
+    }
+}
+
+/// Cancels after it was asked a few times.
+struct Impatient(AtomicU32);
+
+impl Monitor for Impatient {
+    fn cancelled(&self) -> bool {
+        self.0.fetch_add(1, Ordering::Relaxed) > 8
+    }
+}
+
+#[test]
+fn cancelling_ends_a_worker_that_hangs() {
+    let Some(options) = with_worker("cancel") else { return };
+    let mesh = cube();
+    let options = Options { planted: Some((0, Fault::Hang)), ..options };
+    let start = Instant::now();
+    let result = build(&mesh, &bvh(&mesh), &[0], &options, &Impatient(AtomicU32::new(0)));
+    assert!(matches!(result, Err(Error::Cancelled)));
+    assert!(start.elapsed() < Duration::from_secs(15));
+}

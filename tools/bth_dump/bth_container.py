@@ -1,0 +1,147 @@
+"""Header, section table and hashes of a BTH file (format-spec/README.md, "Container")."""
+
+import struct
+from collections import namedtuple
+
+from bth_blake3 import blake3
+
+NONE = 0xFFFFFFFF
+IDENTIFIER = bytes.fromhex("89 42 54 48 31 0D 0A 1A 0A 00 00 00 00 00 00 00")
+VERSION = 0x00010000
+
+OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FACES, TRIANGLE_HOMES = range(1, 10)
+POSITIONS, TRIANGLES, CORNERS, NORMALS, UVS = range(16, 21)
+PROVENANCE = 32
+
+# Kind: name, strides, most elements.
+KINDS = {
+    OBJECT: ("OBJECT", (64,), None),
+    LINES: ("LINES", (64,), 1 << 29),
+    TRIANGLE_IDS: ("TRIANGLE_IDS", (4,), 1 << 30),
+    TET_LEAVES: ("TET_LEAVES", (64,), 1 << 29),
+    TETS: ("TETS", (32, 20, 16), 1 << 30),
+    TET_VERTICES: ("TET_VERTICES", (16,), (1 << 31) - 1),
+    TET_FACES: ("TET_FACES", (32,), (1 << 31) - 1),
+    HULL_FACES: ("HULL_FACES", (20,), (1 << 31) - 1),
+    TRIANGLE_HOMES: ("TRIANGLE_HOMES", (4,), 1 << 30),
+    POSITIONS: ("POSITIONS", (12,), (1 << 32) - 2),
+    TRIANGLES: ("TRIANGLES", (12,), 1 << 30),
+    CORNERS: ("CORNERS", (12,), 1 << 30),
+    NORMALS: ("NORMALS", (12,), (1 << 32) - 2),
+    UVS: ("UVS", (8,), (1 << 32) - 2),
+    PROVENANCE: ("PROVENANCE", (1,), None),
+}
+
+Header = namedtuple(
+    "Header",
+    "identifier writer_version minimum_reader_version file_length section_offset section_count reserved "
+    "required_features optional_features content_id table_hash header_hash",
+)
+HEADER = struct.Struct("<16sIIQQIIQQ32s16s16s")
+Entry = namedtuple("Entry", "kind flags object alignment offset length stride reserved count hash")
+ENTRY = struct.Struct("<IIIIQQIIQ16s")
+
+
+def kind_name(kind):
+    return KINDS[kind][0] if kind in KINDS else "unknown"
+
+
+class Invalid(Exception):
+    """A violated invariant. The offset counts from the start of the file."""
+
+    def __init__(self, number, message, section=None, offset=None):
+        super().__init__(message)
+        self.code, self.message, self.section, self.offset = f"BTH-{number}", message, section, offset
+
+
+def hash128(data):
+    return blake3(bytes(data))[:16]
+
+
+def need(condition, number, message, offset=None, section=None):
+    if not condition:
+        raise Invalid(number, message, section, offset)
+
+
+class Container:
+    """A file whose header and section table have been checked; its sections have not."""
+
+    def __init__(self, data):
+        need(len(data) >= HEADER.size, "F001", f"{len(data)} bytes hold no header", 0)
+        h = self.header = Header(*HEADER.unpack_from(data))
+        need(h.identifier == IDENTIFIER, "F002", f"identifier {h.identifier.hex()}", 0)
+        writer, reader = h.writer_version, h.minimum_reader_version
+        majors = writer >> 16 == 1 and reader >> 16 == 1
+        need(majors and reader <= writer and reader <= VERSION, "F003", f"versions {writer:#x}, {reader:#x}", 16)
+        need(h.header_hash == hash128(data[:112]), "F004", "the header was changed", 112)
+        need(h.file_length == len(data), "F005", f"{len(data)} bytes instead of {h.file_length}", 24)
+        need(h.reserved == 0, "F006", "a reserved field is not zero", 44)
+        need(h.required_features == 0, "F007", f"unknown features {h.required_features:#x}", 48)
+        end = HEADER.size + ENTRY.size * h.section_count
+        fits = h.section_offset == HEADER.size and h.section_count <= 1 << 20 and end <= len(data)
+        need(fits, "F008", f"{h.section_count} sections at {h.section_offset}", 32)
+        need(h.table_hash == hash128(data[HEADER.size : end]), "F009", "the section table was changed", 96)
+        self.data = data
+        self.entries = [Entry(*fields) for fields in ENTRY.iter_unpack(data[HEADER.size : end])]
+        last = self._check_entries(end)
+        self._check_objects()
+        need(h.content_id == self.content_id(), "F018", "the content id is not that of the sections", 64)
+        need((last + 63) // 64 * 64 == len(data), "F019", f"the last section ends at {last}", 24)
+        self.by_key = {(e.object, e.kind): e for e in self.entries}
+
+    def _check_entries(self, end):
+        before = None
+        for i, e in enumerate(self.entries):
+            at, name = HEADER.size + ENTRY.size * i, kind_name(e.kind)
+            key = (e.object, e.kind)
+            need(before is None or before < key, "F010", f"{key} behind {before}", at, name)
+            before = key
+            need(e.reserved == 0, "F006", "a reserved field is not zero", at, name)
+            need(e.flags in (0, 1), "F016", f"flags {e.flags}", at, name)
+            need(e.alignment == 64 and e.offset % 64 == 0, "F011", f"offset {e.offset}", at, name)
+            inside = end <= e.offset and e.offset + e.length <= len(self.data)
+            need(inside, "F012", f"{e.length} bytes at {e.offset}", at, name)
+            end = e.offset + e.length
+            need(e.stride * e.count == e.length, "F013", f"{e.count} x {e.stride} is not {e.length}", at, name)
+            if e.kind in KINDS:
+                _, strides, most = KINDS[e.kind]
+                need(e.stride in strides, "F014", f"stride {e.stride}", at, name)
+                need(most is None or e.count <= most, "F022", f"{e.count} elements", at, name)
+            else:
+                need(e.flags == 0, "F015", f"unknown kind {e.kind}", at, name)
+        return end
+
+    def _check_objects(self):
+        owners = sorted({e.object for e in self.entries} - {NONE})
+        self.objects = len(owners)
+        need(owners == list(range(len(owners))), "F017", f"objects {owners}", HEADER.size)
+        rows = {e.object: e.count for e in self.entries if e.kind == OBJECT}
+        for owner in owners:
+            need(rows.get(owner) == 1, "F017", f"{rows.get(owner)} OBJECT rows in object {owner}", HEADER.size)
+        for e in self.entries:
+            of_file = e.kind == PROVENANCE
+            fits = e.kind not in KINDS or (e.object == NONE) == of_file
+            need(fits, "F017", f"{kind_name(e.kind)} of object {e.object}", HEADER.size)
+
+    def content_id(self):
+        parts = [IDENTIFIER]
+        for e in self.entries:
+            if e.kind != PROVENANCE:
+                parts.append(struct.pack("<IIIIQ", e.kind, e.flags, e.object, e.stride, e.count) + e.hash)
+        return blake3(b"".join(parts))
+
+    def check_bytes(self):
+        """Gaps and hashes: F020 and F021."""
+        end = HEADER.size + ENTRY.size * len(self.entries)
+        for e in [*self.entries, None]:
+            start = len(self.data) if e is None else e.offset
+            need(not any(self.data[end:start]), "F020", f"bytes {end} to {start} are not zero", end)
+            if e is not None:
+                end = e.offset + e.length
+                same = hash128(self.data[e.offset : end]) == e.hash
+                need(same, "F021", "the section was changed", e.offset, kind_name(e.kind))
+
+    def section(self, owner, kind):
+        """Bytes of a section, empty if there is none."""
+        e = self.by_key.get((owner, kind))
+        return b"" if e is None else self.data[e.offset : e.offset + e.length]

@@ -1,0 +1,151 @@
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F207, with exact rational arithmetic."""
+
+import struct
+from fractions import Fraction
+
+import bth_container as c
+from bth_container import NONE
+from bth_indices import INDEXED, NODE, TETS, child
+from bth_tets import FACE_BIT
+
+
+def bits(points):
+    return [struct.pack("<3f", *p) for p in points]
+
+
+def side(a, b, c_, d):
+    """Sign of the volume: 1 where d lies on the side of the triangle that (b-a)x(c-a) points to."""
+    a, b, c_, d = ([Fraction(x) for x in p] for p in (a, b, c_, d))
+    u, v, w = ([p[k] - a[k] for k in range(3)] for p in (b, c_, d))
+    volume = sum(
+        (u[i] * v[j] - u[j] * v[i]) * w[k] for i, j, k in ((1, 2, 0), (2, 0, 1), (0, 1, 2))
+    )
+    return (volume > 0) - (volume < 0)
+
+
+def is_zero_area(points):
+    a, b, c_ = ([Fraction(x) for x in p] for p in points)
+    u, v = ([p[k] - a[k] for k in range(3)] for p in (b, c_))
+    return all(u[i] * v[j] == u[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0)))
+
+
+def contains(box, points):
+    lower, upper = box
+    return all(lower[k] <= p[k] <= upper[k] for p in points for k in range(3))
+
+
+def check_geometry(view, tets):
+    """Checks an object whose indices have been checked; `tets` are the derived ones of each leaf."""
+    homes = _tree(view)
+    for leaf, found in zip(view.tet_leaves, tets):
+        _tet_leaf(view, leaf, found)
+    missing = [t for t in range(view.triangles) if t not in homes]
+    if len(missing) != view.dropped:
+        raise view.invalid("F203", f"{len(missing)} triangles in no leaf, {view.dropped} dropped", c.OBJECT, 36)
+    for t in missing:
+        if view.source and not is_zero_area([view.positions[v] for v in view.source[t]]):
+            raise view.invalid("F207", f"triangle {t} has an area but no leaf", c.TRIANGLES, 12 * t)
+
+
+def _leaf_triangles(view, kind, line):
+    """Rows of TRIANGLE_IDS and corners of a leaf's triangles."""
+    at = 64 * line
+    if kind == INDEXED:
+        rows = struct.unpack_from("<48f", view.lines, at)
+        first, count = struct.unpack_from("<2I", view.lines, at + 240)
+        for t in range(count):
+            corners = (view.lines[at + 192 + 16 * k + t] for k in range(3))
+            yield first + t, [(rows[v], rows[16 + v], rows[32 + v]) for v in corners]
+    else:
+        rows = struct.unpack_from("<144f", view.lines, at)
+        first, count = struct.unpack_from("<2I", view.lines, at + 576)
+        for t in range(count):
+            yield first + t, [tuple(rows[48 * k + 16 * a + t] for a in range(3)) for k in range(3)]
+
+
+def _tree(view):
+    """Checks leaves and boxes; returns the triangles that are in a leaf or a constrained face."""
+    homes, beside = set(), [set() for _ in view.tet_leaves]
+
+    def triangle(t, corners, number, section, at):
+        if view.source:
+            source = [view.positions[v] for v in view.source[t]]
+            if bits(source) != bits(corners):
+                raise view.invalid(number, f"triangle {t} is {source} in the source, {corners} here", section, at)
+            if is_zero_area(source):
+                raise view.invalid("F207", f"triangle {t} has no area", section, at)
+
+    def home(t, section, at):
+        if t in homes:
+            raise view.invalid("F203", f"triangle {t} again", section, at)
+        homes.add(t)
+
+    # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
+    stack = [(view.root, [(view.lower, view.upper)], None)]
+    late = []
+    while stack:
+        code, boxes, leaf_row = stack.pop()
+        if code == NONE:
+            continue
+        kind, index = child(code)
+        points = []
+        if kind == NODE:
+            lower, upper, codes = view.node(index)
+            stack.extend((codes[i], [*boxes, (lower[i], upper[i])], leaf_row) for i in range(16))
+        elif kind == TETS:
+            leaf = view.tet_leaves[index]
+            for row in range(leaf.first_face, leaf.first_face + leaf.faces):
+                face = view.tet_faces[row]
+                corners = [view.tet_vertices[v][:3] for v in face.vertex]
+                home(face.triangle, c.TET_FACES, 32 * row)
+                triangle(face.triangle, corners, "F202", c.TET_FACES, 32 * row)
+                points += corners
+            stack.append((leaf.subtree, [], index))
+        else:
+            for row, corners in _leaf_triangles(view, kind, index):
+                t = view.triangle_ids[row]
+                if leaf_row is None:
+                    home(t, c.TRIANGLE_IDS, 4 * row)
+                else:
+                    leaf = view.tet_leaves[leaf_row]
+                    here = leaf.first_face <= view.triangle_homes[t] < leaf.first_face + leaf.faces
+                    if not here or t in beside[leaf_row]:
+                        raise view.invalid("F203", f"triangle {t} in a subtree", c.TRIANGLE_IDS, 4 * row)
+                    beside[leaf_row].add(t)
+                triangle(t, corners, "F201", c.LINES, 64 * index)
+                points += corners
+        late.append((boxes, points))
+    for boxes, points in late:
+        if not all(contains(box, points) for box in boxes):
+            raise view.invalid("F204", "triangles outside a box above", c.LINES)
+    for row, leaf in enumerate(view.tet_leaves):
+        if leaf.subtree != NONE and len(beside[row]) != leaf.faces:
+            raise view.invalid("F203", f"{len(beside[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
+    return homes
+
+
+def _tet_leaf(view, leaf, found):
+    def point(v):
+        return view.tet_vertices[v][:3]
+
+    for v in range(leaf.first_vertex, leaf.first_vertex + leaf.vertices):
+        if not contains((leaf.lower, leaf.upper), [point(v)]):
+            raise view.invalid("F205", f"vertex {point(v)} outside its box", c.TET_VERTICES, 16 * v)
+    for tet, (four, links) in found.items():
+        for slot, link in enumerate(links):
+            face = [point(v) for v in four[:slot] + four[slot + 1 :]]
+            here = side(*face, point(four[slot]))
+            if here == 0:
+                raise view.invalid("F206", f"tetrahedron {tet} without volume", c.TETS, view.stride * tet)
+            if link & FACE_BIT == 0:
+                other = next(v for v in found[link][0] if v not in four)
+                if side(*face, point(other)) != -here:
+                    raise view.invalid("F206", f"{tet} and {link} on the same side", c.TETS, view.stride * tet)
+    for row in range(leaf.first_face, leaf.first_face + leaf.faces):
+        face = view.tet_faces[row]
+        if [side(*map(point, face.vertex), point(v)) for v in face.opposite] != [1, -1]:
+            raise view.invalid("F206", f"{face} the wrong way round", c.TET_FACES, 32 * row)
+    for row in range(leaf.first_hull, leaf.first_hull + leaf.hulls):
+        hull = view.hull_faces[row]
+        if side(*map(point, hull.vertex), point(hull.opposite)) != 1:
+            raise view.invalid("F206", f"{hull} points outwards", c.HULL_FACES, 20 * row)

@@ -1,0 +1,210 @@
+"""The index check (format-spec/README.md, "Index check"): F101 to F141."""
+
+import math
+import struct
+
+import bth_container as c
+from bth_container import NONE
+from bth_tets import derive
+
+MAX_DEPTH = 96
+NODE, INDEXED, RAW, TETS = "node", "indexed", "raw", "tets"
+LINES_OF = {NODE: 7, INDEXED: 4, RAW: 10}
+F32_MAX = struct.unpack("<f", struct.pack("<I", 0x7F7FFFFF))[0]
+
+
+def child(code):
+    """Kind and index of a child code; None where there is none."""
+    kind = {0: NODE, 4: INDEXED, 5: RAW, 6: TETS}.get(code >> 29)
+    return None if kind is None else (kind, code & (1 << 29) - 1)
+
+
+def is_box(lower, upper):
+    return all(map(math.isfinite, (*lower, *upper))) and all(a <= b for a, b in zip(lower, upper))
+
+
+def check_indices(view):
+    """Checks an object; returns the derived tetrahedra of each tet leaf."""
+    _header(view)
+    _sources(view)
+    _tet_ranges(view)
+    _homes(view)
+    _tree(view)
+    return [derive(view, leaf) for leaf in view.tet_leaves]
+
+
+def _header(view):
+    def need(condition, number, message, at):
+        if not condition:
+            raise view.invalid(number, message, c.OBJECT, at)
+
+    for name, rows in (("TRIANGLE_HOMES", view.triangle_homes), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
+        need(len(rows) in (0, view.triangles), "F102", f"{len(rows)} rows of {name}", 32)
+    need(view.triangles <= 1 << 30, "F022", f"{view.triangles} triangles", 32)
+    need(view.dropped <= view.triangles, "F102", f"{view.dropped} dropped", 36)
+    need(view.depth <= MAX_DEPTH, "F110", f"depth {view.depth}", 40)
+    good = view.bounds_are_zero if view.root == NONE else is_box(view.lower, view.upper)
+    need(good, "F103", f"bounds {view.lower} to {view.upper}", 0)
+    need(not any(view.reserved), "F104", "reserved fields are not zero", 44)
+
+
+def _sources(view):
+    attributes = max(len(view.normals), len(view.uvs))
+    for kind, table, rows in (
+        (c.TRIANGLES, view.source, len(view.positions)),
+        (c.CORNERS, view.corners, attributes),
+    ):
+        for i, row in enumerate(table):
+            if max(row) >= rows:
+                raise view.invalid("F140", f"row {max(row)} of {rows}", kind, 12 * i)
+    if view.normals and view.uvs and len(view.normals) != len(view.uvs):
+        raise view.invalid("F140", "normals and texture coordinates differ in number", c.UVS)
+    for i, position in enumerate(view.positions):
+        if not all(map(math.isfinite, position)):
+            raise view.invalid("F141", f"position {position}", c.POSITIONS, 12 * i)
+
+
+def _tet_ranges(view):
+    rows = [len(view.tets), len(view.tet_vertices), len(view.tet_faces), len(view.hull_faces)]
+    end = [0] * 4
+    for i, leaf in enumerate(view.tet_leaves):
+
+        def need(condition, number, message, at):
+            if not condition:
+                raise view.invalid(number, message, c.TET_LEAVES, 64 * i + at)
+
+        flat = any(a >= b for a, b in zip(leaf.lower, leaf.upper))
+        need(is_box(leaf.lower, leaf.upper) and not flat, "F120", f"{leaf.lower} to {leaf.upper}", 0)
+        need(leaf.flags == 0, "F120", f"flags {leaf.flags}", 60)
+        ranges = (
+            (leaf.first_tet, leaf.tets, 1),
+            (leaf.first_vertex, leaf.vertices, 4),
+            (leaf.first_face, leaf.faces, 1),
+            (leaf.first_hull, leaf.hulls, 4),
+        )
+        for k, (first, count, least) in enumerate(ranges):
+            need(first == end[k] and first + count <= rows[k], "F121", f"{count} rows from {first}", 24 + 8 * k)
+            need(count >= least, "F122", f"{count} rows", 28 + 8 * k)
+            end[k] = first + count
+    if end != rows:
+        raise view.invalid("F121", f"rows up to {end} of {rows}", c.TET_LEAVES)
+    for i, (x, y, z, reserved) in enumerate(view.tet_vertices):
+        if reserved or not all(map(math.isfinite, (x, y, z))):
+            raise view.invalid("F124", f"vertex {x} {y} {z}, {reserved}", c.TET_VERTICES, 16 * i)
+
+
+def _homes(view):
+    homes = view.triangle_homes
+    if len(homes) != (view.triangles if view.tet_leaves else 0):
+        raise view.invalid("F131", f"{len(homes)} rows", c.TRIANGLE_HOMES)
+    expected = {face.triangle: row for row, face in enumerate(view.tet_faces)}
+    if len(expected) != len(view.tet_faces) or any(t >= len(homes) for t in expected):
+        raise view.invalid("F131", "a constrained face without a triangle of its own", c.TET_FACES)
+    for triangle, home in enumerate(homes):
+        if home != expected.get(triangle, NONE):
+            raise view.invalid("F131", f"triangle {triangle} at home in {home}", c.TRIANGLE_HOMES, 4 * triangle)
+
+
+def _tree(view):
+    lines = len(view.lines) // 64
+    claimed, referenced = set(), set()
+    # Code, nodes above, line of the parent, whether in a subtree, section and byte of the reference.
+    stack = [(view.root, 0, -1, False, c.OBJECT, 24)]
+    while stack:
+        code, depth, parent, in_subtree, section, at = stack.pop()
+        if code == NONE:
+            continue
+        found = child(code)
+        if found is None or (found[0] == TETS and in_subtree):
+            raise view.invalid("F105", f"child code {code:#x}", section, at)
+        kind, index = found
+        if kind == TETS:
+            if index >= len(view.tet_leaves):
+                raise view.invalid("F106", f"tet leaf {index}", section, at)
+            if index in referenced:
+                raise view.invalid("F123", f"tet leaf {index} again", section, at)
+            referenced.add(index)
+            stack.append((view.tet_leaves[index].subtree, depth, -1, True, c.TET_LEAVES, 64 * index + 56))
+            continue
+        block = range(index, index + LINES_OF[kind])
+        if block.stop > lines:
+            raise view.invalid("F106", f"{kind} at line {index} of {lines}", section, at)
+        if index <= parent:
+            raise view.invalid("F107", f"line {index} below line {parent}", section, at)
+        if not claimed.isdisjoint(block):
+            raise view.invalid("F108", f"{kind} at line {index}", section, at)
+        claimed.update(block)
+        if kind == NODE:
+            if depth + 1 > min(view.depth, MAX_DEPTH):
+                raise view.invalid("F110", f"{depth + 1} nodes on a path", section, at)
+            codes = _slots(view, index)
+            for slot in reversed(range(16)):
+                stack.append((codes[slot], depth + 1, index, in_subtree, c.LINES, 64 * index + 384 + 4 * slot))
+        else:
+            (_indexed if kind == INDEXED else _raw)(view, index)
+    if len(claimed) != lines:
+        first = next(line for line in range(lines) if line not in claimed)
+        raise view.invalid("F109", f"line {first} is no block's", c.LINES, 64 * first)
+    if len(referenced) != len(view.tet_leaves):
+        raise view.invalid("F123", "a tet leaf without a reference", c.TET_LEAVES)
+    for row, triangle in enumerate(view.triangle_ids):
+        if triangle >= view.triangles:
+            raise view.invalid("F116", f"id {triangle}", c.TRIANGLE_IDS, 4 * row)
+
+
+def _slots(view, line):
+    lower, upper, codes = view.node(line)
+    used = codes.index(NONE) if NONE in codes else 16
+    if used == 0:
+        raise view.invalid("F111", "no children", c.LINES, 64 * line + 384)
+    for i in range(16):
+        if i < used:
+            if not is_box(lower[i], upper[i]):
+                raise view.invalid("F112", f"box {lower[i]} to {upper[i]}", c.LINES, 64 * line + 4 * i)
+        elif codes[i] != NONE or lower[i] != (F32_MAX,) * 3 or upper[i] != (-F32_MAX,) * 3:
+            raise view.invalid("F111", f"slot {i} is neither used nor empty", c.LINES, 64 * line + 4 * i)
+    return codes
+
+
+def _leaf_rows(view, line, first, triangles):
+    if not 1 <= triangles <= 16:
+        raise view.invalid("F113", f"{triangles} triangles", c.LINES, 64 * line)
+    if first + triangles > len(view.triangle_ids):
+        raise view.invalid("F115", f"{triangles} rows from {first}", c.LINES, 64 * line)
+
+
+def _coordinates(view, line, count, used):
+    """Checks rows of 16 coordinates of which some are used."""
+    for row in range(count):
+        at = 64 * (line + row)
+        values, bits = struct.unpack_from("<16f", view.lines, at), struct.unpack_from("<16I", view.lines, at)
+        for i in range(16):
+            if i < used and not math.isfinite(values[i]):
+                raise view.invalid("F117", f"coordinate {values[i]}", c.LINES, at + 4 * i)
+            if i >= used and bits[i] != bits[0]:
+                raise view.invalid("F118", "an unused coordinate differs from that of slot 0", c.LINES, at + 4 * i)
+
+
+def _indexed(view, line):
+    at = 64 * line
+    first, triangles, vertices, reserved = struct.unpack_from("<4I", view.lines, at + 240)
+    if not 1 <= vertices <= 16:
+        raise view.invalid("F113", f"{vertices} vertices", c.LINES, at + 248)
+    _leaf_rows(view, line, first, triangles)
+    for k in range(48):
+        corner = view.lines[at + 192 + k]
+        if k % 16 < triangles and corner >= vertices:
+            raise view.invalid("F114", f"corner {corner}", c.LINES, at + 192 + k)
+        if k % 16 >= triangles and corner:
+            raise view.invalid("F118", f"unused corner {corner}", c.LINES, at + 192 + k)
+    _coordinates(view, line, 3, vertices)
+    if reserved:
+        raise view.invalid("F118", "a reserved field is not zero", c.LINES, at + 252)
+
+
+def _raw(view, line):
+    first, triangles = struct.unpack_from("<2I", view.lines, 64 * line + 576)
+    _leaf_rows(view, line, first, triangles)
+    _coordinates(view, line, 9, triangles)
+    if any(view.lines[64 * line + 584 : 64 * line + 640]):
+        raise view.invalid("F118", "reserved fields are not zero", c.LINES, 64 * line + 584)

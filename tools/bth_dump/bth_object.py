@@ -1,0 +1,72 @@
+"""The sections of an object as Python values (format-spec/README.md, "Objects")."""
+
+import struct
+from collections import namedtuple
+
+import bth_container as c
+from bth_container import Invalid, kind_name
+
+RECORDS = {1: ("Link32", 32), 2: ("Tet32", 32), 3: ("Tet20", 20), 4: ("Tet16", 16)}
+
+TetLeaf = namedtuple(
+    "TetLeaf", "lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags"
+)
+TetFace = namedtuple("TetFace", "vertex triangle tet opposite")
+HullFace = namedtuple("HullFace", "vertex tet opposite")
+
+
+class ObjectView:
+    """An object. Coordinates are Python floats, which hold every f32 exactly."""
+
+    def __init__(self, container, index):
+        self.container, self.index = container, index
+        raw = self.bytes(c.OBJECT)
+        self.lower, self.upper = struct.unpack_from("<3f", raw), struct.unpack_from("<3f", raw, 12)
+        self.bounds_are_zero = not any(raw[:24])
+        self.root, self.record_code, self.triangles, self.dropped, self.depth = struct.unpack_from("<5I", raw, 24)
+        self.reserved = struct.unpack_from("<5I", raw, 44)
+        self.lines = self.bytes(c.LINES)
+        self.triangle_ids = self.rows(c.TRIANGLE_IDS, "<I", scalar=True)
+        self.triangle_homes = self.rows(c.TRIANGLE_HOMES, "<I", scalar=True)
+        self.tet_leaves = [TetLeaf(r[:3], r[3:6], *r[6:]) for r in self.rows(c.TET_LEAVES, "<6f10I")]
+        self.tet_vertices = self.rows(c.TET_VERTICES, "<3fI")
+        self.tet_faces = [TetFace(r[:3], r[3], r[4:6], r[6:]) for r in self.rows(c.TET_FACES, "<8I")]
+        self.hull_faces = [HullFace(r[:3], r[3], r[4]) for r in self.rows(c.HULL_FACES, "<5I")]
+        self.positions = self.rows(c.POSITIONS, "<3f")
+        self.source = self.rows(c.TRIANGLES, "<3I")
+        self.corners = self.rows(c.CORNERS, "<3I")
+        self.normals = self.rows(c.NORMALS, "<3f")
+        self.uvs = self.rows(c.UVS, "<2f")
+        self._read_tets()
+
+    def _read_tets(self):
+        entry = self.container.by_key.get((self.index, c.TETS))
+        stride = entry.stride if entry else 0
+        self.record, expected = RECORDS.get(self.record_code, (None, None))
+        if self.record_code == 0:
+            good = (entry is None or entry.count == 0) and not self.tet_leaves
+        else:
+            good = expected is not None and stride == expected
+        if not good:
+            raise self.invalid("F101", f"record {self.record_code} with a TETS stride of {stride}", c.OBJECT, 28)
+        self.stride = stride
+        self.tets = [] if not self.record else self.rows(c.TETS, f"<{stride // 4}I")
+
+    def bytes(self, kind):
+        return self.container.section(self.index, kind)
+
+    def rows(self, kind, form, scalar=False):
+        rows = struct.iter_unpack(form, self.bytes(kind))
+        return [r[0] for r in rows] if scalar else list(rows)
+
+    def invalid(self, number, message, kind, at=0):
+        """The error for a byte of a section."""
+        entry = self.container.by_key.get((self.index, kind))
+        return Invalid(number, message, kind_name(kind), (entry.offset if entry else 0) + at)
+
+    def node(self, line):
+        """Lower ends and upper ends of the children's boxes, and the children's codes."""
+        raw = struct.unpack_from("<96f16I", self.lines, 64 * line)
+        lower = list(zip(raw[0:16], raw[32:48], raw[64:80]))
+        upper = list(zip(raw[16:32], raw[48:64], raw[80:96]))
+        return lower, upper, raw[96:]

@@ -147,7 +147,8 @@ impl Trouble {
     /// Whether another attempt with other points may succeed.
     pub(super) fn retry(&self) -> bool {
         match self {
-            Trouble::Died(_) | Trouble::Answer(_) | Trouble::Defect(_) => true,
+            Trouble::Died(_) | Trouble::Answer(_) => true,
+            Trouble::Defect(defect) => *defect != super::check::Defect::Duplicate,
             Trouble::Failed(failure, _) => *failure != Failure::Memory,
             Trouble::Start(_) | Trouble::TimedOut | Trouble::Unfit(_) => false,
         }

@@ -173,6 +173,7 @@ fn the_written_tree_costs_what_the_plan_says() {
 }
 
 #[test]
+#[allow(clippy::print_stdout, reason = "says what was measured and what was skipped")]
 fn leaves_are_small_on_disk() {
     let mut cases = vec![
         ("soup".to_string(), Some(soup(50_000, 5)), 110.0),

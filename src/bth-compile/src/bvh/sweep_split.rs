@@ -41,9 +41,9 @@ pub(super) fn split(references: &mut [Reference], scratch: &mut Scratch) -> usiz
             right_cost[i] = bounds.half_area() * (total - i) as f64;
         }
         let mut bounds = Bounds::EMPTY;
-        for left in 1..total {
+        for (left, right_cost) in right_cost.iter().enumerate().skip(1) {
             bounds.grow(at(left - 1));
-            best.improve(bounds.half_area() * left as f64 + right_cost[left], axis, left, left, total);
+            best.improve(bounds.half_area() * left as f64 + right_cost, axis, left, left, total);
         }
     }
     sorted.clear();

@@ -23,6 +23,8 @@ use std::time::Instant;
 const TILE: u32 = 16;
 /// Ambient-occlusion rays per sample.
 const AO_RAYS: u32 = 4;
+/// Dark enough that open surfaces, which are white, stand out.
+const AO_BACKGROUND: Vec3 = Vec3::splat(0.14);
 
 /// What a frame took.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -196,13 +198,11 @@ impl Frame<'_> {
         let blocked = queue.trace(self.scene);
         let mut answers = blocked.chunks(AO_RAYS as usize);
         let color = |hit: &Hit| {
-            let open = if hit.is_hit() {
-                answers.next().map_or(0, |chunk| chunk.iter().filter(|b| !**b).count()) as f32
-                    / AO_RAYS as f32
-            } else {
-                1.0
-            };
-            Vec3::splat(open * 0.9)
+            if !hit.is_hit() {
+                return AO_BACKGROUND;
+            }
+            let open = answers.next().map_or(0, |chunk| chunk.iter().filter(|b| !**b).count());
+            Vec3::splat(0.9 * open as f32 / AO_RAYS as f32)
         };
         hits.iter().map(color).collect()
     }

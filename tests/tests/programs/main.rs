@@ -1,4 +1,6 @@
 //! The programs `bthc` and `bth-play`, from the command line to the files they write.
+// Tests say what they skip.
+#![allow(clippy::print_stdout)]
 
 mod compile;
 mod errors;

@@ -5,7 +5,8 @@ pub mod oracle;
 pub mod rays;
 pub mod rng;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The folder into which cargo builds (`target/debug` or `target/release`).
 pub fn target_folder() -> PathBuf {
@@ -14,18 +15,20 @@ pub fn target_folder() -> PathBuf {
     if deps.ends_with("deps") { deps.parent().expect("a folder").into() } else { deps.into() }
 }
 
-/// Whether the tetrahedralization worker can be found: `BTH_TETGEN`, or built beside the tests. Says so when
-/// not, since what needs it is skipped then.
+/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Says so when there is none,
+/// since what needs it is skipped then.
 #[allow(clippy::print_stderr)]
-pub fn worker() -> bool {
-    static FOUND: std::sync::OnceLock<bool> = std::sync::OnceLock::new();
-    *FOUND.get_or_init(|| {
-        let found = bth_compile::tets::find_worker().is_some();
-        if !found {
+pub fn worker() -> Option<&'static Path> {
+    static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let find = || {
+        let named = std::env::var_os("BTH_TETGEN").map(PathBuf::from);
+        let found = named.unwrap_or_else(|| target_folder().join("bth-tetgen"));
+        if !found.is_file() {
             eprintln!("SKIPPED: everything with tetrahedra: no bth-tetgen (cargo build -p bth-tetgen)");
         }
-        found
-    })
+        Some(found).filter(|f| f.is_file())
+    };
+    FOUND.get_or_init(find).as_deref()
 }
 
 /// Compiles the Rust code of the readme.

@@ -89,14 +89,13 @@ pub fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<BigRational> {
     Some(BigRational::new(determinant(&a, &b, &c), whole))
 }
 
-/// The nearest exact hit within the ray's range.
+/// The nearest exact hit whose t, rounded to f32 as it is reported, lies within the ray's range.
 pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Option<Truth> {
-    let rational = |t: f32| t.is_finite().then(|| BigRational::from_float(t).expect("finite"));
-    let (tmin, tmax) = (rational(ray.tmin), rational(ray.tmax));
     let mut best: Option<Truth> = None;
     for (id, &triangle) in corners.iter().enumerate() {
         let Some(t) = crossing(ray, triangle) else { continue };
-        if tmin.as_ref().is_some_and(|m| t < *m) || tmax.as_ref().is_some_and(|m| t > *m) {
+        let reported = to_f64(&t) as f32;
+        if !(ray.tmin <= reported && reported <= ray.tmax && reported < f32::INFINITY) {
             continue;
         }
         match &mut best {

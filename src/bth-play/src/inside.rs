@@ -1,5 +1,5 @@
 //! A camera within the model, for rooms: of a number of points, the one that sees most surface,
-//! farthest away.
+//! farthest away and in most detail.
 
 use crate::args::{Args, Axis};
 use crate::camera::{self, Camera};
@@ -11,20 +11,26 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 const CANDIDATES: u32 = 96;
-const DIRECTIONS: u32 = 512;
+const DIRECTIONS: u32 = 1024;
 /// Vertical field of view, degrees.
 const FOV: f64 = 70.0;
 
+/// What stands in one direction from a candidate.
+struct Sight {
+    direction: DVec3,
+    /// Infinite into the open.
+    distance: f64,
+    triangle: u32,
+}
+
 /// The camera within the model.
 pub(crate) fn camera(scene: &Scene, shape: &Shape<'_>, args: &Args) -> Camera {
-    let directions: Vec<DVec3> = sphere(DIRECTIONS).collect();
     let eyes: Vec<DVec3> = (0..CANDIDATES).map(|i| candidate(shape, args.up, i)).collect();
-    let seen: Vec<Vec<f64>> = eyes.par_iter().map(|eye| distances(scene, *eye, &directions)).collect();
-    let best = (0..eyes.len())
-        .max_by(|a, b| score(&seen[*a], shape).total_cmp(&score(&seen[*b], shape)))
-        .unwrap_or(0);
+    let seen: Vec<Vec<Sight>> = eyes.par_iter().map(|eye| look_around(scene, *eye)).collect();
+    let scores: Vec<f64> = seen.iter().map(|sights| score(sights, shape.diagonal())).collect();
+    let best = (0..eyes.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
     let vertical = camera::vertical(args.up);
-    let forward = farthest_view(&directions, &seen[best], vertical, shape.diagonal());
+    let forward = richest_view(&seen[best], vertical, shape.diagonal());
     Camera::looking(eyes[best], forward, vertical, camera::extent(args, FOV) / args.zoom)
 }
 
@@ -40,42 +46,55 @@ fn candidate(shape: &Shape<'_>, up: Axis, index: u32) -> DVec3 {
     shape.lower + (shape.upper - shape.lower) * at
 }
 
-/// How far one sees in each direction; infinite into the open.
-fn distances(scene: &Scene, eye: DVec3, directions: &[DVec3]) -> Vec<f64> {
+fn look_around(scene: &Scene, eye: DVec3) -> Vec<Sight> {
     let origin = eye.as_vec3().to_array();
-    let rays: Vec<Ray> = directions
-        .iter()
-        .map(|d| Ray { origin, tmin: 0.0, direction: d.as_vec3().to_array(), tmax: f32::INFINITY })
-        .collect();
+    let directions: Vec<DVec3> = sphere(DIRECTIONS).collect();
+    let ray = |d: &DVec3| Ray { origin, tmin: 0.0, direction: d.as_vec3().to_array(), tmax: f32::INFINITY };
+    let rays: Vec<Ray> = directions.iter().map(ray).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     scene.nearest_batch(&rays, None, &mut hits);
-    hits.iter().map(|h| f64::from(h.t)).collect()
+    let sight = |(direction, hit): (DVec3, &Hit)| Sight {
+        direction,
+        distance: f64::from(hit.t),
+        triangle: hit.surface.triangle,
+    };
+    directions.into_iter().zip(&hits).map(sight).collect()
 }
 
-/// Mean distance, discounted by the share of directions into the open and by what stands close before the eye.
-fn score(distances: &[f64], shape: &Shape<'_>) -> f64 {
-    let mut hit: Vec<f64> = distances.iter().copied().filter(|t| t.is_finite()).collect();
+/// Share of the sights that show a triangle of their own: bare walls have few, furniture many.
+fn detail<'a>(sights: impl Iterator<Item = &'a Sight>) -> f64 {
+    let mut triangles: Vec<u32> = sights.filter(|s| s.distance.is_finite()).map(|s| s.triangle).collect();
+    let total = triangles.len().max(1) as f64;
+    triangles.sort_unstable();
+    triangles.dedup();
+    triangles.len() as f64 / total
+}
+
+/// Mean distance and detail, discounted by the share of directions into the open and by what stands
+/// close before the eye.
+fn score(sights: &[Sight], diagonal: f64) -> f64 {
+    let mut hit: Vec<f64> = sights.iter().map(|s| s.distance).filter(|t| t.is_finite()).collect();
     if hit.is_empty() {
         return 0.0;
     }
     hit.sort_by(f64::total_cmp);
-    let share = hit.len() as f64 / distances.len() as f64;
-    let mean = hit.iter().sum::<f64>() / hit.len() as f64 / shape.diagonal();
-    let close = (hit[hit.len() / 20] / (0.05 * shape.diagonal())).min(1.0);
-    share.powi(4) * mean * close
+    let share = hit.len() as f64 / sights.len() as f64;
+    let mean = hit.iter().sum::<f64>() / hit.len() as f64 / diagonal;
+    let close = (hit[hit.len() / 20] / (0.05 * diagonal)).min(1.0);
+    share.powi(4) * mean * close * (0.1 + detail(sights.iter()))
 }
 
-/// The slightly lowered horizontal direction around which one sees farthest.
-fn farthest_view(directions: &[DVec3], distances: &[f64], vertical: DVec3, diagonal: f64) -> DVec3 {
+/// The slightly lowered horizontal direction around which one sees most detail and depth.
+fn richest_view(sights: &[Sight], vertical: DVec3, diagonal: f64) -> DVec3 {
     let (side, front) = vertical.any_orthonormal_pair();
-    let depth = |forward: DVec3| {
-        let near = directions.iter().zip(distances).filter(|(d, _)| d.dot(forward) > 0.75);
-        let (sum, n) = near.fold((0.0, 0), |(sum, n), (_, t)| (sum + t.min(0.2 * diagonal), n + 1));
-        sum / f64::from(n.max(1))
+    let value = |forward: DVec3| {
+        let cone = || sights.iter().filter(|s| s.direction.dot(forward) > 0.75);
+        let (sum, n) = cone().fold((0.0, 0), |(sum, n), s| (sum + s.distance.min(0.3 * diagonal), n + 1));
+        sum / f64::from(n.max(1)) * (0.1 + detail(cone()))
     };
     let views = (0..32).map(|i| {
         let angle = std::f64::consts::TAU * f64::from(i) / 32.0;
-        (side * angle.cos() + front * angle.sin() - vertical * 0.12).normalize()
+        (side * angle.cos() + front * angle.sin() - vertical * 0.15).normalize()
     });
-    views.max_by(|a, b| depth(*a).total_cmp(&depth(*b))).unwrap_or(side)
+    views.max_by(|a, b| value(*a).total_cmp(&value(*b))).unwrap_or(side)
 }

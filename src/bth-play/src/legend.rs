@@ -21,7 +21,7 @@ const TICKS: u32 = 4;
 
 /// Draws the legend for values from 0 to `maximum` at the right edge, if there is room.
 pub(crate) fn draw(picture: &mut Picture, maximum: u32) {
-    let scale = (picture.height / 360).max(1);
+    let scale = (picture.height / 240).max(1);
     let digits = maximum.to_string().len() as u32;
     let (bar, gap) = (10 * scale, 4 * scale);
     let width = bar + 2 * gap + digits * 4 * scale;

@@ -12,7 +12,6 @@ mod plan;
 mod reinsertion;
 mod sweep_split;
 mod wide_lines;
-mod zero_area;
 
 #[cfg(test)]
 mod samples;

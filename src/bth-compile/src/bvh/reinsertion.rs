@@ -12,16 +12,20 @@ use crate::monitor::Monitor;
 use bth::layout::NONE;
 use rayon::prelude::*;
 
-/// Batches of a pass: the more, the fresher the tree that a search sees.
-const BATCHES: usize = 64;
+/// Size of the first batch, which holds the largest nodes, whose moves matter most to each other.
+const FIRST_BATCH: usize = 16;
+/// Later batches have this share of what was tried before, so that there are few of them.
+const BATCH_GROWTH: usize = 16;
 
 /// Tries to move the given share of the nodes, largest area first. Returns how many moved.
 pub(super) fn pass(tree: &mut LinkedTree, share: f64, monitor: &dyn Monitor) -> Result<u64> {
     let candidates = largest(tree, share);
-    let batch = candidates.len().div_ceil(BATCHES).max(1);
     let mut moved = 0;
-    for batch in candidates.chunks(batch) {
+    let mut done = 0;
+    while done < candidates.len() {
         monitor.check()?;
+        let batch = &candidates[done..candidates.len().min(done + FIRST_BATCH + done / BATCH_GROWTH)];
+        done += batch.len();
         let mut moves: Vec<Move> = batch
             .par_iter()
             .with_min_len(16)

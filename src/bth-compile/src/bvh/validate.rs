@@ -1,8 +1,7 @@
 //! Slow, obvious checks of both trees against the mesh: the oracle of the tests.
 
-use super::zero_area::is_zero_area;
 use super::{BinaryBvh, Wide};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, is_zero_area};
 use bth::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode};
 use std::collections::BTreeSet;
 use zerocopy::{FromBytes, IntoBytes};

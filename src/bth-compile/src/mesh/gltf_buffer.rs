@@ -89,7 +89,7 @@ impl<'a> Buffers<'a> {
             return Err(super::gltf::unsupported_extension(self.source, name));
         }
         let buffer = self.buffer(root, view.buffer)?;
-        let end = view.byte_offset.checked_add(view.byte_length).unwrap_or(u64::MAX);
+        let end = view.byte_offset.saturating_add(view.byte_length);
         if end > buffer.len() as u64 {
             let message = format!(
                 "expected bytes {}..{end} of buffer {}, which has {}",

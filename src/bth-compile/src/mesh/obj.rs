@@ -8,6 +8,8 @@ use super::raw::{NONE, Raw, Row, check_rows};
 use super::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 use crate::error::Result;
 
+const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
+
 /// Keywords that do not change the polygons.
 const KNOWN: [&[u8]; 30] = [
     b"g",
@@ -217,7 +219,8 @@ impl Reader<'_, '_> {
         } else {
             format!("expected an index of a {name} line, from 1 to {rows}, found {number}")
         };
-        self.source.error_at_line(INDEX, line, message, INDEX_HINT)
+        let hint = if kind == Row::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
+        self.source.error_at_line(INDEX, line, message, hint)
     }
 
     /// Fails for the first use of a row that never came.

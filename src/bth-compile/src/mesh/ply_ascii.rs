@@ -10,6 +10,8 @@ use crate::error::Result;
 pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
     let mut lines = Lines::after(source.data, header.body, header.lines);
     let mut indices = Vec::new();
+    // Rows with more values than the header tells: how many, and the line of the first.
+    let (mut longer, mut first_longer) = (0u64, 0);
     for element in header.elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
             source.tick(row, lines.position())?;
@@ -20,8 +22,17 @@ pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) ->
                 );
                 return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
             };
-            read_row(source, element, number, line, &mut indices, sink)?;
+            if !read_row(source, element, number, line, &mut indices, sink)? {
+                first_longer = if longer == 0 { number } else { first_longer };
+                longer += 1;
+            }
         }
+    }
+    if longer > 0 {
+        let message = format!(
+            "{longer} rows have more values than the header tells, which are ignored; the first is line {first_longer}"
+        );
+        source.monitor.warn(&message);
     }
     if let Some((number, _)) = lines.find(|(_, line)| !line.trim_ascii().is_empty()) {
         source.monitor.warn(&format!("line {number}: what follows the last element is ignored"));
@@ -29,6 +40,7 @@ pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) ->
     Ok(())
 }
 
+/// Reads a row; returns whether it ends where the header tells.
 fn read_row(
     source: &Source<'_>,
     element: &Element,
@@ -36,7 +48,7 @@ fn read_row(
     line: &[u8],
     indices: &mut Vec<i64>,
     sink: &mut Sink<'_>,
-) -> Result<()> {
+) -> Result<bool> {
     let mut words = words(line);
     let malformed = |expected: &str, word: &[u8]| {
         let message = format!("expected {expected} of element {}, found \"{}\"", element.name, shown(word));
@@ -76,13 +88,10 @@ fn read_row(
             })?;
         }
     }
-    if let Some(word) = words.next() {
-        return Err(malformed("the end of the row", word));
-    }
     if element.kind == Kind::Vertices {
         sink.vertex(vertex);
     }
-    Ok(())
+    Ok(words.next().is_none())
 }
 
 /// The line of a vertex's row.

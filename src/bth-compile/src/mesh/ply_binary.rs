@@ -126,7 +126,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
             return Ok(());
         }
         if element.properties.iter().all(|property| property.list.is_none()) {
-            let bytes = rows.checked_mul(smallest_row(element) as u64).unwrap_or(u64::MAX);
+            let bytes = rows.saturating_mul(smallest_row(element) as u64);
             self.take(usize::try_from(bytes).unwrap_or(usize::MAX), element)?;
             return Ok(());
         }

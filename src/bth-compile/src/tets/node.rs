@@ -87,9 +87,10 @@ pub(super) fn tetrahedralize(
                 break;
             }
             Err(trouble) => {
-                let retry = trouble.retry();
+                let retry = trouble.retry(triangles);
+                let again = troubles.last() == Some(&Trouble::TimedOut) && trouble == Trouble::TimedOut;
                 troubles.push(trouble);
-                if !retry {
+                if !retry || again {
                     break;
                 }
             }
@@ -127,16 +128,7 @@ fn run(
     let free = free_space::points(input, attempt.free_space, attempt.seed);
     let free_points = free.len() as u32;
     let sent: Vec<[f32; 3]> = input.vertices.iter().copied().chain(input.corners()).chain(free).collect();
-    let origin = if attempt.local { input.lower.map(f64::from) } else { [0.0; 3] };
-    let points: Vec<[f64; 3]> =
-        sent.iter().map(|p| std::array::from_fn(|k| f64::from(p[k]) - origin[k])).collect();
-    // The difference of two f32 is not always an f64, and TetGen must see the very points.
-    let exact = |(p, s): (&[f64; 3], &[f32; 3])| {
-        (0..3).all(|k| difference_is_exact(f64::from(s[k]), origin[k], p[k]))
-    };
-    if !points.iter().zip(&sent).all(exact) {
-        return Ok(Err(Trouble::Unfit("coordinates of too many magnitudes for a local origin")));
-    }
+    let (origin, points) = relative(&sent, if attempt.local { input.lower } else { [0.0; 3] });
     let first = input.vertices.len() as u32;
     let request = match options.planted {
         Some((at, fault)) if at == node => Request::Fault(fault),
@@ -158,6 +150,17 @@ fn run(
         }
         Err(defect) => Err(Trouble::Defect(defect)),
     })
+}
+
+/// The points relative to an origin, which becomes zero where the difference of coordinates of very
+/// different magnitudes is no `f64`: TetGen must see the very points.
+fn relative(points: &[[f32; 3]], origin: [f32; 3]) -> ([f64; 3], Vec<[f64; 3]>) {
+    let origin: [f64; 3] = std::array::from_fn(|k| {
+        let o = f64::from(origin[k]);
+        let exact = |p: &[f32; 3]| difference_is_exact(f64::from(p[k]), o, f64::from(p[k]) - o);
+        if points.iter().all(exact) { o } else { 0.0 }
+    });
+    (origin, points.iter().map(|p| std::array::from_fn(|k| f64::from(p[k]) - origin[k])).collect())
 }
 
 /// Whether `a - b` was computed without rounding (the error term of Knuth's TwoSum is zero).

@@ -40,7 +40,7 @@ impl Default for Options {
             workers: 0,
             free_space: 16,
             inflation: 1.0 / 128.0,
-            deadline: Duration::from_secs(20),
+            deadline: Duration::from_secs(5),
             deadline_per_triangle: Duration::from_millis(1),
             memory: 4 << 30,
             cells: vec![16384, 4096, 1024],

@@ -144,12 +144,15 @@ impl Trouble {
         }
     }
 
-    /// Whether another attempt with other points may succeed.
-    pub(super) fn retry(&self) -> bool {
+    /// Whether another attempt with other points may succeed. TetGen hangs on some points and not
+    /// on others, but time spent on a large node is better spent on its parts.
+    pub(super) fn retry(&self, triangles: u32) -> bool {
         match self {
-            Trouble::Died(_) | Trouble::Answer(_) | Trouble::Defect(_) => true,
+            Trouble::Died(_) | Trouble::Answer(_) => true,
+            Trouble::Defect(defect) => *defect != super::check::Defect::Duplicate,
             Trouble::Failed(failure, _) => *failure != Failure::Memory,
-            Trouble::Start(_) | Trouble::TimedOut | Trouble::Unfit(_) => false,
+            Trouble::TimedOut => triangles <= 16384,
+            Trouble::Start(_) | Trouble::Unfit(_) => false,
         }
     }
 }

@@ -186,6 +186,42 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.bth"]);
     }
 
+    /// Runs this test again in a process that is killed while it writes.
+    #[test]
+    fn killed_writer_leaves_the_old_file_and_nothing_else() {
+        const VARIABLE: &str = "BTH_TEST_KILLED_WRITER";
+        if let Some(path) = std::env::var_os(VARIABLE) {
+            let path = PathBuf::from(path);
+            let endless = write_atomically_with(&path, |out| {
+                out.write_all(&[1; 3 << 20])?;
+                std::fs::write(path.with_extension("started"), b"")?;
+                loop {
+                    std::thread::sleep(std::time::Duration::from_millis(10));
+                }
+            });
+            return endless.unwrap();
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.bth");
+        write_atomically(&path, b"old").unwrap();
+        let test = "write::atomic::tests::killed_writer_leaves_the_old_file_and_nothing_else";
+        let mut writer = std::process::Command::new(std::env::current_exe().unwrap());
+        let mut writer = writer.args(["--exact", test]).env(VARIABLE, &path).spawn().unwrap();
+        while !path.with_extension("started").exists() {
+            assert!(writer.try_wait().unwrap().is_none(), "the writer ended by itself");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        writer.kill().unwrap();
+        writer.wait().unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        let nameless = create(folder.path(), &OsString::from(".b.")).unwrap().1.is_none();
+        if nameless {
+            assert_eq!(names(folder.path()), ["a.bth", "a.started"]);
+        }
+        write_atomically(&path, b"new").unwrap();
+        assert_eq!(names(folder.path()), ["a.bth", "a.started"]);
+    }
+
     #[test]
     fn leftovers_of_killed_programs_are_removed_but_not_locked_ones() {
         let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,7 @@ pub struct ObjectParts<'a> {
     pub tet_faces: &'a [TetFace],
     /// Hull faces.
     pub hull_faces: &'a [HullFace],
-    /// Row of `tet_faces` per source triangle; empty without tet leaves.
+    /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_homes: &'a [u32],
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
@@ -68,12 +68,14 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         );
         return Err(Error::Limit { code: "BTH-L031", message });
     }
+    // Without tet leaves there is no record, and no triangle has a home.
+    let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
     let (lower, upper) = parts.bounds.unwrap_or_default();
     let header = Object {
         lower,
         upper,
         root: parts.root,
-        record: parts.record.map_or(0, |r| r as u32),
+        record: record.map_or(0, |r| r as u32),
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
@@ -84,13 +86,15 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::LINES, index, parts.lines)?;
     builder.rows(kind::TRIANGLE_IDS, index, parts.triangle_ids)?;
     builder.rows(kind::TET_LEAVES, index, parts.tet_leaves)?;
-    if let Some(record) = parts.record {
+    if let Some(record) = record {
         builder.section(kind::TETS, index, record.stride() as u32, parts.tets)?;
     }
     builder.rows(kind::TET_VERTICES, index, parts.tet_vertices)?;
     builder.rows(kind::TET_FACES, index, parts.tet_faces)?;
     builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
-    builder.rows(kind::TRIANGLE_HOMES, index, parts.triangle_homes)?;
+    if record.is_some() {
+        builder.rows(kind::TRIANGLE_HOMES, index, parts.triangle_homes)?;
+    }
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;
         builder.rows(kind::TRIANGLES, index, source.triangles)?;

@@ -8,12 +8,12 @@ use zerocopy::FromBytes;
 use crate::meshes::{bvh, nodes_of_at_most, torus};
 use crate::with_worker;
 
-/// A box cut in five tetrahedra with one of the inner faces constrained, shifted along x.
+/// Five tetrahedra around one constrained face, shifted along x. They do not fill a box: only their
+/// links matter here.
 fn five(shift: f32, triangle: u32) -> TetMesh {
     let vertices: Vec<[f32; 3]> =
         (0..8).map(|i| [shift + (i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32]).collect();
     let tets = vec![[0, 1, 2, 4], [0, 1, 2, 3], [0, 1, 4, 5], [0, 2, 4, 6], [1, 2, 3, 7]];
-    // Not a real partition: only its links matter here. Tetrahedra 0 and 1 share a constrained face.
     let hull = [Behind::Hull; 4];
     let mut behind = vec![hull; 5];
     behind[0] = [Behind::Hull, Behind::Tet(3), Behind::Tet(2), Behind::Face(0)];
@@ -21,7 +21,6 @@ fn five(shift: f32, triangle: u32) -> TetMesh {
     behind[2][3] = Behind::Tet(0);
     behind[3][3] = Behind::Tet(0);
     behind[4][3] = Behind::Tet(1);
-    // The normal of (0, 1, 2) is +z, where vertex 4 is; 3 is in the plane, which does not matter.
     let faces = vec![Face { triangle, vertex: [0, 1, 2], tet: [0, 1] }];
     TetMesh {
         lower: [shift, 0.0, 0.0],
@@ -116,7 +115,6 @@ fn code(behind: Behind, first_tet: u32, first_face: u32) -> u32 {
 
 #[test]
 fn every_record_decodes_to_what_was_encoded() {
-    // Links need faces shared in full, so the second vertex list repeats what the first one has.
     let meshes = [five(0.0, 2), five(4.0, 0)];
     for kind in RecordKind::ALL {
         let encoded = encode(&meshes, &[5, NONE], kind, 4);

@@ -67,7 +67,8 @@ fn trace_with<R: Record, Q: Query, C: Count>(
     // A hint changes where the search begins, never what is found: the tet leaf of the surface is
     // walked first, from the surface, and left out later.
     let (mut walked, row) = (NONE, object.triangle_homes.get(from as usize).copied().unwrap_or(NONE));
-    if row != NONE {
+    // Such a walk sees only what lies ahead of the origin.
+    if row != NONE && ray.tmin >= 0.0 {
         let leaf = leaf_of_face(object, row);
         let space = space(object, records, leaf, &line);
         if let Some(place) = space.locate(row) {

@@ -8,8 +8,16 @@ use crate::rays::{Hit, Ray, Surface};
 pub(crate) trait Query {
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
-    /// Nothing beyond this t is of interest.
+    /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
+}
+
+/// `t` and all that could be taken for it: t is compared with the ray's range after rounding to f32, and
+/// computed only to 2^-28 of itself (`Line::crossing`), so of two equal hits one may seem nearer.
+fn widened(t: f64) -> f64 {
+    const SLACK: f64 = 1.0 / (1 << 23) as f64;
+    const LEAST: f64 = f32::from_bits(1) as f64;
+    t + (t.abs() * SLACK + LEAST)
 }
 
 /// Least t, then least triangle id: an order that does not depend on the traversal.
@@ -57,7 +65,7 @@ impl Query for Nearest {
     }
     #[inline(always)]
     fn limit(&self) -> f64 {
-        self.best.t
+        widened(self.best.t)
     }
 }
 
@@ -83,7 +91,7 @@ impl Query for Any {
     }
     #[inline(always)]
     fn limit(&self) -> f64 {
-        f64::from(self.tmax)
+        widened(f64::from(self.tmax))
     }
 }
 

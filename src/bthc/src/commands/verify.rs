@@ -14,9 +14,8 @@ pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
         Err(error) => Err(vec![error]),
     };
     match result {
-        Ok(report) => {
-            Ok(if args.json { output::json(&passed(&report))? } else { output::text(&summary(&report))? })
-        }
+        Ok(report) if args.json => Ok(output::json(&passed(&report))?),
+        Ok(report) => Ok(output::text(&summary(&report))?),
         Err(errors) => {
             if args.json {
                 let errors: Vec<_> = errors.iter().map(runtime_json).collect();

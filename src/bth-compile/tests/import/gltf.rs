@@ -1,0 +1,304 @@
+use super::*;
+use serde_json::{Value, json};
+
+/// A GLB of a document and its binary chunk.
+fn glb(document: &Value, binary: &[u8]) -> Vec<u8> {
+    let mut json = document.to_string().into_bytes();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut binary = binary.to_vec();
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((28 + json.len() as u32 + binary.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", binary)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+/// The square as 48 bytes of positions, 6 u16 indices, and 48 bytes of normals along z.
+fn binary() -> Vec<u8> {
+    let mut bytes: Vec<u8> = SQUARE.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+    bytes.extend([0u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
+    for _ in 0..4 {
+        bytes.extend([0.0f32, 0.0, 1.0].iter().flat_map(|x| x.to_le_bytes()));
+    }
+    bytes
+}
+
+fn document() -> Value {
+    json!({
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 2}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"},
+            {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC3"}
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 12},
+            {"buffer": 0, "byteOffset": 60, "byteLength": 48}
+        ],
+        "buffers": [{"byteLength": 108}]
+    })
+}
+
+fn edited(edit: impl FnOnce(&mut Value)) -> Value {
+    let mut document = document();
+    edit(&mut document);
+    document
+}
+
+#[track_caller]
+fn read(document: &Value) -> (Mesh, Report) {
+    import_bytes("a.glb", &glb(document, &binary()), Keep::None).unwrap()
+}
+
+#[track_caller]
+fn assert_bad(edit: impl FnOnce(&mut Value), code: &str, place: &str, message: &str) {
+    assert_refused("a.glb", &glb(&edited(edit), &binary()), code, place, message);
+}
+
+#[test]
+fn a_glb_is_read_with_its_normals() {
+    let (mesh, report) = import_bytes("a.glb", &glb(&document(), &binary()), Keep::All).unwrap();
+    assert_eq!(mesh.positions, SQUARE);
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    let attributes = mesh.attributes.unwrap();
+    assert_eq!((attributes.normals.len(), attributes.uvs.len()), (4, 0));
+    assert_eq!((report.format.as_str(), report.positions_read), ("gltf", 4));
+}
+
+#[test]
+fn buffers_may_be_external_or_embedded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(folder.path().join("a b.bin"), [binary(), vec![0; 9]].concat()).unwrap();
+    let base64 = "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAgD8AAAAAAAAAAAAAgD8AAAAA";
+    for (uri, indexed) in [("a%20b.bin", true), (base64, false)] {
+        let document = edited(|d| {
+            d["buffers"][0] = json!({"uri": uri, "byteLength": if indexed { 108 } else { 48 }});
+            if !indexed {
+                d["meshes"][0]["primitives"][0] = json!({"attributes": {"POSITION": 0}, "mode": 5});
+            }
+        });
+        std::fs::write(&path, document.to_string()).unwrap();
+        assert_eq!(import(&path, Keep::None, &Silent).unwrap().0.triangles.len(), 2);
+    }
+    for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc"] {
+        std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = uri.into()).to_string()).unwrap();
+        let error = import(&path, Keep::None, &Silent).unwrap_err();
+        assert!(matches!(error, Error::Input { code: "BTH-I014", .. }), "{error}");
+    }
+    std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = "absent.bin".into()).to_string()).unwrap();
+    let error = import(&path, Keep::None, &Silent).unwrap_err();
+    assert!(error.to_string().contains("absent.bin: BTH-O001"), "{error}");
+}
+
+#[test]
+fn nodes_place_meshes_in_depth_first_order() {
+    let document = edited(|d| {
+        d["scenes"][0]["nodes"] = json!([3, 0]);
+        d["nodes"] = json!([
+            {"mesh": 0},
+            {"mesh": 0, "translation": [0, 0, 1]},
+            {"mesh": 0, "matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,2,1]},
+            {"children": [1, 2], "scale": [2, 2, 2], "translation": [0, 0, 10]}
+        ]);
+    });
+    let (mesh, report) = read(&document);
+    let heights: Vec<_> = (0..6).map(|t| mesh.corners(t)[0][2]).collect();
+    assert_eq!(heights, [12.0, 12.0, 14.0, 14.0, 0.0, 0.0]);
+    assert_eq!(mesh.corners(0)[1], [2.0, 0.0, 12.0]);
+    assert_eq!((report.triangles, report.components), (6, 3));
+}
+
+#[test]
+fn mirrored_instances_keep_their_front_sides() {
+    let document = edited(|d| d["nodes"][0]["scale"] = json!([-1, 1, 1]));
+    let bytes = glb(&document, &binary());
+    let mesh = import_bytes("a.glb", &bytes, Keep::Normals).unwrap().0;
+    for t in 0..2 {
+        let [a, b, c] = mesh.corners(t);
+        assert!((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0);
+    }
+    assert!(mesh.attributes.unwrap().normals.iter().all(|n| *n == [0.0, 0.0, 1.0]));
+}
+
+#[test]
+fn the_default_scene_is_the_first_and_without_scenes_all_roots() {
+    let two = |scene: Value| {
+        edited(|d| {
+            d["scene"] = scene;
+            d["scenes"] = json!([{"nodes": [0]}, {"nodes": [0, 1]}]);
+            d["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "translation": [0, 0, 1]}]);
+        })
+    };
+    assert_eq!(read(&two(Value::Null)).0.triangles.len(), 2);
+    assert_eq!(read(&two(1.into())).0.triangles.len(), 4);
+    let none = edited(|d| {
+        d.as_object_mut().unwrap().retain(|key, _| !key.starts_with("scene"));
+        d["nodes"] = json!([{"mesh": 0}, {"children": [0]}]);
+    });
+    assert_eq!(read(&none).0.triangles.len(), 2);
+}
+
+#[test]
+fn strips_fans_points_and_lines_follow_the_specification() {
+    let mode = |mode: u32| {
+        read(&edited(|d| {
+            d["meshes"][0]["primitives"][0] = json!({"attributes": {"POSITION": 0}, "mode": mode})
+        }))
+    };
+    let corners = |mesh: &Mesh| (0..2).map(|t| mesh.corners(t)).collect::<Vec<_>>();
+    assert_eq!(corners(&mode(5).0), [[0, 1, 2], [1, 3, 2]].map(|t| t.map(|v: usize| SQUARE[v])));
+    assert_eq!(corners(&mode(6).0), [[1, 2, 0], [2, 3, 0]].map(|t| t.map(|v: usize| SQUARE[v])));
+    for (kind, skipped) in [(0, 4), (1, 2), (2, 4), (3, 3)] {
+        let (mesh, report) = mode(kind);
+        assert_eq!((mesh.triangles.len(), report.skipped), (0, skipped));
+    }
+}
+
+#[test]
+fn quantized_and_sparse_positions_are_read() {
+    let document = edited(|d| {
+        d["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        d["accessors"][0] = json!({"bufferView": 1, "componentType": 5121, "normalized": true, "count": 3,
+            "type": "VEC3", "sparse": {"count": 1, "indices": {"bufferView": 1, "byteOffset": 2, "componentType": 5123},
+            "values": {"bufferView": 1, "byteOffset": 4}}});
+        d["meshes"][0]["primitives"][0] = json!({"attributes": {"POSITION": 0}});
+    });
+    // The bytes of the indices: 0 0 1 0 2 0 0 0 2 0 3 0; row 1 becomes 2 0 0.
+    let mesh = read(&document).0;
+    let byte = |x: u8| (f64::from(x) / 255.0) as f32;
+    let expected = [[0, 0, 1], [2, 0, 0], [0, 0, 2]].map(|p| p.map(byte));
+    assert_eq!(mesh.corners(0), expected);
+}
+
+#[test]
+fn skins_and_morph_targets_are_told() {
+    let document = edited(|d| {
+        d["nodes"][0]["skin"] = 0.into();
+        d["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]);
+    });
+    let listener = Listener::default();
+    import_with("a.glb", &glb(&document, &binary()), Keep::None, &listener).unwrap();
+    assert!(listener.heard("skins") && listener.heard("morph"));
+}
+
+#[test]
+fn refuses_required_extensions_by_name() {
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "ACME_secret_geometry"] {
+        assert_bad(|d| d["extensionsRequired"] = json!([name]), "BTH-I011", name, name);
+    }
+    let used = |d: &mut Value| {
+        d["accessors"][0].as_object_mut().unwrap().remove("bufferView");
+        d["meshes"][0]["primitives"][0]["extensions"] = json!({"KHR_draco_mesh_compression": {}});
+    };
+    assert_bad(used, "BTH-I011", "KHR_draco_mesh_compression", "KHR_draco_mesh_compression");
+    let fine = edited(|d| d["extensionsRequired"] = json!(["KHR_materials_unlit", "KHR_texture_transform"]));
+    assert_eq!(read(&fine).0.triangles.len(), 2);
+}
+
+#[test]
+fn refuses_graphs_that_are_not_trees() {
+    let two = json!([{"mesh": 0, "children": [1]}, {"children": [0]}]);
+    assert_bad(|d| d["nodes"] = two, "BTH-I012", "node 0", "one parent");
+    assert_bad(|d| d["scenes"][0]["nodes"] = json!([0, 0]), "BTH-I012", "node 0", "one parent");
+    assert_bad(|d| d["scenes"][0]["nodes"] = json!([7]), "BTH-I012", "node 7", "does not exist");
+    assert_bad(|d| d["scene"] = 4.into(), "BTH-I012", "scene 4", "does not exist");
+    assert_bad(|d| d["nodes"][0]["mesh"] = 4.into(), "BTH-I012", "node 0", "mesh 4 does not exist");
+}
+
+#[test]
+fn refuses_accessors_beyond_their_bytes() {
+    let at = |d: &mut Value, key: &str, value: Value| d["accessors"][0][key] = value;
+    assert_bad(
+        |d| at(d, "count", 5.into()),
+        "BTH-I013",
+        "accessor 0",
+        "5 rows do not fit into buffer view 0",
+    );
+    assert_bad(|d| at(d, "count", 4_000_000_000u64.into()), "BTH-I013", "accessor 0", "do not fit");
+    assert_bad(|d| at(d, "byteOffset", u64::MAX.into()), "BTH-I013", "accessor 0", "do not fit");
+    assert_bad(|d| at(d, "componentType", 1.into()), "BTH-I013", "accessor 0", "component type");
+    assert_bad(|d| at(d, "type", "VEC4".into()), "BTH-I013", "accessor 0", "expected VEC3");
+    assert_bad(|d| at(d, "bufferView", Value::Null), "BTH-I013", "accessor 0", "no data");
+    assert_bad(|d| at(d, "bufferView", 9.into()), "BTH-I014", "buffer view 9", "does not exist");
+    assert_bad(|d| d["bufferViews"][0]["byteStride"] = 4.into(), "BTH-I013", "accessor 0", "stride of 4");
+    assert_bad(
+        |d| d["bufferViews"][0]["byteLength"] = u64::MAX.into(),
+        "BTH-I014",
+        "buffer view 0",
+        "of buffer 0",
+    );
+    assert_bad(|d| d["bufferViews"][0]["buffer"] = 3.into(), "BTH-I014", "buffer 3", "does not exist");
+    assert_bad(|d| d["buffers"][0]["byteLength"] = 200.into(), "BTH-I003", "buffer 0", "expected 200 bytes");
+    assert_bad(
+        |d| d["meshes"][0]["primitives"][0]["indices"] = 9.into(),
+        "BTH-I013",
+        "accessor 9",
+        "not exist",
+    );
+    assert_bad(
+        |d| d["meshes"][0]["primitives"][0]["mode"] = 9.into(),
+        "BTH-I002",
+        "mesh 0 primitive 0",
+        "mode",
+    );
+    let sparse = json!({"count": 1, "indices": {"bufferView": 1, "byteOffset": 10, "componentType": 5123},
+        "values": {"bufferView": 2}});
+    let zeros = |d: &mut Value| {
+        d["accessors"][0] =
+            json!({"componentType": 5126, "count": 4_000_000_000u32, "type": "VEC3", "sparse": sparse});
+    };
+    assert_bad(zeros, "BTH-I013", "accessor 0", "without data");
+}
+
+#[test]
+fn refuses_indices_out_of_range_and_short_attributes() {
+    assert_bad(
+        |d| d["accessors"][0]["count"] = 3.into(),
+        "BTH-I005",
+        "mesh 0 primitive 0 accessor 1 row 5",
+        "below 3",
+    );
+    assert_bad(
+        |d| d["accessors"][2]["count"] = 3.into(),
+        "BTH-I005",
+        "mesh 0 primitive 0 accessor 2",
+        "expected 4",
+    );
+}
+
+#[test]
+fn refuses_coordinates_that_are_not_finite_with_node_and_accessor() {
+    let mut bytes = binary();
+    bytes[12..16].copy_from_slice(&f32::NAN.to_le_bytes());
+    let place = "node 0 mesh 0 primitive 0 accessor 0 row 1";
+    assert_refused("a.glb", &glb(&document(), &bytes), "BTH-I004", place, "NaN");
+    let large = |d: &mut Value| d["nodes"][0]["translation"] = json!([1e300, 0, 0]);
+    assert_bad(large, "BTH-I004", "node 0 mesh 0 primitive 0 accessor 0 row 0", "inf");
+}
+
+#[test]
+fn every_cut_of_a_glb_is_refused() {
+    let bytes = glb(&document(), &binary());
+    for end in 0..bytes.len() {
+        let found = import_bytes("a.glb", &bytes[..end], Keep::None);
+        assert!(matches!(found, Err(Error::Input { .. })), "cut at {end}: {found:?}");
+    }
+}
+
+#[test]
+fn refuses_what_is_not_gltf_2() {
+    assert_bad(|d| d["asset"]["version"] = "1.0".into(), "BTH-I006", "asset", "found version \"1.0\"");
+    assert_refused("a.glb", b"glTF\x01\0\0\0\x0c\0\0\0", "BTH-I006", "byte 4", "found 1");
+    assert_refused("a.gltf", b"{\"asset\":", "BTH-I002", "JSON", "EOF");
+    assert_refused("a.gltf", &[b'['; 100_000], "BTH-I002", "JSON", "expected a glTF document");
+}

@@ -1,0 +1,58 @@
+use super::*;
+
+#[track_caller]
+fn square(text: &str) {
+    let (mesh, report) = import_bytes("a.off", text.as_bytes(), Keep::All).unwrap();
+    assert_eq!(mesh.positions, SQUARE);
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(report.polygons, 1);
+}
+
+#[test]
+fn comments_colours_and_counts_on_the_first_line_are_read() {
+    square("OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
+    square("OFF 4 1 0\r\n0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0\r\n4 0 1 2 3\r\n");
+    square(
+        "# made by hand\nCOFF # coloured\n\n4 1 0\n0 0 0 1 0 0 1\n1 0 0\n# c\n1 1 0\n0 1 0\n4 0 1 2 3 255 0 0\n",
+    );
+    square("4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
+}
+
+#[test]
+fn faces_of_fewer_than_three_corners_are_skipped() {
+    let text = b"OFF\n3 3 0\n0 0 0\n1 0 0\n1 1 0\n2 0 1\n3 0 1 2\n1 0\n";
+    let (mesh, report) = import_bytes("a.off", text, Keep::None).unwrap();
+    assert_eq!((mesh.triangles.len(), report.skipped), (1, 2));
+}
+
+#[test]
+fn refuses_what_is_not_three_dimensional_text() {
+    for first in ["4OFF", "nOFF", "OFF BINARY"] {
+        assert_refused("a.off", format!("{first}\n0 0 0\n").as_bytes(), "BTH-I006", "line 1", first);
+    }
+    assert_refused("a.off", b"hello\n", "BTH-I002", "line 1", "number of vertices");
+}
+
+#[test]
+fn refuses_files_that_are_cut_off() {
+    assert_refused("a.off", b"OFF\n4000000000 1 0\n0 0 0\n", "BTH-I003", "line 3", "vertex 1 of 4000000000");
+    assert_refused("a.off", b"OFF\n1 4000000000 0\n0 0 0\n1 0\n", "BTH-I003", "line 4", "face 1 of");
+    assert_refused("a.off", b"", "BTH-I003", "line 0", "expected OFF");
+}
+
+#[test]
+fn refuses_bad_indices_and_numbers() {
+    let text = "OFF\n3 1 0\n0 0 0\n1 0 0\n1 1 0\n";
+    assert_refused("a.off", format!("{text}3 0 1 3\n").as_bytes(), "BTH-I005", "line 6", "below 3, found 3");
+    assert_refused("a.off", format!("{text}3 0 1 -1\n").as_bytes(), "BTH-I005", "line 6", "found -1");
+    assert_refused("a.off", format!("{text}3 0 1\n").as_bytes(), "BTH-I002", "line 6", "expected 3 indices");
+    assert_refused("a.off", b"OFF\n1 0 0\n0 zero 0\n", "BTH-I002", "line 3", "found \"zero\"");
+}
+
+#[test]
+fn refuses_coordinates_that_are_not_finite_where_they_stand() {
+    let text = b"OFF\n3 1 0\n0 0 0\n\n# c\n1 nan 0\n1 1 0\n3 0 1 2\n";
+    assert_refused("a.off", text, "BTH-I004", "line 6", "NaN");
+    let text = b"OFF 3 1 0\n0 0 0\n1 nan 0\n1 1 0\n3 0 1 2\n";
+    assert_refused("a.off", text, "BTH-I004", "line 3", "NaN");
+}

@@ -1,0 +1,208 @@
+use super::*;
+
+const HEAD: &str = "comment made by hand\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+    property uchar red\nelement face 2\nproperty list uchar int vertex_indices\nproperty short flags\nend_header\n";
+
+fn ascii() -> String {
+    format!("ply\nformat ascii 1.0\n{HEAD}0 0 0 9\n1 0 0 9\n1 1 0 9\n0 1 0 9\n4 0 1 2 3 -7\n3 3 1 0 -7\n")
+}
+
+/// The same in binary.
+fn binary(big: bool) -> Vec<u8> {
+    let order = if big { "big" } else { "little" };
+    let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{HEAD}").into_bytes();
+    let mut push = |little: &[u8]| match big {
+        true => bytes.extend(little.iter().rev()),
+        false => bytes.extend(little),
+    };
+    for vertex in SQUARE {
+        vertex.iter().for_each(|x| push(&x.to_le_bytes()));
+        push(&[9]);
+    }
+    for face in [&[0i32, 1, 2, 3][..], &[3, 1, 0]] {
+        push(&[face.len() as u8]);
+        face.iter().for_each(|index| push(&index.to_le_bytes()));
+        push(&(-7i16).to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn text_and_both_byte_orders_give_the_same_fans_in_file_order() {
+    for bytes in [ascii().into_bytes(), ascii().replace('\n', "\r\n").into(), binary(false), binary(true)] {
+        let (mesh, report) = import_bytes("a.ply", &bytes, Keep::None).unwrap();
+        assert_eq!(mesh.positions, SQUARE);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 1, 0]]);
+        assert_eq!(report.polygons, 1);
+    }
+}
+
+#[test]
+fn double_coordinates_are_rounded_and_other_elements_passed_over() {
+    let head = "element junk 2\nproperty list uchar double many\nproperty char c\nelement edge 1\n\
+        property int vertex1\nproperty int vertex2\nelement vertex 3\nproperty double x\nproperty double y\n\
+        property double z\nelement nothing 4000000000\nelement face 1\nproperty list int uint vertex_index\nend_header\n";
+    let mut bytes = format!("ply\nformat binary_little_endian 1.0\n{head}").into_bytes();
+    bytes.push(2);
+    bytes.extend([0; 16]);
+    bytes.extend([0, 0, 0]);
+    bytes.extend([0; 8]);
+    for x in [0.1, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f64] {
+        bytes.extend(x.to_le_bytes());
+    }
+    for word in [3u32, 0, 1, 2] {
+        bytes.extend(word.to_le_bytes());
+    }
+    let (mesh, report) = import_bytes("a.ply", &bytes, Keep::None).unwrap();
+    assert_eq!((mesh.positions[0], mesh.triangles.as_slice()), ([0.1, 0.0, 0.0], &[[0, 1, 2]][..]));
+    assert_eq!(report.skipped, 1);
+    let text =
+        format!("ply\nformat ascii 1.0\n{head}2 0.5 0.5 0\n0 0\n0 1\n\n0.1 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    assert_eq!(import_bytes("a.ply", text.as_bytes(), Keep::None).unwrap().0, mesh);
+}
+
+#[test]
+fn strips_turn_every_second_triangle_and_restart_at_minus_one() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+        element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n1 1 0\n0 1 0\n11 0 1 3 2 -1 0 1 -1 2 3 0\n";
+    let (mesh, report) = import_bytes("a.ply", text.as_bytes(), Keep::None).unwrap();
+    let corners: Vec<_> = (0..3).map(|t| mesh.corners(t)).collect();
+    let expected = [[0, 1, 3], [1, 2, 3], [2, 3, 0]].map(|t| t.map(|v: usize| SQUARE[v]));
+    let turned = |[a, b, c]: [[f32; 3]; 3]| [[a, b, c], [b, c, a], [c, a, b]];
+    for (found, expected) in corners.into_iter().zip(expected) {
+        assert!(turned(expected).contains(&found), "{found:?} {expected:?}");
+    }
+    assert_eq!((report.triangles, report.skipped), (3, 1));
+}
+
+#[test]
+fn attributes_of_vertices_are_kept_when_asked_for() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        property float nx\nproperty float ny\nproperty float nz\nproperty float s\nproperty float t\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0 0 0 1 .5 .25\n1 0 0 0 0 1 1 1\n0 1 0 0 1 0 0 1\n3 2 1 0\n";
+    let all = import_bytes("a.ply", text.as_bytes(), Keep::All).unwrap().0.attributes.unwrap();
+    assert_eq!(all.corners, [[0, 1, 2]]);
+    assert_eq!(all.normals, [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]);
+    assert_eq!(all.uvs, [[0.0, 1.0], [1.0, 1.0], [0.5, 0.25]]);
+    let normals = import_bytes("a.ply", text.as_bytes(), Keep::Normals).unwrap().0.attributes.unwrap();
+    assert_eq!((normals.normals, normals.uvs.len()), (all.normals, 0));
+}
+
+#[test]
+fn every_cut_of_a_file_is_refused() {
+    for bytes in [ascii().trim_end().as_bytes(), &binary(false), &binary(true)] {
+        for end in 0..bytes.len() {
+            // A cut inside the last number of a text leaves a shorter number.
+            let text = std::str::from_utf8(bytes).is_ok() && bytes[..9] != *b"ply\nformat binary";
+            if text && end + 2 > bytes.len() {
+                continue;
+            }
+            let found = import_bytes("a.ply", &bytes[..end], Keep::None);
+            assert!(matches!(found, Err(Error::Input { .. })), "cut at {end}: {found:?}");
+        }
+    }
+    let cut = binary(false);
+    let place = format!("byte {}", cut.len() - 1);
+    assert_refused("a.ply", &cut[..cut.len() - 1], "BTH-I003", &place, "2 rows of element face");
+}
+
+#[test]
+fn refuses_counts_that_the_file_cannot_hold_without_allocating_for_them() {
+    for encoding in ["ascii", "binary_little_endian", "binary_big_endian"] {
+        let text = format!("ply\nformat {encoding} 1.0\n{HEAD}");
+        for (what, huge) in [("vertex 4", "vertex 4000000000"), ("vertex 4", "vertex 999999999999999999")] {
+            let error = import_bytes("a.ply", text.replace(what, huge).as_bytes(), Keep::None).unwrap_err();
+            assert!(matches!(error, Error::Input { code: "BTH-I003", .. } | Error::Limit { .. }), "{error}");
+        }
+    }
+    let mut bytes = binary(false);
+    let list = bytes.len() - 3 * 4 - 2 - 1;
+    bytes[list] = 255;
+    let place = format!("byte {}", bytes.len());
+    assert_refused("a.ply", &bytes, "BTH-I003", &place, "end of the file");
+}
+
+#[test]
+fn refuses_bad_headers_at_their_line() {
+    let head = |from: &str, to: &str| ascii().replace(from, to);
+    assert_refused("a.ply", b"plywood\n", "BTH-I002", "line 1", "expected ply");
+    assert_refused("a.ply", head("ascii", "base64").as_bytes(), "BTH-I002", "line 2", "expected ascii");
+    assert_refused("a.ply", head("ascii 1.0", "ascii 2.0").as_bytes(), "BTH-I006", "line 2", "version 1.0");
+    assert_refused(
+        "a.ply",
+        head("vertex 4", "vertex four").as_bytes(),
+        "BTH-I002",
+        "line 4",
+        "number of rows",
+    );
+    assert_refused("a.ply", head("float y", "real y").as_bytes(), "BTH-I002", "line 6", "a PLY type");
+    assert_refused(
+        "a.ply",
+        head("float y", "float x").as_bytes(),
+        "BTH-I002",
+        "line 6",
+        "each property once",
+    );
+    assert_refused("a.ply", head("float y", "float q").as_bytes(), "BTH-I002", "line 12", "x, y and z");
+    assert_refused(
+        "a.ply",
+        head("int vertex_indices", "int v").as_bytes(),
+        "BTH-I002",
+        "line 12",
+        "vertex_indices",
+    );
+    assert_refused(
+        "a.ply",
+        head("uchar int", "uchar float").as_bytes(),
+        "BTH-I002",
+        "line 10",
+        "integer type",
+    );
+    assert_refused("a.ply", head("format ascii 1.0\n", "").as_bytes(), "BTH-I002", "line 11", "format");
+    assert_refused("a.ply", head("end_header\n", "").as_bytes(), "BTH-I002", "line 12", "end_header");
+}
+
+#[test]
+fn refuses_rows_that_do_not_fit_their_element() {
+    let body = |from: &str, to: &str| ascii().replace(from, to);
+    assert_refused("a.ply", body("1 1 0 9", "1 1 0").as_bytes(), "BTH-I002", "line 15", "more values");
+    assert_refused("a.ply", body("1 1 0 9", "1 one 0 9").as_bytes(), "BTH-I002", "line 15", "found \"one\"");
+    assert_refused("a.ply", body("3 3 1 0", "-1 3 1 0").as_bytes(), "BTH-I002", "line 18", "count of a list");
+}
+
+#[test]
+fn refuses_indices_out_of_range() {
+    let text = ascii().replace("3 3 1 0", "3 4 1 0");
+    assert_refused("a.ply", text.as_bytes(), "BTH-I005", "line 18", "below 4, found 4");
+    let text = ascii().replace("3 3 1 0", "3 3 -1 0");
+    assert_refused("a.ply", text.as_bytes(), "BTH-I005", "line 18", "found -1");
+    let mut bytes = binary(true);
+    let last = bytes.len() - 3;
+    bytes[last] = 4;
+    let place = format!("byte {}", bytes.len() - 15);
+    assert_refused("a.ply", &bytes, "BTH-I005", &place, "found 4 in row 1 of element face");
+}
+
+#[test]
+fn refuses_coordinates_that_are_not_finite_where_they_stand() {
+    let text = ascii().replace("1 1 0 9", "\n1 nan 0 9");
+    assert_refused("a.ply", text.as_bytes(), "BTH-I004", "line 16", "NaN");
+    let mut bytes = binary(false);
+    let row = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11 + 2 * 13;
+    bytes[row + 4..row + 8].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    assert_refused("a.ply", &bytes, "BTH-I004", &format!("byte {row}"), "inf");
+}
+
+#[test]
+fn values_after_the_end_of_a_row_are_told() {
+    let text = ascii().replace("1 1 0 9", "1 1 0 9 9").replace("0 1 0 9", "0 1 0 9 9");
+    let listener = Listener::default();
+    let (mesh, _) = import_with("a.ply", text.as_bytes(), Keep::None, &listener).unwrap();
+    assert_eq!(mesh.positions, SQUARE);
+    assert!(
+        listener
+            .heard("2 rows have more values than the header tells, which are ignored; the first is line 15")
+    );
+}

@@ -11,9 +11,9 @@ use crate::Model;
 use crate::math::{Vec3, add, cross, dot, length, scale, sin_cos, sub};
 
 /// Faces for a grid of n³ cubes are about this times n².
-const FACES_PER_CELL_AREA: f64 = 35.5;
+const FACES_PER_CELL_AREA: f64 = 32.0;
 /// Corners lie between this and one minus this along an edge of the grid.
-const MARGIN: f64 = 0.1;
+const MARGIN: f64 = 0.01;
 /// Periods of the gyroid across the ball.
 const PERIODS: f64 = 2.0;
 
@@ -27,7 +27,10 @@ pub fn gyroid(faces: u32) -> Model {
 fn field(p: Vec3) -> f64 {
     let [(sx, cx), (sy, cy), (sz, cz)] = p.map(|x| sin_cos(x * PERIODS / 2.0));
     let labyrinth = (sx * cy + sy * cz + sz * cx) / 4.0;
-    labyrinth.max(length(p) - 1.0)
+    // The greater of both, rounded where they meet.
+    let ball = length(p) - 1.0;
+    let apart = labyrinth - ball;
+    0.5 * (labyrinth + ball + (apart * apart + 0.01).sqrt())
 }
 
 /// The zero surface of `field` in the cube from -1.1 to 1.1, cut into n³ cubes of six

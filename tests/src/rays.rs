@@ -21,7 +21,8 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
         .map(|i| {
             let corner = corners[rng.below(corners.len() as u64) as usize];
             let mut inside = |margin: f32| {
-                [0, 1, 2].map(|k| lower[k] + extent[k] * 0.5 + (extent[k] + margin * size) * (rng.unit() - 0.5))
+                [0, 1, 2]
+                    .map(|k| lower[k] + extent[k] * 0.5 + (extent[k] + margin * size) * (rng.unit() - 0.5))
             };
             let target = match i % 3 {
                 0 => corner[0],

@@ -91,15 +91,29 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
         let mut any = vec![false; rays.len()];
         scene.any_batch(&rays, None, &mut any);
         for (i, ray) in rays.iter().enumerate() {
-            assert_eq!(bits(&hits[i]), bits(&expected[i]), "{name}: {ray:?}: {:?}, {:?}", hits[i], expected[i]);
+            assert_eq!(
+                bits(&hits[i]),
+                bits(&expected[i]),
+                "{name}: {ray:?}: {:?}, {:?}",
+                hits[i],
+                expected[i]
+            );
             assert_eq!(any[i], expected[i].is_hit(), "{name}: any hit of {ray:?}");
             assert_eq!(bits(&scene.nearest(ray, Surface::NONE)), bits(&hits[i]), "{name}: one ray at a time");
         }
         for (ray, from) in &onward {
             let (without, with) = (scene.nearest(ray, Surface::NONE), scene.nearest(ray, *from));
-            assert_eq!(bits(&without), bits(&with), "{name}: a hint, {from:?}, changed {ray:?}: {without:?} {with:?}");
+            assert_eq!(
+                bits(&without),
+                bits(&with),
+                "{name}: a hint, {from:?}, changed {ray:?}: {without:?} {with:?}"
+            );
             assert_eq!(scene.any(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
-            assert_eq!(bits(&plain.nearest(ray, Surface::NONE)), bits(&with), "{name}: {ray:?} differs from the BVH");
+            assert_eq!(
+                bits(&plain.nearest(ray, Surface::NONE)),
+                bits(&with),
+                "{name}: {ray:?} differs from the BVH"
+            );
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Triangle meshes: import, weld, report.
 //!
-//! A reader per format (`obj`, `gltf`, `ply`, `stl`, `off`) turns a file into a [`raw::Raw`] mesh with the
+//! A reader per format (`obj`, `gltf`, `ply`, `stl`, `off`) turns a file into a `raw::Raw` mesh with the
 //! source's own rows; `weld` merges its positions, `attributes` its shading rows, and `topology` counts
 //! what the report tells.
 

@@ -26,18 +26,23 @@ struct Attempt {
     inflation: f32,
 }
 
-/// Attempts in order. Near the origin TetGen first sees the coordinates as they are.
-fn attempts(options: &Options, far: bool) -> [Attempt; 4] {
+/// Attempts in order. Near the origin TetGen first sees the coordinates as they are. A node that can be replaced
+/// by smaller cells gets two: on models that defeat TetGen, cells succeed more often than further attempts.
+fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
     let m = options.free_space;
     let more = if m == 0 { 64 } else { m.saturating_mul(4) };
     let wide = options.inflation.max(1.0 / 256.0);
     let inflation = options.inflation;
-    [
+    let mut attempts = vec![
         Attempt { free_space: m, seed: 0, local: far, inflation },
         Attempt { free_space: m, seed: 1, local: !far, inflation },
         Attempt { free_space: more, seed: 2, local: far, inflation: 2.0 * wide },
         Attempt { free_space: 0, seed: 3, local: true, inflation: 4.0 * wide },
-    ]
+    ];
+    if options.cells.iter().any(|&size| size < triangles) {
+        attempts.truncate(2);
+    }
+    attempts
 }
 
 /// Tetrahedralizes a node; `None` with the reasons in the report when every attempt failed.
@@ -70,7 +75,7 @@ pub(super) fn tetrahedralize(
     let mut built = None;
     let deadline = options.deadline + options.deadline_per_triangle.saturating_mul(triangles);
     let far = far(&bvh.nodes[node as usize]);
-    for attempt in attempts(options, far) {
+    for attempt in attempts(options, far, triangles) {
         let done = match gather(mesh, bvh, node, attempt.inflation) {
             Ok(input) => run(slot, &input, &attempt, deadline, options, node, monitor)?,
             Err(trouble) => Err(trouble),

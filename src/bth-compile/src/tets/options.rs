@@ -40,11 +40,11 @@ impl Default for Options {
             workers: 0,
             free_space: 16,
             inflation: 1.0 / 128.0,
-            deadline: Duration::from_secs(5),
+            deadline: Duration::from_secs(2),
             deadline_per_triangle: Duration::from_millis(1),
             memory: 4 << 30,
-            cells: vec![16384, 4096, 1024],
-            minimum: 256,
+            cells: vec![16384, 4096],
+            minimum: 1024,
             planted: None,
         }
     }

@@ -55,9 +55,10 @@ pub(crate) struct Compile {
     /// Shading attributes to keep.
     #[arg(long, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
-    /// Keep a BVH under each tet leaf, for rays that do not start on a surface.
-    #[arg(long)]
-    pub(crate) keep_subtrees: bool,
+    /// The BVH under each tet leaf: rays that do not start on a known surface take it, and are much faster so.
+    /// By default kept with `--structure bth` and pruned with `tets`.
+    #[arg(long, value_enum)]
+    pub(crate) subtrees: Option<Subtrees>,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long)]
     pub(crate) no_geometry: bool,
@@ -194,6 +195,14 @@ pub(crate) enum Structure {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Subtrees {
+    /// Keep them: some 32 bytes a triangle more.
+    Keep,
+    /// Leave them out: all rays walk the tetrahedra.
+    Prune,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Quality {
     Fast,
     Balanced,
@@ -295,7 +304,10 @@ impl Compile {
             structure: self.structure.into(),
             attributes: self.attributes.into(),
             record: self.tets.into(),
-            keep_subtrees: self.keep_subtrees,
+            keep_subtrees: match self.subtrees {
+                Some(subtrees) => subtrees == Subtrees::Keep,
+                None => self.structure == Structure::Bth,
+            },
             geometry: !self.no_geometry,
             ..Default::default()
         };

@@ -50,7 +50,7 @@ impl Default for Options {
             costs: costs::Options::default(),
             tets: tets::Options::default(),
             record: RecordKind::Link32,
-            keep_subtrees: false,
+            keep_subtrees: true,
             geometry: true,
         }
     }

@@ -6,6 +6,7 @@ pub mod rays;
 pub mod rng;
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::OnceLock;
 
 /// The folder into which cargo builds (`target/debug` or `target/release`).
@@ -13,6 +14,22 @@ pub fn target_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the test's own path");
     let deps = test.parent().expect("a folder");
     if deps.ends_with("deps") { deps.parent().expect("a folder").into() } else { deps.into() }
+}
+
+/// Builds packages of the workspace into [`target_folder`], since cargo builds the programs of other packages
+/// for no test; returns that folder.
+pub fn built(packages: &[&str]) -> PathBuf {
+    let folder = target_folder();
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut build = Command::new(cargo);
+    build.args(["build", "--quiet", "--target-dir"]).arg(folder.parent().expect("a folder"));
+    build.args(packages.iter().flat_map(|p| ["-p", p]));
+    if folder.ends_with("release") {
+        build.arg("--release");
+    }
+    let status = build.current_dir(env!("CARGO_MANIFEST_DIR")).status().expect("cargo starts");
+    assert!(status.success(), "{packages:?} do not build");
+    folder
 }
 
 /// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Says so when there is none,

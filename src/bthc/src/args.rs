@@ -91,6 +91,17 @@ pub(crate) struct Selection {
     /// Least number of triangles that is worth a tetrahedralization.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) min_tet_triangles: Option<u32>,
+    /// Nanoseconds that a step through a tetrahedron is taken to cost; less means more tetrahedra.
+    #[arg(long, value_name = "NANOSECONDS", value_parser = positive)]
+    pub(crate) c_tet: Option<f64>,
+}
+
+/// A finite positive number.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("expected a number above 0".into()),
+    }
 }
 
 /// Show what a BTH file contains.
@@ -330,6 +341,9 @@ impl Selection {
         options.costs.estimator = self.estimator.into();
         if let Some(triangles) = self.min_tet_triangles {
             options.costs.minimum_triangles = triangles;
+        }
+        if let Some(nanoseconds) = self.c_tet {
+            options.costs.c_tet = nanoseconds;
         }
     }
 }

@@ -26,24 +26,10 @@ impl Run {
     }
 }
 
-/// Folder of the built programs: beside this test. They are built if need be, because cargo
-/// builds the programs of other packages for no test.
+/// Folder of the built programs.
 fn programs() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| {
-        let test = std::env::current_exe().unwrap();
-        let folder = test.ancestors().nth(2).unwrap().to_path_buf();
-        let target = folder.parent().unwrap();
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut build = Command::new(cargo);
-        build.args(["build", "--quiet", "-p", "bthc", "-p", "bth-play", "--target-dir"]).arg(target);
-        if folder.ends_with("release") {
-            build.arg("--release");
-        }
-        let status = build.current_dir(env!("CARGO_MANIFEST_DIR")).status().unwrap();
-        assert!(status.success(), "the programs do not build");
-        folder
-    })
+    FOLDER.get_or_init(|| bth_tests::built(&["bthc", "bth-play"]))
 }
 
 /// The command for a program, in a folder.

@@ -1,6 +1,6 @@
 //! Every cap in one place. Files beyond them are refused by the reader and not written by the compiler.
 
-/// Wide nodes on a path from the root; bounds the traversal stack.
+/// Wide nodes on a path from the root; bounds the traversal stack: at every level all children but the one entered stay on it.
 pub const MAX_DEPTH: usize = 96;
 /// Entries of the section table.
 pub const MAX_SECTIONS: u32 = 1 << 20;
@@ -8,5 +8,3 @@ pub const MAX_SECTIONS: u32 = 1 << 20;
 pub const MAX_TRIANGLES: u32 = 1 << 30;
 /// Tetrahedra of an object.
 pub const MAX_TETS: u32 = 1 << 30;
-/// Entries of a traversal stack: at every level all children but the one entered stay on it.
-pub const STACK: usize = MAX_DEPTH * (crate::layout::WIDTH - 1) + 1;

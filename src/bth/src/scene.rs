@@ -5,7 +5,7 @@ use crate::file::File;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Steps};
+use crate::trace::{self, Scratch, Steps};
 use std::path::Path;
 
 /// An open file, ready to trace. Each object stands once in the world, untransformed: instance
@@ -91,7 +91,9 @@ impl Scene {
     /// Nearest hit of a ray. `from` is the surface that it starts on, or [`Surface::NONE`]: a hint,
     /// which makes it faster and never changes the answer.
     pub fn nearest(&self, ray: &Ray, from: Surface) -> Hit {
-        self.nearest_counted(ray, from).0
+        let mut hit = Hit::MISS;
+        self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));
+        hit
     }
 
     /// As [`Self::nearest`], with a count of the work.
@@ -110,7 +112,9 @@ impl Scene {
 
     /// Whether a ray hits anything; `from` as for [`Self::nearest`].
     pub fn any(&self, ray: &Ray, from: Surface) -> bool {
-        (0..self.object_count()).any(|i| trace::any(&self.object(i), ray, hint(from, i)))
+        let mut found = false;
+        self.any_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut found));
+        found
     }
 
     /// Nearest hits of many rays; `from`, if given, names the surface that each starts on.
@@ -120,11 +124,13 @@ impl Scene {
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
         hits.fill(Hit::MISS);
+        let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
             for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
                 let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
-                let hit = trace::nearest(&object, &ray, hint(surface(from, i), instance), instance);
+                let hit =
+                    trace::nearest(&object, &ray, hint(surface(from, i), instance), instance, &mut scratch);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -139,10 +145,11 @@ impl Scene {
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
         found.fill(false);
+        let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || trace::any(&object, ray, hint(surface(from, i), instance));
+                *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), &mut scratch);
             }
         }
     }

@@ -4,32 +4,26 @@ use super::line::{Line, Projected};
 use super::query::{Count, Query};
 use super::slabs::Slabs;
 use crate::layout::{Child, IndexedLeaf, NONE, RawLeaf, WIDTH};
-use crate::limits::STACK;
 use crate::object::ObjectView;
 
-/// Children that wait, the nearest on top.
-struct Stack {
-    entry: [(f32, u32); STACK],
-    len: usize,
-}
+/// Children that wait: a lower bound of t, and the code. The nearest lies on top.
+pub(crate) type Stack = Vec<(f32, u32)>;
 
-/// Walks from `root`. Tet leaves are handed to `tets` with their row; it returns true to end the
+/// Walks from the root. Tet leaves are handed to `tets` with their row; it returns true to end the
 /// traversal, or the code of a subtree to walk instead.
 pub(crate) fn walk<Q: Query, C: Count>(
     object: &ObjectView<'_>,
-    root: u32,
     line: &Line,
     slabs: &Slabs,
+    stack: &mut Stack,
     query: &mut Q,
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) -> bool {
-    let mut stack = Stack { entry: [(0.0, NONE); STACK], len: 1 };
-    stack.entry[0] = (f32::NEG_INFINITY, root);
+    stack.clear();
+    stack.push((f32::NEG_INFINITY, object.header.root));
     let mut limit = slabs.limit(query.limit());
-    while stack.len > 0 {
-        stack.len -= 1;
-        let (enter, code) = stack.entry[stack.len];
+    while let Some((enter, code)) = stack.pop() {
         if enter > limit {
             continue;
         }
@@ -38,7 +32,7 @@ pub(crate) fn walk<Q: Query, C: Count>(
                 count.node();
                 let mut found = [(0.0, NONE); WIDTH];
                 let hits = slabs.children(object.node(at), limit, &mut found);
-                push_nearest_last(&mut stack, &found[..hits]);
+                push_nearest_last(stack, &found[..hits]);
                 continue;
             }
             Some(Child::Indexed(at)) => indexed_leaf(object, object.indexed_leaf(at), line, query, count),
@@ -47,8 +41,7 @@ pub(crate) fn walk<Q: Query, C: Count>(
                 TetOutcome::Done => true,
                 TetOutcome::GoOn => false,
                 TetOutcome::Instead(code) => {
-                    stack.entry[stack.len] = (enter, code);
-                    stack.len += 1;
+                    stack.push((enter, code));
                     false
                 }
             },
@@ -73,16 +66,16 @@ pub(crate) enum TetOutcome {
 }
 
 fn push_nearest_last(stack: &mut Stack, found: &[(f32, u32)]) {
-    let base = stack.len;
-    for &child in found {
-        // Insertion into descending order; at most sixteen, usually two or three.
-        let mut at = stack.len;
-        while at > base && stack.entry[at - 1].0 < child.0 {
-            stack.entry[at] = stack.entry[at - 1];
+    let base = stack.len();
+    stack.extend_from_slice(found);
+    // Insertion sort into descending order; at most sixteen, usually two or three.
+    let pushed = &mut stack[base..];
+    for i in 1..pushed.len() {
+        let mut at = i;
+        while at > 0 && pushed[at - 1].0 < pushed[at].0 {
+            pushed.swap(at - 1, at);
             at -= 1;
         }
-        stack.entry[at] = child;
-        stack.len += 1;
     }
 }
 

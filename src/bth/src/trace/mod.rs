@@ -24,34 +24,55 @@ use records::Record;
 use slabs::Slabs;
 use tet_walk::{Outcome, TetSpace};
 
+/// Memory that traversals need, kept from one ray to the next.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    stack: bvh_walk::Stack,
+}
+
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
-pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
+pub(crate) fn nearest(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    instance: u32,
+    scratch: &mut Scratch,
+) -> Hit {
     let mut query = Nearest::new(ray);
-    trace(object, ray, from, &mut query, &mut ());
+    trace(object, ray, from, scratch, &mut query, &mut ());
     query.hit(instance)
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let (mut query, mut steps) = (Nearest::new(ray), Steps::default());
-    trace(object, ray, from, &mut query, &mut steps);
+    trace(object, ray, from, &mut Scratch::default(), &mut query, &mut steps);
     (query.hit(instance), steps)
 }
 
 /// Whether a ray in object space hits anything.
-pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
+pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
     let mut query = Any::new(ray);
-    trace(object, ray, from, &mut query, &mut ());
+    trace(object, ray, from, scratch, &mut query, &mut ());
     query.found
 }
 
-fn trace<Q: Query, C: Count>(object: &ObjectView<'_>, ray: &Ray, from: u32, query: &mut Q, count: &mut C) {
+fn trace<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    scratch: &mut Scratch,
+    query: &mut Q,
+    count: &mut C,
+) {
     match object.records {
-        Records::None => trace_with::<crate::layout::Tet20, _, _>(object, &[], ray, from, query, count),
-        Records::Link32(records) => trace_with(object, records, ray, from, query, count),
-        Records::Tet32(records) => trace_with(object, records, ray, from, query, count),
-        Records::Tet20(records) => trace_with(object, records, ray, from, query, count),
-        Records::Tet16(records) => trace_with(object, records, ray, from, query, count),
+        Records::None => {
+            trace_with::<crate::layout::Tet20, _, _>(object, &[], ray, from, scratch, query, count)
+        }
+        Records::Link32(records) => trace_with(object, records, ray, from, scratch, query, count),
+        Records::Tet32(records) => trace_with(object, records, ray, from, scratch, query, count),
+        Records::Tet20(records) => trace_with(object, records, ray, from, scratch, query, count),
+        Records::Tet16(records) => trace_with(object, records, ray, from, scratch, query, count),
     }
 }
 
@@ -60,6 +81,7 @@ fn trace_with<R: Record, Q: Query, C: Count>(
     records: &[R],
     ray: &Ray,
     from: u32,
+    scratch: &mut Scratch,
     query: &mut Q,
     count: &mut C,
 ) {
@@ -87,7 +109,8 @@ fn trace_with<R: Record, Q: Query, C: Count>(
         return;
     }
     let slabs = Slabs::new(ray, &line, object.header);
-    bvh_walk::walk(object, object.header.root, &line, &slabs, query, count, |leaf, query, count| {
+    let stack = &mut scratch.stack;
+    bvh_walk::walk(object, &line, &slabs, stack, query, count, |leaf, query, count| {
         if leaf == walked {
             return TetOutcome::GoOn;
         }

@@ -20,8 +20,12 @@ use zerocopy::{FromBytes, Immutable, KnownLayout};
 #[derive(Debug)]
 pub struct File {
     buffer: Buffer,
-    objects: u32,
+    /// Per object and kind the row of the section table, or `NONE`.
+    rows: Vec<[u32; OBJECT_KINDS]>,
 }
+
+/// Kinds that belong to objects are below this.
+const OBJECT_KINDS: usize = kind::PROVENANCE as usize;
 
 /// A section: its table entry and its bytes.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +77,16 @@ impl File {
             return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));
         }
         let objects = table::check(buffer.bytes())?;
-        Ok(Self { buffer, objects })
+        let mut file = Self { buffer, rows: vec![[NONE; OBJECT_KINDS]; objects as usize] };
+        let mut rows = std::mem::take(&mut file.rows);
+        for (row, entry) in file.table().iter().enumerate() {
+            let object = rows.get_mut(entry.object as usize);
+            if let Some(slot) = object.and_then(|kinds| kinds.get_mut(entry.kind as usize)) {
+                *slot = row as u32;
+            }
+        }
+        file.rows = rows;
+        Ok(file)
     }
 
     /// All bytes of the file.
@@ -104,8 +117,10 @@ impl File {
     /// The section of this kind; `object` is `NONE` for sections of the whole file.
     pub fn section(&self, object: u32, kind: u32) -> Option<SectionView<'_>> {
         let table = self.table();
-        let at = table.binary_search_by_key(&(object, kind), |e| (e.object, e.kind)).ok()?;
-        let entry = &table[at];
+        let entry = match self.rows.get(object as usize).and_then(|kinds| kinds.get(kind as usize)) {
+            Some(&row) => table.get(row as usize)?,
+            None => &table[table.binary_search_by_key(&(object, kind), |e| (e.object, e.kind)).ok()?],
+        };
         Some(SectionView {
             entry,
             bytes: &self.bytes()[entry.offset as usize..(entry.offset + entry.length) as usize],
@@ -114,7 +129,7 @@ impl File {
 
     /// Objects in the file.
     pub fn object_count(&self) -> u32 {
-        self.objects
+        self.rows.len() as u32
     }
 
     /// BLAKE3 of what the file says, without how it came about: equal for equal content.
@@ -139,8 +154,8 @@ impl File {
     /// `BTH-O003` when there is no such object, `BTH-F101` when its tetrahedron records are of another kind
     /// than it says.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
-        if object >= self.objects {
-            let expected = format!("an object below {}", self.objects);
+        if object >= self.object_count() {
+            let expected = format!("an object below {}", self.object_count());
             return Err(Error::at(Code::NoSuchObject, 0, expected, object.to_string()));
         }
         let header: &[Object] = self.slice(object, kind::OBJECT);

@@ -67,7 +67,7 @@ void bth_close(bth_scene *scene);
 const char *bth_last_error(void);
 
 /* Nearest hits of `count` rays. `from` (or null) names, per ray, the surface that it starts on:
- * that makes it faster and never changes an answer. */
+ * a hint where to begin, which never changes an answer. */
 void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
 /* For each ray 1 if it hits anything, else 0. */

@@ -15,12 +15,15 @@
 
 pub mod check;
 pub mod error;
+mod expansion;
 pub mod file;
 pub mod layout;
 pub mod limits;
 pub mod object;
 pub mod rays;
 mod scene;
+#[cfg(test)]
+mod testing;
 mod trace;
 pub mod verify;
 

@@ -9,7 +9,7 @@
 //! hits and misses are exact: a closed triangle is hit if and only if the real line of the
 //! ray meets it (rays that lie in its plane miss it).
 
-use super::expansion::Expansion;
+use crate::expansion::Expansion;
 use crate::rays::Ray;
 
 /// 8 units of f64 rounding (2^-53 each): bounds the error of a projected coordinate relative

@@ -1,13 +1,10 @@
 //! Tracing rays through one object: BVH walk, tet walk, and what both share.
 
 mod bvh_walk;
-mod expansion;
 mod line;
 mod query;
 mod records;
 mod slabs;
-#[cfg(test)]
-mod testing;
 mod tet_flood;
 mod tet_locate;
 mod tet_walk;

@@ -1,46 +1,7 @@
-//! Signs that are right whatever the rounding.
-//!
-//! Determinants of points of `f32` are sums of products of three `f32`. Such a product is two `f64`
-//! without error, and exponents stay far from the ends of `f64`, so the sum can be taken exactly by
-//! Shewchuk's expansions (Adaptive Precision Floating-Point Arithmetic, 1997, GROW-EXPANSION).
+//! Signs that are right whatever the rounding: f64 first, exact sums where it leaves them open.
 
+use crate::expansion::Expansion;
 use std::cmp::Ordering;
-
-/// An exact sum of `f64`: components that do not overlap, ascending in magnitude.
-#[derive(Default)]
-struct Sum(Vec<f64>);
-
-impl Sum {
-    fn add(&mut self, value: f64) {
-        let mut carry = value;
-        let mut kept = 0;
-        for i in 0..self.0.len() {
-            let part = self.0[i];
-            let sum = carry + part;
-            let virtual_part = sum - carry;
-            let error = (carry - (sum - virtual_part)) + (part - virtual_part);
-            carry = sum;
-            if error != 0.0 {
-                self.0[kept] = error;
-                kept += 1;
-            }
-        }
-        self.0.truncate(kept);
-        if carry != 0.0 {
-            self.0.push(carry);
-        }
-    }
-    /// Adds `sign * a * b * c` exactly: `a * b` has 48 bits, the product's rounding error is another `f64`.
-    fn add_product(&mut self, sign: f64, a: f32, b: f32, c: f32) {
-        let (ab, c) = (sign * a as f64 * b as f64, c as f64);
-        let product = ab * c;
-        self.add(ab.mul_add(c, -product));
-        self.add(product);
-    }
-    fn sign(&self) -> Ordering {
-        self.0.last().map_or(Ordering::Equal, |x| x.total_cmp(&0.0))
-    }
-}
 
 /// On which side of the plane through a, b, c the point d lies: `Greater` where (b-a)x(c-a) points to,
 /// `Equal` on the plane. Exact for finite points.
@@ -53,32 +14,23 @@ pub(crate) fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Orderi
     if det.abs() > 16.0 * f64::EPSILON * size {
         return det.total_cmp(&0.0);
     }
-    // The determinant of the rows (p, 1), expanded along the last column.
-    let mut sum = Sum::default();
-    for (sign, [p, q, r]) in [(1.0, [a, c, b]), (1.0, [a, b, d]), (-1.0, [a, c, d]), (1.0, [b, c, d])] {
-        for (sign, [i, j, k]) in [
-            (sign, [0, 1, 2]),
-            (sign, [1, 2, 0]),
-            (sign, [2, 0, 1]),
-            (-sign, [0, 2, 1]),
-            (-sign, [2, 1, 0]),
-            (-sign, [1, 0, 2]),
-        ] {
-            sum.add_product(sign, p[i], q[j], r[k]);
-        }
-    }
-    sum.sign()
+    let mut volume = Expansion::new();
+    let [a, b, c, d] = [a, b, c, d].map(|p| p.map(f64::from));
+    volume.add_volume(d, a, b, c);
+    // det[a-d, b-d, c-d] is positive behind the plane.
+    0.0f64.total_cmp(&(volume.value() + 0.0))
 }
 
 /// Whether a triangle has exactly zero area: its projections along the axes all have.
-pub(crate) fn is_zero_area([a, b, c]: [[f32; 3]; 3]) -> bool {
+pub(crate) fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
-        let mut sum = Sum::default();
+        let mut sum = Expansion::new();
         for [p, q] in [[a, b], [b, c], [c, a]] {
-            sum.add_product(1.0, p[i], q[j], 1.0);
-            sum.add_product(-1.0, p[j], q[i], 1.0);
+            sum.add_product(p[i], q[j], 1.0);
+            sum.add_product(-p[j], q[i], 1.0);
         }
-        sum.sign() == Ordering::Equal
+        sum.value() == 0.0
     })
 }
 

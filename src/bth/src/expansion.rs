@@ -56,7 +56,7 @@ impl Expansion {
     }
 
     /// Adds a·b·c for values of f32 precision (a·b is then exact in f64).
-    fn add_product(&mut self, a: f64, b: f64, c: f64) {
+    pub(crate) fn add_product(&mut self, a: f64, b: f64, c: f64) {
         let (product, error) = two_product(a * b, c);
         self.add(error);
         self.add(product);
@@ -94,7 +94,7 @@ impl Expansion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::testing::Rng;
+    use crate::testing::Rng;
 
     fn wide(v: [f32; 3]) -> [f64; 3] {
         v.map(f64::from)

@@ -1,4 +1,4 @@
-//! What the tests of this module share.
+//! What the tests of this crate share.
 
 /// Small generator of pseudo-random numbers (SplitMix64).
 pub(crate) struct Rng(pub(crate) u64);

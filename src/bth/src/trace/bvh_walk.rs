@@ -1,6 +1,6 @@
 //! The walk through the wide BVH, nearest child first, one ray at a time.
 
-use super::line::{Line, Projected};
+use super::line::Line;
 use super::query::{Count, Query};
 use super::slabs::Slabs;
 use crate::layout::{Child, IndexedLeaf, NONE, RawLeaf, WIDTH};
@@ -79,8 +79,6 @@ fn push_nearest_last(stack: &mut Stack, found: &[(f32, u32)]) {
     }
 }
 
-const ORIGIN: Projected = Projected { x: 0.0, y: 0.0, depth: 0.0 };
-
 fn indexed_leaf<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     leaf: &IndexedLeaf,
@@ -91,13 +89,11 @@ fn indexed_leaf<Q: Query, C: Count>(
     count.leaf();
     count.triangles(leaf.triangles);
     let point = |i: usize| leaf.vertex.map(|row| row[i]);
-    let mut projected = [ORIGIN; WIDTH];
-    for (i, p) in projected.iter_mut().enumerate().take(leaf.vertices as usize) {
-        *p = line.project(point(i));
-    }
+    let projected = line.project_rows(&leaf.vertex);
     for i in 0..(leaf.triangles as usize).min(WIDTH) {
         let corner = leaf.corner.map(|row| usize::from(row[i]) % WIDTH);
-        let crossing = line.crossing(|| corner.map(point), corner.each_ref().map(|&c| &projected[c]));
+        let Some(near) = projected.near(corner) else { continue };
+        let crossing = line.crossing(|| corner.map(point), near.each_ref());
         if let Some(crossing) = crossing
             && query.offer(object.triangle_ids[leaf.first as usize + i], crossing)
         {

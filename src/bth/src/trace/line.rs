@@ -10,6 +10,7 @@
 //! ray meets it (rays that lie in its plane miss it).
 
 use crate::expansion::Expansion;
+use crate::layout::WIDTH;
 use crate::rays::Ray;
 
 /// 8 units of f64 rounding (2^-53 each): bounds the error of a projected coordinate relative
@@ -42,6 +43,33 @@ pub(crate) struct Projected {
 impl Projected {
     fn size(&self) -> f64 {
         self.x.abs() + self.y.abs()
+    }
+}
+
+/// All vertices of a leaf as seen along the line.
+pub(crate) struct ProjectedRows {
+    x: [f64; WIDTH],
+    y: [f64; WIDTH],
+    depth: [f64; WIDTH],
+    /// At least the bound within which [`Line::crossing`] takes a weight for uncertain, for any of the triangles.
+    bound: f64,
+}
+
+impl ProjectedRows {
+    #[inline(always)]
+    fn point(&self, i: usize) -> Projected {
+        Projected { x: self.x[i], y: self.y[i], depth: self.depth[i] }
+    }
+
+    /// The corners of a triangle, unless the line certainly passes it by.
+    #[inline(always)]
+    pub(crate) fn near(&self, corner: [usize; 3]) -> Option<[Projected; 3]> {
+        let points = corner.map(|i| self.point(i));
+        let [a, b, c] = points.each_ref();
+        let weight = [cross(b, c), cross(c, a), cross(a, b)];
+        let least = weight[0].min(weight[1]).min(weight[2]);
+        let greatest = weight[0].max(weight[1]).max(weight[2]);
+        (greatest <= self.bound || least >= -self.bound).then_some(points)
     }
 }
 
@@ -110,6 +138,29 @@ impl Line {
     pub(crate) fn project(&self, point: [f32; 3]) -> Projected {
         let [x, y, z] = self.axis.map(|k| f64::from(point[k]) - self.origin[k]);
         Projected { x: x - self.shear[0] * z, y: y - self.shear[1] * z, depth: z }
+    }
+
+    /// Projects the vertices of a leaf, given as rows of x, y and z: to the same bits as [`Self::project`].
+    #[inline(always)]
+    pub(crate) fn project_rows(&self, rows: &[[f32; WIDTH]; 3]) -> ProjectedRows {
+        let [rx, ry, rz] = self.axis.map(|k| &rows[k]);
+        let [ox, oy, oz] = self.axis.map(|k| self.origin[k]);
+        let mut out = ProjectedRows { x: [0.0; WIDTH], y: [0.0; WIDTH], depth: [0.0; WIDTH], bound: 0.0 };
+        for i in 0..WIDTH {
+            let z = f64::from(rz[i]) - oz;
+            out.x[i] = (f64::from(rx[i]) - ox) - self.shear[0] * z;
+            out.y[i] = (f64::from(ry[i]) - oy) - self.shear[1] * z;
+            out.depth[i] = z;
+        }
+        let (mut size, mut depth) = (0.0, 0.0);
+        for i in 0..WIDTH {
+            let s = out.x[i].abs() + out.y[i].abs();
+            size = if s > size { s } else { size };
+            depth = if out.depth[i].abs() > depth { out.depth[i].abs() } else { depth };
+        }
+        let error = Self::projection_error(size + depth);
+        out.bound = 4.0 * error * (3.0 * size + error);
+        out
     }
 
     /// Bound on the error of x and y of [`Self::project`], for points no farther (in the maximum

@@ -89,7 +89,7 @@ impl Scene {
     }
 
     /// Nearest hit of a ray. `from` is the surface that it starts on, or [`Surface::NONE`]: a hint,
-    /// which makes it faster and never changes the answer.
+    /// where to begin, which never changes the answer.
     pub fn nearest(&self, ray: &Ray, from: Surface) -> Hit {
         let mut hit = Hit::MISS;
         self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));

@@ -32,6 +32,7 @@ pub(crate) enum Command {
     Marks(Marks),
     Trace(Trace),
     Completions(Completions),
+    /// Print the manual page (roff).
     Man,
 }
 

@@ -1,7 +1,7 @@
 //! Progress on a terminal, and cancellation by Ctrl-C.
 
 use bth_compile::Monitor;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,6 +16,12 @@ pub(crate) fn listen_for_interrupts() {
             std::process::exit(130);
         }
     });
+}
+
+/// Units a second, without digits behind the point.
+fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
+    // Drawing goes on whatever the writer says.
+    let _ = write!(out, "{}/s", HumanCount(state.per_sec() as u64));
 }
 
 /// Shows stage, count, rate and remaining time on standard error if that is a terminal.
@@ -42,12 +48,12 @@ impl Drop for Progress {
 impl Monitor for Progress {
     fn stage(&self, name: &'static str, total: Option<u64>) {
         let template = match total {
-            Some(_) => "{msg:<12} {bar:30} {human_pos}/{human_len}  {per_sec}  {eta} left",
+            Some(_) => "{msg:<12} {bar:30} {human_pos}/{human_len}  {rate}  {eta} left",
             None => "{msg:<12} {spinner} {human_pos}  {elapsed}",
         };
         self.bar.reset();
         if let Ok(style) = ProgressStyle::with_template(template) {
-            self.bar.set_style(style);
+            self.bar.set_style(style.with_key("rate", whole_rate));
         }
         match total {
             Some(total) => self.bar.set_length(total),

@@ -22,6 +22,7 @@ pub mod limits;
 pub mod object;
 pub mod rays;
 mod scene;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod trace;
@@ -30,4 +31,5 @@ pub mod verify;
 pub use error::{Code, Error};
 pub use file::File;
 pub use scene::{Scene, from_bytes, map, open};
+pub use simd::{Isa, IsaError};
 pub use trace::Steps;

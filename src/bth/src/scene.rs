@@ -125,6 +125,9 @@ impl Scene {
         check_lengths(rays, from, hits.len());
         hits.fill(Hit::MISS);
         let mut scratch = Scratch::default();
+        if from.is_none() && self.object_count() == 1 {
+            return trace::nearest_batch(&self.object(0), rays, 0, &mut scratch, hits);
+        }
         for instance in 0..self.object_count() {
             let object = self.object(instance);
             for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
@@ -146,6 +149,9 @@ impl Scene {
         check_lengths(rays, from, found.len());
         found.fill(false);
         let mut scratch = Scratch::default();
+        if from.is_none() && self.object_count() == 1 {
+            return trace::any_batch(&self.object(0), rays, &mut scratch, found);
+        }
         for instance in 0..self.object_count() {
             let object = self.object(instance);
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {

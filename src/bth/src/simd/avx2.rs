@@ -36,6 +36,16 @@ impl Avx2 {
     }
 
     #[inline(always)]
+    fn lookup_half(self, table: F, at: __m256i) -> __m256 {
+        // SAFETY: registers only. Bit 3 of the index chooses the half: it becomes the sign for the blend.
+        unsafe {
+            let low = _mm256_permutevar8x32_ps(table[0], at);
+            let high = _mm256_permutevar8x32_ps(table[1], at);
+            _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at)))
+        }
+    }
+
+    #[inline(always)]
     fn arrays(self, a: F, b: U) -> ([f32; LANES], [u32; LANES]) {
         let mut out = ([0.0; LANES], [0; LANES]);
         self.store(a, &mut out.0);
@@ -54,12 +64,17 @@ macro_rules! halves {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
         #[inline(always)]
         fn $name(self, $($arg: $of),*) -> $out {
-            let half = |i: usize| {
-                $(let $arg = $arg[i];)*
-                // SAFETY: the features are there (self), and only registers are touched.
-                unsafe { $do }
+            // SAFETY: the features are there (self), and only registers are touched.
+            let low = unsafe {
+                $(let $arg = $arg[0];)*
+                $do
             };
-            [half(0), half(1)]
+            // SAFETY: as above.
+            let high = unsafe {
+                $(let $arg = $arg[1];)*
+                $do
+            };
+            [low, high]
         }
     )* };
 }
@@ -105,6 +120,7 @@ impl Simd for Avx2 {
         le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
         select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));
         add_u(a: U, b: U) -> U = _mm256_add_epi32(a, b);
+        sub_u(a: U, b: U) -> U = _mm256_sub_epi32(a, b);
         and_u(a: U, b: U) -> U = _mm256_and_si256(a, b);
         or_u(a: U, b: U) -> U = _mm256_or_si256(a, b);
         xor_u(a: U, b: U) -> U = _mm256_xor_si256(a, b);
@@ -132,8 +148,9 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn load(self, from: &[f32; LANES]) -> F {
+        let [low, high] = split(from);
         // SAFETY: eight readable floats each; unaligned loads.
-        split(from).map(|half| unsafe { _mm256_loadu_ps(half) })
+        unsafe { [_mm256_loadu_ps(low), _mm256_loadu_ps(high)] }
     }
     #[inline(always)]
     fn store(self, a: F, to: &mut [f32; LANES]) {
@@ -146,13 +163,20 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn load_u(self, from: &[u32; LANES]) -> U {
+        let [low, high] = split(from);
         // SAFETY: as `load`.
-        split(from).map(|half| unsafe { _mm256_loadu_si256(half.cast()) })
+        unsafe { [_mm256_loadu_si256(low.cast()), _mm256_loadu_si256(high.cast())] }
     }
     #[inline(always)]
     fn load_bytes(self, from: &[u8; LANES]) -> U {
+        let [low, high] = split(from);
         // SAFETY: eight readable bytes each; unaligned loads.
-        split(from).map(|half| unsafe { _mm256_cvtepu8_epi32(_mm_loadl_epi64(half.cast())) })
+        unsafe {
+            [
+                _mm256_cvtepu8_epi32(_mm_loadl_epi64(low.cast())),
+                _mm256_cvtepu8_epi32(_mm_loadl_epi64(high.cast())),
+            ]
+        }
     }
     #[inline(always)]
     fn store_u(self, a: U, to: &mut [u32; LANES]) {
@@ -165,12 +189,7 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn lookup(self, table: F, at: U) -> F {
-        // SAFETY: registers only. Bit 3 of the index chooses the half: it becomes the sign for the blend.
-        at.map(|at| unsafe {
-            let low = _mm256_permutevar8x32_ps(table[0], at);
-            let high = _mm256_permutevar8x32_ps(table[1], at);
-            _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at)))
-        })
+        [self.lookup_half(table, at[0]), self.lookup_half(table, at[1])]
     }
     #[inline(always)]
     fn lookup_u(self, table: U, at: U) -> U {
@@ -189,12 +208,18 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
         // SAFETY: registers only. The count is a register too: an immediate would have to be an i32 constant.
-        a.map(|a| unsafe { _mm256_sll_epi32(a, _mm_cvtsi32_si128(K as i32)) })
+        unsafe {
+            let count = _mm_cvtsi32_si128(K as i32);
+            [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
+        }
     }
     #[inline(always)]
     fn shr_u<const K: u32>(self, a: U) -> U {
         // SAFETY: registers only.
-        a.map(|a| unsafe { _mm256_srl_epi32(a, _mm_cvtsi32_si128(K as i32)) })
+        unsafe {
+            let count = _mm_cvtsi32_si128(K as i32);
+            [_mm256_srl_epi32(a[0], count), _mm256_srl_epi32(a[1], count)]
+        }
     }
     #[inline(always)]
     fn gather(self, m: M, from: &[f32], at: U) -> F {
@@ -214,10 +239,13 @@ impl Simd for Avx2 {
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
         assert_within(self, m, at, from.len());
         // SAFETY: as `gather`.
-        let half = |i: usize| unsafe {
-            _mm256_mask_i32gather_epi32::<4>(_mm256_setzero_si256(), from.as_ptr().cast(), at[i], m[i])
-        };
-        [half(0), half(1)]
+        unsafe {
+            let (zero, from) = (_mm256_setzero_si256(), from.as_ptr().cast());
+            [
+                _mm256_mask_i32gather_epi32::<4>(zero, from, at[0], m[0]),
+                _mm256_mask_i32gather_epi32::<4>(zero, from, at[1], m[1]),
+            ]
+        }
     }
     #[inline(always)]
     fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
@@ -256,8 +284,13 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn mask_bits(self, m: M) -> u32 {
         // SAFETY: registers only.
-        let half = |i: usize| unsafe { _mm256_movemask_ps(_mm256_castsi256_ps(m[i])) as u32 };
-        half(0) | half(1) << 8
+        let (low, high) = unsafe {
+            (
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[0])) as u32,
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[1])) as u32,
+            )
+        };
+        low | high << 8
     }
 
     #[inline(always)]

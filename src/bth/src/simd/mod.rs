@@ -3,7 +3,8 @@
 //! An implementation is a token that exists only on machines that have its instructions, so its methods are
 //! safe to call, and every `unsafe` of the kernels lies in the files beside this one. All methods, and
 //! everything generic over [`Simd`], must be `#[inline(always)]`: only so does code end up
-//! inside the one function per instruction set that enables its features ([`Isa::run`]).
+//! inside the one function per instruction set that enables its features ([`Isa::run`]). A closure, or
+//! a library function that takes one (`array::map`), is compiled on its own and must not touch lanes.
 //!
 //! Kernels use these lanes only to *leave out* what certainly does not matter; hits are decided elsewhere, in f64
 //! (`trace::line`). So it does no harm that `fma` rounds once or twice, depending on the machine.
@@ -74,6 +75,7 @@ pub(crate) trait Simd: Copy {
     fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn sub_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;

@@ -185,6 +185,10 @@ impl Simd for Scalar {
         from_fn(|i| a[i].wrapping_add(b[i]))
     }
     #[inline(always)]
+    fn sub_u(self, a: U, b: U) -> U {
+        from_fn(|i| a[i].wrapping_sub(b[i]))
+    }
+    #[inline(always)]
     fn and_u(self, a: U, b: U) -> U {
         from_fn(|i| a[i] & b[i])
     }

@@ -25,10 +25,10 @@ pub(crate) struct Line {
     pub(crate) origin: [f64; 3],
     pub(crate) direction: [f64; 3],
     /// The axes of the projection: two in the plane, and the one along which the direction is greatest.
-    axis: [usize; 3],
-    shear: [f64; 2],
+    pub(crate) axis: [usize; 3],
+    pub(crate) shear: [f64; 2],
     /// 1 / direction[axis[2]]: turns depths into t.
-    inverse_depth: f64,
+    pub(crate) inverse_depth: f64,
 }
 
 /// A point as seen along the line.

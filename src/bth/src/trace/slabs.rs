@@ -5,16 +5,17 @@
 //! direction components, so a box that the ray meets is never lost. t is in units of the direction
 //! scaled by a power of two such that its greatest component lies in [1, 2).
 
-use crate::layout::{NONE, Object, WIDTH, WideNode};
+use crate::layout::{Object, WideNode};
 use crate::rays::Ray;
+use crate::simd::Simd;
 use crate::trace::line::Line;
 
 /// Pad of a plane relative to the greatest coordinate in play. Half of it covers the roundings
 /// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the clamping below.
-const PAD: f64 = 1.0 / (1 << 20) as f64;
+pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
 /// Components below this (of a greatest one in [1, 2)) are raised to it. Over the way to the farthest
 /// coordinate that moves the ray by less than half the pad, and it keeps products finite.
-const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
+pub(crate) const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
 /// Beyond this, products could overflow f32: every box is visited instead.
 const LARGEST_COORDINATE: f64 = 1e30;
 
@@ -22,13 +23,14 @@ const LARGEST_COORDINATE: f64 = 1e30;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slabs {
     /// 0 or 1 per axis: which of (lower, upper) is met first.
-    near: [usize; 3],
-    reciprocal: [f32; 3],
-    near_addend: [f32; 3],
-    far_addend: [f32; 3],
+    pub(crate) near: [u32; 3],
+    pub(crate) reciprocal: [f32; 3],
+    pub(crate) near_addend: [f32; 3],
+    pub(crate) far_addend: [f32; 3],
     /// Power of two from t to scaled t.
-    scale: f64,
-    tmin: f32,
+    pub(crate) scale: f32,
+    /// Lower bound of t, scaled.
+    pub(crate) tmin: f32,
 }
 
 impl Slabs {
@@ -45,14 +47,14 @@ impl Slabs {
             reciprocal: [0.0; 3],
             near_addend: [f32::NEG_INFINITY; 3],
             far_addend: [f32::INFINITY; 3],
-            scale,
+            scale: scale as f32,
             tmin: 0.0,
         };
         slabs.tmin = ((f64::from(ray.tmin) * scale) as f32).next_down();
         for k in 0..3 {
             let d = line.direction[k] / scale;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
-            slabs.near[k] = (d.is_sign_negative()) as usize;
+            slabs.near[k] = d.is_sign_negative().into();
             if extent < LARGEST_COORDINATE {
                 slabs.reciprocal[k] = r as f32;
                 slabs.near_addend[k] = (-line.origin[k] * r - pad * r.abs()) as f32;
@@ -65,38 +67,59 @@ impl Slabs {
     /// Upper bound of t in scaled units, for [`Self::children`].
     pub(crate) fn limit(&self, t: f64) -> f32 {
         // Rounding to f32 can lower t; one step up makes good for it, also where it underflows.
-        ((t * self.scale) as f32).next_up()
+        ((t * f64::from(self.scale)) as f32).next_up()
     }
 
-    /// The children of a node whose boxes the ray may meet before `limit`: their slots and a lower
-    /// bound of t, in `found`; returns how many.
+    /// Lower bound of t in scaled units.
+    pub(crate) fn lower(&self, t: f64) -> f32 {
+        ((t * f64::from(self.scale)) as f32).next_down()
+    }
+
+    /// From which to which scaled t a hit certainly lies in the ray's range.
+    pub(crate) fn certain_range(&self, ray: &Ray) -> [f32; 2] {
+        let scaled = |t: f32| (f64::from(t) * f64::from(self.scale)) as f32;
+        [scaled(ray.tmin).next_up(), scaled(ray.tmax.min(f32::MAX)).next_down()]
+    }
+
+    /// From depths along the line's greatest axis to scaled t; between 1/2 and 1, or -1/2 and -1.
+    pub(crate) fn depth_to_t(&self, line: &Line) -> f32 {
+        (line.inverse_depth * f64::from(self.scale)) as f32
+    }
+
+    /// The children of a node whose boxes the ray may meet before `limit`, a bit each, and lower bounds of
+    /// their t. Empty slots may be among them when coordinates are too great for f32.
     #[inline(always)]
-    pub(crate) fn children(&self, node: &WideNode, limit: f32, found: &mut [(f32, u32); WIDTH]) -> usize {
-        let (mut enter, mut leave) = ([self.tmin; WIDTH], [limit; WIDTH]);
+    pub(crate) fn children<S: Simd>(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
+        let (mut enter, mut leave) = (s.splat(self.tmin), s.splat(limit));
         for k in 0..3 {
-            let (near, far) = (&node.bounds[k][self.near[k]], &node.bounds[k][1 - self.near[k]]);
-            for i in 0..WIDTH {
-                let t = near[i] * self.reciprocal[k] + self.near_addend[k];
-                enter[i] = if t > enter[i] { t } else { enter[i] };
-                let t = far[i] * self.reciprocal[k] + self.far_addend[k];
-                leave[i] = if t < leave[i] { t } else { leave[i] };
-            }
+            let near = (self.near[k] & 1) as usize;
+            let reciprocal = s.splat(self.reciprocal[k]);
+            let (first, second) = (s.load(&node.bounds[k][near]), s.load(&node.bounds[k][1 - near]));
+            enter = s.max(s.fma(first, reciprocal, s.splat(self.near_addend[k])), enter);
+            leave = s.min(s.fma(second, reciprocal, s.splat(self.far_addend[k])), leave);
         }
-        let mut count = 0;
-        for i in 0..WIDTH {
-            if enter[i] <= leave[i] && node.child[i] != NONE {
-                found[count] = (enter[i], node.child[i]);
-                count += 1;
-            }
-        }
-        count
+        (s.mask_bits(s.le(enter, leave)), enter)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::{NONE, WIDTH};
+    use crate::simd::{Isa, Kernel};
     use crate::testing::Rng;
+
+    /// The children as a kernel.
+    struct Children<'a>(&'a Slabs, &'a WideNode, f32);
+
+    impl Kernel for Children<'_> {
+        type Output = u32;
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> u32 {
+            let (bits, _) = self.0.children(s, self.1, self.2);
+            (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && self.1.child[i] != NONE).fold(0, |m, i| m | 1 << i)
+        }
+    }
 
     /// A node with one box, and the object whose bounds it has.
     fn boxed(corners: [[f32; 3]; 3]) -> (WideNode, Object) {
@@ -150,17 +173,18 @@ mod tests {
             let projected = corners.map(|p| line.project(p));
             let crossing = line.crossing(|| corners, projected.each_ref());
             let t = crossing.map(|c| c.t).unwrap_or(f64::INFINITY);
-            let mut found = [(0.0, NONE); WIDTH];
             // Also with the range cut off right at the crossing.
             for (tmin, limit) in [(f32::NEG_INFINITY, f64::INFINITY), (t as f32, t)] {
                 let slabs = Slabs::new(&Ray { tmin, ..ray }, &line, &object);
-                let count = slabs.children(&node, slabs.limit(limit), &mut found);
-                assert!(
-                    crossing.is_none() || count == 1,
-                    "round {round}: {ray:?} crosses {corners:?} at {t}"
-                );
-                assert!(count <= 1, "empty slots are never entered");
-                missed += (count == 0) as u32;
+                for isa in Isa::ALL {
+                    let found = isa.run(Children(&slabs, &node, slabs.limit(limit)));
+                    assert!(
+                        crossing.is_none() || found == 1,
+                        "{isa}, round {round}: {ray:?} crosses {corners:?} at {t}"
+                    );
+                    assert!(found <= 1, "empty slots are never entered");
+                    missed += (found == 0) as u32;
+                }
             }
             crossings += crossing.is_some() as u32;
         }

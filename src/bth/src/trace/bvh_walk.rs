@@ -58,7 +58,6 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 } else {
                     stack.pop();
                     count.leaf();
-                    flight.settle(object, ray);
                     let outcome = tets(row, flight.query(), count);
                     flight.take_over();
                     outcome == TetOutcome::Done

@@ -2,7 +2,7 @@
 
 mod bvh_batch;
 mod bvh_walk;
-mod finish;
+mod crossing;
 mod flight;
 mod line;
 mod prepare;
@@ -23,18 +23,31 @@ use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bvh_batch::{BatchWalk, Waiting};
 use bvh_walk::TetOutcome;
-use finish::Finish;
 use flight::Flight;
 use line::Line;
 use query::{Any, Count, Nearest, Query};
 use records::Record;
 use stack::Stacks;
+use std::cell::Cell;
+use std::marker::PhantomData;
 use tet_walk::{Outcome, TetSpace};
 
 /// Memory that traversals need, kept from one batch to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     stacks: Stacks,
+}
+
+/// Lends the thread's scratch memory.
+pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
+    thread_local! {
+        static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
+    }
+    // Taken out while it is in use, so that a panic leaves nothing half done behind.
+    let mut scratch = SCRATCH.take().unwrap_or_default();
+    let result = work(&mut scratch);
+    SCRATCH.set(Some(scratch));
+    result
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
@@ -52,7 +65,7 @@ pub(crate) fn nearest(
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let mut steps = Steps::default();
-    let query = trace(object, ray, from, &mut Scratch::default(), Nearest::new(ray), &mut steps);
+    let query = with_scratch(|scratch| trace(object, ray, from, scratch, Nearest::new(ray), &mut steps));
     (query.hit(instance), steps)
 }
 
@@ -69,35 +82,35 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    let done = trace_batch::<Nearest>(object, rays, scratch);
-    for (ray, query) in done {
-        hits[ray] = query.hit(instance);
-    }
+    trace_batch(object, rays, scratch, |ray, query: &Nearest| hits[ray] = query.hit(instance));
 }
 
 /// Whether each of many rays in object space hits anything.
 pub(crate) fn any_batch(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch, found: &mut [bool]) {
-    for (ray, query) in trace_batch::<Any>(object, rays, scratch) {
-        found[ray] = query.found;
-    }
+    trace_batch(object, rays, scratch, |ray, query: &Any| found[ray] = query.found);
 }
 
-fn trace_batch<Q: Query>(object: &ObjectView<'_>, rays: &[Ray], scratch: &mut Scratch) -> Vec<(usize, Q)> {
-    let mut finish = Finish { done: Vec::with_capacity(rays.len()) };
+fn trace_batch<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    scratch: &mut Scratch,
+    done: impl FnMut(usize, &Q),
+) {
     if object.header.root != NONE {
-        Isa::chosen().run(Batch { object, rays, scratch, finish: &mut finish });
+        Isa::chosen().run(Batch { object, rays, scratch, done, query: PhantomData });
     }
-    finish.done
 }
 
-struct Batch<'a, Q> {
+struct Batch<'a, Q, D> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut Scratch,
-    finish: &'a mut Finish<Q>,
+    /// Takes the results.
+    done: D,
+    query: PhantomData<Q>,
 }
 
-impl<Q: Query> Kernel for Batch<'_, Q> {
+impl<Q: Query, D: FnMut(usize, &Q)> Kernel for Batch<'_, Q, D> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
@@ -106,9 +119,11 @@ impl<Q: Query> Kernel for Batch<'_, Q> {
             rays: self.rays,
             waiting: Waiting { order: None, queries: None },
             stacks: &mut self.scratch.stacks,
-            finish: self.finish,
+            done: self.done,
         };
-        walk.run(s, |leaf, ray, query| enter_tets(self.object, leaf, ray, query, &mut ()) == TetOutcome::Done);
+        walk.run(s, |leaf, ray, query| {
+            enter_tets(self.object, leaf, ray, query, &mut ()) == TetOutcome::Done
+        });
     }
 }
 
@@ -158,8 +173,7 @@ impl<Q: Query, C: Count> Kernel for Single<'_, Q, C> {
             self.count,
             |leaf, query, count| enter_tets(self.object, leaf, self.ray, query, count),
         );
-        flight.settle(self.object, self.ray);
-        flight.result().0
+        *flight.query()
     }
 }
 

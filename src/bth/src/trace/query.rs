@@ -1,6 +1,6 @@
 //! What a traversal looks for: the nearest hit or any hit; and what it counts.
 
-use super::line::Crossing;
+use super::crossing::Crossing;
 use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
 
@@ -20,7 +20,7 @@ pub(crate) trait Query: Copy {
 }
 
 /// `t` and all that could be taken for it: t is compared with the ray's range after rounding to f32, and
-/// computed only to 2^-28 of itself (`Line::crossing`), so of two equal hits one may seem nearer.
+/// computed only to 2^-28 of itself (`super::crossing`), so of two equal hits one may seem nearer.
 fn widened(t: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1 << 23) as f64;
     const LEAST: f64 = f32::from_bits(1) as f64;
@@ -42,8 +42,9 @@ impl Nearest {
             return Hit::MISS;
         }
         let surface = Surface { instance, triangle: self.triangle };
+        let [u, v] = self.best.uv();
         // + 0.0 turns -0.0 into 0.0.
-        Hit { t: self.best.t as f32 + 0.0, u: self.best.u + 0.0, v: self.best.v + 0.0, surface }
+        Hit { t: self.best.t as f32 + 0.0, u: u + 0.0, v: v + 0.0, surface }
     }
 }
 
@@ -56,7 +57,7 @@ fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
 impl Query for Nearest {
     const ANY: bool = false;
     fn new(ray: &Ray) -> Self {
-        let best = Crossing { t: f64::from(ray.tmax), u: 0.0, v: 0.0 };
+        let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
         Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
     }
     #[inline(always)]

@@ -34,6 +34,16 @@ pub(crate) struct Slabs {
 }
 
 impl Slabs {
+    /// Of no ray.
+    pub(crate) const VACANT: Slabs = Slabs {
+        near: [0; 3],
+        reciprocal: [0.0; 3],
+        near_addend: [0.0; 3],
+        far_addend: [0.0; 3],
+        scale: 1.0,
+        tmin: 0.0,
+    };
+
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> Slabs {
         let greatest = line.direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
         // Exact: the exponent of a finite non-zero f32 is that of a normal f64.
@@ -170,8 +180,7 @@ mod tests {
             let ray = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
             let Some(line) = Line::new(&ray) else { continue };
             let (node, object) = boxed(corners);
-            let projected = corners.map(|p| line.project(p));
-            let crossing = line.crossing(|| corners, projected.each_ref());
+            let crossing = line.crossing(corners);
             let t = crossing.map(|c| c.t).unwrap_or(f64::INFINITY);
             // Also with the range cut off right at the crossing.
             for (tmin, limit) in [(f32::NEG_INFINITY, f64::INFINITY), (t as f32, t)] {

@@ -1,0 +1,288 @@
+//! Many rays through the wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
+//! with the work of the others.
+
+use super::flight::Flight;
+use super::prepare::{Frame, Prepared};
+use super::query::Query;
+use super::stack::{Stack, Stacks};
+use crate::layout::{Child, NODE_LINES, NONE};
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+
+/// Rays on their way at once.
+const IN_FLIGHT: usize = 32;
+/// While at least this many rays stand before inner nodes, those before leaves wait.
+const ENOUGH: usize = IN_FLIGHT / 4;
+
+/// Slots of rays that wait for the same kind of step.
+struct List {
+    slot: [u8; 2 * IN_FLIGHT],
+    len: usize,
+}
+
+impl List {
+    fn new() -> Self {
+        List { slot: [0; 2 * IN_FLIGHT], len: 0 }
+    }
+    #[inline(always)]
+    fn get(&self, i: usize) -> usize {
+        usize::from(self.slot[i % (2 * IN_FLIGHT)]) % IN_FLIGHT
+    }
+    /// Adds a slot on a condition, without a branch.
+    #[inline(always)]
+    fn push_if(&mut self, slot: usize, condition: bool) {
+        self.slot[self.len % (2 * IN_FLIGHT)] = slot as u8;
+        self.len += usize::from(condition);
+    }
+    /// Empties the list, whose entries can still be read if at most as many are added as were read.
+    #[inline(always)]
+    fn take(&mut self) -> usize {
+        std::mem::replace(&mut self.len, 0)
+    }
+}
+
+/// The rays on their way, by what they do next.
+struct Lists {
+    inner: List,
+    leaf: List,
+    /// At the bottom of the stack, or before an empty slot of a node.
+    bottom: List,
+}
+
+impl Lists {
+    #[inline(always)]
+    fn sort(&mut self, slot: usize, code: u32) {
+        let (leaf, bottom) = (code & Child::LEAF_BIT != 0, code == NONE);
+        self.inner.push_if(slot, !leaf);
+        self.leaf.push_if(slot, leaf && !bottom);
+        self.bottom.push_if(slot, bottom);
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Slot<Q> {
+    flight: Flight<Q>,
+    /// Place of the ray in the batch.
+    ray: usize,
+    /// Place of the top of its stack.
+    top: usize,
+}
+
+/// The rays still to be traced.
+pub(crate) struct Waiting<'a, Q> {
+    /// Places in the batch of those to trace, or all.
+    pub(crate) order: Option<&'a [u32]>,
+    /// Queries of all rays of the batch, if they have been asked elsewhere already.
+    pub(crate) queries: Option<&'a [Q]>,
+}
+
+/// A batch on its way.
+pub(crate) struct BatchWalk<'a, Q, D> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) rays: &'a [Ray],
+    pub(crate) waiting: Waiting<'a, Q>,
+    pub(crate) stacks: &'a mut Stacks,
+    /// Takes the place of a ray in the batch, and its query as it ended.
+    pub(crate) done: D,
+}
+
+/// The next rays, sixteen at a time.
+struct Supply {
+    /// Where rays start.
+    root: u32,
+    frame: Frame,
+    prepared: Prepared,
+    /// Places in the batch of those prepared.
+    ray: [u32; LANES],
+    /// Lanes that are prepared, and of these those that are gone.
+    filled: usize,
+    used: usize,
+    /// Rays prepared before.
+    before: usize,
+}
+
+impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
+    /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
+    /// the query has what it wants.
+    #[inline(always)]
+    pub(crate) fn run<S: Simd>(mut self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
+        self.stacks.reserve(self.object, IN_FLIGHT);
+        let root = root(self.object);
+        let mut supply = Supply {
+            root,
+            frame: Frame::new(self.object.header),
+            prepared: Prepared::new(),
+            ray: [0; LANES],
+            filled: 0,
+            used: 0,
+            before: 0,
+        };
+        let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+        let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: 0 }; IN_FLIGHT];
+        let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
+        for (i, slot) in slots.iter_mut().enumerate() {
+            if self.launch(s, &mut supply, i, slot) {
+                lists.sort(i, root);
+            }
+        }
+        loop {
+            self.inner_steps(s, &mut slots, &mut lists);
+            if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
+                return;
+            }
+            for i in 0..lists.bottom.take() {
+                let at = lists.bottom.get(i);
+                let slot = &mut slots[at];
+                let mut stack = self.stacks.stack(at, slot.top);
+                if !stack.is_empty() {
+                    stack.pop();
+                    slot.top = stack.place();
+                    lists.sort(at, stack.code());
+                    continue;
+                }
+                (self.done)(slot.ray, slot.flight.query());
+                if self.launch(s, &mut supply, at, &mut slots[at]) {
+                    lists.sort(at, root);
+                }
+            }
+            for i in 0..lists.leaf.take() {
+                let at = lists.leaf.get(i);
+                let slot = &mut slots[at];
+                let mut stack = self.stacks.stack(at, slot.top);
+                let ray = &self.rays[slot.ray];
+                let done = match Child::from_code(stack.code()) {
+                    Some(Child::Indexed(line)) => {
+                        let leaf = self.object.indexed_leaf(line);
+                        slot.flight.enter_leaf(s, self.object, ray, leaf, &mut stack)
+                    }
+                    Some(Child::Raw(line)) => {
+                        let leaf = self.object.raw_leaf(line);
+                        slot.flight.enter_leaf(s, self.object, ray, leaf, &mut stack)
+                    }
+                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, &mut stack, &mut tets),
+                    _ => {
+                        stack.pop();
+                        false
+                    }
+                };
+                if done {
+                    stack.clear();
+                }
+                let code = stack.code();
+                slot.top = stack.place();
+                prefetch(s, self.object, code);
+                lists.sort(at, code);
+            }
+        }
+    }
+
+    /// Steps through inner nodes until few rays stand before one.
+    #[inline(always)]
+    fn inner_steps<S: Simd>(&mut self, s: S, slots: &mut [Slot<Q>; IN_FLIGHT], lists: &mut Lists) {
+        while lists.inner.len > 0 {
+            for i in 0..lists.inner.take() {
+                let at = lists.inner.get(i);
+                let slot = &mut slots[at];
+                let mut stack = self.stacks.stack(at, slot.top);
+                slot.flight.enter_node(s, self.object, stack.code(), &mut stack);
+                let code = stack.code();
+                slot.top = stack.place();
+                prefetch(s, self.object, code);
+                lists.sort(at, code);
+            }
+            if lists.inner.len < ENOUGH && lists.leaf.len + lists.bottom.len > 0 {
+                return;
+            }
+        }
+    }
+
+    /// Puts the next ray that can hit anything into a slot; false if there is none.
+    #[inline(always)]
+    fn launch<S: Simd>(&mut self, s: S, supply: &mut Supply, at: usize, slot: &mut Slot<Q>) -> bool {
+        loop {
+            if supply.used == supply.filled && !self.refill(s, supply) {
+                return false;
+            }
+            let lane = supply.used % LANES;
+            supply.used += 1;
+            let place = supply.ray[lane] as usize;
+            let ray = &self.rays[place];
+            let ready = slot.flight.launch(&supply.prepared, lane);
+            match self.waiting.queries {
+                None => *slot.flight.query() = Q::new(ray),
+                Some(queries) => {
+                    *slot.flight.query() = queries[place];
+                    slot.flight.take_over();
+                }
+            }
+            if !ready {
+                let query = *slot.flight.query();
+                let Some(flight) = Flight::new(self.object, ray, query) else { continue };
+                slot.flight = flight;
+            }
+            let mut stack = self.stacks.stack(at, 0);
+            stack.start(supply.root);
+            slot.ray = place;
+            slot.top = stack.place();
+            return true;
+        }
+    }
+
+    /// Prepares the next sixteen rays; false if there are none.
+    #[inline(always)]
+    fn refill<S: Simd>(&mut self, s: S, supply: &mut Supply) -> bool {
+        let total = self.waiting.order.map_or(self.rays.len(), <[u32]>::len);
+        let count = (total - supply.before).min(LANES);
+        for i in 0..count {
+            let place = supply.before + i;
+            supply.ray[i] = self.waiting.order.map_or(place as u32, |order| order[place]);
+        }
+        supply.before += count;
+        (supply.used, supply.filled) = (0, count);
+        if count > 0 {
+            supply.prepared.fill(s, &supply.frame, self.rays, &supply.ray, count);
+        }
+        count > 0
+    }
+}
+
+/// Where rays start that need not enter tetrahedra.
+fn root(object: &ObjectView<'_>) -> u32 {
+    match Child::from_code(object.header.root) {
+        Some(Child::Tets(row)) if object.tet_leaves[row as usize].subtree != NONE => {
+            object.tet_leaves[row as usize].subtree
+        }
+        _ => object.header.root,
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn enter_tets<Q: Query>(
+    object: &ObjectView<'_>,
+    row: u32,
+    ray: &Ray,
+    slot: &mut Slot<Q>,
+    stack: &mut Stack<'_>,
+    tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
+) -> bool {
+    let subtree = object.tet_leaves[row as usize].subtree;
+    if subtree != NONE {
+        stack.set_code(subtree);
+        return false;
+    }
+    stack.pop();
+    let done = tets(row, ray, slot.flight.query());
+    slot.flight.take_over();
+    done
+}
+
+/// Asks for the lines of a node or of an indexed leaf.
+#[inline(always)]
+fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
+    let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
+    for i in 0..NODE_LINES {
+        s.prefetch(first.wrapping_add(i));
+    }
+}

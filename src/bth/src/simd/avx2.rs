@@ -316,6 +316,18 @@ impl Simd for Avx2 {
         scalar::keep_up_to(codes, keys, limit)
     }
     #[inline(always)]
+    fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
+        let (mut a, mut out) = ([[0.0; LANES]; LANES], rows);
+        for i in 0..LANES {
+            self.store(rows[i], &mut a[i]);
+        }
+        let a = scalar::transpose(a);
+        for i in 0..LANES {
+            out[i] = self.load(&a[i]);
+        }
+        out
+    }
+    #[inline(always)]
     fn prefetch<T>(self, place: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }

@@ -337,6 +337,41 @@ impl Simd for Avx512 {
         kept
     }
     #[inline(always)]
+    fn transpose(self, rows: [__m512; LANES]) -> [__m512; LANES] {
+        let mut r = rows;
+        // SAFETY: registers only.
+        unsafe {
+            // Within each quarter of the lanes: four by four,
+            for i in (0..LANES).step_by(4) {
+                let (a, b) = (_mm512_unpacklo_ps(r[i], r[i + 1]), _mm512_unpackhi_ps(r[i], r[i + 1]));
+                let (c, d) = (_mm512_unpacklo_ps(r[i + 2], r[i + 3]), _mm512_unpackhi_ps(r[i + 2], r[i + 3]));
+                r[i] = _mm512_shuffle_ps::<0b01_00_01_00>(a, c);
+                r[i + 1] = _mm512_shuffle_ps::<0b11_10_11_10>(a, c);
+                r[i + 2] = _mm512_shuffle_ps::<0b01_00_01_00>(b, d);
+                r[i + 3] = _mm512_shuffle_ps::<0b11_10_11_10>(b, d);
+            }
+            // then the quarters: row 4p + i holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
+            let mut out = r;
+            for i in 0..4 {
+                let (a, b) = (r[i], r[i + 4]);
+                let (c, d) = (r[i + 8], r[i + 12]);
+                let (even, odd) = (
+                    _mm512_shuffle_f32x4::<0b10_00_10_00>(a, b),
+                    _mm512_shuffle_f32x4::<0b11_01_11_01>(a, b),
+                );
+                let (even2, odd2) = (
+                    _mm512_shuffle_f32x4::<0b10_00_10_00>(c, d),
+                    _mm512_shuffle_f32x4::<0b11_01_11_01>(c, d),
+                );
+                out[i] = _mm512_shuffle_f32x4::<0b10_00_10_00>(even, even2);
+                out[i + 8] = _mm512_shuffle_f32x4::<0b11_01_11_01>(even, even2);
+                out[i + 4] = _mm512_shuffle_f32x4::<0b10_00_10_00>(odd, odd2);
+                out[i + 12] = _mm512_shuffle_f32x4::<0b11_01_11_01>(odd, odd2);
+            }
+            out
+        }
+    }
+    #[inline(always)]
     fn prefetch<T>(self, place: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }

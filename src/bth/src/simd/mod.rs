@@ -118,6 +118,9 @@ pub(crate) trait Simd: Copy {
     /// Drops the elements whose key exceeds the limit, keeping the order. Returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
 
+    /// Row i becomes lane i of every row.
+    fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
+
     /// Asks for a cache line.
     fn prefetch<T>(self, place: *const T);
 }

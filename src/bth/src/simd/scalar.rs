@@ -71,6 +71,18 @@ pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: 
     count
 }
 
+/// [`Simd::transpose`] in plain code.
+#[inline(always)]
+pub(super) fn transpose(rows: [F; LANES]) -> [F; LANES] {
+    let mut out = [[0.0; LANES]; LANES];
+    for (i, row) in rows.iter().enumerate() {
+        for lane in 0..LANES {
+            out[lane][i] = row[lane];
+        }
+    }
+    out
+}
+
 /// [`Simd::keep_up_to`] in plain code.
 #[inline(always)]
 pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
@@ -278,6 +290,10 @@ impl Simd for Scalar {
     #[inline(always)]
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
         keep_up_to(codes, keys, limit)
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
+        transpose(rows)
     }
     #[inline(always)]
     fn prefetch<T>(self, _place: *const T) {}

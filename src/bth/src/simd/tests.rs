@@ -63,7 +63,17 @@ impl Kernel for Everything<'_> {
         pairs.sort_unstable();
         let (mut kept_codes, mut kept_keys) = (self.u.repeat(2), self.a.repeat(2));
         let kept = s.keep_up_to(&mut kept_codes[..19], &mut kept_keys[..19], self.b[3]);
+        let mut square = [a; LANES];
+        for i in 0..LANES {
+            square[i] = s.from_bits(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
+        }
+        let square = s.transpose(square);
+        let mut turned = Vec::new();
+        for row in square {
+            turned.extend(u(s.bits(row)));
+        }
         vec![
+            turned,
             f(s.splat(self.a[0])),
             f(s.add(a, b)),
             f(s.sub(a, b)),

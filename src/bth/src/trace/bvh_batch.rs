@@ -1,10 +1,10 @@
 //! Many rays through the wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
 //! with the work of the others.
 
-use super::flight::Flight;
+use super::flight::{Flight, Found};
 use super::prepare::{Frame, Prepared};
 use super::query::Query;
-use super::stack::{Stack, Stacks};
+use super::stack::Stacks;
 use crate::layout::{Child, NODE_LINES, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -61,6 +61,7 @@ impl Lists {
 }
 
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Slot<Q> {
     flight: Flight<Q>,
     /// Place of the ray in the batch.
@@ -134,11 +135,10 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             for i in 0..lists.bottom.take() {
                 let at = lists.bottom.get(i);
                 let slot = &mut slots[at];
-                let mut stack = self.stacks.stack(at, slot.top);
-                if !stack.is_empty() {
-                    stack.pop();
-                    slot.top = stack.place();
-                    lists.sort(at, stack.code());
+                if slot.top > self.stacks.bottom(at) {
+                    // An empty slot of a node.
+                    slot.top -= 1;
+                    lists.sort(at, self.stacks.code(slot.top));
                     continue;
                 }
                 (self.done)(slot.ray, slot.flight.query());
@@ -149,28 +149,26 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             for i in 0..lists.leaf.take() {
                 let at = lists.leaf.get(i);
                 let slot = &mut slots[at];
-                let mut stack = self.stacks.stack(at, slot.top);
                 let ray = &self.rays[slot.ray];
-                let done = match Child::from_code(stack.code()) {
+                let found = match Child::from_code(self.stacks.code(slot.top)) {
                     Some(Child::Indexed(line)) => {
-                        let leaf = self.object.indexed_leaf(line);
-                        slot.flight.enter_leaf(s, self.object, ray, leaf, &mut stack)
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.indexed_leaf(line))
                     }
                     Some(Child::Raw(line)) => {
-                        let leaf = self.object.raw_leaf(line);
-                        slot.flight.enter_leaf(s, self.object, ray, leaf, &mut stack)
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
                     }
-                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, &mut stack, &mut tets),
-                    _ => {
-                        stack.pop();
-                        false
-                    }
+                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, self.stacks, &mut tets),
+                    _ => Found::Nothing,
                 };
-                if done {
-                    stack.clear();
+                slot.top -= 1;
+                match found {
+                    Found::Nothing => {}
+                    Found::Nearer => {
+                        slot.top = self.stacks.keep_up_to(s, at, slot.top, slot.flight.key_limit());
+                    }
+                    Found::Enough => slot.top = self.stacks.bottom(at),
                 }
-                let code = stack.code();
-                slot.top = stack.place();
+                let code = self.stacks.code(slot.top);
                 prefetch(s, self.object, code);
                 lists.sort(at, code);
             }
@@ -184,10 +182,10 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             for i in 0..lists.inner.take() {
                 let at = lists.inner.get(i);
                 let slot = &mut slots[at];
-                let mut stack = self.stacks.stack(at, slot.top);
-                slot.flight.enter_node(s, self.object, stack.code(), &mut stack);
-                let code = stack.code();
-                slot.top = stack.place();
+                let node = self.object.node(self.stacks.code(slot.top));
+                let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
+                slot.top = slot.top + count - 1;
+                let code = self.stacks.code(slot.top);
                 prefetch(s, self.object, code);
                 lists.sort(at, code);
             }
@@ -208,23 +206,19 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             supply.used += 1;
             let place = supply.ray[lane] as usize;
             let ray = &self.rays[place];
-            let ready = slot.flight.launch(&supply.prepared, lane);
-            match self.waiting.queries {
-                None => *slot.flight.query() = Q::new(ray),
-                Some(queries) => {
-                    *slot.flight.query() = queries[place];
-                    slot.flight.take_over();
-                }
-            }
-            if !ready {
-                let query = *slot.flight.query();
-                let Some(flight) = Flight::new(self.object, ray, query) else { continue };
+            let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
+            if let Some(aim) = supply.prepared.aim(lane) {
+                slot.flight.launch(aim, query);
+            } else if let Some(flight) = Flight::new(self.object, ray, query) {
                 slot.flight = flight;
+            } else {
+                continue;
             }
-            let mut stack = self.stacks.stack(at, 0);
-            stack.start(supply.root);
+            if self.waiting.queries.is_some() {
+                slot.flight.take_over();
+            }
             slot.ray = place;
-            slot.top = stack.place();
+            slot.top = self.stacks.start(at, supply.root);
             return true;
         }
     }
@@ -264,25 +258,26 @@ fn enter_tets<Q: Query>(
     row: u32,
     ray: &Ray,
     slot: &mut Slot<Q>,
-    stack: &mut Stack<'_>,
+    stacks: &mut Stacks,
     tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
-) -> bool {
+) -> Found {
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
-        stack.set_code(subtree);
-        return false;
+        stacks.set_code(slot.top, subtree);
+        // It is not done with: it stays on top.
+        slot.top += 1;
+        return Found::Nothing;
     }
-    stack.pop();
     let done = tets(row, ray, slot.flight.query());
     slot.flight.take_over();
-    done
+    if done { Found::Enough } else { Found::Nearer }
 }
 
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
     let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
-    for i in 0..NODE_LINES {
+    for i in (0..NODE_LINES).step_by(2) {
         s.prefetch(first.wrapping_add(i));
     }
 }

@@ -1,8 +1,8 @@
 //! The walk of one ray through the wide BVH.
 
-use super::flight::Flight;
+use super::flight::{Flight, Found};
 use super::query::{Count, Query};
-use super::stack::Stack;
+use super::stack::Stacks;
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -26,56 +26,48 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
     ray: &Ray,
     walked: u32,
     flight: &mut Flight<Q>,
-    mut stack: Stack<'_>,
+    stacks: &mut Stacks,
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
-    stack.start(object.header.root);
-    loop {
-        let done = match Child::from_code(stack.code()) {
+    let mut top = stacks.start(0, object.header.root);
+    while top > stacks.bottom(0) {
+        let found = match Child::from_code(stacks.code(top)) {
             Some(Child::Node(at)) => {
                 count.node();
-                flight.enter_node(s, object, at, &mut stack);
-                false
+                top += flight.enter_node(s, object.node(at), stacks.room(top));
+                Found::Nothing
             }
             Some(Child::Indexed(at)) => {
                 let leaf = object.indexed_leaf(at);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf(s, object, ray, leaf, &mut stack)
+                flight.enter_leaf(s, object, ray, leaf)
             }
             Some(Child::Raw(at)) => {
                 let leaf = object.raw_leaf(at);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf(s, object, ray, leaf, &mut stack)
+                flight.enter_leaf(s, object, ray, leaf)
             }
             Some(Child::Tets(row)) if row != walked => {
                 let subtree = object.tet_leaves[row as usize].subtree;
                 if subtree != NONE {
-                    stack.set_code(subtree);
-                    false
-                } else {
-                    stack.pop();
-                    count.leaf();
-                    let outcome = tets(row, flight.query(), count);
-                    flight.take_over();
-                    outcome == TetOutcome::Done
+                    stacks.set_code(top, subtree);
+                    continue;
                 }
+                count.leaf();
+                let outcome = tets(row, flight.query(), count);
+                flight.take_over();
+                if outcome == TetOutcome::Done { Found::Enough } else { Found::Nearer }
             }
-            Some(Child::Tets(_)) => {
-                stack.pop();
-                false
-            }
-            // An empty slot, or the bottom.
-            None => {
-                let done = stack.is_empty();
-                stack.pop();
-                done
-            }
+            Some(Child::Tets(_)) | None => Found::Nothing,
         };
-        if done {
-            return;
+        top -= 1;
+        match found {
+            Found::Nothing => {}
+            Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
+            Found::Enough => return,
         }
     }
 }

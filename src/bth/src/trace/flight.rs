@@ -3,15 +3,15 @@
 
 use super::crossing::{Crossing, Estimate, estimate};
 use super::line::Line;
-use super::prepare::Prepared;
+use super::prepare::Aim;
 use super::query::Query;
 use super::sight::{Block, Sight};
 use super::slabs::Slabs;
-use super::stack::Stack;
-use crate::layout::WIDTH;
+use crate::layout::{WIDTH, WideNode};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
+use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true t by, relative: the four lowest bits of f32.
 const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
@@ -19,11 +19,20 @@ const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flight<Q> {
-    slabs: Slabs,
-    sight: Sight,
-    /// Nothing whose scaled t certainly exceeds this matters.
+    aim: Aim,
+    /// Nothing whose depth certainly exceeds this matters.
     limit: f32,
     query: Q,
+}
+
+/// What a leaf made of a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Found {
+    Nothing,
+    /// A nearer hit than before: what waits farther off need not be entered.
+    Nearer,
+    /// What the query wants.
+    Enough,
 }
 
 impl<Q: Query> Flight<Q> {
@@ -35,21 +44,21 @@ impl<Q: Query> Flight<Q> {
         }
         let slabs = Slabs::new(ray, &line, object.header);
         let sight = Sight::new(ray, &line, &slabs, object.header);
-        let mut flight = Flight { slabs, sight, limit: 0.0, query };
-        flight.take_over();
-        Some(flight)
+        let limit = slabs.last;
+        Some(Flight { aim: Aim { slabs, sight }, limit, query })
     }
 
     /// A place for a ray.
     pub(crate) fn vacant(query: Q) -> Self {
-        let (slabs, sight) = (Slabs::VACANT, Sight::VACANT);
-        Flight { slabs, sight, limit: 0.0, query }
+        Flight { aim: Aim::new_zeroed(), limit: 0.0, query }
     }
 
-    /// Takes in a ray that has been prepared; false if it has not.
+    /// Takes in a ray that has been prepared.
     #[inline(always)]
-    pub(crate) fn launch(&mut self, prepared: &Prepared, lane: usize) -> bool {
-        prepared.write(lane, &mut self.slabs, &mut self.sight, &mut self.limit)
+    pub(crate) fn launch(&mut self, aim: &Aim, query: Q) {
+        self.aim = *aim;
+        self.limit = aim.slabs.last;
+        self.query = query;
     }
 
     #[inline(always)]
@@ -59,31 +68,33 @@ impl<Q: Query> Flight<Q> {
 
     /// Takes over what the query has found meanwhile.
     pub(crate) fn take_over(&mut self) {
-        self.limit = self.slabs.limit(self.query.limit());
+        self.limit = self.aim.slabs.limit(self.query.limit());
     }
 
-    /// Replaces the node on top of the stack by its children that the ray may meet, the nearest on top.
+    /// Keys of the stack beyond this are of no interest any more.
+    #[inline(always)]
+    pub(crate) fn key_limit(&self) -> f32 {
+        self.limit + self.limit.abs() * KEY_SLACK
+    }
+
+    /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
     #[inline(always)]
     pub(crate) fn enter_node<S: Simd>(
         &self,
         s: S,
-        object: &ObjectView<'_>,
-        line: u32,
-        stack: &mut Stack<'_>,
-    ) {
-        let node = object.node(line);
-        let (bits, enter) = self.slabs.children(s, node, self.limit);
-        let codes = s.load_u(&node.child);
-        let (to, keys) = stack.top::<WIDTH>();
-        let count = if Q::ANY {
-            s.compress(bits, codes, to)
+        node: &WideNode,
+        (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+    ) -> usize {
+        let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
+        let children = s.load_u(&node.child);
+        if Q::ANY {
+            s.compress(bits, children, codes)
         } else {
-            s.compress_far_to_near(bits, enter, codes, to, keys)
-        };
-        stack.replace_top(count);
+            s.compress_far_to_near(bits, enter, children, codes, keys)
+        }
     }
 
-    /// Tests the triangles of the leaf on top of the stack and drops it; true if the query has what it wants.
+    /// Tests the triangles of a leaf.
     #[inline(always)]
     pub(crate) fn enter_leaf<S: Simd, B: Block>(
         &mut self,
@@ -91,29 +102,22 @@ impl<Q: Query> Flight<Q> {
         object: &ObjectView<'_>,
         ray: &Ray,
         block: &B,
-        stack: &mut Stack<'_>,
-    ) -> bool {
-        stack.pop();
-        let found = self.sight.candidates(s, block, self.slabs.tmin, self.limit);
+    ) -> Found {
+        let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.limit);
         if found.maybe == 0 {
-            return false;
+            return Found::Nothing;
         }
         if Q::ANY && found.sure != 0 {
             self.query.accept();
-            return true;
+            return Found::Enough;
         }
-        let limit = self.limit;
-        let done = self.decide(object, ray, block, found.maybe);
-        if !Q::ANY && self.limit < limit {
-            stack.keep_up_to(s, self.limit + self.limit.abs() * KEY_SLACK);
-        }
-        done
+        self.decide(object, ray, block, found.maybe)
     }
 
     /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.
     #[inline(always)]
-    fn decide<B: Block>(&mut self, object: &ObjectView<'_>, ray: &Ray, block: &B, mut bits: u32) -> bool {
-        let axis = self.sight.axis;
+    fn decide<B: Block>(&mut self, object: &ObjectView<'_>, ray: &Ray, block: &B, mut bits: u32) -> Found {
+        let axis = self.aim.sight.axis;
         let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
             origin[k] = ray.origin[axis[k] as usize].into();
@@ -129,11 +133,12 @@ impl<Q: Query> Flight<Q> {
             };
             let Some(crossing) = crossing else { continue };
             if self.query.offer(object.triangle_ids[block.first() as usize + i], crossing) {
-                return true;
+                return Found::Enough;
             }
         }
+        let limit = self.limit;
         self.take_over();
-        false
+        if self.limit < limit { Found::Nearer } else { Found::Nothing }
     }
 }
 

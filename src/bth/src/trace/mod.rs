@@ -162,14 +162,13 @@ impl<Q: Query, C: Count> Kernel for Single<'_, Q, C> {
     fn run<S: Simd>(self, s: S) -> Q {
         let Some(mut flight) = Flight::new(self.object, self.ray, self.query) else { return self.query };
         self.scratch.stacks.reserve(self.object, 1);
-        let stack = self.scratch.stacks.stack(0, 0);
         bvh_walk::walk(
             s,
             self.object,
             self.ray,
             self.walked,
             &mut flight,
-            stack,
+            &mut self.scratch.stacks,
             self.count,
             |leaf, query, count| enter_tets(self.object, leaf, self.ray, query, count),
         );

@@ -18,6 +18,7 @@ const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct Flight<Q> {
     aim: Aim,
     /// Nothing whose depth certainly exceeds this matters.
@@ -29,6 +30,8 @@ pub(crate) struct Flight<Q> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
     Nothing,
+    /// Something else in the place of the leaf, to be entered now.
+    Again,
     /// A nearer hit than before: what waits farther off need not be entered.
     Nearer,
     /// What the query wants.

@@ -17,6 +17,7 @@ pub mod check;
 pub mod error;
 mod expansion;
 pub mod file;
+pub mod instances;
 pub mod layout;
 pub mod limits;
 pub mod object;

@@ -1,0 +1,5 @@
+//! Scenes of instances that move.
+
+mod view;
+
+pub use view::SceneView;

@@ -108,6 +108,9 @@ codes! {
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
     ZeroArea "F207" "Exactly the triangles of zero area are dropped."
+
+    Singular "S001" "The transform of an instance that is seen can be inverted."
+    NotFinite "S002" "The transform and the world box of an instance that is seen are finite."
 }
 
 impl Code {
@@ -124,6 +127,10 @@ impl Code {
             Code::HeaderHash | Code::TableHash | Code::SectionHash | Code::Gap | Code::ContentId => {
                 "the file was damaged; copy or compile it again"
             }
+            Code::Singular => {
+                "scale by 0 to hide; else keep the scales of one node within 2^24 of each other"
+            }
+            Code::NotFinite => "keep translations and scales within the range of 32-bit numbers",
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }

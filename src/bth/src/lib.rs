@@ -20,6 +20,7 @@ pub mod file;
 pub mod instances;
 pub mod layout;
 pub mod limits;
+mod motion;
 pub mod object;
 pub mod rays;
 mod scene;
@@ -30,5 +31,7 @@ pub mod verify;
 
 pub use error::{Code, Error};
 pub use file::File;
+pub use instances::Update;
+pub use motion::InstanceView;
 pub use scene::{Scene, from_bytes, map, open};
 pub use trace::Steps;

@@ -214,8 +214,9 @@ fn camera(view: &SceneView<'_>, camera: &Camera) -> std::result::Result<(), Viol
     let most = if camera.projection == 0 { 180.0 } else { f64::INFINITY };
     let size = camera.size > 0.0 && camera.size < most;
     let aspect = camera.aspect.is_finite() && camera.aspect >= 0.0;
+    let near = camera.near.is_finite() && camera.near >= 0.0;
     let far = camera.far == 0.0 || camera.far > camera.near && camera.far.is_finite();
-    if !size || !aspect || !(camera.near.is_finite() && camera.near >= 0.0) || !far {
+    if !(size && aspect && near && far) {
         let found = (camera.size, camera.aspect, camera.near, camera.far);
         return violation(Code::Camera, offset_of!(Camera, size), "numbers that are allowed", found);
     }

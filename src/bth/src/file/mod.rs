@@ -208,6 +208,17 @@ impl File {
         Ok(view)
     }
 
+    /// The OBJECT row of an object that exists.
+    pub(crate) fn object_header(&self, object: u32) -> &Object {
+        let rows: &[Object] = self.slice(object, kind::OBJECT);
+        &rows[0]
+    }
+
+    /// The instances of the scene, unchecked inside.
+    pub(crate) fn instances(&self) -> &[Instance] {
+        self.slice(NONE, kind::INSTANCES)
+    }
+
     /// The scene sections, **unchecked inside**; `None` when the file has none of them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
         // Sections of the whole file come last.

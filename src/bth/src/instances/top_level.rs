@@ -106,9 +106,9 @@ struct Task {
 impl TopLevel {
     /// Builds over the instances that have a place.
     pub(crate) fn build(&mut self, placed: &[Option<Placed>]) {
-        // Rarely more than one node for eight instances.
+        // Rarely more than one node for seven instances.
         self.nodes.clear();
-        self.nodes.reserve_exact(placed.len() / 8 + 1);
+        self.nodes.reserve_exact(placed.len() / 7 + 1);
         (self.extent, self.looseness) = (0.0, 0.0);
         for place in placed.iter().flatten() {
             self.looseness = self.looseness.max(place.looseness);

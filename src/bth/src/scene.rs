@@ -2,13 +2,15 @@
 
 use crate::error::Error;
 use crate::file::File;
+use crate::instances::World;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::trace::{self, Steps};
 use std::path::Path;
 
-/// An open file, ready to trace. Each object stands once in the world, untransformed: instance
+/// An open file, ready to trace. A file with a scene shows its instances at a time (see
+/// [`Scene::set_frame`]); in others each object stands once in the world, untransformed: instance
 /// and object numbers are the same.
 ///
 /// Queries take `&self` and may run on any number of threads. A ray whose origin or direction is not
@@ -17,9 +19,13 @@ use std::path::Path;
 /// Answers are exact: a ray hits a closed triangle if and only if its real line meets it within
 /// [`tmin`, `tmax`] (t as reported, rounded to f32), lines within the plane of a triangle excepted; of equal
 /// hits the triangle of least id is reported. They depend neither on hints nor on the structure in the file.
+/// In a scene the ray is first transformed into the object's space and rounded there: relative 2^-24 for each
+/// component of origin and direction. Of equal t the instance of least number is reported.
 #[derive(Debug)]
 pub struct Scene {
     file: File,
+    /// What the file's scene sections say, at a time; `None` without them.
+    world: Option<World>,
 }
 
 /// Reads a compiled file into memory and checks every index, so that tracing is safe whatever the
@@ -27,7 +33,7 @@ pub struct Scene {
 ///
 /// # Errors
 /// `BTH-O…` when it cannot be read, `BTH-F0…` when header or table, `BTH-F1…` when contents break the
-/// specification; the error names the section and byte.
+/// specification; the error names the section and byte. `BTH-S…` when the first frame of its scene cannot be shown.
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
     Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
@@ -41,7 +47,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
 }
 
-/// Maps a compiled file and checks header and section table only: ready at once whatever its size.
+/// Maps a compiled file and checks header, section table and scene only: ready at once whatever its size.
 ///
 /// # Safety
 /// Until the scene is dropped nobody may write to the file or truncate it (see [`File::map`]).
@@ -49,12 +55,12 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
 /// others, tracing may panic or never end; it does not read out of bounds.
 ///
 /// # Errors
-/// As [`open`], without those about contents.
+/// As [`open`], without those about contents of objects.
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     // SAFETY: the caller's contract includes that of `File::map`.
     let file = unsafe { File::map(path.as_ref())? };
-    Ok(Scene { file })
+    Scene::with_world(file)
 }
 
 impl Scene {
@@ -62,7 +68,22 @@ impl Scene {
         for object in 0..file.object_count() {
             file.check(object)?;
         }
-        Ok(Scene { file })
+        Scene::with_world(file)
+    }
+
+    fn with_world(file: File) -> Result<Scene, Error> {
+        let world = World::new(&file)?;
+        Ok(Scene { file, world })
+    }
+
+    /// The instances, if the file has a scene.
+    pub(crate) fn world(&self) -> Option<&World> {
+        self.world.as_ref()
+    }
+
+    /// The file and the instances, to move these.
+    pub(crate) fn parts_mut(&mut self) -> (&File, &mut Option<World>) {
+        (&self.file, &mut self.world)
     }
 
     /// The file behind the scene.
@@ -98,6 +119,9 @@ impl Scene {
 
     /// As [`Self::nearest`], with a count of the work.
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
+        if let Some(world) = &self.world {
+            return world.nearest_counted(&self.file, ray, from);
+        }
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
             let (hit, more) =
@@ -123,6 +147,9 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
+        if let Some(world) = &self.world {
+            return world.nearest(&self.file, rays, from, hits);
+        }
         hits.fill(Hit::MISS);
         trace::with_scratch(|scratch| {
             if from.is_none() && self.object_count() == 1 {
@@ -148,6 +175,9 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
+        if let Some(world) = &self.world {
+            return world.any(&self.file, rays, from, found);
+        }
         found.fill(false);
         trace::with_scratch(|scratch| {
             if from.is_none() && self.object_count() == 1 {

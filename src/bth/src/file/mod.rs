@@ -10,6 +10,7 @@ pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
 use crate::error::{Code, Error, Result};
+use crate::instances::SceneView;
 use crate::layout::*;
 use crate::object::{ObjectView, Records};
 use buffer::Buffer;
@@ -205,6 +206,46 @@ impl File {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
         Ok(view)
+    }
+
+    /// The OBJECT row of an object that exists.
+    pub(crate) fn object_header(&self, object: u32) -> &Object {
+        let rows: &[Object] = self.slice(object, kind::OBJECT);
+        &rows[0]
+    }
+
+    /// The instances of the scene, unchecked inside.
+    pub(crate) fn instances(&self) -> &[Instance] {
+        self.slice(NONE, kind::INSTANCES)
+    }
+
+    /// The scene sections, **unchecked inside**; `None` when the file has none of them.
+    pub fn scene(&self) -> Option<SceneView<'_>> {
+        // Sections of the whole file come last.
+        let of_file = self.table().iter().rev().take_while(|e| e.object == NONE);
+        of_file.map(|e| e.kind).find(|kind| kind::is_scene(*kind))?;
+        Some(SceneView {
+            scene: self.slice(NONE, kind::SCENE),
+            nodes: self.slice(NONE, kind::NODES),
+            instances: self.slice(NONE, kind::INSTANCES),
+            tracks: self.slice(NONE, kind::TRACKS),
+            times: self.slice(NONE, kind::TIMES),
+            values: self.slice(NONE, kind::VALUES),
+            cameras: self.slice(NONE, kind::CAMERAS),
+            lights: self.slice(NONE, kind::LIGHTS),
+            names: self.slice(NONE, kind::NAMES),
+        })
+    }
+
+    /// The scene sections, checked: instances and tracks lead nowhere but to what is there. Costs
+    /// O(bytes of these sections).
+    ///
+    /// # Errors
+    /// `BTH-F150` to `BTH-F159`.
+    pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
+        let Some(view) = self.scene() else { return Ok(None) };
+        check::scene(&view, self.object_count()).map_err(|e| self.locate(e, NONE))?;
+        Ok(Some(view))
     }
 
     /// Turns an offset within a section into one within the file.

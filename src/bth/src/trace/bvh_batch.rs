@@ -209,10 +209,11 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
             if let Some(aim) = supply.prepared.aim(lane) {
                 slot.flight.launch(aim, query);
-            } else if let Some(flight) = Flight::new(self.object, ray, query) {
-                slot.flight = flight;
             } else {
-                continue;
+                *slot.flight.query() = query;
+                if !slot.flight.aim_at(self.object, &supply.frame, ray) {
+                    continue;
+                }
             }
             if self.waiting.queries.is_some() {
                 slot.flight.take_over();

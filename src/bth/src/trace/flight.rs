@@ -3,7 +3,7 @@
 
 use super::crossing::{Crossing, Estimate, estimate};
 use super::line::Line;
-use super::prepare::Aim;
+use super::prepare::{Aim, Frame};
 use super::query::Query;
 use super::sight::{Block, Sight};
 use super::slabs::Slabs;
@@ -39,16 +39,25 @@ pub(crate) enum Found {
 }
 
 impl<Q: Query> Flight<Q> {
-    /// None if the ray hits nothing whatever there is: see [`Line::new`], or an empty range of t.
-    pub(crate) fn new(object: &ObjectView<'_>, ray: &Ray, query: Q) -> Option<Self> {
-        let line = Line::new(ray)?;
-        if ray.tmin.partial_cmp(&ray.tmax).is_none_or(|o| o.is_gt()) {
-            return None;
+    /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
+    #[inline(always)]
+    pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
+        if !self.aim.set(frame, ray) && !self.aim_in_f64(object, ray) {
+            return false;
         }
+        self.take_over();
+        true
+    }
+
+    /// As [`Self::aim_at`], for rays that f32 can't prepare too.
+    #[cold]
+    #[inline(never)]
+    fn aim_in_f64(&mut self, object: &ObjectView<'_>, ray: &Ray) -> bool {
+        let Some(line) = Line::new(ray) else { return false };
         let slabs = Slabs::new(ray, &line, object.header);
         let sight = Sight::new(ray, &line, &slabs, object.header);
-        let limit = slabs.last;
-        Some(Flight { aim: Aim { slabs, sight }, limit, query })
+        self.aim = Aim { slabs, sight };
+        ray.tmin <= ray.tmax
     }
 
     /// A place for a ray.

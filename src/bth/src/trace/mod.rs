@@ -25,12 +25,16 @@ use bvh_batch::{BatchWalk, Waiting};
 use bvh_walk::TetOutcome;
 use flight::Flight;
 use line::Line;
+use prepare::Frame;
 use query::{Any, Count, Nearest, Query};
 use records::Record;
 use stack::Stacks;
 use std::cell::Cell;
 use std::marker::PhantomData;
 use tet_walk::{Outcome, TetSpace};
+
+/// Fewer rays than these are traced one after the other.
+pub(crate) const FEW: usize = 4;
 
 /// Memory that traversals need, kept from one batch to the next.
 #[derive(Debug, Default)]
@@ -160,7 +164,10 @@ impl<Q: Query, C: Count> Kernel for Single<'_, Q, C> {
     type Output = Q;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q {
-        let Some(mut flight) = Flight::new(self.object, self.ray, self.query) else { return self.query };
+        let mut flight = Flight::vacant(self.query);
+        if !flight.aim_at(self.object, &Frame::new(self.object.header), self.ray) {
+            return self.query;
+        }
         self.scratch.stacks.reserve(self.object, 1);
         bvh_walk::walk(
             s,

@@ -127,6 +127,11 @@ impl Scene {
         let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
+            if let Some(from) = from.filter(|_| rays.len() > 1 && !object.tet_leaves.is_empty()) {
+                let from: Vec<u32> = from.iter().map(|&f| hint(f, instance)).collect();
+                trace::nearest_hinted(&object, rays, &from, instance, hits, &mut scratch);
+                continue;
+            }
             for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
                 let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
                 let hit =
@@ -148,6 +153,11 @@ impl Scene {
         let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
+            if let Some(from) = from.filter(|_| rays.len() > 1 && !object.tet_leaves.is_empty()) {
+                let from: Vec<u32> = from.iter().map(|&f| hint(f, instance)).collect();
+                trace::any_hinted(&object, rays, &from, found, &mut scratch);
+                continue;
+            }
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
                 *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), &mut scratch);
             }

@@ -86,6 +86,35 @@ fn assert_within(simd: Avx2, m: M, at: U, len: usize) {
     assert!(simd.mask_bits(outside) == 0, "an index of a gather lies outside");
 }
 
+/// For each lane of eight whose bit is set, how many set bits lie below it: where its element is in a packed row.
+///
+/// # Safety
+/// The machine must have the features of [`Avx2`].
+#[inline(always)]
+unsafe fn expansion(bits: u8) -> __m256i {
+    // SAFETY: see above; registers only.
+    unsafe {
+        // A byte a lane: ones where the bit is set.
+        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
+        let places = _pdep_u64(0x0706_0504_0302_0100, bytes);
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
+    }
+}
+
+/// Places of the lanes of eight whose bit is set, in order: the inverse of [`expansion`].
+///
+/// # Safety
+/// As [`expansion`].
+#[inline(always)]
+unsafe fn compression(bits: u8) -> __m256i {
+    // SAFETY: see above; registers only.
+    unsafe {
+        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
+        let places = _pext_u64(0x0706_0504_0302_0100, bytes);
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
+    }
+}
+
 impl Simd for Avx2 {
     type F = F;
     type U = U;
@@ -105,6 +134,8 @@ impl Simd for Avx2 {
         le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
         select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));
         add_u(a: U, b: U) -> U = _mm256_add_epi32(a, b);
+        // The mask is -1 where it is set.
+        increment(a: U, m: M) -> U = _mm256_sub_epi32(a, m);
         and_u(a: U, b: U) -> U = _mm256_and_si256(a, b);
         or_u(a: U, b: U) -> U = _mm256_or_si256(a, b);
         xor_u(a: U, b: U) -> U = _mm256_xor_si256(a, b);
@@ -230,11 +261,17 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
-        let (mut out, _) = self.arrays(a, m);
-        for (next, lane) in scalar::lanes(self.mask_bits(m)).enumerate() {
-            out[lane] = from[next];
+        let bits = self.mask_bits(m);
+        let low = from.as_ptr();
+        // The high half goes on where the low one ends, after at most eight.
+        let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
+        // SAFETY: eight readable floats each; unaligned loads.
+        unsafe {
+            let (low, high) = (_mm256_loadu_ps(low), _mm256_loadu_ps(high));
+            let low = _mm256_permutevar8x32_ps(low, expansion(bits as u8));
+            let high = _mm256_permutevar8x32_ps(high, expansion((bits >> 8) as u8));
+            self.select(m, [low, high], a)
         }
-        self.load(&out)
     }
     #[inline(always)]
     fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
@@ -262,9 +299,17 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
-        let mut lanes = [0; LANES];
-        self.store_u(a, &mut lanes);
-        scalar::compress(bits, &lanes, to)
+        let low = (bits as u8).count_ones() as usize;
+        // SAFETY: the first store fills to[..8]; the second begins after the lanes that count, at most eight.
+        unsafe {
+            let packed = [
+                _mm256_permutevar8x32_epi32(a[0], compression(bits as u8)),
+                _mm256_permutevar8x32_epi32(a[1], compression((bits >> 8) as u8)),
+            ];
+            _mm256_storeu_si256(to[..8].as_mut_ptr().cast(), packed[0]);
+            _mm256_storeu_si256(to[low..][..8].as_mut_ptr().cast(), packed[1]);
+        }
+        (bits & 0xffff).count_ones() as usize
     }
     #[inline(always)]
     fn compress_far_to_near(

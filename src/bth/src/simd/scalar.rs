@@ -185,6 +185,10 @@ impl Simd for Scalar {
         from_fn(|i| a[i].wrapping_add(b[i]))
     }
     #[inline(always)]
+    fn increment(self, a: U, m: u32) -> U {
+        from_fn(|i| a[i].wrapping_add(m >> i & 1))
+    }
+    #[inline(always)]
     fn and_u(self, a: U, b: U) -> U {
         from_fn(|i| a[i] & b[i])
     }

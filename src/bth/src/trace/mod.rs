@@ -5,11 +5,16 @@ mod line;
 mod query;
 mod records;
 mod slabs;
+mod tet_batch;
 mod tet_flood;
+mod tet_hinted;
+mod tet_lanes;
 mod tet_locate;
+mod tet_queue;
 mod tet_walk;
 
 pub use query::Steps;
+pub(crate) use tet_hinted::{any_hinted, nearest_hinted};
 
 use crate::layout::{Child, NONE};
 use crate::object::{ObjectView, Records};
@@ -102,12 +107,27 @@ fn trace_with<R: Record, Q: Query, C: Count>(
             walked = leaf;
         }
     }
+    trace_rest(object, records, ray, &line, walked, scratch, query, count);
+}
+
+/// What remains once a tet leaf, if any, has been walked.
+#[allow(clippy::too_many_arguments)]
+fn trace_rest<R: Record, Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    records: &[R],
+    ray: &Ray,
+    line: &Line,
+    walked: u32,
+    scratch: &mut Scratch,
+    query: &mut Q,
+    count: &mut C,
+) {
     if object.header.root == NONE || object.header.root == Child::Tets(walked).code() && walked != NONE {
         return;
     }
-    let slabs = Slabs::new(ray, &line, object.header);
+    let slabs = Slabs::new(ray, line, object.header);
     let stack = &mut scratch.stack;
-    bvh_walk::walk(object, &line, &slabs, stack, query, count, |leaf, query, count| {
+    bvh_walk::walk(object, line, &slabs, stack, query, count, |leaf, query, count| {
         if leaf == walked {
             return TetOutcome::GoOn;
         }
@@ -116,7 +136,7 @@ fn trace_with<R: Record, Q: Query, C: Count>(
             return TetOutcome::Instead(subtree);
         }
         count.leaf();
-        let space = space(object, records, leaf, &line);
+        let space = space(object, records, leaf, line);
         let outcome = match space.enter_hull() {
             Ok(place) => space.walk(place, query, count),
             Err(outcome) => outcome,

@@ -392,7 +392,7 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
         let mut groups = [idle; GROUPS];
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
         let most = self.records.len() as u64 + 1;
-        let mut round = 0;
+        let (mut round, mut age) = (0, 0);
         let mut more = true;
         loop {
             let mut any = 0;
@@ -428,12 +428,14 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
                 return;
             }
             round += 1;
+            age += 1;
             for group in &mut groups {
                 if s.mask_bits(group.lanes.active) != 0 {
                     group.lanes.step::<R>(s, words, vertices);
                 }
             }
-            if round % most == 0 {
+            if age > most {
+                age = 0;
                 for group in &mut groups {
                     let active = s.mask_bits(group.lanes.active);
                     let old = (0..LANES as u32)

@@ -242,6 +242,22 @@ impl Simd for Avx2 {
         [half(0), half(1)]
     }
     #[inline(always)]
+    fn gather_rows(self, m: M, from: &[[f32; 4]], row: U, column: U) -> F {
+        assert_within(self, m, row, from.len().min(1 << 29));
+        let column = self.and_u(column, self.splat_u(3));
+        let at = self.or_u(self.shl_u::<2>(row), column);
+        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
+        let half = |i: usize| unsafe {
+            _mm256_mask_i32gather_ps::<4>(
+                _mm256_setzero_ps(),
+                from.as_ptr().cast(),
+                at[i],
+                _mm256_castsi256_ps(m[i]),
+            )
+        };
+        [half(0), half(1)]
+    }
+    #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
         assert_within(self, m, at, from.len());
         // SAFETY: as `gather`.

@@ -210,6 +210,14 @@ impl Simd for Avx512 {
         unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr()) }
     }
     #[inline(always)]
+    fn gather_rows(self, m: u16, from: &[[f32; 4]], row: __m512i, column: __m512i) -> __m512 {
+        assert_within(self, m, row, from.len().min(1 << 29));
+        let column = self.and_u(column, self.splat_u(3));
+        let at = self.or_u(self.shl_u::<2>(row), column);
+        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
+        unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr().cast()) }
+    }
+    #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
         assert_within(self, m, at, from.len());
         // SAFETY: as `gather`.

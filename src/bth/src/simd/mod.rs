@@ -66,6 +66,8 @@ pub(crate) trait Simd: Copy {
     fn least(self, a: Self::F) -> f32;
     /// Elements of a slice, 0.0 where the mask is clear. Panics if a lane that is set lies outside.
     fn gather(self, m: Self::M, from: &[f32], at: Self::U) -> Self::F;
+    /// Elements of rows of four: `column[i] % 4` of row `row[i]`. Panics if a row of a lane that is set lies outside.
+    fn gather_rows(self, m: Self::M, from: &[[f32; 4]], row: Self::U, column: Self::U) -> Self::F;
     /// Where the mask is set, the next elements of `from` in order; else `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 

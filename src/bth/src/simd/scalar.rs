@@ -160,6 +160,10 @@ impl Simd for Scalar {
         from_fn(|i| if set(m, i) { from[at[i] as usize] } else { 0.0 })
     }
     #[inline(always)]
+    fn gather_rows(self, m: u32, from: &[[f32; 4]], row: U, column: U) -> F {
+        from_fn(|i| if set(m, i) { from[row[i] as usize][column[i] as usize % 4] } else { 0.0 })
+    }
+    #[inline(always)]
     fn expand(self, a: F, m: u32, from: &F) -> F {
         expand(a, m, from)
     }

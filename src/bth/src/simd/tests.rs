@@ -78,6 +78,7 @@ impl Kernel for Everything<'_> {
             f(s.lookup(a, x)),
             vec![s.least(s.load(&ordered)).to_bits()],
             f(s.gather(mask, &table, index)),
+            f(s.gather_rows(mask, table.as_chunks().0, s.and_u(index, s.splat_u(7)), y)),
             f(s.expand(a, mask, self.b)),
             u(s.load_bytes(&bytes)),
             u(s.add_u(x, y)),

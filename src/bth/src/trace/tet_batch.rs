@@ -8,7 +8,7 @@
 use super::line::Line;
 use super::query::Query;
 use super::records::{Entered, LaneRecord};
-use super::tet_lanes::{Lanes, float, three, word};
+use super::tet_lanes::{Lanes, Step, float, three, word};
 use super::tet_queue::{Queue, Ready};
 use super::tet_walk::{Outcome, Place, TetSpace};
 use super::{leaf_of_face, space};
@@ -332,6 +332,21 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         }
     }
 
+    /// Stops walks that began two rounds ago, in each of which every lane made as many steps as there are tetrahedra.
+    #[inline(always)]
+    fn give_up<S: Simd>(&mut self, s: S, group: &mut Group<S>, round: u32) {
+        let old = s.and(group.lanes.active, s.lt_u(group.since, s.splat_u(round.saturating_sub(1))));
+        let mut bits = s.mask_bits(old);
+        let mut slot = [0; LANES];
+        s.store_u(group.lanes.words[word::SLOT], &mut slot);
+        group.lanes.active = s.and_not(group.lanes.active, old);
+        group.held &= !bits;
+        while bits != 0 {
+            self.flood(slot[bits.trailing_zeros() as usize % LANES]);
+            bits &= bits - 1;
+        }
+    }
+
     /// Hands over the lanes of a group that have stopped.
     #[inline(always)]
     fn take_stopped<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, mut stopped: u32) {
@@ -367,16 +382,17 @@ fn rays(rays: &[Ray]) -> &[f32] {
     <[f32]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")
 }
 
-fn vertices<'a>(object: &ObjectView<'a>) -> &'a [f32] {
-    <[f32]>::ref_from_bytes(object.tet_vertices.as_bytes()).expect("a vertex is four words")
+fn vertices<'a>(object: &ObjectView<'a>) -> &'a [[f32; 4]] {
+    <[[f32; 4]]>::ref_from_bytes(object.tet_vertices.as_bytes()).expect("a vertex is four words")
 }
 
 /// A group of lanes, those of them that hold a ray, and when they got it.
 #[derive(Clone, Copy)]
 struct Group<S: Simd> {
     lanes: Lanes<S>,
+    step: Step<S>,
     held: u32,
-    since: [u64; LANES],
+    since: S::U,
 }
 
 impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
@@ -388,11 +404,11 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
         let words = R::words(self.records);
         let vertices = vertices(self.object);
         let mut queue = Queue::new();
-        let idle = Group { lanes: Lanes::idle(s), held: 0, since: [0; LANES] };
+        let idle = Group { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
         let mut groups = [idle; GROUPS];
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
-        let most = self.records.len() as u64 + 1;
-        let (mut round, mut age) = (0, 0);
+        let most = self.records.len();
+        let (mut round, mut steps) = (0, 0);
         let mut more = true;
         loop {
             let mut any = 0;
@@ -413,9 +429,7 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
                         let taken = queue.pop(s, idle, &mut group.lanes);
                         idle &= !taken;
                         group.held |= taken;
-                        for lane in (0..LANES).filter(|i| taken >> i & 1 != 0) {
-                            group.since[lane] = round;
-                        }
+                        group.since = s.select_u(s.mask(taken), s.splat_u(round), group.since);
                         more = taken != 0;
                         if !more {
                             break;
@@ -427,27 +441,26 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
             if any == 0 {
                 return;
             }
-            round += 1;
-            age += 1;
             for group in &mut groups {
                 if s.mask_bits(group.lanes.active) != 0 {
-                    group.lanes.step::<R>(s, words, vertices);
+                    group.lanes.fetch::<R>(s, &mut group.step, words, vertices);
                 }
             }
-            if age > most {
-                age = 0;
+            for group in &mut groups {
+                if s.mask_bits(group.lanes.active) != 0 {
+                    group.lanes.choose(s, &mut group.step);
+                }
+            }
+            for group in &mut groups {
+                if s.mask_bits(group.lanes.active) != 0 {
+                    group.lanes.follow::<R>(s, &group.step, words);
+                }
+            }
+            steps += 1;
+            if steps == most {
+                (round, steps) = (round + 1, 0);
                 for group in &mut groups {
-                    let active = s.mask_bits(group.lanes.active);
-                    let old = (0..LANES as u32)
-                        .filter(|&i| active >> i & 1 != 0 && group.since[i as usize] + most < round)
-                        .fold(0, |bits, i| bits | 1 << i);
-                    let mut slot = [0; LANES];
-                    s.store_u(group.lanes.words[word::SLOT], &mut slot);
-                    for lane in (0..LANES).filter(|i| old >> i & 1 != 0) {
-                        self.flood(slot[lane]);
-                    }
-                    group.lanes.active = s.mask(active & !old);
-                    group.held &= !old;
+                    self.give_up(s, group, round);
                 }
             }
         }

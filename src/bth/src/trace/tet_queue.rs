@@ -1,6 +1,6 @@
 //! Rays made ready to walk, in wait for lanes that are free.
 
-use super::tet_lanes::{Doubt, Lanes, float, side, three, word};
+use super::tet_lanes::{Extent, Lanes, cross, float, three, word};
 use crate::layout::TetFace;
 use crate::simd::{LANES, Simd};
 
@@ -139,7 +139,7 @@ pub(super) struct Ready<S: Simd> {
 impl<S: Simd> Ready<S> {
     /// Prepares the rays `slot` of the batch, to the projection of their faces.
     #[inline(always)]
-    pub(super) fn new(s: S, m: S::M, rays: &[f32], vertices: &[f32], slot: S::U, face: [S::U; 3]) -> Self {
+    pub(super) fn new(s: S, m: S::M, rays: &[f32], vertices: &[[f32; 4]], slot: S::U, face: [S::U; 3]) -> Self {
         let row = s.shl_u::<RAY_WORDS>(slot);
         let o = three!(|k| column(s, m, rays, row, k));
         let tmin = column(s, m, rays, row, 3);
@@ -175,14 +175,17 @@ impl<S: Simd> Ready<S> {
         lanes.words[word::SLOT] = slot;
         let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
         lanes.floats[float::LIMIT] = s.add(high, spare(s, high));
-        let mut reach = Lanes::least_reach(s);
+        let mut extent = Extent::least(s);
         for (i, vertex) in face.into_iter().enumerate() {
-            let corner = lanes.project(s, m, vertices, vertex);
-            reach = Lanes::reach(s, reach, &corner);
+            let corner = lanes.project(s, lanes.gather(s, m, vertices, vertex));
+            extent = extent.with(s, &corner).0;
             lanes.words[word::FACE + i] = vertex;
-            lanes.set_corner(i, &corner);
+            lanes.floats[float::X + i] = corner.x;
+            lanes.floats[float::Y + i] = corner.y;
+            lanes.floats[float::DEPTH + i] = corner.depth;
         }
-        lanes.floats[float::REACH] = reach;
+        lanes.floats[float::REACH] = extent.reach;
+        lanes.floats[float::SIZE] = extent.size;
         Ready { lanes, tmin_low: s.sub(low, spare(s, low)), able }
     }
 
@@ -194,7 +197,7 @@ impl<S: Simd> Ready<S> {
         s: S,
         m: S::M,
         rays: &[f32],
-        vertices: &[f32],
+        vertices: &[[f32; 4]],
         faces: &[u32],
         slot: S::U,
         face: S::U,
@@ -207,17 +210,17 @@ impl<S: Simd> Ready<S> {
         let mut ready = Ready::new(s, m, rays, vertices, slot, vertex);
         let lanes = &mut ready.lanes;
         let corner = three!(|i| lanes.corner(i));
+        let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
+        let bound = extent.bound(s, extent.size);
+        let minus = s.sub(s.splat(0.0), bound);
         let (mut up, mut down) = (ready.able, ready.able);
-        let (mut bounds, mut area, mut volume) = (s.splat(0.0), s.splat(0.0), s.splat(0.0));
+        let (mut area, mut volume) = (s.splat(0.0), s.splat(0.0));
         for i in 0..3 {
-            let (p, q, opposite) = (&corner[i], &corner[(i + 1) % 3], &corner[(i + 2) % 3]);
-            let bound = Doubt::new(s, p, lanes.floats[float::REACH]).bound(s, q.size);
-            let (positive, negative, value) = side(s, p, q, bound);
-            (up, down) = (s.and(up, positive), s.and(down, negative));
+            let value = cross(s, &corner[i], &corner[(i + 1) % 3]);
+            (up, down) = (s.and(up, s.lt(bound, value)), s.and(down, s.lt(value, minus)));
             let weight = s.abs(value);
-            bounds = s.add(bounds, bound);
             area = s.add(area, weight);
-            volume = s.fma(weight, opposite.depth, volume);
+            volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
         }
         // volume / area is the depth of the crossing; both are off by their bounds and roundings.
         let low = ready.tmin_low;
@@ -225,7 +228,7 @@ impl<S: Simd> Ready<S> {
         for p in &corner {
             farthest = s.max(s.abs(p.depth), farthest);
         }
-        let doubt = s.fma(area, s.splat(SPARE), s.add(bounds, bounds));
+        let doubt = s.fma(area, s.splat(SPARE), s.mul(bound, s.splat(6.0)));
         let behind = s.lt(s.fma(doubt, farthest, s.add(volume, s.splat(LEAST_VOLUME))), s.mul(low, area));
         let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
         let able = s.and(s.or(up, down), s.and(behind, near));
@@ -237,7 +240,7 @@ impl<S: Simd> Ready<S> {
         let [_, v1, v2] = vertex;
         lanes.words[word::FACE + 1] = s.select_u(up, v1, v2);
         lanes.words[word::FACE + 2] = s.select_u(up, v2, v1);
-        for k in [float::X, float::Y, float::DEPTH, float::SIZE] {
+        for k in [float::X, float::Y, float::DEPTH] {
             let (p1, p2) = (lanes.floats[k + 1], lanes.floats[k + 2]);
             lanes.floats[k + 1] = s.select(up, p1, p2);
             lanes.floats[k + 2] = s.select(up, p2, p1);

@@ -315,15 +315,22 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
+        let mut floats = [0.0; LANES];
+        let count = self.compress_f(bits, self.from_bits(a), &mut floats);
+        self.store_u(self.bits(self.load(&floats)), to);
+        count
+    }
+    #[inline(always)]
+    fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
         let low = (bits as u8).count_ones() as usize;
         // SAFETY: the first store fills to[..8]; the second begins after the lanes that count, at most eight.
         unsafe {
             let packed = [
-                _mm256_permutevar8x32_epi32(a[0], compression(bits as u8)),
-                _mm256_permutevar8x32_epi32(a[1], compression((bits >> 8) as u8)),
+                _mm256_permutevar8x32_ps(a[0], compression(bits as u8)),
+                _mm256_permutevar8x32_ps(a[1], compression((bits >> 8) as u8)),
             ];
-            _mm256_storeu_si256(to[..8].as_mut_ptr().cast(), packed[0]);
-            _mm256_storeu_si256(to[low..][..8].as_mut_ptr().cast(), packed[1]);
+            _mm256_storeu_ps(to[..8].as_mut_ptr(), packed[0]);
+            _mm256_storeu_ps(to[low..][..8].as_mut_ptr(), packed[1]);
         }
         (bits & 0xffff).count_ones() as usize
     }

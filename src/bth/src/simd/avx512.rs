@@ -280,6 +280,12 @@ impl Simd for Avx512 {
         (bits & 0xffff).count_ones() as usize
     }
     #[inline(always)]
+    fn compress_f(self, bits: u32, a: __m512, to: &mut [f32; LANES]) -> usize {
+        // SAFETY: as `compress`.
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), _mm512_maskz_compress_ps(bits as u16, a)) };
+        (bits & 0xffff).count_ones() as usize
+    }
+    #[inline(always)]
     fn compress_far_to_near(
         self,
         bits: u32,

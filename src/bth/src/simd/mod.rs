@@ -107,6 +107,8 @@ pub(crate) trait Simd: Copy {
     /// Stores the lanes whose bit is set, in order, from `to[0]`; what follows them in `to` is undefined.
     /// Returns how many.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
+    /// As [`Self::compress`].
+    fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
     /// As [`Self::compress`], the greatest key first; keys are compared, and stored, but for their four lowest
     /// bits. Negative keys may come in any order.
     fn compress_far_to_near(

@@ -43,9 +43,8 @@ fn expand<T: Copy>(a: [T; LANES], bits: u32, from: &[T; LANES]) -> [T; LANES] {
     out
 }
 
-/// [`Simd::compress`] in plain code.
 #[inline(always)]
-pub(super) fn compress(bits: u32, a: &U, to: &mut U) -> usize {
+fn compress<T: Copy>(bits: u32, a: &[T; LANES], to: &mut [T; LANES]) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
         to[count % LANES] = a[lane];
@@ -273,6 +272,10 @@ impl Simd for Scalar {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut U) -> usize {
+        compress(bits, &a, to)
+    }
+    #[inline(always)]
+    fn compress_f(self, bits: u32, a: F, to: &mut F) -> usize {
         compress(bits, &a, to)
     }
     #[inline(always)]

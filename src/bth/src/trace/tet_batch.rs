@@ -18,8 +18,6 @@ use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Simd};
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Groups of lanes that are walked in turn, so that one's gathers are under way while another computes.
-const GROUPS: usize = 3;
 /// Idle lanes of a group that are worth a refill.
 const WORTH_A_REFILL: u32 = 4;
 /// Hits that wait to be looked at in f64 together.
@@ -332,6 +330,34 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         }
     }
 
+    #[inline(always)]
+    fn refill<S: Simd>(&mut self, s: S, queue: &mut Queue, group: &mut Group<S>, clock: &mut Clock) {
+        let active = s.mask_bits(group.lanes.active);
+        let idle = LANES as u32 - active.count_ones();
+        if idle < WORTH_A_REFILL || !(clock.more || (active == 0 && group.held != 0)) {
+            return;
+        }
+        let stopped = group.held & !active;
+        if stopped != 0 {
+            self.take_stopped(s, &group.lanes, stopped);
+        }
+        group.held = active;
+        let mut idle = !active & 0xffff;
+        while idle != 0 {
+            if queue.len() == 0 {
+                self.fill(s, queue);
+            }
+            let taken = queue.pop(s, idle, &mut group.lanes);
+            idle &= !taken;
+            group.held |= taken;
+            group.since = s.select_u(s.mask(taken), s.splat_u(clock.round), group.since);
+            clock.more = taken != 0;
+            if !clock.more {
+                break;
+            }
+        }
+    }
+
     /// Stops walks that began two rounds ago, in each of which every lane made as many steps as there are tetrahedra.
     #[inline(always)]
     fn give_up<S: Simd>(&mut self, s: S, group: &mut Group<S>, round: u32) {
@@ -350,16 +376,15 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     /// Hands over the lanes of a group that have stopped.
     #[inline(always)]
     fn take_stopped<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, mut stopped: u32) {
-        let mut words = [[0; LANES]; word::AXIS];
-        for (row, &lane) in words.iter_mut().zip(&lanes.words) {
-            s.store_u(lane, row);
+        let (mut words, mut slot, mut depth) = ([[0; LANES]; word::AXIS], [0; LANES], [[0.0; LANES]; 3]);
+        macro_rules! store {
+            ($($i:literal)*) => { $(s.store_u(lanes.words[$i], &mut words[$i]);)* };
         }
-        let mut slot = [0; LANES];
+        store!(0 1 2 3 4 5);
         s.store_u(lanes.words[word::SLOT], &mut slot);
-        let mut depth = [[0.0; LANES]; 3];
-        for (i, row) in depth.iter_mut().enumerate() {
-            s.store(lanes.floats[float::DEPTH + i], row);
-        }
+        s.store(lanes.floats[float::DEPTH], &mut depth[0]);
+        s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
+        s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
         while stopped != 0 {
             let lane = stopped.trailing_zeros() as usize % LANES;
             stopped &= stopped - 1;
@@ -405,64 +430,39 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
         let vertices = vertices(self.object);
         let mut queue = Queue::new();
         let idle = Group { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
-        let mut groups = [idle; GROUPS];
+        let (mut a, mut b, mut c) = (idle, idle, idle);
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
         let most = self.records.len();
-        let (mut round, mut steps) = (0, 0);
-        let mut more = true;
+        let mut clock = Clock { round: 0, more: true };
+        let mut steps = 0;
         loop {
-            let mut any = 0;
-            for group in &mut groups {
-                let active = s.mask_bits(group.lanes.active);
-                let idle = LANES as u32 - active.count_ones();
-                if idle >= WORTH_A_REFILL && (more || (active == 0 && group.held != 0)) {
-                    let stopped = group.held & !active;
-                    if stopped != 0 {
-                        self.take_stopped(s, &group.lanes, stopped);
-                    }
-                    group.held = active;
-                    let mut idle = !active & 0xffff;
-                    while idle != 0 {
-                        if queue.len() == 0 {
-                            self.fill(s, &mut queue);
-                        }
-                        let taken = queue.pop(s, idle, &mut group.lanes);
-                        idle &= !taken;
-                        group.held |= taken;
-                        group.since = s.select_u(s.mask(taken), s.splat_u(round), group.since);
-                        more = taken != 0;
-                        if !more {
-                            break;
-                        }
-                    }
-                }
-                any |= group.held;
-            }
-            if any == 0 {
+            self.refill(s, &mut queue, &mut a, &mut clock);
+            self.refill(s, &mut queue, &mut b, &mut clock);
+            self.refill(s, &mut queue, &mut c, &mut clock);
+            if a.held | b.held | c.held == 0 {
                 return;
             }
-            for group in &mut groups {
-                if s.mask_bits(group.lanes.active) != 0 {
-                    group.lanes.fetch::<R>(s, &mut group.step, words, vertices);
-                }
-            }
-            for group in &mut groups {
-                if s.mask_bits(group.lanes.active) != 0 {
-                    group.lanes.choose(s, &mut group.step);
-                }
-            }
-            for group in &mut groups {
-                if s.mask_bits(group.lanes.active) != 0 {
-                    group.lanes.follow::<R>(s, &group.step, words);
-                }
-            }
+            a.lanes.fetch::<R>(s, &mut a.step, words, vertices);
+            b.lanes.fetch::<R>(s, &mut b.step, words, vertices);
+            c.lanes.fetch::<R>(s, &mut c.step, words, vertices);
+            a.lanes.choose(s, &mut a.step);
+            b.lanes.choose(s, &mut b.step);
+            c.lanes.choose(s, &mut c.step);
+            a.lanes.follow::<R>(s, &a.step, words);
+            b.lanes.follow::<R>(s, &b.step, words);
+            c.lanes.follow::<R>(s, &c.step, words);
             steps += 1;
             if steps == most {
-                (round, steps) = (round + 1, 0);
-                for group in &mut groups {
-                    self.give_up(s, group, round);
-                }
+                (clock.round, steps) = (clock.round + 1, 0);
+                self.give_up(s, &mut a, clock.round);
+                self.give_up(s, &mut b, clock.round);
+                self.give_up(s, &mut c, clock.round);
             }
         }
     }
+}
+
+struct Clock {
+    round: u32,
+    more: bool,
 }

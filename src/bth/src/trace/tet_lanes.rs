@@ -138,11 +138,7 @@ impl<S: Simd> Lanes<S> {
     /// No walk at all.
     #[inline(always)]
     pub(super) fn idle(s: S) -> Self {
-        Lanes {
-            words: [s.splat_u(0); word::COUNT],
-            floats: [s.splat(0.0); float::COUNT],
-            active: s.mask(0),
-        }
+        Lanes { words: [s.splat_u(0); word::COUNT], floats: [s.splat(0.0); float::COUNT], active: s.mask(0) }
     }
 
     #[inline(always)]
@@ -201,7 +197,13 @@ impl<S: Simd> Lanes<S> {
 
     /// First part of a step, which takes every active walk one tetrahedron on: fetches the fourth vertex.
     #[inline(always)]
-    pub(super) fn fetch<R: LaneRecord>(&self, s: S, step: &mut Step<S>, words: &[R::Word], vertices: &[[f32; 4]]) {
+    pub(super) fn fetch<R: LaneRecord>(
+        &self,
+        s: S,
+        step: &mut Step<S>,
+        words: &[R::Word],
+        vertices: &[[f32; 4]],
+    ) {
         step.apex = R::apex_lanes(s, words, self.active, &self.entered());
         step.position = self.gather(s, self.active, vertices, step.apex);
     }

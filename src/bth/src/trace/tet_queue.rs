@@ -68,14 +68,13 @@ impl Queue {
     /// Adds the lanes whose bit is set.
     #[inline(always)]
     pub(super) fn push<S: Simd>(&mut self, s: S, bits: u32, lanes: &Lanes<S>) {
-        for (row, &lane) in self.words.iter_mut().zip(&lanes.words) {
-            s.compress(bits, lane, sixteen_mut(row, self.end));
+        macro_rules! push {
+            ($values:ident $compress:ident $($i:literal)*) => { $(
+                s.$compress(bits, lanes.$values[$i], sixteen_mut(&mut self.$values[$i], self.end));
+            )* };
         }
-        for (row, &lane) in self.floats.iter_mut().zip(&lanes.floats) {
-            let mut packed = [0; LANES];
-            s.compress(bits, s.bits(lane), &mut packed);
-            s.store(s.from_bits(s.load_u(&packed)), sixteen_mut(row, self.end));
-        }
+        push!(words compress 0 1 2 3 4 5 6 7 8 9 10);
+        push!(floats compress_f 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
         self.end += bits.count_ones() as usize;
     }
 
@@ -87,12 +86,14 @@ impl Queue {
             taken &= taken - 1;
         }
         let m = s.mask(taken);
-        for (row, lane) in self.words.iter().zip(&mut lanes.words) {
-            *lane = s.expand_u(*lane, m, sixteen(row, self.first));
+        // Written out, so that the lanes can stay in registers.
+        macro_rules! pop {
+            ($values:ident $expand:ident $($i:literal)*) => { $(
+                lanes.$values[$i] = s.$expand(lanes.$values[$i], m, sixteen(&self.$values[$i], self.first));
+            )* };
         }
-        for (row, lane) in self.floats.iter().zip(&mut lanes.floats) {
-            *lane = s.expand(*lane, m, sixteen(row, self.first));
-        }
+        pop!(words expand_u 0 1 2 3 4 5 6 7 8 9 10);
+        pop!(floats expand 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
         lanes.active = s.or(lanes.active, m);
         self.first += taken.count_ones() as usize;
         taken
@@ -139,7 +140,14 @@ pub(super) struct Ready<S: Simd> {
 impl<S: Simd> Ready<S> {
     /// Prepares the rays `slot` of the batch, to the projection of their faces.
     #[inline(always)]
-    pub(super) fn new(s: S, m: S::M, rays: &[f32], vertices: &[[f32; 4]], slot: S::U, face: [S::U; 3]) -> Self {
+    pub(super) fn new(
+        s: S,
+        m: S::M,
+        rays: &[f32],
+        vertices: &[[f32; 4]],
+        slot: S::U,
+        face: [S::U; 3],
+    ) -> Self {
         let row = s.shl_u::<RAY_WORDS>(slot);
         let o = three!(|k| column(s, m, rays, row, k));
         let tmin = column(s, m, rays, row, 3);

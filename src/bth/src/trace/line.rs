@@ -200,6 +200,11 @@ impl Line {
         (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]))
     }
 
+    /// Whether the corners of a triangle that the line crosses for certain go around it clockwise.
+    pub(crate) fn turns_clockwise([a, b, c]: [&Projected; 3]) -> bool {
+        cross(b, c) + cross(c, a) + cross(a, b) < 0.0
+    }
+
     /// A t before which the line does not cross a triangle that it certainly crosses, with coordinates of this error.
     pub(crate) fn t_before(&self, [a, b, c]: [&Projected; 3], error: f64) -> f64 {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];

@@ -109,6 +109,8 @@ impl<S: Simd> EnteredLanes<S> {
 
 /// [`Record`] for sixteen at a time: the same answers by gathers from the records as plain words.
 pub(crate) trait LaneRecord: Record + IntoBytes + zerocopy::Immutable {
+    /// Whether [`EnteredLanes::behind`] is of use.
+    const KNOWS_BEHIND: bool;
     /// What gathers read, a whole number a record.
     type Word: FromBytes + zerocopy::Immutable + Copy;
 
@@ -136,6 +138,7 @@ fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor
 }
 
 impl LaneRecord for Link32 {
+    const KNOWS_BEHIND: bool = false;
     type Word = [u32; 2];
     #[inline(always)]
     fn apex_lanes<S: Simd>(_s: S, _words: &[[u32; 2]], _m: S::M, at: &EnteredLanes<S>) -> S::U {
@@ -154,6 +157,7 @@ impl LaneRecord for Link32 {
 }
 
 impl LaneRecord for Tet32 {
+    const KNOWS_BEHIND: bool = false;
     type Word = u32;
     #[inline(always)]
     fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
@@ -167,6 +171,7 @@ impl LaneRecord for Tet32 {
 }
 
 impl LaneRecord for Tet20 {
+    const KNOWS_BEHIND: bool = false;
     type Word = u32;
     #[inline(always)]
     fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
@@ -180,6 +185,7 @@ impl LaneRecord for Tet20 {
 }
 
 impl LaneRecord for Tet16 {
+    const KNOWS_BEHIND: bool = true;
     type Word = u32;
     #[inline(always)]
     fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {

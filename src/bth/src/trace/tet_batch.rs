@@ -8,7 +8,7 @@
 use super::line::Line;
 use super::query::Query;
 use super::records::{Entered, LaneRecord};
-use super::tet_lanes::{Lanes, Step, float, three, word};
+use super::tet_lanes::{DOUBT, Lanes, Step, float, three, word};
 use super::tet_queue::{Queue, Ready};
 use super::tet_walk::{Outcome, Place, TetSpace};
 use super::{leaf_of_face, space};
@@ -50,8 +50,6 @@ struct Start {
 struct Reached {
     slot: u32,
     face: u32,
-    /// The tetrahedron before it.
-    from: u32,
 }
 
 /// The batch: rays, where they begin, and what is known of them.
@@ -159,7 +157,7 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         let mut place = Place { tet: start.tet, entered, corner: entered.face.map(|v| space.project(v)) };
         let Some(link) = space.exit(&mut place) else { return self.flood(slot) };
         if link.next != NONE && link.next & FACE_BIT != 0 {
-            let reached = Reached { slot, face: link.next & !FACE_BIT, from: place.tet };
+            let reached = Reached { slot, face: link.next & !FACE_BIT };
             return self.reached.push(reached);
         }
         match space.beyond(place.tet, link, place.entered.face) {
@@ -172,21 +170,22 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     }
 
     /// Looks in f64 at a constrained face that a ray certainly crosses.
-    fn look(&mut self, Reached { slot, face, from }: Reached) {
+    fn look(&mut self, Reached { slot, face }: Reached) {
         let line = self.line(slot);
         let space = self.space(slot, &line);
         let row: &TetFace = &self.object.tet_faces[face as usize];
         let mut query = self.queries[slot as usize];
         let done = space.offer(row, &mut query);
         // Another face is as near within rounding only if the line leaves the next tetrahedron at once.
-        let side = usize::from(row.tet[0] == from);
-        let [a, b, c] = row.vertex;
-        let entered = Entered {
-            face: if side == 0 { [a, b, c] } else { [a, c, b] },
-            apex: row.opposite[side],
-            behind: face | FACE_BIT,
-        };
-        let place = Place { tet: row.tet[side], entered, corner: entered.face.map(|v| space.project(v)) };
+        let mut vertex = row.vertex;
+        let mut corner = vertex.map(|v| space.project(v));
+        let side = usize::from(Line::turns_clockwise(corner.each_ref()));
+        if side == 1 {
+            vertex.swap(1, 2);
+            corner.swap(1, 2);
+        }
+        let entered = Entered { face: vertex, apex: row.opposite[side], behind: face | FACE_BIT };
+        let place = Place { tet: row.tet[side], entered, corner };
         let left = !done && {
             let mut exit = place;
             space.exit(&mut exit).is_some()
@@ -213,12 +212,12 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     /// Takes a lane that has stopped.
     #[inline]
     fn stopped(&mut self, start: Start, depth: [f32; 3]) {
-        let Start { slot, tet, entered } = start;
-        if tet & FACE_BIT == 0 {
-            return self.in_doubt(start);
-        }
+        let Start { slot, tet, .. } = start;
         if tet == NONE {
             return self.finish(slot, Outcome::Left);
+        }
+        if tet & DOUBT == DOUBT {
+            return self.in_doubt(Start { tet: tet & !DOUBT, ..start });
         }
         let [a, b, c] = depth;
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
@@ -229,7 +228,7 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         if self.queries[slot as usize].settled_by((low / f64::from(per_t), high / f64::from(per_t))) {
             return self.finish(slot, Outcome::Done);
         }
-        self.reached.push(Reached { slot, face: tet & !FACE_BIT, from: entered.behind });
+        self.reached.push(Reached { slot, face: tet & !FACE_BIT });
     }
 
     /// Gets sixteen rays ready, if there are as many.
@@ -332,7 +331,7 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
 
     #[inline(always)]
     fn refill<S: Simd>(&mut self, s: S, queue: &mut Queue, group: &mut Group<S>, clock: &mut Clock) {
-        let active = s.mask_bits(group.lanes.active);
+        let active = s.mask_bits(group.lanes.active(s));
         let idle = LANES as u32 - active.count_ones();
         if idle < WORTH_A_REFILL || !(clock.more || (active == 0 && group.held != 0)) {
             return;
@@ -361,11 +360,12 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     /// Stops walks that began two rounds ago, in each of which every lane made as many steps as there are tetrahedra.
     #[inline(always)]
     fn give_up<S: Simd>(&mut self, s: S, group: &mut Group<S>, round: u32) {
-        let old = s.and(group.lanes.active, s.lt_u(group.since, s.splat_u(round.saturating_sub(1))));
+        let old = s.and(group.lanes.active(s), s.lt_u(group.since, s.splat_u(round.saturating_sub(1))));
         let mut bits = s.mask_bits(old);
         let mut slot = [0; LANES];
         s.store_u(group.lanes.words[word::SLOT], &mut slot);
-        group.lanes.active = s.and_not(group.lanes.active, old);
+        let tet = &mut group.lanes.words[word::TET];
+        *tet = s.select_u(old, s.splat_u(NONE), *tet);
         group.held &= !bits;
         while bits != 0 {
             self.flood(slot[bits.trailing_zeros() as usize % LANES]);

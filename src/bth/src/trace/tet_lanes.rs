@@ -46,9 +46,13 @@ macro_rules! three {
 }
 pub(super) use three;
 
+/// Added to the tetrahedron of a lane that is in doubt; with [`FACE_BIT`] it makes a lane stop.
+pub(super) const DOUBT: u32 = FACE_BIT | 1 << 30;
+
 /// Names of the u32 of a lane.
 pub(super) mod word {
-    /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link.
+    /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link, or
+    /// the tetrahedron and [`super::DOUBT`].
     pub(crate) const TET: usize = 0;
     /// The vertex that the link hither named.
     pub(crate) const APEX: usize = 1;
@@ -88,8 +92,6 @@ pub(super) mod float {
 pub(super) struct Lanes<S: Simd> {
     pub(super) words: [S::U; word::COUNT],
     pub(super) floats: [S::F; float::COUNT],
-    /// Walks under way.
-    pub(super) active: S::M,
 }
 
 /// Points as seen along the rays of the lanes.
@@ -138,7 +140,15 @@ impl<S: Simd> Lanes<S> {
     /// No walk at all.
     #[inline(always)]
     pub(super) fn idle(s: S) -> Self {
-        Lanes { words: [s.splat_u(0); word::COUNT], floats: [s.splat(0.0); float::COUNT], active: s.mask(0) }
+        let mut lanes = Lanes { words: [s.splat_u(0); word::COUNT], floats: [s.splat(0.0); float::COUNT] };
+        lanes.words[word::TET] = s.splat_u(NONE);
+        lanes
+    }
+
+    /// Walks under way.
+    #[inline(always)]
+    pub(super) fn active(&self, s: S) -> S::M {
+        s.lt_u(self.words[word::TET], s.splat_u(FACE_BIT))
     }
 
     #[inline(always)]
@@ -204,8 +214,9 @@ impl<S: Simd> Lanes<S> {
         words: &[R::Word],
         vertices: &[[f32; 4]],
     ) {
-        step.apex = R::apex_lanes(s, words, self.active, &self.entered());
-        step.position = self.gather(s, self.active, vertices, step.apex);
+        let active = self.active(s);
+        step.apex = R::apex_lanes(s, words, active, &self.entered());
+        step.position = self.gather(s, active, vertices, step.apex);
     }
 
     /// Second part: finds the face through which the line leaves.
@@ -219,10 +230,11 @@ impl<S: Simd> Lanes<S> {
         let side = three!(|i| cross(s, &apex, &self.corner(i)));
         let positive = three!(|i| s.lt(bound, side[i]));
         let negative = three!(|i| s.lt(side[i], minus));
+        let active = self.active(s);
         let out = [
-            s.and(self.active, s.and(positive[1], negative[2])),
-            s.and(self.active, s.and(positive[2], negative[0])),
-            s.and(self.active, s.and(positive[0], negative[1])),
+            s.and(active, s.and(positive[1], negative[2])),
+            s.and(active, s.and(positive[2], negative[0])),
+            s.and(active, s.and(positive[0], negative[1])),
         ];
         step.go = s.or(out[0], s.or(out[1], out[2]));
         step.face = three!(|i| self.words[word::FACE + i]);
@@ -249,11 +261,13 @@ impl<S: Simd> Lanes<S> {
         let (next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
         let f = &self.floats;
         let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
-        let past = s.and(step.go, s.lt(f[float::LIMIT], nearest));
+        let past = s.lt(f[float::LIMIT], nearest);
         let next = s.select_u(past, s.splat_u(NONE), next);
-        self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
-        self.words[word::TET] = s.select_u(step.go, next, tet);
+        if R::KNOWS_BEHIND {
+            self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
+        }
+        let next = s.select_u(step.go, next, s.or_u(tet, s.splat_u(DOUBT)));
+        self.words[word::TET] = s.select_u(self.active(s), next, tet);
         self.words[word::APEX] = s.select_u(step.go, opposite, self.words[word::APEX]);
-        self.active = s.and(step.go, s.lt_u(next, s.splat_u(FACE_BIT)));
     }
 }

@@ -94,7 +94,6 @@ impl Queue {
         }
         pop!(words expand_u 0 1 2 3 4 5 6 7 8 9 10);
         pop!(floats expand 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
-        lanes.active = s.or(lanes.active, m);
         self.first += taken.count_ones() as usize;
         taken
     }

@@ -156,8 +156,10 @@ impl Scene {
         }
         hits.fill(Hit::MISS);
         trace::with_scratch(|scratch| {
-            if from.is_none() && self.object_count() == 1 && rays.len() >= trace::FEW {
-                return trace::nearest_batch(self.view(0), rays, 0, scratch, hits);
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::nearest_batch(object, rays, from.as_deref(), 0, scratch, hits);
             }
             for instance in 0..self.object_count() {
                 let object = self.view(instance);
@@ -184,8 +186,10 @@ impl Scene {
         }
         found.fill(false);
         trace::with_scratch(|scratch| {
-            if from.is_none() && self.object_count() == 1 && rays.len() >= trace::FEW {
-                return trace::any_batch(self.view(0), rays, scratch, found);
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::any_batch(object, rays, from.as_deref(), scratch, found);
             }
             for instance in 0..self.object_count() {
                 let object = self.view(instance);
@@ -204,6 +208,11 @@ fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
 
 fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
     from.map_or(Surface::NONE, |f| f[ray])
+}
+
+/// The triangles of the only object that rays start on, if that is of use.
+fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>) -> Option<Vec<u32>> {
+    from.filter(|_| !object.tet_leaves.is_empty()).map(|from| from.iter().map(|&f| hint(f, 0)).collect())
 }
 
 /// The triangle of an object that a ray starts on, or `NONE`.

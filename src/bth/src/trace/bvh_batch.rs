@@ -77,6 +77,15 @@ pub(crate) struct Waiting<'a, Q> {
     pub(crate) order: Option<&'a [u32]>,
     /// Queries of all rays of the batch, if they have been asked elsewhere already.
     pub(crate) queries: Option<&'a [Q]>,
+    /// Per ray of the batch the tet leaf that it has walked already, or `NONE`.
+    pub(crate) walked: Option<&'a [u32]>,
+}
+
+impl<Q> Waiting<'_, Q> {
+    /// All rays of a batch, that have been nowhere yet.
+    pub(crate) fn all() -> Self {
+        Waiting { order: None, queries: None, walked: None }
+    }
 }
 
 /// A batch on its way.
@@ -158,7 +167,13 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                     Some(Child::Raw(line)) => {
                         slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
                     }
-                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, self.stacks, &mut tets),
+                    Some(Child::Tets(row)) => {
+                        if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
+                            Found::Nothing
+                        } else {
+                            enter_tets(self.object, row, ray, slot, self.stacks, &mut tets)
+                        }
+                    }
                     _ => Found::Nothing,
                 };
                 let below = slot.top.below();

@@ -11,10 +11,13 @@ pub(crate) trait Query: Copy {
     fn new(ray: &Ray) -> Self;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
+    /// range if they do not; true if that is all the query wants to know.
+    fn settled_by(&mut self, _t: (f64, f64)) -> bool {
+        false
+    }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
-    /// t of the nearest hit so far, if the query wants the nearest.
-    fn found(&self) -> Option<f64>;
     /// A triangle is certainly hit within the ray's range; of use where any hit will do.
     fn accept(&mut self);
 }
@@ -75,9 +78,6 @@ impl Query for Nearest {
     fn limit(&self) -> f64 {
         widened(self.best.t)
     }
-    fn found(&self) -> Option<f64> {
-        (self.triangle != NONE).then_some(self.best.t)
-    }
     fn accept(&mut self) {}
 }
 
@@ -99,12 +99,13 @@ impl Query for Any {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);
         self.found
     }
+    fn settled_by(&mut self, t: (f64, f64)) -> bool {
+        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
+        self.found
+    }
     #[inline(always)]
     fn limit(&self) -> f64 {
         widened(f64::from(self.tmax))
-    }
-    fn found(&self) -> Option<f64> {
-        None
     }
     fn accept(&mut self) {
         self.found = true;

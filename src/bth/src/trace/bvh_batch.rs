@@ -283,8 +283,7 @@ fn enter_tets<Q: Query>(
         return Found::Again;
     }
     let done = tets(row, ray, slot.flight.query());
-    slot.flight.take_over();
-    if done { Found::Enough } else { Found::Nearer }
+    if done { Found::Enough } else { slot.flight.settled(Found::Nothing) }
 }
 
 /// Asks for the lines of a node or of an indexed leaf.

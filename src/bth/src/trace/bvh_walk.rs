@@ -59,8 +59,7 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 }
                 count.leaf();
                 let outcome = tets(row, flight.query(), count);
-                flight.take_over();
-                if outcome == TetOutcome::Done { Found::Enough } else { Found::Nearer }
+                if outcome == TetOutcome::Done { Found::Enough } else { flight.settled(Found::Nothing) }
             }
             Some(Child::Tets(_)) | None => Found::Nothing,
         };

@@ -148,9 +148,19 @@ impl<Q: Query> Flight<Q> {
                 return Found::Enough;
             }
         }
+        self.settled(Found::Nothing)
+    }
+
+    /// Takes over what the query has found, and says what that means.
+    #[inline(always)]
+    pub(crate) fn settled(&mut self, otherwise: Found) -> Found {
+        // Any hit ends the query; until then nothing changes. (And the stack has no keys.)
+        if Q::ANY {
+            return otherwise;
+        }
         let limit = self.limit;
         self.take_over();
-        if self.limit < limit { Found::Nearer } else { Found::Nothing }
+        if self.limit < limit { Found::Nearer } else { otherwise }
     }
 }
 

@@ -85,7 +85,7 @@ impl Kernel for Everything<'_> {
             f(s.expand(a, mask, self.b)),
             u(s.load_bytes(&bytes)),
             u(s.add_u(x, y)),
-            u(s.increment(x, mask)),
+            u(s.add_where(x, mask, y)),
             u(s.and_u(x, y)),
             u(s.or_u(x, y)),
             u(s.xor_u(x, y)),

@@ -6,6 +6,9 @@ use crate::rays::{Hit, Ray, Surface};
 
 /// A query in progress over one ray.
 pub(crate) trait Query {
+    /// Whether walks should keep an eye on how far they are: where rays are often short, and where
+    /// [`Self::settled_by`] has a use for it.
+    const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
     /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
@@ -89,6 +92,7 @@ impl Any {
 }
 
 impl Query for Any {
+    const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
     fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);

@@ -152,9 +152,7 @@ impl Simd for Avx2 {
         le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
         select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));
         add_u(a: U, b: U) -> U = _mm256_add_epi32(a, b);
-        sub_u(a: U, b: U) -> U = _mm256_sub_epi32(a, b);
-        // The mask is -1 where it is set.
-        increment(a: U, m: M) -> U = _mm256_sub_epi32(a, m);
+        add_where(a: U, m: M, b: U) -> U = _mm256_add_epi32(a, _mm256_and_si256(m, b));
         and_u(a: U, b: U) -> U = _mm256_and_si256(a, b);
         or_u(a: U, b: U) -> U = _mm256_or_si256(a, b);
         xor_u(a: U, b: U) -> U = _mm256_xor_si256(a, b);

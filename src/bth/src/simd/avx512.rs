@@ -159,8 +159,7 @@ impl Simd for Avx512 {
         least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
         splat_u(x: u32) -> __m512i = _mm512_set1_epi32(x as i32);
         add_u(a: __m512i, b: __m512i) -> __m512i = _mm512_add_epi32(a, b);
-        sub_u(a: __m512i, b: __m512i) -> __m512i = _mm512_sub_epi32(a, b);
-        increment(a: __m512i, m: u16) -> __m512i = _mm512_mask_add_epi32(a, m, a, _mm512_set1_epi32(1));
+        add_where(a: __m512i, m: u16, b: __m512i) -> __m512i = _mm512_mask_add_epi32(a, m, a, b);
         and_u(a: __m512i, b: __m512i) -> __m512i = _mm512_and_si512(a, b);
         or_u(a: __m512i, b: __m512i) -> __m512i = _mm512_or_si512(a, b);
         xor_u(a: __m512i, b: __m512i) -> __m512i = _mm512_xor_si512(a, b);

@@ -77,9 +77,8 @@ pub(crate) trait Simd: Copy {
     fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn sub_u(self, a: Self::U, b: Self::U) -> Self::U;
-    /// a + 1 where the mask is set, else `a`.
-    fn increment(self, a: Self::U, m: Self::M) -> Self::U;
+    /// a + b where the mask is set, else `a`.
+    fn add_where(self, a: Self::U, m: Self::M, b: Self::U) -> Self::U;
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;

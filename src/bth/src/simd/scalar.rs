@@ -200,12 +200,8 @@ impl Simd for Scalar {
         from_fn(|i| a[i].wrapping_add(b[i]))
     }
     #[inline(always)]
-    fn sub_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i].wrapping_sub(b[i]))
-    }
-    #[inline(always)]
-    fn increment(self, a: U, m: u32) -> U {
-        from_fn(|i| a[i].wrapping_add(m >> i & 1))
+    fn add_where(self, a: U, m: u32, b: U) -> U {
+        from_fn(|i| if set(m, i) { a[i].wrapping_add(b[i]) } else { a[i] })
     }
     #[inline(always)]
     fn and_u(self, a: U, b: U) -> U {

@@ -104,7 +104,9 @@ fn walk_tets<R: LaneRecord, Q: Query>(
     walks: &mut [Walk],
 ) {
     if tet_batch::Batch::<R, Q>::fits(object, records) && faces.iter().any(|&face| face != NONE) {
-        Isa::chosen().run(&mut tet_batch::Batch::new(object, records, rays, faces, queries, walks));
+        let mut batch = tet_batch::Batch::new(object, records, rays, faces, queries, walks);
+        // Without vectors the BVH is faster, and a hint of no use to it.
+        let _ = Isa::chosen().run_wide(&mut batch);
     }
 }
 

@@ -9,6 +9,9 @@ pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
     fn new(ray: &Ray) -> Self;
+    /// Whether walks should keep an eye on how far they are: where rays are often short, and where
+    /// [`Self::settled_by`] has a use for it.
+    const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
     /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
@@ -94,6 +97,7 @@ impl Query for Any {
     fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
+    const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
     fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);

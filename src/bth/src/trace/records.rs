@@ -93,6 +93,8 @@ pub(crate) struct EnteredLanes<S: Simd> {
     pub(crate) face: [S::U; 3],
     pub(crate) apex: S::U,
     pub(crate) behind: S::U,
+    /// 1 in every lane: not a constant, since compilers make more of adding that where a mask is set than it is.
+    pub(crate) one: S::U,
 }
 
 impl<S: Simd> EnteredLanes<S> {
@@ -101,7 +103,7 @@ impl<S: Simd> EnteredLanes<S> {
     fn rank(&self, s: S, vertex: S::U) -> S::U {
         let mut rank = s.splat_u(0);
         for v in [self.apex, self.face[0], self.face[1], self.face[2]] {
-            rank = s.increment(rank, s.lt_u(v, vertex));
+            rank = s.add_where(rank, s.lt_u(v, vertex), self.one);
         }
         rank
     }

@@ -19,7 +19,7 @@ use crate::simd::{Kernel, LANES, Simd};
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Idle lanes of a group that are worth a refill.
-const WORTH_A_REFILL: u32 = 4;
+const WORTH_A_REFILL: u32 = 6;
 /// Hits that wait to be looked at in f64 together.
 const PENDING: usize = 64;
 /// A ray that went back to the lanes so often is walked to its end in f64.
@@ -219,6 +219,9 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         if tet & DOUBT == DOUBT {
             return self.in_doubt(Start { tet: tet & !DOUBT, ..start });
         }
+        if !Q::KEEPS_DEPTHS {
+            return self.reached.push(Reached { slot, face: tet & !FACE_BIT });
+        }
         let [a, b, c] = depth;
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
         let per_t = self.rays[slot as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));
@@ -382,9 +385,11 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         }
         store!(0 1 2 3 4 5);
         s.store_u(lanes.words[word::SLOT], &mut slot);
-        s.store(lanes.floats[float::DEPTH], &mut depth[0]);
-        s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
-        s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
+        if Q::KEEPS_DEPTHS {
+            s.store(lanes.floats[float::DEPTH], &mut depth[0]);
+            s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
+            s.store(lanes.floats[float::DEPTH + 2], &mut depth[2]);
+        }
         while stopped != 0 {
             let lane = stopped.trailing_zeros() as usize % LANES;
             stopped &= stopped - 1;
@@ -435,6 +440,7 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
         let most = self.records.len();
         let mut clock = Clock { round: 0, more: true };
         let mut steps = 0;
+        let one = s.splat_u(std::hint::black_box(1));
         loop {
             self.refill(s, &mut queue, &mut a, &mut clock);
             self.refill(s, &mut queue, &mut b, &mut clock);
@@ -442,15 +448,20 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
             if a.held | b.held | c.held == 0 {
                 return;
             }
-            a.lanes.fetch::<R>(s, &mut a.step, words, vertices);
-            b.lanes.fetch::<R>(s, &mut b.step, words, vertices);
-            c.lanes.fetch::<R>(s, &mut c.step, words, vertices);
-            a.lanes.choose(s, &mut a.step);
-            b.lanes.choose(s, &mut b.step);
-            c.lanes.choose(s, &mut c.step);
-            a.lanes.follow::<R>(s, &a.step, words);
-            b.lanes.follow::<R>(s, &b.step, words);
-            c.lanes.follow::<R>(s, &c.step, words);
+            a.lanes.fetch::<R>(s, one, &mut a.step, words, vertices);
+            b.lanes.fetch::<R>(s, one, &mut b.step, words, vertices);
+            c.lanes.fetch::<R>(s, one, &mut c.step, words, vertices);
+            macro_rules! onward {
+                ($depths:literal $($group:ident)*) => {
+                    $($group.lanes.choose::<$depths>(s, &mut $group.step);)*
+                    $($group.lanes.follow::<R, $depths>(s, one, &$group.step, words);)*
+                };
+            }
+            if Q::KEEPS_DEPTHS {
+                onward!(true a b c);
+            } else {
+                onward!(false a b c);
+            }
             steps += 1;
             if steps == most {
                 (clock.round, steps) = (clock.round + 1, 0);

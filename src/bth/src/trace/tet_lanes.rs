@@ -195,13 +195,14 @@ impl<S: Simd> Step<S> {
 
 impl<S: Simd> Lanes<S> {
     #[inline(always)]
-    fn entered(&self) -> EnteredLanes<S> {
+    fn entered(&self, one: S::U) -> EnteredLanes<S> {
         let w = &self.words;
         EnteredLanes {
             tet: w[word::TET],
             face: three!(|i| w[word::FACE + i]),
             apex: w[word::APEX],
             behind: w[word::BEHIND],
+            one,
         }
     }
 
@@ -210,18 +211,19 @@ impl<S: Simd> Lanes<S> {
     pub(super) fn fetch<R: LaneRecord>(
         &self,
         s: S,
+        one: S::U,
         step: &mut Step<S>,
         words: &[R::Word],
         vertices: &[[f32; 4]],
     ) {
         let active = self.active(s);
-        step.apex = R::apex_lanes(s, words, active, &self.entered());
+        step.apex = R::apex_lanes(s, words, active, &self.entered(one));
         step.position = self.gather(s, active, vertices, step.apex);
     }
 
-    /// Second part: finds the face through which the line leaves.
+    /// Second part: finds the face through which the line leaves. Depths are kept only if asked for.
     #[inline(always)]
-    pub(super) fn choose(&mut self, s: S, step: &mut Step<S>) {
+    pub(super) fn choose<const DEPTHS: bool>(&mut self, s: S, step: &mut Step<S>) {
         let apex = self.project(s, step.position);
         let extent = Extent { reach: self.floats[float::REACH], size: self.floats[float::SIZE] };
         let (extent, size) = extent.with(s, &apex);
@@ -244,25 +246,34 @@ impl<S: Simd> Lanes<S> {
         for (i, &out) in out.iter().enumerate() {
             let word = &mut self.words[word::FACE + i];
             *word = s.select_u(out, step.apex, *word);
-            for (name, value) in [(float::X, apex.x), (float::Y, apex.y), (float::DEPTH, apex.depth)] {
-                let float = &mut self.floats[name + i];
-                *float = s.select(out, value, *float);
+            let corner = self.corner(i);
+            self.floats[float::X + i] = s.select(out, apex.x, corner.x);
+            self.floats[float::Y + i] = s.select(out, apex.y, corner.y);
+            if DEPTHS {
+                self.floats[float::DEPTH + i] = s.select(out, apex.depth, corner.depth);
             }
         }
     }
 
-    /// Third part: goes through that face. Walks that come to a constrained face, leave the hull or pass their limit
-    /// stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
+    /// Third part: goes through that face. Walks that come to a constrained face, leave the hull or, if depths are kept,
+    /// pass their limit stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
     /// it was.
     #[inline(always)]
-    pub(super) fn follow<R: LaneRecord>(&mut self, s: S, step: &Step<S>, words: &[R::Word]) {
+    pub(super) fn follow<R: LaneRecord, const DEPTHS: bool>(
+        &mut self,
+        s: S,
+        one: S::U,
+        step: &Step<S>,
+        words: &[R::Word],
+    ) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
-        let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind };
-        let (next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
-        let f = &self.floats;
-        let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
-        let past = s.lt(f[float::LIMIT], nearest);
-        let next = s.select_u(past, s.splat_u(NONE), next);
+        let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
+        let (mut next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
+        if DEPTHS {
+            let f = &self.floats;
+            let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
+            next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
+        }
         if R::KNOWS_BEHIND {
             self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
         }

@@ -1,0 +1,19 @@
+//! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
+
+use bth_bench::args::{Arguments, Command};
+use bth_bench::{output, speed};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Speed(arguments) => speed::run(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::note(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -19,6 +19,11 @@ pub struct Arguments {
 pub enum Command {
     /// Rays per second of our structures and the rivals.
     Speed(Speed),
+    /// Opening a compiled file and tracing the first rays, against building at the start.
+    Load(Load),
+    /// One start in a process of its own; `load` calls this.
+    #[command(hide = true)]
+    Probe(Probe),
 }
 
 /// Which models, and from where they are seen.
@@ -93,6 +98,50 @@ pub struct Speed {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub output: Output,
+}
+
+/// `load`.
+#[derive(Debug, Args)]
+pub struct Load {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// First rays to trace.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Numbers of threads to build and trace on.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
+    pub threads: Vec<usize>,
+    /// Folder for the compiled files: its storage is what a cold start reads from.
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `probe`.
+#[derive(Debug, Args)]
+pub struct Probe {
+    /// How to start.
+    #[arg(long, value_enum)]
+    pub start: crate::load::probe::Start,
+    /// Numbers of threads to build and trace on.
+    #[arg(long)]
+    pub threads: usize,
+    /// Vector instructions of our kernels.
+    #[arg(long)]
+    pub isa: Option<String>,
+    /// Compiled file, or for a rival the triangles.
+    pub file: PathBuf,
+    /// The rays, the first of which hits.
+    pub rays: PathBuf,
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -46,8 +46,8 @@ const GAP: f64 = 26.0;
 const LEFT: f64 = 60.0;
 const PLOT_TOP: f64 = 54.0;
 const PLOT_HEIGHT: f64 = 280.0;
-/// Width of a letter of the legend, about.
-const LETTER: f64 = 6.6;
+/// Width of a letter, about.
+const LETTER: f64 = 6.8;
 
 /// The vertical axis.
 struct Axis {
@@ -117,7 +117,8 @@ impl BarChart {
     /// The picture. Every bar carries its value.
     pub fn svg(&self) -> String {
         let axis = Axis::of(self);
-        let group = self.series.len() as f64 * BAR;
+        let longest = self.groups.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        let group = (self.series.len() as f64 * BAR).max(longest as f64 * LETTER);
         let width = (LEFT + self.groups.len() as f64 * (group + GAP) + GAP).max(420.0);
         let legend = self.legend(width);
         let bottom = PLOT_TOP + PLOT_HEIGHT;
@@ -136,14 +137,17 @@ impl BarChart {
             text(&mut svg, LEFT - 8.0, y + 4.0, "text-anchor=\"end\" fill=\"#555\"", &tick.to_string());
         }
         for (g, name) in self.groups.iter().enumerate() {
-            let left = LEFT + GAP + g as f64 * (group + GAP);
-            for (s, series) in self.series.iter().enumerate() {
-                let x = left + s as f64 * BAR;
-                if let Some(value) = series.values.get(g).copied().flatten() {
-                    bar(&mut svg, x, axis.y(value), bottom, COLOURS[s % COLOURS.len()], value);
-                }
+            let middle = LEFT + GAP + g as f64 * (group + GAP) + group / 2.0;
+            // Bars without a value leave no gap.
+            let value = |s: &Series| s.values.get(g).copied().flatten();
+            let bars: Vec<(usize, f64)> =
+                self.series.iter().enumerate().filter_map(|(i, s)| Some((i, value(s)?))).collect();
+            let left = middle - bars.len() as f64 * BAR / 2.0;
+            for (place, (series, value)) in bars.into_iter().enumerate() {
+                let x = left + place as f64 * BAR;
+                bar(&mut svg, x, axis.y(value), bottom, COLOURS[series % COLOURS.len()], value);
             }
-            text(&mut svg, left + group / 2.0, bottom + 18.0, "text-anchor=\"middle\"", name);
+            text(&mut svg, middle, bottom + 18.0, "text-anchor=\"middle\"", name);
         }
         line(&mut svg, (LEFT, width - GAP), bottom, "stroke=\"#333\"");
         if let Some(value) = self.line {

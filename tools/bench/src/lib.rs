@@ -1,13 +1,14 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed` is
-//! a measurement, which fills a record that `output` writes as Markdown, JSON and SVG.
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed` and `load` are
+//! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
 #![warn(missing_docs)]
 
 pub mod args;
 pub mod chart;
 pub mod clock;
 pub mod isa;
+pub mod load;
 pub mod machine;
 pub mod markdown;
 pub mod model;

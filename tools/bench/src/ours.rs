@@ -33,6 +33,8 @@ pub const KINDS: [Kind; 6] = [
     Kind { name: "tets tet16", structure: Structure::Tets, record: RecordKind::Tet16 },
 ];
 
+/// The default file.
+pub const BTH: Kind = KINDS[0];
 /// The plain BVH.
 pub const BVH: Kind = KINDS[1];
 

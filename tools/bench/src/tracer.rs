@@ -54,29 +54,30 @@ pub struct Contender {
 impl Contender {
     /// Nearest hits, on so many threads.
     pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize) {
-        spread(batch, hits, threads, |batch, hits| self.tracer.nearest(batch, hits));
+        spread(batch, hits, threads, BLOCK, |batch, hits| self.tracer.nearest(batch, hits));
     }
 
     /// Any hits, on so many threads.
     pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize) {
-        spread(batch, found, threads, |batch, found| self.tracer.any(batch, found));
+        spread(batch, found, threads, BLOCK, |batch, found| self.tracer.any(batch, found));
     }
 }
 
 /// Rays that a thread takes at a time.
-const BLOCK: usize = 4096;
+pub const BLOCK: usize = 4096;
 
-/// Calls `trace` for blocks of rays, from so many threads, each of which takes the next block.
+/// Calls `trace` for blocks of so many rays, from so many threads, each of which takes the next block.
 pub fn spread<T: Send>(
     batch: Batch<'_>,
     answers: &mut [T],
     threads: usize,
+    block: usize,
     trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
 ) {
     if threads <= 1 {
         return trace(batch, answers);
     }
-    let blocks = Mutex::new(batch.chunks(BLOCK).zip(answers.chunks_mut(BLOCK)));
+    let blocks = Mutex::new(batch.chunks(block).zip(answers.chunks_mut(block)));
     let next = || blocks.lock().expect("no thread panics while it holds the lock").next();
     std::thread::scope(|scope| {
         for _ in 0..threads {

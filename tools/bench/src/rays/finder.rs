@@ -2,7 +2,7 @@
 //! the same everywhere, so the rays are too.
 
 use crate::model::{Model, position};
-use crate::tracer::{Batch, spread};
+use crate::tracer::{BLOCK, Batch, spread};
 use bth::Scene;
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
@@ -26,7 +26,7 @@ impl<'a> Finder<'a> {
     pub(super) fn nearest(&self, rays: &[Ray]) -> Vec<Hit> {
         let mut hits = vec![Hit::MISS; rays.len()];
         let batch = Batch { rays, from: None, coherent: false };
-        spread(batch, &mut hits, self.threads, |b, h| self.scene.nearest_batch(b.rays, None, h));
+        spread(batch, &mut hits, self.threads, BLOCK, |b, h| self.scene.nearest_batch(b.rays, None, h));
         hits
     }
 

@@ -108,7 +108,7 @@ pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, shot: &Shot) -> Camer
 /// Samples of [`automatic`].
 const SAMPLES: usize = 4096;
 /// A model is seen from inside when less than this share of the rays from its fronts leave it.
-const OPEN: f64 = 0.2;
+const OPEN: f64 = 0.08;
 
 /// Decides by how much of the sky the fronts of the triangles see: next to nothing in rooms and caves,
 /// most of it on objects. Triangles count equally, so that furniture outweighs the walls around it.

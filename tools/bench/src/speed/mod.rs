@@ -190,3 +190,19 @@ impl Answers {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_answers_are_counted_to_the_last_bit_for_ours() {
+        let hit = Hit { t: 1.0, u: 0.25, v: 0.5, surface: Surface { instance: 0, triangle: 7 } };
+        let nudged = Hit { u: 0.25f32.next_up(), ..hit };
+        let expected = Answers::Nearest(vec![hit, hit, Hit::MISS, Hit::MISS]);
+        let hits = [hit, nudged, Hit::MISS, hit];
+        assert_eq!(expected.differ(true, &hits, &[]), 2);
+        assert_eq!(expected.differ(false, &hits, &[]), 1);
+        assert_eq!(Answers::Any(vec![true, false]).differ(false, &[], &[true, true]), 1);
+    }
+}

@@ -47,6 +47,15 @@ impl Clock {
 }
 
 fn thread_cpu() -> f64 {
-    let now = clock_gettime(ClockId::ThreadCPUTime);
+    read(ClockId::ThreadCPUTime)
+}
+
+/// CPU seconds of this process so far, over all its threads.
+pub fn process_cpu() -> f64 {
+    read(ClockId::ProcessCPUTime)
+}
+
+fn read(clock: ClockId) -> f64 {
+    let now = clock_gettime(clock);
     now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
 }

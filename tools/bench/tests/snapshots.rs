@@ -66,6 +66,7 @@ fn load_record() -> LoadRecord {
         ready_s: total / 10.0,
         first_hit_s: total / 5.0,
         total_s: total,
+        cpu_s: 0.9 * total,
         storage_bytes: storage,
     };
     let starts = vec![

@@ -4,6 +4,7 @@
 
 use super::files;
 use crate::args::Probe;
+use crate::clock::process_cpu;
 use crate::isa;
 use crate::ours::BATCH;
 use crate::rivals::embree;
@@ -49,6 +50,8 @@ pub struct Probed {
     pub first_hit_s: f64,
     /// Until all rays were traced.
     pub total_s: f64,
+    /// CPU seconds of all threads until then.
+    pub cpu_s: f64,
     /// Bytes that came from storage meanwhile, where the system tells.
     pub storage_bytes: Option<u64>,
     /// Rays that hit.
@@ -99,7 +102,7 @@ impl Tracer for Opened {
 fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result<T>) -> Result<Probed> {
     let mut hits = vec![Hit::MISS; rays.len()];
     let batch = |rays| Batch { rays, from: None, coherent: true };
-    let (before, clock) = (storage_bytes(), Instant::now());
+    let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
     let tracer = start()?;
     let ready_s = clock.elapsed().as_secs_f64();
     tracer.nearest(batch(&rays[..1]), &mut hits[..1]);
@@ -107,12 +110,14 @@ fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result
     let share = rays.len().div_ceil(threads);
     spread(batch(rays), &mut hits, threads, share, |batch, hits| tracer.nearest(batch, hits));
     let total_s = clock.elapsed().as_secs_f64();
+    let cpu_s = process_cpu() - cpu;
     anyhow::ensure!(hits[0].is_hit(), "the first ray hits nothing");
     let storage_bytes = storage_bytes().zip(before).map(|(after, before)| after - before);
     Ok(Probed {
         ready_s,
         first_hit_s,
         total_s,
+        cpu_s,
         storage_bytes,
         hits: hits.iter().filter(|h| h.is_hit()).count(),
     })

@@ -59,6 +59,8 @@ pub struct Times {
     pub first_hit_s: f64,
     /// Seconds until all rays were traced.
     pub total_s: f64,
+    /// CPU seconds of all threads until then.
+    pub cpu_s: f64,
     /// Bytes that came from storage, where the system tells.
     pub storage_bytes: Option<u64>,
 }
@@ -72,6 +74,7 @@ impl Times {
             ready_s: of(|p| p.ready_s),
             first_hit_s: of(|p| p.first_hit_s),
             total_s: of(|p| p.total_s),
+            cpu_s: of(|p| p.cpu_s),
             storage_bytes: storage.and_then(median).map(|b| b as u64),
         }
     }

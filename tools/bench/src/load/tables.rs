@@ -71,7 +71,8 @@ fn page(model: &ModelStarts) -> String {
         count(model.triangles as u64),
         sizes.join(", ")
     );
-    let head = row(&["start", "ready", "first hit", "all rays", "than Embree's build", "MiB from storage"]);
+    let head =
+        row(&["start", "ready", "first hit", "all rays", "CPU", "than Embree's build", "MiB from storage"]);
     for run in &model.runs {
         let mut rows = Vec::new();
         for (name, times) in &run.starts {
@@ -80,6 +81,7 @@ fn page(model: &ModelStarts) -> String {
                 seconds(Some(times.ready_s)),
                 seconds(Some(times.first_hit_s)),
                 seconds(Some(times.total_s)),
+                seconds(Some(times.cpu_s)),
                 factor(run.faster(name)),
                 times.storage_bytes.map_or("?".to_owned(), |b| format!("{:.1}", b as f64 / 1048576.0)),
             ]);

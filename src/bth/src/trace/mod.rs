@@ -2,9 +2,16 @@
 
 mod bvh_batch;
 mod bvh_walk;
+mod coherence;
 mod crossing;
 mod flight;
 mod line;
+mod packet;
+mod packet_group;
+mod packet_hull;
+mod packet_leaf;
+mod packet_settle;
+mod packets;
 mod prepare;
 mod query;
 mod records;
@@ -25,6 +32,7 @@ use bvh_batch::{BatchWalk, Waiting};
 use bvh_walk::TetOutcome;
 use flight::Flight;
 use line::Line;
+use packets::PacketScratch;
 use query::{Any, Count, Nearest, Query};
 use records::Record;
 use stack::Stacks;
@@ -36,6 +44,7 @@ use tet_walk::{Outcome, TetSpace};
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     stacks: Stacks,
+    packets: PacketScratch,
 }
 
 /// Lends the thread's scratch memory.
@@ -113,14 +122,16 @@ struct Batch<'a, Q, D> {
 impl<Q: Query, D: FnMut(usize, &Q)> Kernel for Batch<'_, Q, D> {
     type Output = ();
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) {
-        let walk = BatchWalk {
-            object: self.object,
-            rays: self.rays,
-            waiting: Waiting { order: None, queries: None },
-            stacks: &mut self.scratch.stacks,
-            done: self.done,
-        };
+    fn run<S: Simd>(mut self, s: S) {
+        let Scratch { stacks, packets } = self.scratch;
+        let packed = packets::trace(s, self.object, self.rays, packets, &mut self.done);
+        if packed.rays == self.rays.len() {
+            return;
+        }
+        let order = (packed.rays > 0).then_some(&packets.rest[..]);
+        let waiting = Waiting { order, queries: None };
+        let (object, rays, done) = (self.object, self.rays, self.done);
+        let walk = BatchWalk { object, rays, waiting, stacks, done };
         walk.run(s, |leaf, ray, query| {
             enter_tets(self.object, leaf, ray, query, &mut ()) == TetOutcome::Done
         });

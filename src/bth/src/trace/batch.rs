@@ -4,6 +4,7 @@
 use super::Scratch;
 use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
+use super::packets;
 use super::query::{Any, Nearest, Query};
 use super::records::LaneRecord;
 use super::tet_batch::{self, Walk};
@@ -124,16 +125,17 @@ struct ThroughBvh<'a, Q, D> {
 impl<Q: Query, D: FnMut(usize, &Q)> Kernel for ThroughBvh<'_, Q, D> {
     type Output = ();
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) {
-        let walk = BatchWalk {
-            object: self.object,
-            rays: self.rays,
-            waiting: self.waiting,
-            stacks: &mut self.scratch.stacks,
-            done: self.done,
-        };
-        walk.run(s, |leaf, ray, query| {
-            enter_tets(self.object, leaf, ray, query, &mut ()) == TetOutcome::Done
-        });
+    fn run<S: Simd>(mut self, s: S) {
+        let Scratch { stacks, packets } = self.scratch;
+        let (object, rays, mut waiting) = (self.object, self.rays, self.waiting);
+        if waiting.order.is_none() {
+            let packed = packets::trace(s, object, rays, packets, &mut self.done);
+            if packed.rays == rays.len() {
+                return;
+            }
+            waiting.order = (packed.rays > 0).then_some(&packets.rest[..]);
+        }
+        let walk = BatchWalk { object, rays, waiting, stacks, done: self.done };
+        walk.run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }
 }

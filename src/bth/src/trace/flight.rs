@@ -14,7 +14,7 @@ use crate::simd::Simd;
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true t by, relative: the four lowest bits of f32.
-const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
+pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
@@ -167,6 +167,6 @@ impl<Q: Query> Flight<Q> {
 /// What f64 leaves open.
 #[cold]
 #[inline(never)]
-fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
     Line::new(ray)?.crossing(corners)
 }

@@ -3,9 +3,16 @@
 mod batch;
 mod bvh_batch;
 mod bvh_walk;
+mod coherence;
 mod crossing;
 mod flight;
 mod line;
+mod packet;
+mod packet_group;
+mod packet_hull;
+mod packet_leaf;
+mod packet_settle;
+mod packets;
 mod prepare;
 mod query;
 mod records;
@@ -26,6 +33,7 @@ pub use query::Steps;
 
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
+use packets::PacketScratch;
 use query::{Any, Nearest, Query};
 use single::trace;
 use stack::Stacks;
@@ -38,6 +46,7 @@ pub(crate) const FEW: usize = 4;
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     stacks: Stacks,
+    packets: PacketScratch,
 }
 
 /// Lends the thread's scratch memory.

@@ -21,6 +21,8 @@ pub(crate) trait Query: Copy {
     }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
+    /// t of the nearest hit so far, if the query wants the nearest.
+    fn found(&self) -> Option<f64>;
     /// A triangle is certainly hit within the ray's range; of use where any hit will do.
     fn accept(&mut self);
 }
@@ -81,6 +83,9 @@ impl Query for Nearest {
     fn limit(&self) -> f64 {
         widened(self.best.t)
     }
+    fn found(&self) -> Option<f64> {
+        (self.triangle != NONE).then_some(self.best.t)
+    }
     fn accept(&mut self) {}
 }
 
@@ -110,6 +115,9 @@ impl Query for Any {
     #[inline(always)]
     fn limit(&self) -> f64 {
         widened(f64::from(self.tmax))
+    }
+    fn found(&self) -> Option<f64> {
+        None
     }
     fn accept(&mut self) {
         self.found = true;

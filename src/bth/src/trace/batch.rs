@@ -13,7 +13,6 @@ use crate::layout::{Child, NONE};
 use crate::object::{ObjectView, Records};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use std::marker::PhantomData;
 
 /// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
 const PART: usize = 2048;
@@ -28,7 +27,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    trace(object, rays, from, scratch, |ray, query: &Nearest| hits[ray] = query.hit(instance));
+    trace::<Nearest>(object, rays, from, scratch, Sink { answers: hits, instance });
 }
 
 /// Whether rays in object space hit anything; `from` as for [`nearest_batch`].
@@ -39,7 +38,20 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    trace(object, rays, from, scratch, |ray, query: &Any| found[ray] = query.found);
+    trace::<Any>(object, rays, from, scratch, Sink { answers: found, instance: 0 });
+}
+
+/// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.
+struct Sink<'a, Q: Query> {
+    answers: &'a mut [Q::Answer],
+    instance: u32,
+}
+
+impl<Q: Query> Sink<'_, Q> {
+    #[inline(always)]
+    fn put(&mut self, ray: usize, query: &Q) {
+        self.answers[ray] = query.answer(self.instance);
+    }
 }
 
 fn trace<Q: Query>(
@@ -47,17 +59,25 @@ fn trace<Q: Query>(
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    mut done: impl FnMut(usize, &Q),
+    mut sink: Sink<'_, Q>,
 ) {
     if object.header.root == NONE {
         return;
     }
-    let Some(from) = from.filter(|_| !object.tet_leaves.is_empty()) else {
-        let waiting = Waiting::all();
-        return Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, done, query: PhantomData });
-    };
-    for (part, (rays, from)) in rays.chunks(PART).zip(from.chunks(PART)).enumerate() {
-        trace_hinted(object, rays, from, scratch, |ray, query: &Q| done(part * PART + ray, query));
+    if let Some(from) = from.filter(|_| !object.tet_leaves.is_empty()) {
+        let parts = rays.chunks(PART).zip(from.chunks(PART)).zip(sink.answers.chunks_mut(PART));
+        for ((rays, from), answers) in parts {
+            trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, instance: sink.instance });
+        }
+        return;
+    }
+    let packed = Isa::chosen().run(Together { object, rays, with_short: true, scratch, sink: &mut sink });
+    if packed < rays.len() {
+        let rest = std::mem::take(&mut scratch.packets.rest);
+        let order = (packed > 0).then_some(&rest[..]);
+        let waiting = Waiting { order, queries: None, walked: None };
+        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
+        scratch.packets.rest = rest;
     }
 }
 
@@ -67,10 +87,19 @@ fn trace_hinted<Q: Query>(
     rays: &[Ray],
     from: &[u32],
     scratch: &mut Scratch,
-    mut done: impl FnMut(usize, &Q),
+    sink: &mut Sink<'_, Q>,
 ) {
-    let home = |&triangle: &u32| object.triangle_homes.get(triangle as usize).copied().unwrap_or(NONE);
-    let faces: Vec<u32> = from.iter().map(home).collect();
+    // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
+    let packed = Isa::chosen().run(Together { object, rays, with_short: false, scratch, sink });
+    let mut faces = vec![NONE; rays.len()];
+    let home = |ray: usize| object.triangle_homes.get(from[ray] as usize).copied().unwrap_or(NONE);
+    let mut order: Vec<u32> = match packed {
+        0 => (0..rays.len() as u32).collect(),
+        _ => scratch.packets.rest.clone(),
+    };
+    for &ray in &order {
+        faces[ray as usize] = home(ray as usize);
+    }
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
     let mut walks = vec![Walk::Not; rays.len()];
     match object.records {
@@ -81,19 +110,21 @@ fn trace_hinted<Q: Query>(
         Records::Tet16(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
     }
     let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
-    let (mut order, mut walked) = (Vec::with_capacity(rays.len()), vec![NONE; rays.len()]);
-    for (ray, walk) in walks.iter().enumerate() {
-        if *walk == Walk::Done || *walk == Walk::Left && is_all {
-            done(ray, &queries[ray]);
-            continue;
-        }
-        if *walk == Walk::Left {
+    let mut walked = vec![NONE; rays.len()];
+    order.retain(|&ray| {
+        let ray = ray as usize;
+        let done = walks[ray] == Walk::Done || walks[ray] == Walk::Left && is_all;
+        if done {
+            sink.put(ray, &queries[ray]);
+        } else if walks[ray] == Walk::Left {
             walked[ray] = leaf_of_face(object, faces[ray]);
         }
-        order.push(ray as u32);
+        !done
+    });
+    if !order.is_empty() {
+        let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
+        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink });
     }
-    let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
-    Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, done, query: PhantomData });
 }
 
 fn walk_tets<R: LaneRecord, Q: Query>(
@@ -111,31 +142,44 @@ fn walk_tets<R: LaneRecord, Q: Query>(
     }
 }
 
-/// Rays through the BVH, as a kernel.
-struct ThroughBvh<'a, Q, D> {
+/// Packets of rays that go together, as a kernel; returns how many rays went in them. If any did, the others are in the
+/// scratch's rest.
+struct Together<'a, 'b, Q: Query> {
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    /// Also short rays that fill a small box.
+    with_short: bool,
+    scratch: &'a mut Scratch,
+    sink: &'a mut Sink<'b, Q>,
+}
+
+impl<Q: Query> Kernel for Together<'_, '_, Q> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> usize {
+        let (packets, sink) = (&mut self.scratch.packets, self.sink);
+        let done = |ray: usize, query: &Q| sink.put(ray, query);
+        packets::trace(s, self.object, self.rays, self.with_short, packets, done).rays
+    }
+}
+
+/// Rays through the BVH, each on its own, as a kernel.
+struct ThroughBvh<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     waiting: Waiting<'a, Q>,
     scratch: &'a mut Scratch,
-    /// Takes the results.
-    done: D,
-    query: PhantomData<Q>,
+    sink: &'a mut Sink<'b, Q>,
 }
 
-impl<Q: Query, D: FnMut(usize, &Q)> Kernel for ThroughBvh<'_, Q, D> {
+impl<Q: Query> Kernel for ThroughBvh<'_, '_, Q> {
     type Output = ();
     #[inline(always)]
-    fn run<S: Simd>(mut self, s: S) {
-        let Scratch { stacks, packets } = self.scratch;
-        let (object, rays, mut waiting) = (self.object, self.rays, self.waiting);
-        if waiting.order.is_none() {
-            let packed = packets::trace(s, object, rays, packets, &mut self.done);
-            if packed.rays == rays.len() {
-                return;
-            }
-            waiting.order = (packed.rays > 0).then_some(&packets.rest[..]);
-        }
-        let walk = BatchWalk { object, rays, waiting, stacks, done: self.done };
+    fn run<S: Simd>(self, s: S) {
+        let (object, rays, waiting, sink) = (self.object, self.rays, self.waiting, self.sink);
+        let stacks = &mut self.scratch.stacks;
+        let done = |ray: usize, query: &Q| sink.put(ray, query);
+        let walk = BatchWalk { object, rays, waiting, stacks, done };
         walk.run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }
 }

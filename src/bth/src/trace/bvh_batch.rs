@@ -81,13 +81,6 @@ pub(crate) struct Waiting<'a, Q> {
     pub(crate) walked: Option<&'a [u32]>,
 }
 
-impl<Q> Waiting<'_, Q> {
-    /// All rays of a batch, that have been nowhere yet.
-    pub(crate) fn all() -> Self {
-        Waiting { order: None, queries: None, walked: None }
-    }
-}
-
 /// A batch on its way.
 pub(crate) struct BatchWalk<'a, Q, D> {
     pub(crate) object: &'a ObjectView<'a>,

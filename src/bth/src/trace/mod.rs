@@ -70,17 +70,17 @@ pub(crate) fn nearest(
     scratch: &mut Scratch,
 ) -> Hit {
     let query = Nearest::new(ray);
-    trace(object, ray, from, scratch, query, &mut ()).hit(instance)
+    trace(object, ray, from, scratch, query, &mut ()).answer(instance)
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let mut steps = Steps::default();
     let query = with_scratch(|scratch| trace(object, ray, from, scratch, Nearest::new(ray), &mut steps));
-    (query.hit(instance), steps)
+    (query.answer(instance), steps)
 }
 
 /// Whether a ray in object space hits anything.
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
-    trace(object, ray, from, scratch, Any::new(ray), &mut ()).found
+    trace(object, ray, from, scratch, Any::new(ray), &mut ()).answer(0)
 }

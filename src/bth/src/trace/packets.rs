@@ -41,13 +41,13 @@ enum Run {
 }
 
 /// Traces those rays of a batch that are better traced in packets, and leaves the others in `scratch.rest`, unless it does
-/// not try at all.
-/// Hands on places and queries of rays that hit something.
+/// not try at all. `with_short`: also short rays that fill a small box. Hands on places and queries of rays that hit something.
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
     object: &ObjectView<'_>,
     rays: &[Ray],
+    with_short: bool,
     scratch: &mut PacketScratch,
     mut done: impl FnMut(usize, &Q),
 ) -> PacketCount {
@@ -57,13 +57,13 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         return count;
     }
     let frame = Frame::new(object.header);
-    let (mut coherent, mut short) = (Guard::new(), Guard::new());
+    let (mut coherent, mut short) = (Guard::new(), with_short.then(Guard::new));
     let PacketScratch { stack, rest } = scratch;
     rest.clear();
     let mut packets = None;
     for (i, own) in rays.chunks(PACKET).enumerate() {
         let at = i * PACKET;
-        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
+        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, short.as_mut()) else {
             rest.extend(at as u32..(at + own.len()) as u32);
             continue;
         };
@@ -83,7 +83,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             }
             Run::Short(bounds) => {
                 let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
-                (outcome, &mut short, SHORT_USE, &mut count.short)
+                (outcome, short.as_mut().unwrap_or(&mut coherent), SHORT_USE, &mut count.short)
             }
         };
         match outcome {
@@ -106,7 +106,7 @@ fn choose<S: Simd, Q: Query>(
     frame: &Frame,
     rays: &[Ray],
     coherent: &mut Guard,
-    short: &mut Guard,
+    short: Option<&mut Guard>,
 ) -> Option<Run> {
     if rays.len() < FEWEST {
         return None;
@@ -116,7 +116,7 @@ fn choose<S: Simd, Q: Query>(
     if try_coherent && span.is_coherent() {
         return Some(Run::Coherent(span));
     }
-    if Q::ANY && short.is_open() {
+    if Q::ANY && short.is_some_and(|guard| guard.is_open()) {
         return span.segments(s, frame, rays).map(Run::Short);
     }
     None

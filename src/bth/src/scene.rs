@@ -127,8 +127,8 @@ impl Scene {
         let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
-            if let Some(from) = from.filter(|_| rays.len() > 1 && !object.tet_leaves.is_empty()) {
-                let from: Vec<u32> = from.iter().map(|&f| hint(f, instance)).collect();
+            if rays.len() > 1 && (hinted(&object, from) || trace::whole(&object) != NONE) {
+                let from: Vec<u32> = (0..rays.len()).map(|i| hint(surface(from, i), instance)).collect();
                 trace::nearest_hinted(&object, rays, &from, instance, hits, &mut scratch);
                 continue;
             }
@@ -153,8 +153,8 @@ impl Scene {
         let mut scratch = Scratch::default();
         for instance in 0..self.object_count() {
             let object = self.object(instance);
-            if let Some(from) = from.filter(|_| rays.len() > 1 && !object.tet_leaves.is_empty()) {
-                let from: Vec<u32> = from.iter().map(|&f| hint(f, instance)).collect();
+            if rays.len() > 1 && (hinted(&object, from) || trace::whole(&object) != NONE) {
+                let from: Vec<u32> = (0..rays.len()).map(|i| hint(surface(from, i), instance)).collect();
                 trace::any_hinted(&object, rays, &from, found, &mut scratch);
                 continue;
             }
@@ -168,6 +168,11 @@ impl Scene {
 fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
     assert_eq!(rays.len(), results, "as many results as rays");
     assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
+}
+
+/// Whether hints may be of use.
+fn hinted(object: &ObjectView<'_>, from: Option<&[Surface]>) -> bool {
+    from.is_some() && !object.tet_leaves.is_empty()
 }
 
 fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {

@@ -14,7 +14,7 @@ mod tet_queue;
 mod tet_walk;
 
 pub use query::Steps;
-pub(crate) use tet_hinted::{any_hinted, nearest_hinted};
+pub(crate) use tet_hinted::{any_hinted, nearest_hinted, whole};
 
 use crate::layout::{Child, NONE};
 use crate::object::{ObjectView, Records};

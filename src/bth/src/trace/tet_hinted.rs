@@ -1,5 +1,5 @@
-//! Batches of rays that start on known surfaces: their tet leaves are walked all together, the rest of the
-//! structure ray by ray.
+//! Batches of rays that start on known surfaces, or all in one tet leaf: the tet leaves are walked all together, the
+//! rest of the structure ray by ray.
 
 use super::line::Line;
 use super::query::{Any, Nearest, Query};
@@ -57,6 +57,14 @@ pub(crate) fn any_hinted(
     }
 }
 
+/// The tet leaf that is the whole object, without another structure for rays that come from outside; or [`NONE`].
+pub(crate) fn whole(object: &ObjectView<'_>) -> u32 {
+    match Child::from_code(object.header.root) {
+        Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
+        _ => NONE,
+    }
+}
+
 fn trace<Q: Query + Copy>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -85,18 +93,19 @@ fn trace_with_records<R: LaneRecord, Q: Query + Copy>(
 ) {
     let home = |&triangle: &u32| object.triangle_homes.get(triangle as usize).copied().unwrap_or(NONE);
     let faces: Vec<u32> = from.iter().map(home).collect();
-    if !Batch::<R, Q>::fits(object, records) || faces.iter().all(|&face| face == NONE) {
+    let whole = whole(object);
+    let nothing_to_walk = whole == NONE && faces.iter().all(|&face| face == NONE);
+    if !Batch::<R, Q>::fits(object, records) || nothing_to_walk {
         for ((ray, &from), query) in rays.iter().zip(from).zip(queries) {
             trace_with(object, records, ray, from, scratch, query, &mut ());
         }
         return;
     }
     let mut walks = vec![Walk::Not; rays.len()];
-    Isa::chosen().run(&mut Batch::new(object, records, rays, &faces, queries, &mut walks));
-    let only = match (Child::from_code(object.header.root), object.tet_leaves) {
-        (Some(Child::Tets(_)), [_]) => true,
-        _ => false,
-    };
+    let leaves = vec![whole; rays.len()];
+    Isa::chosen().run(&mut Batch::new(object, records, rays, &faces, &leaves, queries, &mut walks));
+    let root = Child::from_code(object.header.root);
+    let only = whole != NONE || (matches!(root, Some(Child::Tets(_))) && object.tet_leaves.len() == 1);
     for (((ray, &face), query), &walk) in rays.iter().zip(&faces).zip(queries).zip(&walks) {
         if walk == Walk::Done || (walk == Walk::Left && only) {
             continue;

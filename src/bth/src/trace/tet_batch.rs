@@ -308,10 +308,14 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         let row = s.load_u(&row);
         let valid = s.lt_u(row, s.splat_u(NONE));
         let mut rest = (1u32 << part.len()) - 1;
+        let slot = s.load_u(&std::array::from_fn(|i| (first + i) as u32));
         if s.mask_bits(valid) == 0 {
+            let leaf = self.leaves[first];
+            if leaf != NONE && self.leaves[first..][..part.len()].iter().all(|&l| l == leaf) {
+                rest = self.fill_from_outside(s, queue, s.mask(rest), slot, leaf);
+            }
             return self.locate_all(first as u32, rest);
         }
-        let slot = s.load_u(&std::array::from_fn(|i| (first + i) as u32));
         let faces = <[u32]>::ref_from_bytes(self.object.tet_faces.as_bytes()).expect("whole words");
         let (ready, able) =
             Ready::from_faces(s, valid, rays(self.rays), vertices(self.object), faces, slot, row);
@@ -319,6 +323,25 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         queue.push(s, able, &ready.lanes);
         rest &= !able;
         self.locate_all(first as u32, rest);
+    }
+
+    /// Gets rays ready that all enter one tet leaf; returns those that f32 cannot tell.
+    #[inline(always)]
+    fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut Queue, m: S::M, slot: S::U, leaf: u32) -> u32 {
+        let leaf = &self.object.tet_leaves[leaf as usize];
+        let hull = &self.object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
+        let (ready, entered, missed) =
+            Ready::from_hull(s, m, rays(self.rays), vertices(self.object), hull, slot);
+        let (entered, mut missed) = (s.mask_bits(entered), s.mask_bits(missed));
+        queue.push(s, entered, &ready.lanes);
+        let rest = s.mask_bits(m) & !entered & !missed;
+        let mut slots = [0; LANES];
+        s.store_u(slot, &mut slots);
+        while missed != 0 {
+            self.finish(slots[missed.trailing_zeros() as usize % LANES], Outcome::Left);
+            missed &= missed - 1;
+        }
+        rest
     }
 
     /// Looks in f64 for the places where rays begin: those from `first` on whose bit is set.

@@ -64,9 +64,10 @@ fn trace<Q: Query>(
     if object.header.root == NONE {
         return;
     }
-    if let Some(from) = from.filter(|_| !object.tet_leaves.is_empty()) {
-        let parts = rays.chunks(PART).zip(from.chunks(PART)).zip(sink.answers.chunks_mut(PART));
-        for ((rays, from), answers) in parts {
+    let from = from.filter(|_| !object.tet_leaves.is_empty());
+    if from.is_some() || whole(object) != NONE {
+        for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
+            let from = from.map(|from| &from[part * PART..][..rays.len()]);
             trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, instance: sink.instance });
         }
         return;
@@ -81,18 +82,29 @@ fn trace<Q: Query>(
     }
 }
 
-/// Traces at most [`PART`] rays, some of which start on known surfaces.
+/// The tet leaf that is the whole object, without another structure for rays that come from outside; or `NONE`.
+fn whole(object: &ObjectView<'_>) -> u32 {
+    match Child::from_code(object.header.root) {
+        Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
+        _ => NONE,
+    }
+}
+
+/// Traces at most [`PART`] rays, some of which start on known surfaces, or all of which enter the same tetrahedra.
 fn trace_hinted<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
-    from: &[u32],
+    from: Option<&[u32]>,
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
     // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
     let packed = Isa::chosen().run(Together { object, rays, with_short: false, scratch, sink });
     let mut faces = vec![NONE; rays.len()];
-    let home = |ray: usize| object.triangle_homes.get(from[ray] as usize).copied().unwrap_or(NONE);
+    let home = |ray: usize| {
+        let triangle = from.map_or(NONE, |from| from[ray]);
+        object.triangle_homes.get(triangle as usize).copied().unwrap_or(NONE)
+    };
     let mut order: Vec<u32> = match packed {
         0 => (0..rays.len() as u32).collect(),
         _ => scratch.packets.rest.clone(),
@@ -135,8 +147,11 @@ fn walk_tets<R: LaneRecord, Q: Query>(
     queries: &mut [Q],
     walks: &mut [Walk],
 ) {
-    if tet_batch::Batch::<R, Q>::fits(object, records) && faces.iter().any(|&face| face != NONE) {
-        let mut batch = tet_batch::Batch::new(object, records, rays, faces, queries, walks);
+    let whole = whole(object);
+    let any = whole != NONE || faces.iter().any(|&face| face != NONE);
+    if any && tet_batch::Batch::<R, Q>::fits(object, records) {
+        let leaves = vec![whole; rays.len()];
+        let mut batch = tet_batch::Batch::new(object, records, rays, faces, &leaves, queries, walks);
         // Without vectors the BVH is faster, and a hint of no use to it.
         let _ = Isa::chosen().run_wide(&mut batch);
     }

@@ -59,6 +59,8 @@ pub(crate) struct Batch<'a, R, Q> {
     pub(crate) rays: &'a [Ray],
     /// For each ray the constrained face that it starts about, or [`NONE`].
     pub(crate) faces: &'a [u32],
+    /// For each ray the tet leaf that it is to enter from outside if it does not start about a face; or [`NONE`].
+    pub(crate) leaves: &'a [u32],
     pub(crate) queries: &'a mut [Q],
     pub(crate) walks: &'a mut [Walk],
     next: usize,
@@ -74,6 +76,7 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         records: &'a [R],
         rays: &'a [Ray],
         faces: &'a [u32],
+        leaves: &'a [u32],
         queries: &'a mut [Q],
         walks: &'a mut [Walk],
     ) -> Self {
@@ -83,6 +86,7 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
             records,
             rays,
             faces,
+            leaves,
             queries,
             walks,
             next: 0,
@@ -103,9 +107,10 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     }
 
     fn space<'b>(&'b self, slot: u32, line: &'b Line) -> TetSpace<'b, R> {
-        let leaf = match self.object.tet_leaves {
-            [_] => 0,
-            _ => leaf_of_face(self.object, self.faces[slot as usize]),
+        let leaf = match (self.object.tet_leaves, self.leaves[slot as usize]) {
+            ([_], _) => 0,
+            (_, NONE) => leaf_of_face(self.object, self.faces[slot as usize]),
+            (_, leaf) => leaf,
         };
         space(self.object, self.records, leaf, line)
     }
@@ -302,33 +307,71 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
         row[..part.len()].copy_from_slice(part);
         let row = s.load_u(&row);
         let valid = s.lt_u(row, s.splat_u(NONE));
-        if s.mask_bits(valid) == 0 {
-            return;
-        }
+        let mut rest = (1u32 << part.len()) - 1;
         let slot = s.load_u(&std::array::from_fn(|i| (first + i) as u32));
+        if s.mask_bits(valid) == 0 {
+            let leaf = self.leaves[first];
+            if leaf != NONE && self.leaves[first..][..part.len()].iter().all(|&l| l == leaf) {
+                rest = self.fill_from_outside(s, queue, s.mask(rest), slot, leaf);
+            }
+            return self.locate_all(first as u32, rest);
+        }
         let faces = <[u32]>::ref_from_bytes(self.object.tet_faces.as_bytes()).expect("whole words");
         let (ready, able) =
             Ready::from_faces(s, valid, rays(self.rays), vertices(self.object), faces, slot, row);
         let able = s.mask_bits(able);
         queue.push(s, able, &ready.lanes);
-        let mut rest = s.mask_bits(valid) & !able;
-        while rest != 0 {
-            self.locate(first as u32 + rest.trailing_zeros());
-            rest &= rest - 1;
+        rest &= !able;
+        self.locate_all(first as u32, rest);
+    }
+
+    /// Gets rays ready that all enter one tet leaf; returns those that f32 cannot tell.
+    #[inline(always)]
+    fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut Queue, m: S::M, slot: S::U, leaf: u32) -> u32 {
+        let leaf = &self.object.tet_leaves[leaf as usize];
+        let hull = &self.object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
+        let (ready, entered, missed) =
+            Ready::from_hull(s, m, rays(self.rays), vertices(self.object), hull, slot);
+        let (entered, mut missed) = (s.mask_bits(entered), s.mask_bits(missed));
+        queue.push(s, entered, &ready.lanes);
+        let rest = s.mask_bits(m) & !entered & !missed;
+        let mut slots = [0; LANES];
+        s.store_u(slot, &mut slots);
+        while missed != 0 {
+            self.finish(slots[missed.trailing_zeros() as usize % LANES], Outcome::Left);
+            missed &= missed - 1;
+        }
+        rest
+    }
+
+    /// Looks in f64 for the places where rays begin: those from `first` on whose bit is set.
+    fn locate_all(&mut self, first: u32, mut bits: u32) {
+        while bits != 0 {
+            let slot = first + bits.trailing_zeros();
+            bits &= bits - 1;
+            if (self.faces[slot as usize] & self.leaves[slot as usize]) != NONE {
+                self.locate(slot);
+            }
         }
     }
 
-    /// Looks in f64 for the place where a ray begins.
     #[inline(never)]
     fn locate(&mut self, slot: u32) {
         let ray = &self.rays[slot as usize];
-        // A walk from the origin sees only what lies ahead of it.
-        if ray.tmin.is_nan() || ray.tmin < 0.0 {
-            return;
-        }
         let Some(line) = Line::new(ray) else { return };
-        if let Some(place) = self.space(slot, &line).locate(self.faces[slot as usize]) {
-            self.starts.push(Start { slot, tet: place.tet, entered: place.entered });
+        let space = self.space(slot, &line);
+        let face = self.faces[slot as usize];
+        // A walk from the origin sees only what lies ahead of it.
+        let located = if face != NONE && ray.tmin >= 0.0 { space.locate(face) } else { None };
+        let place = match located {
+            Some(place) => Ok(place),
+            None if self.leaves[slot as usize] == NONE => return,
+            None => space.enter_hull(),
+        };
+        match place {
+            Ok(place) => self.starts.push(Start { slot, tet: place.tet, entered: place.entered }),
+            Err(Outcome::Uncertain) => self.flood(slot),
+            Err(outcome) => self.finish(slot, outcome),
         }
     }
 

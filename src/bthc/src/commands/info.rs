@@ -4,10 +4,10 @@ use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::{Table, bytes, count};
-use bth::{File, Isa};
 use bth::error::kind_name;
 use bth::layout::{NONE, RecordKind};
 use bth::object::ObjectView;
+use bth::{File, Isa};
 use serde_json::{Value, json};
 
 pub(crate) fn run(args: &Info) -> Result<(), Failure> {

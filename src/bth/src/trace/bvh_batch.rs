@@ -4,7 +4,7 @@
 use super::flight::{Flight, Found};
 use super::prepare::{Frame, Prepared};
 use super::query::Query;
-use super::stack::Stacks;
+use super::stack::{BOTTOM, Place, Stacks};
 use crate::layout::{Child, NODE_LINES, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -13,31 +13,32 @@ use crate::simd::{LANES, Simd};
 /// Rays on their way at once.
 const IN_FLIGHT: usize = 32;
 /// While at least this many rays stand before inner nodes, those before leaves wait.
-const ENOUGH: usize = IN_FLIGHT / 4;
+const ENOUGH: u8 = (IN_FLIGHT / 4) as u8;
 
 /// Slots of rays that wait for the same kind of step.
 struct List {
-    slot: [u8; 2 * IN_FLIGHT],
-    len: usize,
+    /// As long as any `u8` reaches; a list is never longer than the rays in flight, plus one.
+    slot: [u8; 256],
+    len: u8,
 }
 
 impl List {
     fn new() -> Self {
-        List { slot: [0; 2 * IN_FLIGHT], len: 0 }
+        List { slot: [0; 256], len: 0 }
     }
     #[inline(always)]
-    fn get(&self, i: usize) -> usize {
-        usize::from(self.slot[i % (2 * IN_FLIGHT)]) % IN_FLIGHT
+    fn get(&self, i: u8) -> usize {
+        usize::from(self.slot[usize::from(i)]) % IN_FLIGHT
     }
     /// Adds a slot on a condition, without a branch.
     #[inline(always)]
     fn push_if(&mut self, slot: usize, condition: bool) {
-        self.slot[self.len % (2 * IN_FLIGHT)] = slot as u8;
-        self.len += usize::from(condition);
+        self.slot[usize::from(self.len)] = slot as u8;
+        self.len += u8::from(condition);
     }
     /// Empties the list, whose entries can still be read if at most as many are added as were read.
     #[inline(always)]
-    fn take(&mut self) -> usize {
+    fn take(&mut self) -> u8 {
         std::mem::replace(&mut self.len, 0)
     }
 }
@@ -53,7 +54,7 @@ struct Lists {
 impl Lists {
     #[inline(always)]
     fn sort(&mut self, slot: usize, code: u32) {
-        let (leaf, bottom) = (code & Child::LEAF_BIT != 0, code == NONE);
+        let (leaf, bottom) = (code & Child::LEAF_BIT != 0, code >= BOTTOM);
         self.inner.push_if(slot, !leaf);
         self.leaf.push_if(slot, leaf && !bottom);
         self.bottom.push_if(slot, bottom);
@@ -61,13 +62,13 @@ impl Lists {
 }
 
 #[derive(Clone, Copy)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 struct Slot<Q> {
     flight: Flight<Q>,
     /// Place of the ray in the batch.
     ray: usize,
     /// Place of the top of its stack.
-    top: usize,
+    top: Place,
 }
 
 /// The rays still to be traced.
@@ -76,6 +77,20 @@ pub(crate) struct Waiting<'a, Q> {
     pub(crate) order: Option<&'a [u32]>,
     /// Queries of all rays of the batch, if they have been asked elsewhere already.
     pub(crate) queries: Option<&'a [Q]>,
+    /// Per ray of the batch the tet leaf that it has walked already, or `NONE`.
+    pub(crate) walked: Option<&'a [u32]>,
+}
+
+impl<Q> Waiting<'_, Q> {
+    /// All rays of a batch, that have been nowhere yet.
+    pub(crate) fn all() -> Self {
+        Waiting { order: None, queries: None, walked: None }
+    }
+
+    /// Whether that is what it is.
+    pub(crate) fn is_all(&self) -> bool {
+        self.order.is_none() && self.queries.is_none() && self.walked.is_none()
+    }
 }
 
 /// A batch on its way.
@@ -120,7 +135,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             before: 0,
         };
         let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
-        let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: 0 }; IN_FLIGHT];
+        let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: Place::NOWHERE }; IN_FLIGHT];
         let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
         for (i, slot) in slots.iter_mut().enumerate() {
             if self.launch(s, &mut supply, i, slot) {
@@ -137,7 +152,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                 let slot = &mut slots[at];
                 if slot.top > self.stacks.bottom(at) {
                     // An empty slot of a node.
-                    slot.top -= 1;
+                    slot.top = slot.top.below();
                     lists.sort(at, self.stacks.code(slot.top));
                     continue;
                 }
@@ -157,17 +172,22 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                     Some(Child::Raw(line)) => {
                         slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
                     }
-                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, self.stacks, &mut tets),
+                    Some(Child::Tets(row)) => {
+                        if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
+                            Found::Nothing
+                        } else {
+                            enter_tets(self.object, row, ray, slot, self.stacks, &mut tets)
+                        }
+                    }
                     _ => Found::Nothing,
                 };
-                slot.top -= 1;
-                match found {
-                    Found::Nothing => {}
-                    Found::Nearer => {
-                        slot.top = self.stacks.keep_up_to(s, at, slot.top, slot.flight.key_limit());
-                    }
-                    Found::Enough => slot.top = self.stacks.bottom(at),
-                }
+                let below = slot.top.below();
+                slot.top = match found {
+                    Found::Nothing => below,
+                    Found::Again => slot.top,
+                    Found::Nearer => self.stacks.keep_up_to(s, at, below, slot.flight.key_limit()),
+                    Found::Enough => self.stacks.bottom(at),
+                };
                 let code = self.stacks.code(slot.top);
                 prefetch(s, self.object, code);
                 lists.sort(at, code);
@@ -184,7 +204,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                 let slot = &mut slots[at];
                 let node = self.object.node(self.stacks.code(slot.top));
                 let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
-                slot.top = slot.top + count - 1;
+                slot.top = self.stacks.replaced(slot.top, count);
                 let code = self.stacks.code(slot.top);
                 prefetch(s, self.object, code);
                 lists.sort(at, code);
@@ -209,10 +229,11 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
             if let Some(aim) = supply.prepared.aim(lane) {
                 slot.flight.launch(aim, query);
-            } else if let Some(flight) = Flight::new(self.object, ray, query) {
-                slot.flight = flight;
             } else {
-                continue;
+                *slot.flight.query() = query;
+                if !slot.flight.aim_at(self.object, &supply.frame, ray) {
+                    continue;
+                }
             }
             if self.waiting.queries.is_some() {
                 slot.flight.take_over();
@@ -264,13 +285,16 @@ fn enter_tets<Q: Query>(
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
         stacks.set_code(slot.top, subtree);
-        // It is not done with: it stays on top.
-        slot.top += 1;
-        return Found::Nothing;
+        return Found::Again;
     }
     let done = tets(row, ray, slot.flight.query());
     slot.flight.take_over();
-    if done { Found::Enough } else { Found::Nearer }
+    match done {
+        true => Found::Enough,
+        // Stacks have no keys then.
+        false if Q::ANY => Found::Nothing,
+        false => Found::Nearer,
+    }
 }
 
 /// Asks for the lines of a node or of an indexed leaf.

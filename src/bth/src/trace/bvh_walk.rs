@@ -35,8 +35,9 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
         let found = match Child::from_code(stacks.code(top)) {
             Some(Child::Node(at)) => {
                 count.node();
-                top += flight.enter_node(s, object.node(at), stacks.room(top));
-                Found::Nothing
+                let count = flight.enter_node(s, object.node(at), stacks.room(top));
+                top = stacks.replaced(top, count);
+                continue;
             }
             Some(Child::Indexed(at)) => {
                 let leaf = object.indexed_leaf(at);
@@ -59,13 +60,18 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 count.leaf();
                 let outcome = tets(row, flight.query(), count);
                 flight.take_over();
-                if outcome == TetOutcome::Done { Found::Enough } else { Found::Nearer }
+                match outcome {
+                    TetOutcome::Done => Found::Enough,
+                    // The stack has no keys then.
+                    TetOutcome::GoOn if Q::ANY => Found::Nothing,
+                    TetOutcome::GoOn => Found::Nearer,
+                }
             }
             Some(Child::Tets(_)) | None => Found::Nothing,
         };
-        top -= 1;
+        top = top.below();
         match found {
-            Found::Nothing => {}
+            Found::Nothing | Found::Again => {}
             Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
             Found::Enough => return,
         }

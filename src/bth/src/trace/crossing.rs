@@ -8,7 +8,7 @@ use super::line::{Line, PROJECTION_ERROR};
 use crate::expansion::Expansion;
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32.
-const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
+pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 
 use super::crossing::{Crossing, Estimate, estimate};
 use super::line::Line;
-use super::prepare::Aim;
+use super::prepare::{Aim, Frame};
 use super::query::Query;
 use super::sight::{Block, Sight};
 use super::slabs::Slabs;
@@ -18,6 +18,7 @@ pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct Flight<Q> {
     aim: Aim,
     /// Nothing whose depth certainly exceeds this matters.
@@ -29,6 +30,8 @@ pub(crate) struct Flight<Q> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Found {
     Nothing,
+    /// Something else in the place of the leaf, to be entered now.
+    Again,
     /// A nearer hit than before: what waits farther off need not be entered.
     Nearer,
     /// What the query wants.
@@ -36,16 +39,25 @@ pub(crate) enum Found {
 }
 
 impl<Q: Query> Flight<Q> {
-    /// None if the ray hits nothing whatever there is: see [`Line::new`], or an empty range of t.
-    pub(crate) fn new(object: &ObjectView<'_>, ray: &Ray, query: Q) -> Option<Self> {
-        let line = Line::new(ray)?;
-        if ray.tmin.partial_cmp(&ray.tmax).is_none_or(|o| o.is_gt()) {
-            return None;
+    /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
+    #[inline(always)]
+    pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
+        if !self.aim.set(frame, ray) && !self.aim_in_f64(object, ray) {
+            return false;
         }
+        self.take_over();
+        true
+    }
+
+    /// As [`Self::aim_at`], for rays that f32 can't prepare too.
+    #[cold]
+    #[inline(never)]
+    fn aim_in_f64(&mut self, object: &ObjectView<'_>, ray: &Ray) -> bool {
+        let Some(line) = Line::new(ray) else { return false };
         let slabs = Slabs::new(ray, &line, object.header);
         let sight = Sight::new(ray, &line, &slabs, object.header);
-        let limit = slabs.last;
-        Some(Flight { aim: Aim { slabs, sight }, limit, query })
+        self.aim = Aim { slabs, sight };
+        ray.tmin <= ray.tmax
     }
 
     /// A place for a ray.
@@ -135,6 +147,10 @@ impl<Q: Query> Flight<Q> {
             if self.query.offer(object.triangle_ids[block.first() as usize + i], crossing) {
                 return Found::Enough;
             }
+        }
+        if Q::ANY {
+            // Nothing has come nearer; the entries of the stack have no keys.
+            return Found::Nothing;
         }
         let limit = self.limit;
         self.take_over();

@@ -55,6 +55,70 @@ pub(crate) struct Aim {
 
 const _: () = assert!(size_of::<Slabs>() == 64 && size_of::<Sight>() == 64);
 
+impl Aim {
+    /// A single ray, to the same bounds as [`Prepared::fill`]; false where f32 can't prepare it. Written in place: copies of
+    /// what was just written word by word stall.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, frame: &Frame, ray: &Ray) -> bool {
+        let (o, d) = (&ray.origin, &ray.direction);
+        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
+        let z = if size[0] > size[1] && size[0] > size[2] {
+            0
+        } else if size[1] > size[2] {
+            1
+        } else {
+            2
+        };
+        let greatest = size[z];
+        let (mut reach, mut farthest) = (0f32, 0f32);
+        for k in 0..3 {
+            reach = reach.max((frame.lower[k] - o[k]).abs()).max((frame.upper[k] - o[k]).abs());
+            farthest = farthest.max(o[k].abs());
+        }
+        let extent = (frame.farthest + farthest) * UP;
+        // Sums, because `max` drops NaN.
+        let finite = reach + (o[0] + o[1] + o[2]).abs() + (size[0] + size[1] + size[2]);
+        if !(greatest > 1.0 / LARGEST && finite < LARGEST && extent < LARGEST && ray.tmin <= ray.tmax) {
+            return false;
+        }
+        let pad = extent * slabs::PAD as f32;
+        let least = greatest * slabs::LEAST_COMPONENT as f32;
+        let Aim { slabs, sight } = self;
+        for k in 0..3 {
+            let magnitude = greatest / size[k].max(least);
+            let reciprocal = magnitude.copysign(d[k]);
+            let (middle, pad) = (o[k] * reciprocal, pad * magnitude);
+            slabs.reciprocal[k] = reciprocal;
+            slabs.near_addend[k] = -(middle + pad);
+            slabs.far_addend[k] = pad - middle;
+            slabs.near[k] = (d[k].to_bits() >> 31) * slabs::FAR;
+        }
+        let backward = d[z] < 0.0;
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let (x, y) = if backward { (y, x) } else { (x, y) };
+        let inverse = 1.0 / greatest;
+        let forward = if backward { -1.0 } else { 1.0 };
+        // Not a denormal number on the way: those cost a hundred cycles.
+        let least = (greatest + 1.0) * f32::MIN_POSITIVE;
+        let slack = |t: f32| t.abs() * (4.0 / (1 << 24) as f32) + least;
+        let first = (ray.tmin * greatest).max(-f32::MAX);
+        let limit = ray.tmax * greatest;
+        let last = (ray.tmax.min(f32::MAX) * greatest).min(f32::MAX);
+        slabs.scale = greatest;
+        slabs.first = first - slack(first);
+        slabs.last = limit + slack(limit);
+        sight.axis = [x as u32, y as u32, z as u32];
+        sight.floor = f32::MIN_POSITIVE;
+        sight.origin = [o[x], o[y]];
+        sight.shear = [d[x] * inverse, d[y] * inverse];
+        sight.forward = forward;
+        sight.start = -o[z] * forward;
+        sight.first = first + slack(first);
+        sight.last = last - slack(last);
+        true
+    }
+}
+
 /// Sixteen rays, prepared.
 #[derive(Debug)]
 pub(crate) struct Prepared {
@@ -190,7 +254,7 @@ pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 
     aim[25] = s.fnma(choose(s, is_x, is_y, o), forward, zero);
 
     // What rounding and underflow can take from t, as depth.
-    let least = s.fma(greatest, s.splat(f32::MIN_POSITIVE), s.splat(f32::MIN_POSITIVE));
+    let least = s.mul(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let first = s.max(s.mul(tmin, greatest), s.splat(-f32::MAX));
     let slack = s.fma(s.abs(first), ulps, least);

@@ -11,6 +11,11 @@ pub(crate) trait Query: Copy {
     fn new(ray: &Ray) -> Self;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
+    /// range if they do not; true if that is all the query wants to know.
+    fn settled_by(&mut self, _t: (f64, f64)) -> bool {
+        false
+    }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
     /// t of the nearest hit so far, if the query wants the nearest.
@@ -97,6 +102,10 @@ impl Query for Any {
     #[inline(always)]
     fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);
+        self.found
+    }
+    fn settled_by(&mut self, t: (f64, f64)) -> bool {
+        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
         self.found
     }
     #[inline(always)]

@@ -127,7 +127,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> Kernel for ThroughBvh<'_, Q, D> {
         let Scratch { stacks, packets } = self.scratch;
         let (object, rays) = (self.object, self.rays);
         if self.waiting.is_all() {
-            let count = packets::trace(s, object, rays, packets, &mut self.done);
+            let count = packets::trace(s, object, rays, packets, packets::LEAST_USE, &mut self.done);
             if count.rays == rays.len() {
                 return;
             }

@@ -1,6 +1,6 @@
 //! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
 
-use super::packets::{self, PacketCount, PacketScratch};
+use super::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
 use super::query::{Any, Nearest, Query};
 use super::{single, with_scratch};
 use crate::layout::{Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf};
@@ -24,6 +24,9 @@ struct Surface {
     /// Its points.
     points: Vec<[f32; 3]>,
 }
+
+/// Packets whatever they are worth.
+const ALWAYS: LeastUse = LeastUse { coherent: 0, short: 0 };
 
 /// A block that follows the lines.
 fn append(lines: &mut Vec<Line>, block: &[u8]) -> u32 {
@@ -149,6 +152,7 @@ struct Packed<'a, Q, D> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut PacketScratch,
+    least: LeastUse,
     done: D,
     query: PhantomData<Q>,
 }
@@ -157,7 +161,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> Kernel for Packed<'_, Q, D> {
     type Output = PacketCount;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> PacketCount {
-        packets::trace(s, self.object, self.rays, self.scratch, self.done)
+        packets::trace(s, self.object, self.rays, self.scratch, self.least, self.done)
     }
 }
 
@@ -165,10 +169,11 @@ fn packed<Q: Query>(
     isa: Isa,
     object: &ObjectView<'_>,
     rays: &[Ray],
+    least: LeastUse,
     done: impl FnMut(usize, &Q),
 ) -> (PacketCount, Vec<u32>) {
     let mut scratch = PacketScratch::default();
-    let count = isa.run(Packed { object, rays, scratch: &mut scratch, done, query: PhantomData });
+    let count = isa.run(Packed { object, rays, scratch: &mut scratch, least, done, query: PhantomData });
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     (count, scratch.rest)
 }
@@ -178,7 +183,7 @@ fn bits(hit: &Hit) -> [u32; 4] {
 }
 
 /// Compares packets with single rays; returns how many packets and how many hits there were.
-fn check(surface: &Surface, rays: &[Ray]) -> [(PacketCount, usize); 2] {
+fn check(surface: &Surface, rays: &[Ray], least: LeastUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = with_scratch(|scratch| {
@@ -190,9 +195,9 @@ fn check(surface: &Surface, rays: &[Ray]) -> [(PacketCount, usize); 2] {
     });
     for isa in Isa::ALL {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let (count, rest) = packed(isa, &object, rays, |i, q: &Nearest| hits[i] = q.hit(0));
+        let (count, rest) = packed(isa, &object, rays, least, |i, q: &Nearest| hits[i] = q.hit(0));
         let mut found = vec![false; rays.len()];
-        let (count_any, rest_any) = packed(isa, &object, rays, |i, q: &Any| found[i] = q.found);
+        let (count_any, rest_any) = packed(isa, &object, rays, least, |i, q: &Any| found[i] = q.found);
         for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
             if !rest.contains(&(i as u32)) {
                 assert_eq!(bits(&hits[i]), bits(hit), "{isa}, ray {i}, {ray:?}: {:?}, {hit:?}", hits[i]);
@@ -254,7 +259,7 @@ fn coherent_bundles_are_traced_to_the_same_bits_as_single_rays() {
     for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
         let surface = Surface::new(scale, away);
         let rays = bundles(&surface, scale, false, 1);
-        for (count, hits) in check(&surface, &rays) {
+        for (count, hits) in check(&surface, &rays, ALWAYS) {
             assert!(count.coherent >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
         }
     }
@@ -265,7 +270,7 @@ fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
     for scale in [1.0, 0.125] {
         let surface = Surface::new(scale, 0.0);
         let rays = bundles(&surface, scale, true, 2);
-        for (count, hits) in check(&surface, &rays) {
+        for (count, hits) in check(&surface, &rays, ALWAYS) {
             assert!(count.coherent >= 5 && hits > 500, "{count:?}, {hits}");
         }
     }
@@ -276,7 +281,7 @@ fn short_bundles_are_traced_to_the_same_bits() {
     for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
         let surface = Surface::new(scale, away);
         let rays = short(&surface, scale, 3);
-        let [_, (count, hits)] = check(&surface, &rays);
+        let [_, (count, hits)] = check(&surface, &rays, ALWAYS);
         assert!(count.short >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
     }
 }
@@ -304,7 +309,7 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
     }
     // A last packet that is not full.
     rays.extend_from_slice(&coherent[..50]);
-    let [(nearest, _), (any, _)] = check(&surface, &rays);
+    let [(nearest, _), (any, _)] = check(&surface, &rays, ALWAYS);
     assert!(nearest.rays > 0 && nearest.rays < rays.len(), "{nearest:?}");
     assert!(any.coherent > 0 && any.short > 0, "{any:?}");
 }
@@ -314,7 +319,7 @@ fn rays_that_lanes_cannot_hold_are_left_to_go_alone() {
     for scale in [1e15, 1e-42] {
         let surface = Surface::new(scale, 0.0);
         let rays = bundles(&surface, scale, false, 7);
-        for (count, _) in check(&surface, &rays) {
+        for (count, _) in check(&surface, &rays, ALWAYS) {
             assert_eq!(count, PacketCount::default(), "{scale}");
         }
     }
@@ -332,7 +337,7 @@ fn packets_that_serve_few_of_their_rays_make_way() {
         ray.direction = [400.0, 300.0, -500.0];
         ray.tmax = f32::INFINITY;
     }
-    for (count, _) in check(&surface, &rays) {
+    for (count, _) in check(&surface, &rays, LEAST_USE) {
         assert!(count.poor > 0 && count.rays < rays.len() / 2, "{count:?}");
     }
 }

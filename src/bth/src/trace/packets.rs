@@ -13,9 +13,16 @@ use zerocopy::{FromBytes, IntoBytes};
 
 /// Fewer rays make no packet.
 const FEWEST: usize = 2 * LANES;
-/// Per cent of the rays that a step must serve on average: with less, one ray at a time is faster.
-const COHERENT_USE: u32 = 40;
-const SHORT_USE: u32 = 15;
+
+/// Per cent of its rays that a step of a packet must serve on average: with less, one ray at a time is faster.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeastUse {
+    pub(crate) coherent: u32,
+    pub(crate) short: u32,
+}
+
+/// By measurement.
+pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 40, short: 15 };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
@@ -49,6 +56,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     scratch: &mut PacketScratch,
+    least: LeastUse,
     mut done: impl FnMut(usize, &Q),
 ) -> PacketCount {
     let mut count = PacketCount::default();
@@ -72,27 +80,27 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         }
         let packets = packets.as_mut().expect("just made");
         let done = |ray: usize, query: &Q| done(at + ray, query);
-        let (outcome, guard, least, kind) = match run {
+        let (outcome, guard, least_use, kind) = match run {
             _ if !prepare(s, &frame, packets, own) => {
-                (Use::Refused, &mut coherent, COHERENT_USE, &mut count.coherent)
+                (Use::Refused, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Coherent(span) => {
                 let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
                 let outcome = packets.trace(s, object, &beam, own, done);
-                (outcome, &mut coherent, COHERENT_USE, &mut count.coherent)
+                (outcome, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Short(bounds) => {
                 let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
-                (outcome, &mut short, SHORT_USE, &mut count.short)
+                (outcome, &mut short, least.short, &mut count.short)
             }
         };
         match outcome {
             Use::Refused => rest.extend(at as u32..(at + own.len()) as u32),
             Use::Lanes(share) => {
-                guard.learn(share >= least);
+                guard.learn(share >= least_use);
                 count.rays += own.len();
                 *kind += 1;
-                count.poor += usize::from(share < least);
+                count.poor += usize::from(share < least_use);
             }
         }
     }

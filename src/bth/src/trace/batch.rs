@@ -4,7 +4,7 @@
 use super::Scratch;
 use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
-use super::packets;
+use super::packets::{self, LeastUse};
 use super::query::{Any, Nearest, Query};
 use super::records::LaneRecord;
 use super::tet_batch::{self, Walk};
@@ -72,7 +72,8 @@ fn trace<Q: Query>(
         }
         return;
     }
-    let packed = Isa::chosen().run(Together { object, rays, with_short: true, scratch, sink: &mut sink });
+    let packed =
+        Isa::chosen().run(Together { object, rays, least: packets::LEAST_USE, scratch, sink: &mut sink });
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
@@ -99,7 +100,7 @@ fn trace_hinted<Q: Query>(
     sink: &mut Sink<'_, Q>,
 ) {
     // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
-    let packed = Isa::chosen().run(Together { object, rays, with_short: false, scratch, sink });
+    let packed = Isa::chosen().run(Together { object, rays, least: packets::ONLY_COHERENT, scratch, sink });
     let mut faces = vec![NONE; rays.len()];
     let home = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
@@ -162,8 +163,7 @@ fn walk_tets<R: LaneRecord, Q: Query>(
 struct Together<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    /// Also short rays that fill a small box.
-    with_short: bool,
+    least: LeastUse,
     scratch: &'a mut Scratch,
     sink: &'a mut Sink<'b, Q>,
 }
@@ -174,7 +174,7 @@ impl<Q: Query> Kernel for Together<'_, '_, Q> {
     fn run<S: Simd>(self, s: S) -> usize {
         let (packets, sink) = (&mut self.scratch.packets, self.sink);
         let done = |ray: usize, query: &Q| sink.put(ray, query);
-        packets::trace(s, self.object, self.rays, self.with_short, packets, done).rays
+        packets::trace(s, self.object, self.rays, packets, self.least, done).rays
     }
 }
 

@@ -12,6 +12,8 @@ mod packet_group;
 mod packet_hull;
 mod packet_leaf;
 mod packet_settle;
+#[cfg(test)]
+mod packet_tests;
 mod packets;
 mod prepare;
 mod query;

@@ -24,6 +24,7 @@ mod motion;
 pub mod object;
 pub mod rays;
 mod scene;
+mod simd;
 #[cfg(test)]
 mod testing;
 mod trace;
@@ -34,4 +35,5 @@ pub use file::File;
 pub use instances::Update;
 pub use motion::InstanceView;
 pub use scene::{Scene, from_bytes, map, open};
+pub use simd::{Isa, IsaError};
 pub use trace::Steps;

@@ -6,7 +6,7 @@ use crate::instances::World;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Scratch, Steps};
+use crate::trace::{self, Steps};
 use std::path::Path;
 
 /// An open file, ready to trace. A file with a scene shows its instances at a time (see
@@ -151,18 +151,22 @@ impl Scene {
             return world.nearest(&self.file, rays, from, hits);
         }
         hits.fill(Hit::MISS);
-        let mut scratch = Scratch::default();
-        for instance in 0..self.object_count() {
-            let object = self.object(instance);
-            for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
-                let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
-                let hit =
-                    trace::nearest(&object, &ray, hint(surface(from, i), instance), instance, &mut scratch);
-                if hit.t < best.t {
-                    *best = hit;
+        trace::with_scratch(|scratch| {
+            if from.is_none() && self.object_count() == 1 {
+                return trace::nearest_batch(&self.object(0), rays, 0, scratch, hits);
+            }
+            for instance in 0..self.object_count() {
+                let object = self.object(instance);
+                for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
+                    let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
+                    let hit =
+                        trace::nearest(&object, &ray, hint(surface(from, i), instance), instance, scratch);
+                    if hit.t < best.t {
+                        *best = hit;
+                    }
                 }
             }
-        }
+        });
     }
 
     /// Whether each of many rays hits anything.
@@ -175,13 +179,17 @@ impl Scene {
             return world.any(&self.file, rays, from, found);
         }
         found.fill(false);
-        let mut scratch = Scratch::default();
-        for instance in 0..self.object_count() {
-            let object = self.object(instance);
-            for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), &mut scratch);
+        trace::with_scratch(|scratch| {
+            if from.is_none() && self.object_count() == 1 {
+                return trace::any_batch(&self.object(0), rays, scratch, found);
             }
-        }
+            for instance in 0..self.object_count() {
+                let object = self.object(instance);
+                for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
+                    *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), scratch);
+                }
+            }
+        });
     }
 }
 

@@ -75,8 +75,7 @@ impl<'a, R: Record> TetSpace<'a, R> {
     /// Offers a constrained face to the query, by the test that all structures share.
     pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
-        let projected = corners.map(|p| self.line.project(p));
-        match self.line.crossing(|| corners, projected.each_ref()) {
+        match self.line.crossing(corners) {
             Some(crossing) => query.offer(face.triangle, crossing),
             None => false,
         }

@@ -1,0 +1,335 @@
+//! Sixteen lanes in two AVX2 registers.
+//!
+//! Every block below is sound for one reason: an [`Avx2`] exists only where [`Avx2::detect`] found the features that
+//! the intrinsics need, so each may be executed. Blocks that go through pointers say more.
+#![allow(unsafe_code)]
+
+use super::{Kernel, LANES, Simd, scalar};
+use std::arch::x86_64::*;
+
+/// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Avx2(());
+
+type F = [__m256; 2];
+type U = [__m256i; 2];
+/// All bits of a lane, or none.
+type M = [__m256i; 2];
+
+impl Avx2 {
+    #[inline]
+    pub(super) fn detect() -> Option<Self> {
+        let found = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        found.then_some(Avx2(()))
+    }
+
+    /// Runs a kernel compiled for these features.
+    #[inline]
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: self proves that the machine has the features that `entry` enables.
+        unsafe { entry(self, kernel) }
+    }
+
+    #[inline(always)]
+    fn lookup_half(self, table: F, at: __m256i) -> __m256 {
+        // SAFETY: registers only. Bit 3 of the index chooses the half: it becomes the sign for the blend.
+        unsafe {
+            let low = _mm256_permutevar8x32_ps(table[0], at);
+            let high = _mm256_permutevar8x32_ps(table[1], at);
+            _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at)))
+        }
+    }
+
+    #[inline(always)]
+    fn arrays(self, a: F, b: U) -> ([f32; LANES], [u32; LANES]) {
+        let mut out = ([0.0; LANES], [0; LANES]);
+        self.store(a, &mut out.0);
+        self.store_u(b, &mut out.1);
+        out
+    }
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+fn entry<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
+    kernel.run(simd)
+}
+
+/// Methods that are one intrinsic on either half.
+macro_rules! halves {
+    ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
+        #[inline(always)]
+        fn $name(self, $($arg: $of),*) -> $out {
+            // SAFETY: the features are there (self), and only registers are touched.
+            let low = unsafe {
+                $(let $arg = $arg[0];)*
+                $do
+            };
+            // SAFETY: as above.
+            let high = unsafe {
+                $(let $arg = $arg[1];)*
+                $do
+            };
+            [low, high]
+        }
+    )* };
+}
+
+/// The two halves of an array of sixteen.
+#[inline(always)]
+fn split<T>(from: &[T; LANES]) -> [*const T; 2] {
+    let (low, high) = from.split_at(8);
+    [low.as_ptr(), high.as_ptr()]
+}
+
+#[inline(always)]
+fn split_mut<T>(to: &mut [T; LANES]) -> [*mut T; 2] {
+    let (low, high) = to.split_at_mut(8);
+    [low.as_mut_ptr(), high.as_mut_ptr()]
+}
+
+/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
+/// gathers.
+#[inline(always)]
+fn assert_within(simd: Avx2, m: M, at: U, len: usize) {
+    let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
+    let outside = simd.and_not(m, simd.lt_u(at, simd.splat_u(len)));
+    assert!(simd.mask_bits(outside) == 0, "an index of a gather lies outside");
+}
+
+impl Simd for Avx2 {
+    type F = F;
+    type U = U;
+    type M = M;
+
+    halves! {
+        add(a: F, b: F) -> F = _mm256_add_ps(a, b);
+        sub(a: F, b: F) -> F = _mm256_sub_ps(a, b);
+        mul(a: F, b: F) -> F = _mm256_mul_ps(a, b);
+        div(a: F, b: F) -> F = _mm256_div_ps(a, b);
+        fma(a: F, b: F, c: F) -> F = _mm256_fmadd_ps(a, b, c);
+        fnma(a: F, b: F, c: F) -> F = _mm256_fnmadd_ps(a, b, c);
+        min(a: F, b: F) -> F = _mm256_min_ps(a, b);
+        max(a: F, b: F) -> F = _mm256_max_ps(a, b);
+        abs(a: F) -> F = _mm256_andnot_ps(_mm256_set1_ps(-0.0), a);
+        lt(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b));
+        le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
+        select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));
+        add_u(a: U, b: U) -> U = _mm256_add_epi32(a, b);
+        sub_u(a: U, b: U) -> U = _mm256_sub_epi32(a, b);
+        and_u(a: U, b: U) -> U = _mm256_and_si256(a, b);
+        or_u(a: U, b: U) -> U = _mm256_or_si256(a, b);
+        xor_u(a: U, b: U) -> U = _mm256_xor_si256(a, b);
+        eq_u(a: U, b: U) -> M = _mm256_cmpeq_epi32(a, b);
+        // a < b unless max(a, b) is a.
+        lt_u(a: U, b: U) -> M =
+            _mm256_xor_si256(_mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a), _mm256_set1_epi32(-1));
+        select_u(m: M, a: U, b: U) -> U = _mm256_blendv_epi8(b, a, m);
+        bits(a: F) -> U = _mm256_castps_si256(a);
+        from_bits(a: U) -> F = _mm256_castsi256_ps(a);
+        and(a: M, b: M) -> M = _mm256_and_si256(a, b);
+        or(a: M, b: M) -> M = _mm256_or_si256(a, b);
+        and_not(a: M, b: M) -> M = _mm256_andnot_si256(b, a);
+    }
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> F {
+        // SAFETY: registers only.
+        [unsafe { _mm256_set1_ps(x) }; 2]
+    }
+    #[inline(always)]
+    fn splat_u(self, x: u32) -> U {
+        // SAFETY: registers only.
+        [unsafe { _mm256_set1_epi32(x as i32) }; 2]
+    }
+    #[inline(always)]
+    fn load(self, from: &[f32; LANES]) -> F {
+        let [low, high] = split(from);
+        // SAFETY: eight readable floats each; unaligned loads.
+        unsafe { [_mm256_loadu_ps(low), _mm256_loadu_ps(high)] }
+    }
+    #[inline(always)]
+    fn store(self, a: F, to: &mut [f32; LANES]) {
+        let [low, high] = split_mut(to);
+        // SAFETY: eight writable floats each; unaligned stores.
+        unsafe {
+            _mm256_storeu_ps(low, a[0]);
+            _mm256_storeu_ps(high, a[1]);
+        }
+    }
+    #[inline(always)]
+    fn load_u(self, from: &[u32; LANES]) -> U {
+        let [low, high] = split(from);
+        // SAFETY: as `load`.
+        unsafe { [_mm256_loadu_si256(low.cast()), _mm256_loadu_si256(high.cast())] }
+    }
+    #[inline(always)]
+    fn load_bytes(self, from: &[u8; LANES]) -> U {
+        let [low, high] = split(from);
+        // SAFETY: eight readable bytes each; unaligned loads.
+        unsafe {
+            [
+                _mm256_cvtepu8_epi32(_mm_loadl_epi64(low.cast())),
+                _mm256_cvtepu8_epi32(_mm_loadl_epi64(high.cast())),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn store_u(self, a: U, to: &mut [u32; LANES]) {
+        let [low, high] = split_mut(to);
+        // SAFETY: as `store`.
+        unsafe {
+            _mm256_storeu_si256(low.cast(), a[0]);
+            _mm256_storeu_si256(high.cast(), a[1]);
+        }
+    }
+    #[inline(always)]
+    fn lookup(self, table: F, at: U) -> F {
+        [self.lookup_half(table, at[0]), self.lookup_half(table, at[1])]
+    }
+    #[inline(always)]
+    fn lookup_u(self, table: U, at: U) -> U {
+        self.bits(self.lookup(self.from_bits(table), at))
+    }
+    #[inline(always)]
+    fn least(self, a: F) -> f32 {
+        // SAFETY: registers only.
+        unsafe {
+            let m = _mm256_min_ps(a[0], a[1]);
+            let m = _mm_min_ps(_mm256_castps256_ps128(m), _mm256_extractf128_ps::<1>(m));
+            let m = _mm_min_ps(m, _mm_movehl_ps(m, m));
+            _mm_cvtss_f32(_mm_min_ss(m, _mm_shuffle_ps::<1>(m, m)))
+        }
+    }
+    #[inline(always)]
+    fn shl_u<const K: u32>(self, a: U) -> U {
+        // SAFETY: registers only. The count is a register too: an immediate would have to be an i32 constant.
+        unsafe {
+            let count = _mm_cvtsi32_si128(K as i32);
+            [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
+        }
+    }
+    #[inline(always)]
+    fn shr_u<const K: u32>(self, a: U) -> U {
+        // SAFETY: registers only.
+        unsafe {
+            let count = _mm_cvtsi32_si128(K as i32);
+            [_mm256_srl_epi32(a[0], count), _mm256_srl_epi32(a[1], count)]
+        }
+    }
+    #[inline(always)]
+    fn gather(self, m: M, from: &[f32], at: U) -> F {
+        assert_within(self, m, at, from.len());
+        // SAFETY: only lanes of the mask are read, and those lie within the slice.
+        let half = |i: usize| unsafe {
+            _mm256_mask_i32gather_ps::<4>(
+                _mm256_setzero_ps(),
+                from.as_ptr(),
+                at[i],
+                _mm256_castsi256_ps(m[i]),
+            )
+        };
+        [half(0), half(1)]
+    }
+    #[inline(always)]
+    fn gather_u(self, m: M, from: &[u32], at: U) -> U {
+        assert_within(self, m, at, from.len());
+        // SAFETY: as `gather`.
+        unsafe {
+            let (zero, from) = (_mm256_setzero_si256(), from.as_ptr().cast());
+            [
+                _mm256_mask_i32gather_epi32::<4>(zero, from, at[0], m[0]),
+                _mm256_mask_i32gather_epi32::<4>(zero, from, at[1], m[1]),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
+        let flat = from.as_flattened();
+        let even = self.shl_u::<1>(at);
+        let odd = self.or_u(even, self.splat_u(1));
+        // Doubling would wrap where the index is too great already.
+        assert_within(self, m, at, from.len());
+        (self.gather_u(m, flat, even), self.gather_u(m, flat, odd))
+    }
+    #[inline(always)]
+    fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
+        let (mut out, _) = self.arrays(a, m);
+        for (next, lane) in scalar::lanes(self.mask_bits(m)).enumerate() {
+            out[lane] = from[next];
+        }
+        self.load(&out)
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
+        self.bits(self.expand(self.from_bits(a), m, &from.map(f32::from_bits)))
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u32) -> M {
+        // SAFETY: registers only.
+        unsafe {
+            let of =
+                |bit: __m256i| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), bit), bit);
+            [
+                of(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)),
+                of(_mm256_setr_epi32(1 << 8, 2 << 8, 4 << 8, 8 << 8, 16 << 8, 32 << 8, 64 << 8, 128 << 8)),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn mask_bits(self, m: M) -> u32 {
+        // SAFETY: registers only.
+        let (low, high) = unsafe {
+            (
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[0])) as u32,
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[1])) as u32,
+            )
+        };
+        low | high << 8
+    }
+
+    #[inline(always)]
+    fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
+        let mut lanes = [0; LANES];
+        self.store_u(a, &mut lanes);
+        scalar::compress(bits, &lanes, to)
+    }
+    #[inline(always)]
+    fn compress_far_to_near(
+        self,
+        bits: u32,
+        key: F,
+        a: U,
+        to: &mut [u32; LANES],
+        keys: &mut [f32; LANES],
+    ) -> usize {
+        let (key, a) = self.arrays(key, a);
+        scalar::compress_far_to_near(bits, &key, &a, to, keys)
+    }
+    #[inline(always)]
+    fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
+        scalar::keep_up_to(codes, keys, limit)
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
+        let (mut a, mut out) = ([[0.0; LANES]; LANES], rows);
+        for i in 0..LANES {
+            self.store(rows[i], &mut a[i]);
+        }
+        let a = scalar::transpose(a);
+        for i in 0..LANES {
+            out[i] = self.load(&a[i]);
+        }
+        out
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, place: *const T) {
+        // SAFETY: a hint that never faults, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+    }
+}

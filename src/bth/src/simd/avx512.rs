@@ -1,0 +1,379 @@
+//! Sixteen lanes in one AVX-512 register.
+//!
+//! Every block below is sound for one reason: an [`Avx512`] exists only where [`Avx512::detect`] found the features
+//! that the intrinsics need, so each may be executed. Blocks that go through pointers say more.
+#![allow(unsafe_code)]
+
+use super::{Kernel, LANES, Simd};
+use std::arch::x86_64::*;
+
+/// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Avx512(());
+
+impl Avx512 {
+    #[inline]
+    pub(super) fn detect() -> Option<Self> {
+        let found = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512cd")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        found.then_some(Avx512(()))
+    }
+
+    /// Runs a kernel compiled for these features.
+    #[inline]
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: self proves that the machine has the features that `entry` enables.
+        unsafe { entry(self, kernel) }
+    }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+fn entry<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
+    kernel.run(simd)
+}
+
+/// Methods that are one intrinsic on registers.
+macro_rules! intrinsics {
+    ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
+        #[inline(always)]
+        fn $name(self, $($arg: $of),*) -> $out {
+            // SAFETY: the features are there (self), and only registers are touched.
+            unsafe { $do }
+        }
+    )* };
+}
+
+/// Step of a bitonic sorting network, descending: lanes whose bit is set keep the greater of themselves and partner.
+macro_rules! exchange {
+    ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
+        let (v, partner) = ($v, $partner);
+        $mask_max($min(v, partner), $keep_greater, v, partner)
+    }};
+}
+
+/// Sorts four lanes of i32, the greatest first.
+///
+/// # Safety
+/// The machine must have the features of [`Avx512`]. Touches registers only, as the next two.
+#[inline(always)]
+unsafe fn sort4(v: __m128i) -> __m128i {
+    // SAFETY: see above.
+    unsafe {
+        let v =
+            exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b10_11_00_01>(v), 0b1001);
+        let v =
+            exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b01_00_11_10>(v), 0b0011);
+        exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b10_11_00_01>(v), 0b0101)
+    }
+}
+
+/// Sorts eight lanes; see [`sort4`].
+///
+/// # Safety
+/// As [`sort4`].
+#[inline(always)]
+unsafe fn sort8(v: __m256i) -> __m256i {
+    macro_rules! step {
+        ($v:expr, $partner:expr, $mask:literal) => {
+            exchange!(_mm256_min_epi32, _mm256_mask_max_epi32, $v, $partner, $mask)
+        };
+    }
+    // SAFETY: see `sort4`.
+    unsafe {
+        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1001_1001);
+        let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_0011);
+        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_0101);
+        let v = step!(v, _mm256_permute4x64_epi64::<0b01_00_11_10>(v), 0b0000_1111);
+        let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b0011_0011);
+        step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b0101_0101)
+    }
+}
+
+/// Sorts sixteen lanes; see [`sort4`].
+///
+/// # Safety
+/// As [`sort4`].
+#[inline(always)]
+unsafe fn sort16(v: __m512i) -> __m512i {
+    macro_rules! step {
+        ($v:expr, $partner:expr, $mask:literal) => {
+            exchange!(_mm512_min_epi32, _mm512_mask_max_epi32, $v, $partner, $mask)
+        };
+    }
+    // SAFETY: see `sort4`.
+    unsafe {
+        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1001_1001_1001_1001);
+        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_0011_1100_0011);
+        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_0101_1010_0101);
+        let v = step!(v, _mm512_shuffle_i32x4::<0b10_11_00_01>(v, v), 0b1111_0000_0000_1111);
+        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100_0011_0011);
+        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010_0101_0101);
+        let v = step!(v, _mm512_shuffle_i32x4::<0b01_00_11_10>(v, v), 0b0000_0000_1111_1111);
+        let v = step!(v, _mm512_shuffle_i32x4::<0b10_11_00_01>(v, v), 0b0000_1111_0000_1111);
+        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b0011_0011_0011_0011);
+        step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b0101_0101_0101_0101)
+    }
+}
+
+/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
+/// gathers.
+#[inline(always)]
+fn assert_within(simd: Avx512, m: u16, at: __m512i, len: usize) {
+    let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
+    let outside = m & !simd.lt_u(at, simd.splat_u(len));
+    assert!(outside == 0, "an index of a gather lies outside");
+}
+
+impl Simd for Avx512 {
+    type F = __m512;
+    type U = __m512i;
+    type M = __mmask16;
+
+    intrinsics! {
+        splat(x: f32) -> __m512 = _mm512_set1_ps(x);
+        add(a: __m512, b: __m512) -> __m512 = _mm512_add_ps(a, b);
+        sub(a: __m512, b: __m512) -> __m512 = _mm512_sub_ps(a, b);
+        mul(a: __m512, b: __m512) -> __m512 = _mm512_mul_ps(a, b);
+        div(a: __m512, b: __m512) -> __m512 = _mm512_div_ps(a, b);
+        fma(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fmadd_ps(a, b, c);
+        fnma(a: __m512, b: __m512, c: __m512) -> __m512 = _mm512_fnmadd_ps(a, b, c);
+        min(a: __m512, b: __m512) -> __m512 = _mm512_min_ps(a, b);
+        max(a: __m512, b: __m512) -> __m512 = _mm512_max_ps(a, b);
+        abs(a: __m512) -> __m512 = _mm512_abs_ps(a);
+        lt(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
+        le(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
+        select(m: u16, a: __m512, b: __m512) -> __m512 = _mm512_mask_mov_ps(b, m, a);
+        lookup(table: __m512, at: __m512i) -> __m512 = _mm512_permutexvar_ps(at, table);
+        least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
+        splat_u(x: u32) -> __m512i = _mm512_set1_epi32(x as i32);
+        add_u(a: __m512i, b: __m512i) -> __m512i = _mm512_add_epi32(a, b);
+        sub_u(a: __m512i, b: __m512i) -> __m512i = _mm512_sub_epi32(a, b);
+        and_u(a: __m512i, b: __m512i) -> __m512i = _mm512_and_si512(a, b);
+        or_u(a: __m512i, b: __m512i) -> __m512i = _mm512_or_si512(a, b);
+        xor_u(a: __m512i, b: __m512i) -> __m512i = _mm512_xor_si512(a, b);
+        eq_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmpeq_epi32_mask(a, b);
+        lt_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmplt_epu32_mask(a, b);
+        select_u(m: u16, a: __m512i, b: __m512i) -> __m512i = _mm512_mask_mov_epi32(b, m, a);
+        lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
+        bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
+        from_bits(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
+    }
+
+    #[inline(always)]
+    fn load(self, from: &[f32; LANES]) -> __m512 {
+        // SAFETY: sixteen readable floats; unaligned loads.
+        unsafe { _mm512_loadu_ps(from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store(self, a: __m512, to: &mut [f32; LANES]) {
+        // SAFETY: sixteen writable floats; unaligned stores.
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), a) }
+    }
+    #[inline(always)]
+    fn load_u(self, from: &[u32; LANES]) -> __m512i {
+        // SAFETY: as `load`.
+        unsafe { _mm512_loadu_si512(from.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn load_bytes(self, from: &[u8; LANES]) -> __m512i {
+        // SAFETY: sixteen readable bytes; an unaligned load.
+        unsafe { _mm512_cvtepu8_epi32(_mm_loadu_si128(from.as_ptr().cast())) }
+    }
+    #[inline(always)]
+    fn store_u(self, a: __m512i, to: &mut [u32; LANES]) {
+        // SAFETY: as `store`.
+        unsafe { _mm512_storeu_si512(to.as_mut_ptr().cast(), a) }
+    }
+    #[inline(always)]
+    fn shl_u<const K: u32>(self, a: __m512i) -> __m512i {
+        // SAFETY: registers only.
+        unsafe { _mm512_slli_epi32::<K>(a) }
+    }
+    #[inline(always)]
+    fn shr_u<const K: u32>(self, a: __m512i) -> __m512i {
+        // SAFETY: registers only.
+        unsafe { _mm512_srli_epi32::<K>(a) }
+    }
+    #[inline(always)]
+    fn gather(self, m: u16, from: &[f32], at: __m512i) -> __m512 {
+        assert_within(self, m, at, from.len());
+        // SAFETY: only lanes of the mask are read, and those lie within the slice.
+        unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
+        assert_within(self, m, at, from.len());
+        // SAFETY: as `gather`.
+        unsafe { _mm512_mask_i32gather_epi32::<4>(_mm512_setzero_si512(), m, at, from.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: u16, from: &[[u32; 2]], at: __m512i) -> (__m512i, __m512i) {
+        assert_within(self, m, at, from.len());
+        // SAFETY: as `gather`, eight lanes at a time.
+        unsafe {
+            let zero = _mm512_setzero_si512();
+            let low = _mm512_castsi512_si256(at);
+            let high = _mm512_extracti64x4_epi64::<1>(at);
+            let low = _mm512_mask_i32gather_epi64::<8>(zero, m as u8, low, from.as_ptr().cast());
+            let high = _mm512_mask_i32gather_epi64::<8>(zero, (m >> 8) as u8, high, from.as_ptr().cast());
+            let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+            let odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+            (_mm512_permutex2var_epi32(low, even, high), _mm512_permutex2var_epi32(low, odd, high))
+        }
+    }
+    #[inline(always)]
+    fn expand(self, a: __m512, m: u16, from: &[f32; LANES]) -> __m512 {
+        // SAFETY: at most sixteen floats are read.
+        unsafe { _mm512_mask_expandloadu_ps(a, m, from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn expand_u(self, a: __m512i, m: u16, from: &[u32; LANES]) -> __m512i {
+        // SAFETY: at most sixteen words are read.
+        unsafe { _mm512_mask_expandloadu_epi32(a, m, from.as_ptr().cast()) }
+    }
+
+    #[inline(always)]
+    fn mask(self, bits: u32) -> u16 {
+        bits as u16
+    }
+    #[inline(always)]
+    fn mask_bits(self, m: u16) -> u32 {
+        m.into()
+    }
+    #[inline(always)]
+    fn and(self, a: u16, b: u16) -> u16 {
+        a & b
+    }
+    #[inline(always)]
+    fn or(self, a: u16, b: u16) -> u16 {
+        a | b
+    }
+    #[inline(always)]
+    fn and_not(self, a: u16, b: u16) -> u16 {
+        a & !b
+    }
+
+    #[inline(always)]
+    fn compress(self, bits: u32, a: __m512i, to: &mut [u32; LANES]) -> usize {
+        // SAFETY: `to` has room for all sixteen lanes.
+        unsafe {
+            // Compressing to a register and storing it whole is much faster than a compressing store.
+            _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(bits as u16, a));
+        }
+        (bits & 0xffff).count_ones() as usize
+    }
+    #[inline(always)]
+    fn compress_far_to_near(
+        self,
+        bits: u32,
+        key: __m512,
+        a: __m512i,
+        to: &mut [u32; LANES],
+        keys: &mut [f32; LANES],
+    ) -> usize {
+        let count = (bits & 0xffff).count_ones() as usize;
+        let m = bits as u16;
+        // SAFETY: `to` and `keys` have room for sixteen lanes, of which 4, 8 or 16 are stored.
+        unsafe {
+            // The lane goes into the lowest bits of its key, and is sorted with it.
+            let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+            let low = _mm512_set1_epi32(15);
+            let key = _mm512_or_si512(_mm512_andnot_si512(low, _mm512_castps_si512(key)), lane);
+            let least = _mm512_set1_epi32(i32::MIN);
+            if count <= 4 {
+                let key = sort4(_mm512_castsi512_si128(_mm512_mask_compress_epi32(least, m, key)));
+                let a = _mm512_permutexvar_epi32(_mm512_castsi128_si512(key), a);
+                _mm_storeu_ps(keys.as_mut_ptr(), _mm_castsi128_ps(key));
+                _mm_storeu_si128(to.as_mut_ptr().cast(), _mm512_castsi512_si128(a));
+            } else if count <= 8 {
+                let key = sort8(_mm512_castsi512_si256(_mm512_mask_compress_epi32(least, m, key)));
+                let a = _mm512_permutexvar_epi32(_mm512_castsi256_si512(key), a);
+                _mm256_storeu_ps(keys.as_mut_ptr(), _mm256_castsi256_ps(key));
+                _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm512_castsi512_si256(a));
+            } else {
+                let key = sort16(_mm512_mask_mov_epi32(least, m, key));
+                let a = _mm512_permutexvar_epi32(key, a);
+                _mm512_storeu_ps(keys.as_mut_ptr(), _mm512_castsi512_ps(key));
+                _mm512_storeu_si512(to.as_mut_ptr().cast(), a);
+            }
+        }
+        count
+    }
+    #[inline(always)]
+    fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
+        let len = codes.len().min(keys.len());
+        let (mut from, mut kept) = (0, 0);
+        let limit = self.splat(limit);
+        while from < len {
+            let valid = if len - from >= LANES { u16::MAX } else { (1 << (len - from)) - 1 };
+            // SAFETY: masked loads read only lanes below len; the compressed lanes, at most as many as were read
+            // so far, are stored by a mask of their number, from kept <= from on.
+            unsafe {
+                let key = _mm512_maskz_loadu_ps(valid, keys.as_ptr().add(from));
+                let code = _mm512_maskz_loadu_epi32(valid, codes.as_ptr().add(from).cast());
+                let keep = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, key, limit);
+                let count = keep.count_ones();
+                let stored = ((1u32 << count) - 1) as u16;
+                _mm512_mask_storeu_ps(
+                    keys.as_mut_ptr().add(kept),
+                    stored,
+                    _mm512_maskz_compress_ps(keep, key),
+                );
+                let code = _mm512_maskz_compress_epi32(keep, code);
+                _mm512_mask_storeu_epi32(codes.as_mut_ptr().add(kept).cast(), stored, code);
+                kept += count as usize;
+            }
+            from += LANES;
+        }
+        kept
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [__m512; LANES]) -> [__m512; LANES] {
+        let mut r = rows;
+        // SAFETY: registers only.
+        unsafe {
+            // Within each quarter of the lanes: four by four,
+            for i in (0..LANES).step_by(4) {
+                let (a, b) = (_mm512_unpacklo_ps(r[i], r[i + 1]), _mm512_unpackhi_ps(r[i], r[i + 1]));
+                let (c, d) = (_mm512_unpacklo_ps(r[i + 2], r[i + 3]), _mm512_unpackhi_ps(r[i + 2], r[i + 3]));
+                r[i] = _mm512_shuffle_ps::<0b01_00_01_00>(a, c);
+                r[i + 1] = _mm512_shuffle_ps::<0b11_10_11_10>(a, c);
+                r[i + 2] = _mm512_shuffle_ps::<0b01_00_01_00>(b, d);
+                r[i + 3] = _mm512_shuffle_ps::<0b11_10_11_10>(b, d);
+            }
+            // then the quarters: row 4p + i holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
+            let mut out = r;
+            for i in 0..4 {
+                let (a, b) = (r[i], r[i + 4]);
+                let (c, d) = (r[i + 8], r[i + 12]);
+                let (even, odd) = (
+                    _mm512_shuffle_f32x4::<0b10_00_10_00>(a, b),
+                    _mm512_shuffle_f32x4::<0b11_01_11_01>(a, b),
+                );
+                let (even2, odd2) = (
+                    _mm512_shuffle_f32x4::<0b10_00_10_00>(c, d),
+                    _mm512_shuffle_f32x4::<0b11_01_11_01>(c, d),
+                );
+                out[i] = _mm512_shuffle_f32x4::<0b10_00_10_00>(even, even2);
+                out[i + 8] = _mm512_shuffle_f32x4::<0b11_01_11_01>(even, even2);
+                out[i + 4] = _mm512_shuffle_f32x4::<0b10_00_10_00>(odd, odd2);
+                out[i + 12] = _mm512_shuffle_f32x4::<0b11_01_11_01>(odd, odd2);
+            }
+            out
+        }
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, place: *const T) {
+        // SAFETY: a hint that never faults, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+    }
+}

@@ -1,0 +1,126 @@
+//! Sixteen lanes of f32 or u32, whatever the machine: the small vector trait over which kernels are written once.
+//!
+//! An implementation is a token that exists only on machines that have its instructions, so its methods are
+//! safe to call, and every `unsafe` of the kernels lies in the files beside this one. All methods, and
+//! everything generic over [`Simd`], must be `#[inline(always)]`: only so does code end up
+//! inside the one function per instruction set that enables its features ([`Isa::run`]). A closure, or
+//! a library function that takes one (`array::map`), is compiled on its own and must not touch lanes.
+//!
+//! Kernels use these lanes only to *leave out* what certainly does not matter; hits are decided elsewhere, in f64
+//! (`trace::line`). So it does no harm that `fma` rounds once or twice, depending on the machine.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod isa;
+mod scalar;
+#[cfg(test)]
+mod tests;
+
+pub use isa::{Isa, IsaError};
+pub(crate) use scalar::Scalar;
+
+/// Number of lanes.
+pub(crate) const LANES: usize = 16;
+
+/// Work that is generic over the instruction set. `run` must be `#[inline(always)]`.
+pub(crate) trait Kernel {
+    type Output;
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+/// Sixteen lanes. Lane i of a mask is bit i.
+pub(crate) trait Simd: Copy {
+    /// f32 lanes.
+    type F: Copy;
+    /// u32 lanes.
+    type U: Copy;
+    /// A truth value a lane.
+    type M: Copy;
+
+    fn splat(self, x: f32) -> Self::F;
+    fn load(self, from: &[f32; LANES]) -> Self::F;
+    fn store(self, a: Self::F, to: &mut [f32; LANES]);
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a·b + c, rounded once or twice.
+    fn fma(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// c - a·b, rounded once or twice.
+    fn fnma(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// The lesser; `b` where either is NaN.
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// The greater; `b` where either is NaN.
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    fn abs(self, a: Self::F) -> Self::F;
+    /// a < b; false for NaN.
+    fn lt(self, a: Self::F, b: Self::F) -> Self::M;
+    /// a <= b; false for NaN.
+    fn le(self, a: Self::F, b: Self::F) -> Self::M;
+    /// `a` where the mask is set, else `b`.
+    fn select(self, m: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    /// Lane `at[i] % 16` of the table.
+    fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
+    /// The least of all lanes; none may be NaN.
+    fn least(self, a: Self::F) -> f32;
+    /// Elements of a slice, 0.0 where the mask is clear. Panics if a lane that is set lies outside.
+    fn gather(self, m: Self::M, from: &[f32], at: Self::U) -> Self::F;
+    /// Where the mask is set, the next elements of `from` in order; else `a`.
+    fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
+
+    fn splat_u(self, x: u32) -> Self::U;
+    fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
+    fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
+    fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn sub_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn shl_u<const K: u32>(self, a: Self::U) -> Self::U;
+    fn shr_u<const K: u32>(self, a: Self::U) -> Self::U;
+    fn eq_u(self, a: Self::U, b: Self::U) -> Self::M;
+    /// a < b, unsigned.
+    fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
+    fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
+    fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
+    fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
+    /// Both halves of elements of a slice: one access each where the machine has it.
+    fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
+    fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
+    /// The bits of f32 lanes.
+    fn bits(self, a: Self::F) -> Self::U;
+    /// f32 lanes from their bits.
+    fn from_bits(self, a: Self::U) -> Self::F;
+
+    fn mask(self, bits: u32) -> Self::M;
+    fn mask_bits(self, m: Self::M) -> u32;
+    fn and(self, a: Self::M, b: Self::M) -> Self::M;
+    fn or(self, a: Self::M, b: Self::M) -> Self::M;
+    /// a and not b.
+    fn and_not(self, a: Self::M, b: Self::M) -> Self::M;
+
+    /// Stores the lanes whose bit is set, in order, from `to[0]`; what follows them in `to` is undefined.
+    /// Returns how many.
+    fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
+    /// As [`Self::compress`], the greatest key first; keys are compared, and stored, but for their four lowest
+    /// bits. Negative keys may come in any order.
+    fn compress_far_to_near(
+        self,
+        bits: u32,
+        key: Self::F,
+        a: Self::U,
+        to: &mut [u32; LANES],
+        keys: &mut [f32; LANES],
+    ) -> usize;
+    /// Drops the elements whose key exceeds the limit, keeping the order. Returns how many remain.
+    fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
+
+    /// Row i becomes lane i of every row.
+    fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
+
+    /// Asks for a cache line.
+    fn prefetch<T>(self, place: *const T);
+}

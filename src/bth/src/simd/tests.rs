@@ -1,0 +1,203 @@
+//! Every instruction set against plain code, on random lanes.
+
+use super::*;
+use crate::testing::Rng;
+
+fn floats(rng: &mut Rng) -> [f32; LANES] {
+    std::array::from_fn(|_| match rng.below(12) {
+        0 => 0.0,
+        1 => -0.0,
+        2 => f32::INFINITY,
+        3 => f32::NEG_INFINITY,
+        4 => f32::NAN,
+        5 => f32::MAX,
+        6 => f32::from_bits(rng.below(100) as u32),
+        7 => 1.0,
+        _ => (rng.below(1 << 24) as f32 - (1 << 23) as f32) / 1024.0,
+    })
+}
+
+/// Everything that the trait does, as bits that can be compared.
+struct Everything<'a> {
+    a: &'a [f32; LANES],
+    b: &'a [f32; LANES],
+    u: &'a [u32; LANES],
+    v: &'a [u32; LANES],
+    bits: u32,
+}
+
+impl Kernel for Everything<'_> {
+    type Output = Vec<Vec<u32>>;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let f = |x: S::F| {
+            let mut out = [0.0; LANES];
+            s.store(x, &mut out);
+            // The sign of NaN is nobody's business.
+            out.map(|x| if x.is_nan() { 0x7fc0_0000 } else { x.to_bits() }).to_vec()
+        };
+        let u = |x: S::U| {
+            let mut out = [0; LANES];
+            s.store_u(x, &mut out);
+            out.to_vec()
+        };
+        let m = |x: S::M| vec![s.mask_bits(x)];
+        let (a, b, x, y) = (s.load(self.a), s.load(self.b), s.load_u(self.u), s.load_u(self.v));
+        let mask = s.mask(self.bits);
+        let other = s.lt(a, b);
+        let index = s.and_u(x, s.splat_u(31));
+        let table: Vec<f32> = (0..32).map(|i| i as f32 * 1.5).collect();
+        let words: Vec<u32> = (0..32).map(|i| i * 77).collect();
+        let pairs: Vec<[u32; 2]> = (0..32).map(|i| [i * 3, i * 5 + 1]).collect();
+        let (first, second) = s.gather_pair(mask, &pairs, index);
+        let bytes: [u8; LANES] = self.u.map(|x| x as u8);
+        let mut compressed = [0; LANES];
+        let count = s.compress(self.bits, x, &mut compressed);
+        let ordered = self.a.map(|x| if x.is_nan() { 0.5 } else { x.abs() });
+        let (mut codes, mut keys) = ([0; LANES], [0.0; LANES]);
+        let sorted = s.compress_far_to_near(self.bits, s.load(&ordered), x, &mut codes, &mut keys);
+        // Of equal keys either may come first.
+        let mut pairs: Vec<(u32, u32)> =
+            keys[..sorted].iter().zip(&codes).map(|(k, &c)| (k.to_bits() & !15, c)).collect();
+        assert!(pairs.is_sorted_by(|p, q| p.0 >= q.0), "far to near: {pairs:?}");
+        pairs.sort_unstable();
+        let (mut kept_codes, mut kept_keys) = (self.u.repeat(2), self.a.repeat(2));
+        let kept = s.keep_up_to(&mut kept_codes[..19], &mut kept_keys[..19], self.b[3]);
+        let mut square = [a; LANES];
+        for i in 0..LANES {
+            square[i] = s.from_bits(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
+        }
+        let square = s.transpose(square);
+        let mut turned = Vec::new();
+        for row in square {
+            turned.extend(u(s.bits(row)));
+        }
+        vec![
+            turned,
+            f(s.splat(self.a[0])),
+            f(s.add(a, b)),
+            f(s.sub(a, b)),
+            f(s.mul(a, b)),
+            f(s.div(a, b)),
+            f(s.min(a, b)),
+            f(s.max(a, b)),
+            f(s.abs(a)),
+            m(other),
+            m(s.le(a, b)),
+            f(s.select(other, a, b)),
+            f(s.lookup(a, x)),
+            vec![s.least(s.load(&ordered)).to_bits()],
+            f(s.gather(mask, &table, index)),
+            f(s.expand(a, mask, self.b)),
+            u(s.load_bytes(&bytes)),
+            u(s.add_u(x, y)),
+            u(s.sub_u(x, y)),
+            u(s.and_u(x, y)),
+            u(s.or_u(x, y)),
+            u(s.xor_u(x, y)),
+            u(s.shl_u::<3>(x)),
+            u(s.shr_u::<5>(x)),
+            m(s.eq_u(s.and_u(x, s.splat_u(3)), s.and_u(y, s.splat_u(3)))),
+            m(s.lt_u(x, y)),
+            u(s.select_u(mask, x, y)),
+            u(s.lookup_u(x, y)),
+            u(s.gather_u(mask, &words, index)),
+            u(first),
+            u(second),
+            u(s.expand_u(x, mask, self.v)),
+            u(s.bits(a)),
+            f(s.from_bits(s.bits(a))),
+            m(mask),
+            m(s.and(mask, other)),
+            m(s.or(mask, other)),
+            m(s.and_not(mask, other)),
+            compressed[..count].to_vec(),
+            pairs.into_iter().flat_map(|(k, c)| [k, c]).collect(),
+            kept_codes[..kept].to_vec(),
+            kept_keys[..kept].iter().map(|k| k.to_bits()).collect(),
+        ]
+    }
+}
+
+/// Fused or not, within a rounding of the greater of product and sum.
+struct Fused<'a>(&'a [f32; LANES], &'a [f32; LANES], &'a [f32; LANES]);
+
+impl Kernel for Fused<'_> {
+    type Output = [[f32; LANES]; 2];
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let (a, b, c) = (s.load(self.0), s.load(self.1), s.load(self.2));
+        let mut out = [[0.0; LANES]; 2];
+        s.store(s.fma(a, b, c), &mut out[0]);
+        s.store(s.fnma(a, b, c), &mut out[1]);
+        out
+    }
+}
+
+#[test]
+fn every_instruction_set_does_what_plain_code_does() {
+    let mut rng = Rng(31);
+    for _ in 0..3_000 {
+        let (a, b) = (floats(&mut rng), floats(&mut rng));
+        let [u, v] = [(); 2].map(|()| std::array::from_fn(|_| rng.below(1 << 32) as u32));
+        let bits = rng.below(1 << 16) as u32 & rng.below(1 << 16) as u32;
+        let input = || Everything { a: &a, b: &b, u: &u, v: &v, bits };
+        let want = Isa::Scalar.run(input());
+        for isa in Isa::ALL {
+            for (step, (got, want)) in isa.run(input()).iter().zip(&want).enumerate() {
+                assert_eq!(got, want, "{isa}, row {step}");
+            }
+        }
+    }
+}
+
+#[test]
+fn fused_or_not_the_product_sums_agree_to_a_rounding() {
+    let mut rng = Rng(32);
+    for _ in 0..3_000 {
+        let mut draw = || std::array::from_fn(|_| (rng.below(1 << 24) as f32 - (1 << 23) as f32) / 4096.0);
+        let (a, b, c) = (draw(), draw(), draw());
+        for isa in Isa::ALL {
+            let got = isa.run(Fused(&a, &b, &c));
+            for i in 0..LANES {
+                let (p, c) = (f64::from(a[i]) * f64::from(b[i]), f64::from(c[i]));
+                let bound = (p.abs() + c.abs()) * 2f64.powi(-23);
+                assert!((f64::from(got[0][i]) - (c + p)).abs() <= bound, "{isa}");
+                assert!((f64::from(got[1][i]) - (c - p)).abs() <= bound, "{isa}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_gather_outside_of_its_slice_panics_on_every_instruction_set() {
+    struct Outside(u32, u32);
+    impl Kernel for Outside {
+        type Output = [f32; LANES];
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> [f32; LANES] {
+            let mut at = [0; LANES];
+            at[7] = self.0;
+            let mut out = [0.0; LANES];
+            s.store(s.gather(s.mask(self.1), &[1.0, 2.0, 3.0], s.load_u(&at)), &mut out);
+            out
+        }
+    }
+    for isa in Isa::ALL {
+        for index in [3, 4, 1 << 31, u32::MAX] {
+            let caught = std::panic::catch_unwind(|| isa.run(Outside(index, 0xffff)));
+            assert!(caught.is_err(), "{isa} {index}");
+            assert_eq!(isa.run(Outside(index, 1))[..2], [1.0, 0.0], "{isa}: a clear lane is not read");
+        }
+        assert_eq!(isa.run(Outside(2, 0x80))[7], 3.0);
+    }
+}
+
+#[test]
+fn names_are_read_back_and_nonsense_is_refused() {
+    for isa in Isa::ALL {
+        assert_eq!(isa.to_string().parse(), Ok(isa));
+    }
+    assert_eq!("mmx".parse::<Isa>(), Err(IsaError::Unknown("mmx".into())));
+    assert!(Isa::Scalar.is_available() && Isa::best().is_available());
+}

@@ -9,6 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::file::File;
 use crate::layout::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// What an update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub struct Update {
     pub placed: usize,
     /// Instances that can be seen.
     pub visible: usize,
+    /// Time that the rebuilding of the top level took.
+    pub top_level: Duration,
 }
 
 /// The instances of a file with scene sections, placed for a time. Its sections have been checked.
@@ -116,7 +119,9 @@ impl World {
             self.placed[row] = Some(place);
         }
         if update.placed > 0 {
+            let start = Instant::now();
             self.top.build(&self.placed);
+            update.top_level = start.elapsed();
         }
         update.visible = self.placed.iter().flatten().count();
         Ok(update)

@@ -149,7 +149,7 @@ impl Studio {
 }
 
 /// A lamp above and beside the camera, before the next wall.
-fn lamp(frame: &Frame<'_>, vertical: DVec3) -> DVec3 {
+pub(crate) fn lamp(frame: &Frame<'_>, vertical: DVec3) -> DVec3 {
     let camera = &frame.camera;
     let direction = (vertical * 0.7 - camera.right * 0.6).normalize();
     let ray = Ray {

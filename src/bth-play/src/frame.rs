@@ -2,7 +2,7 @@
 
 use crate::args::{Args, Mode};
 use crate::camera::{self, Camera, Sight};
-use crate::clay::Studio;
+use crate::clay::{self, Studio};
 use crate::failure::Failure;
 use crate::lights::Lights;
 use crate::occlusion::{Queue, Start};
@@ -123,7 +123,13 @@ impl Frame<'_> {
                 let ground = !self.args.no_ground && self.scene.description().is_none();
                 Shader::Clay(Studio::new(self, vertical, ground))
             }
-            Mode::Path => Shader::Path(Lights::new(self.scene, self.space, vertical)),
+            Mode::Path => {
+                let lamp = self.interior.then(|| {
+                    let place = clay::lamp(self, vertical);
+                    (place, 1.5 * (place - self.camera.eye).length())
+                });
+                Shader::Path(Lights::new(self.scene, self.space, vertical, lamp))
+            }
             Mode::Normals | Mode::Ao | Mode::Steps | Mode::Instances => Shader::Plain,
         };
         let tiles: Vec<Tile> = (0..count)

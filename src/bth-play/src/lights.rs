@@ -47,8 +47,9 @@ pub(crate) struct Lights {
 }
 
 impl Lights {
-    /// The lights of a scene at its time; a sun when it has none.
-    pub(crate) fn new(scene: &Scene, space: &Space, vertical: DVec3) -> Self {
+    /// The lights of a scene at its time. One without any gets a sun, or in a room the lamp: a place, and the distance
+    /// at which it is as bright as the brightest.
+    pub(crate) fn new(scene: &Scene, space: &Space, vertical: DVec3, lamp: Option<(DVec3, f64)>) -> Self {
         let reach = 4.0 * space.diagonal();
         let mut lights = Vec::new();
         if let Some(view) = scene.description() {
@@ -85,6 +86,10 @@ impl Lights {
                     }),
                 });
             }
+        }
+        if let Some((place, distance)) = lamp.filter(|_| lights.is_empty()) {
+            let light = Vec3::splat((LAMP * distance * distance) as f32);
+            lights.push(Light::Near { place, light, range: f64::INFINITY, cone: None });
         }
         if lights.is_empty() {
             // Fixed in the world, so that it does not turn with a moving camera.

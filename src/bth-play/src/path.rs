@@ -113,5 +113,5 @@ fn albedo(surface: Surface) -> Vec3 {
 
 /// Rolls off bright values (Reinhard, extended, white at 4).
 fn tone(color: Vec3) -> Vec3 {
-    color * (Vec3::ONE + color / 16.0) / (Vec3::ONE + color * 0.55)
+    color * (Vec3::ONE + color / 16.0) / (Vec3::ONE + color)
 }

@@ -323,7 +323,7 @@ fn high_end(tiles: &[Tile]) -> u32 {
 }
 
 /// A colour for a number: hues far apart for successive ones (golden ratio), in linear light.
-fn hue(number: u32) -> Vec3 {
+pub(crate) fn hue(number: u32) -> Vec3 {
     let angle = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * std::f32::consts::TAU;
     let third = std::f32::consts::TAU / 3.0;
     let wave = |shift: f32| (0.5 + 0.5 * (angle - shift).cos()).powf(1.5);

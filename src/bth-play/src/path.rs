@@ -1,10 +1,10 @@
 //! Mode path: diffuse path tracing with sun, sky and the scene's lights. Each bounce of all samples of a tile
 //! is one batch of rays that know the surface they start on.
 
-use crate::frame::{Frame, Sample};
+use crate::frame::{Frame, Sample, hue};
 use crate::lights::Lights;
 use crate::occlusion::{Queue, Start};
-use crate::sampling::{Sampler, cosine_hemisphere};
+use crate::sampling::cosine_hemisphere;
 use bth::rays::{Hit, Ray, Surface};
 use glam::{DVec2, DVec3, Vec3};
 
@@ -105,10 +105,12 @@ fn away(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
     if depth >= 0.0 { direction } else { direction - normal * (2.0 * depth) }
 }
 
-/// Instances differ a little, so that they stand apart.
+/// Instances differ in hue, so that they stand apart; the first is plain.
 fn albedo(surface: Surface) -> Vec3 {
-    let tint = Sampler::new(surface.instance, 0).point(0, 0).as_vec2();
-    ALBEDO * Vec3::new(1.0 + 0.2 * (tint.x - 0.5), 1.0, 1.0 + 0.3 * (tint.y - 0.5))
+    match surface.instance {
+        0 => ALBEDO,
+        instance => ALBEDO.lerp(hue(instance), 0.4),
+    }
 }
 
 /// Rolls off bright values (Reinhard, extended, white at 4).

@@ -28,17 +28,20 @@ pub(crate) struct Space {
 
 impl Space {
     /// Looks at some frames of a range, the same ones whatever part of it is rendered.
-    fn of_scene(scene: &mut Scene, (first, last): (i32, i32)) -> Result<Self, Failure> {
+    fn of_scene(scene: &mut Scene, (first, last): (i32, i32)) -> Self {
         let count = (i64::from(last) - i64::from(first) + 1).min(LOOKS);
         let mut space = Space { lower: DVec3::INFINITY, upper: DVec3::NEG_INFINITY, points: Vec::new() };
         for look in 0..count {
             let step = if count > 1 { look * (i64::from(last) - i64::from(first)) / (count - 1) } else { 0 };
-            scene.set_frame(first + step as i32)?;
+            // One that cannot be shown is for those to tell who render it.
+            if scene.set_frame(first + step as i32).is_err() {
+                continue;
+            }
             for (lower, upper) in (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)) {
                 space.add(wide(lower), wide(upper));
             }
         }
-        Ok(space.or_point())
+        space.or_point()
     }
 
     /// Of a file with one object, as it is.
@@ -114,7 +117,7 @@ impl Stage {
             let what = "the file has no objects";
             return Err(Failure::Lacks { file: file.into(), what, hint: "compile a model" });
         }
-        let space = if is_scene { Space::of_scene(scene, range)? } else { Space::of_object(scene) };
+        let space = if is_scene { Space::of_scene(scene, range) } else { Space::of_object(scene) };
         scene.set_frame(range.0)?;
         let stand = match named(scene, file, args)? {
             Some(row) => Stand::Carried(row),

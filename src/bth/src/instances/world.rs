@@ -107,14 +107,18 @@ impl World {
             }
             let world = self.pose.world(&view, instance.node);
             let place = Placed::new(&world, instance.object, object).map_err(|why| {
-                let (code, found) = match why {
-                    Misplaced::Singular => (Code::Singular, "one that cannot"),
-                    Misplaced::NotFinite => (Code::NotFinite, "one that is not"),
+                let (code, expected, found) = match why {
+                    Misplaced::Singular => {
+                        (Code::Singular, "a transform that can be inverted", "one that cannot")
+                    }
+                    Misplaced::NotFinite => {
+                        (Code::NotFinite, "a finite transform and world box", "one that is not")
+                    }
                 };
                 let name = view.node_name(instance.node).escape_debug();
                 let found = format!("{found}: node \"{name}\" at {seconds} s");
                 let at = u64::from(instance.node) * size_of::<Node>() as u64;
-                file.locate(Error::within_file(code, kind::NODES, at, code.rule(), found), NONE)
+                file.locate(Error::within_file(code, kind::NODES, at, expected, found), NONE)
             })?;
             self.placed[row] = Some(place);
         }

@@ -4,6 +4,7 @@
 //! defines to the last bit, so a model has the same bytes on every machine.
 #![warn(missing_docs)]
 
+pub mod animations;
 pub mod blob;
 pub mod catalogue;
 pub mod gyroid;

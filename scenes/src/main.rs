@@ -1,18 +1,19 @@
-//! Makes the models of the catalogue.
+//! Makes the models of the catalogue and the scenes that move.
 
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use bth_scenes::animations::{self, ANIMATIONS};
 use bth_scenes::catalogue::{ENTRIES, MAX_FACES, find};
 use bth_scenes::{topology, write};
 use clap::Parser;
 
-/// Makes models for tests, demos and benchmarks; the same bytes on every machine.
+/// Makes models and scenes for tests, demos and benchmarks; the same bytes on every machine.
 #[derive(Parser)]
 #[command(version)]
 enum Command {
-    /// Lists the models.
+    /// Lists the models and scenes.
     List,
     /// Makes a model.
     Make {
@@ -25,6 +26,14 @@ enum Command {
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
+    /// Makes a scene that moves: NAME.manifest and its models.
+    Scene {
+        /// Name of a scene (see `list`).
+        name: String,
+        /// Folder to write into.
+        #[arg(short, long, value_name = "FOLDER")]
+        output: PathBuf,
+    },
 }
 
 fn main() -> Result<()> {
@@ -33,6 +42,9 @@ fn main() -> Result<()> {
         Command::List => {
             for e in &ENTRIES {
                 writeln!(out, "{:22}{:>8} faces  {}", e.name, e.faces, e.about)?;
+            }
+            for a in &ANIMATIONS {
+                writeln!(out, "{:22}   scene        {}", a.name, a.about)?;
             }
         }
         Command::Make { name, faces, output } => {
@@ -51,6 +63,24 @@ fn main() -> Result<()> {
                 t.components,
                 if t.is_closed() { "closed" } else { "not closed" }
             )?;
+        }
+        Command::Scene { name, output } => {
+            let animation =
+                animations::find(&name).with_context(|| format!("no scene `{name}`; `list` shows all"))?;
+            let scene = (animation.make)();
+            for (path, model) in &scene.models {
+                let path = output.join(path);
+                let folder = path.parent().context("models lie in a folder")?;
+                std::fs::create_dir_all(folder)
+                    .with_context(|| format!("cannot make {}", folder.display()))?;
+                write::file(model, &path)?;
+                writeln!(out, "{}: {} faces", path.display(), model.triangles.len())?;
+            }
+            let path = output.join(format!("{name}.manifest"));
+            std::fs::write(&path, scene.manifest.to_toml())
+                .with_context(|| format!("cannot write {}", path.display()))?;
+            let frames = scene.manifest.frames;
+            writeln!(out, "{}: frames {} to {}", path.display(), frames.first, frames.last)?;
         }
     }
     Ok(())

@@ -11,31 +11,43 @@ Exit codes:
     3  bad input: the compiled file cannot be used
     4  a file could not be read or written";
 
-/// Renders a compiled BTH file to a PNG picture.
+/// Renders compiled BTH files and scenes to pictures and animations.
 #[derive(Debug, Parser)]
 #[command(name = "bth-play", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
-    /// The compiled file.
+    /// The compiled file, or a scene manifest (.manifest, .toml), which is compiled first with the bthc beside this
+    /// program and kept in a cache.
     #[arg(required_unless_present = "completions")]
     file: Option<PathBuf>,
-    /// The picture (PNG).
-    #[arg(short, long, value_name = "PNG", required_unless_present = "completions")]
+    /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or .y4m); or `-` for
+    /// YUV4MPEG2 on standard output.
+    #[arg(short, long, value_name = "FILE", required_unless_present = "completions")]
     output: Option<PathBuf>,
+    /// Frames of a scene, both included, or one; by default the first for a picture, else all of them.
+    #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
+    pub(crate) frames: Option<(i32, i32)>,
+    /// Render part I of N of the frames, from 1, for many machines; needs numbered pictures.
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    pub(crate) shard: Option<(u32, u32)>,
+    /// Render frames again whose pictures are there and whole.
+    #[arg(long)]
+    pub(crate) force: bool,
     /// Width and height of the picture.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
     pub(crate) size: (u32, u32),
     /// What to show.
     #[arg(long, value_enum, default_value_t = Mode::Shaded)]
     pub(crate) mode: Mode,
-    /// Eye and target, in the model's space; by default the camera shows the whole model.
-    #[arg(long, value_name = "EX,EY,EZ,TX,TY,TZ", value_parser = parse_camera, allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch", "inside"])]
-    pub(crate) camera: Option<[f64; 6]>,
-    /// Degrees around the model, from its front.
-    #[arg(long, default_value_t = 35.0, allow_hyphen_values = true, value_parser = parse_finite)]
-    pub(crate) yaw: f64,
-    /// Degrees above the horizon.
-    #[arg(long, default_value_t = 20.0, allow_hyphen_values = true, value_parser = parse_finite)]
-    pub(crate) pitch: f64,
+    /// Eye and target in world space, or the name of a camera of the scene. By default the scene's first choice; without
+    /// one the camera shows the whole model.
+    #[arg(long, value_name = "NAME|EX,EY,EZ,TX,TY,TZ", value_parser = parse_camera, allow_hyphen_values = true, conflicts_with_all = ["yaw", "pitch", "inside"])]
+    pub(crate) camera: Option<View>,
+    /// Degrees around the model, from its front; 35 by default.
+    #[arg(long, allow_hyphen_values = true, value_parser = parse_finite)]
+    pub(crate) yaw: Option<f64>,
+    /// Degrees above the horizon; 20 by default.
+    #[arg(long, allow_hyphen_values = true, value_parser = parse_finite)]
+    pub(crate) pitch: Option<f64>,
     /// Magnification.
     #[arg(long, default_value_t = 1.0, value_parser = parse_positive)]
     pub(crate) zoom: f64,
@@ -51,9 +63,15 @@ pub(crate) struct Args {
     /// Samples per pixel.
     #[arg(long, default_value_t = 16, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) spp: u32,
-    /// No ground under the model.
+    /// No ground under the model. Scenes never have one but their own.
     #[arg(long)]
     pub(crate) no_ground: bool,
+    /// Times that light is reflected, in mode path.
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) bounces: u32,
+    /// Upper end of the heat map of mode steps; by default according to each picture.
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(crate) scale: Option<u32>,
     /// Threads; 0 for one per processor. The picture does not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = parse_threads)]
     pub(crate) threads: usize,
@@ -61,6 +79,9 @@ pub(crate) struct Args {
     /// change it meanwhile.
     #[arg(long)]
     pub(crate) map: bool,
+    /// Also print what each frame took, memory, and how many objects were touched.
+    #[arg(long)]
+    pub(crate) stats: bool,
     /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,
@@ -79,6 +100,19 @@ pub(crate) enum Mode {
     Ao,
     /// Heat map of the traversal steps of camera rays.
     Steps,
+    /// Diffuse path tracing with sun, sky and the scene's lights.
+    Path,
+    /// Each instance in a colour of its own.
+    Instances,
+}
+
+/// Where the camera is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum View {
+    /// Eye and target.
+    Points([f64; 6]),
+    /// A camera of the scene.
+    Named(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -105,6 +139,8 @@ impl Mode {
             Mode::Normals => "normals",
             Mode::Ao => "ao",
             Mode::Steps => "steps",
+            Mode::Path => "path",
+            Mode::Instances => "instances",
         }
     }
 }
@@ -125,14 +161,39 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((parse(parts.0)?, parse(parts.1)?))
 }
 
-fn parse_camera(text: &str) -> Result<[f64; 6], String> {
-    let numbers = text.split(',').map(|s| parse_finite(s.trim())).collect::<Result<Vec<_>, _>>()?;
-    let camera: [f64; 6] =
-        numbers.try_into().map_err(|n: Vec<f64>| format!("expected six numbers, found {}", n.len()))?;
+/// Six numbers, or else a name.
+fn parse_camera(text: &str) -> Result<View, String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|s| s.trim().parse().ok()).collect();
+    let Ok(camera) = <[f64; 6]>::try_from(numbers) else { return Ok(View::Named(text.to_owned())) };
+    if text.split(',').count() != 6 {
+        return Ok(View::Named(text.to_owned()));
+    }
+    if camera.iter().any(|x| !x.is_finite()) {
+        return Err("expected finite numbers".to_owned());
+    }
     if camera[..3] == camera[3..] {
         return Err("the eye and the target are the same point".to_owned());
     }
-    Ok(camera)
+    Ok(View::Points(camera))
+}
+
+fn parse_frames(text: &str) -> Result<(i32, i32), String> {
+    let number = |s: &str| s.trim().parse::<i32>().map_err(|_| format!("expected a frame, found {s:?}"));
+    let (first, last) = match text.split_once("..") {
+        Some((a, b)) => (number(a)?, number(b)?),
+        None => (number(text)?, number(text)?),
+    };
+    if last < first {
+        return Err(format!("expected a last frame from {first} on, found {last}"));
+    }
+    Ok((first, last))
+}
+
+fn parse_shard(text: &str) -> Result<(u32, u32), String> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    parts
+        .filter(|(i, n)| 1 <= *i && i <= n)
+        .ok_or_else(|| format!("expected I/N with I from 1 to N, such as 2/8, found {text:?}"))
 }
 
 fn parse_finite(text: &str) -> Result<f64, String> {

@@ -52,14 +52,14 @@ struct Lit {
 impl Studio {
     pub(crate) fn new(frame: &Frame<'_>, vertical: DVec3, ground: bool) -> Self {
         let camera = &frame.camera;
-        let diagonal = frame.shape.diagonal();
+        let diagonal = frame.space.diagonal();
         let key = if frame.interior {
             Key::Near(lamp(frame, vertical))
         } else {
             Key::Far((-camera.forward * 0.45 - camera.right * 0.55 + vertical * 0.85).normalize())
         };
         let fill = (camera.right * 0.85 - camera.forward * 0.5 + vertical * 0.1).normalize();
-        let ground = (ground && !frame.interior).then(|| frame.shape.lower.dot(vertical));
+        let ground = (ground && !frame.interior).then(|| frame.space.lower.dot(vertical));
         Self { vertical, key, fill, ground, diagonal }
     }
 
@@ -79,7 +79,7 @@ impl Studio {
                 let (point, geometric) = frame.surface(sample, hit);
                 let start = Start::above(point, geometric, hit.surface, self.diagonal);
                 let to_key = self.push(&mut queue, start, geometric, sample, frame.reach);
-                let normal = frame.shape.shading_normal(hit, geometric);
+                let normal = frame.surfaces.shading_normal(hit, geometric);
                 lit.push(Lit { pixel, normal, to_key, ground: None });
             } else if let Some((point, share)) = self.on_ground(frame, sample) {
                 let start = Start::above(point, self.vertical, Surface::NONE, self.diagonal);
@@ -95,7 +95,7 @@ impl Studio {
             let color = &mut colors[lit.pixel];
             *color = match lit.ground {
                 Some(share) => *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key))),
-                None => self.clay(lit, samples[lit.pixel].direction, key, open),
+                None => self.clay(lit, samples[lit.pixel].sight.direction, key, open),
             };
         }
         colors
@@ -135,28 +135,28 @@ impl Studio {
     /// Where the camera ray meets the ground, and how much of the shadow there shows.
     fn on_ground(&self, frame: &Frame<'_>, sample: &Sample) -> Option<(DVec3, f64)> {
         let height = self.ground?;
-        let eye = frame.camera.eye;
-        let (above, descent) = (eye.dot(self.vertical) - height, -sample.direction.dot(self.vertical));
+        let eye = sample.sight.origin;
+        let (above, descent) = (eye.dot(self.vertical) - height, -sample.sight.direction.dot(self.vertical));
         if above <= 0.0 || descent <= 1e-6 {
             return None;
         }
-        let point = eye + sample.direction * (above / descent);
+        let point = eye + sample.sight.direction * (above / descent);
         let away =
-            (point - frame.shape.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
+            (point - frame.space.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
         // Beyond a few diagonals the shadow is too faint to be seen.
         (away < 3.0).then(|| (point, (-(away / 1.1).powi(2)).exp()))
     }
 }
 
 /// A lamp above and beside the camera, before the next wall.
-fn lamp(frame: &Frame<'_>, vertical: DVec3) -> DVec3 {
+pub(crate) fn lamp(frame: &Frame<'_>, vertical: DVec3) -> DVec3 {
     let camera = &frame.camera;
     let direction = (vertical * 0.7 - camera.right * 0.6).normalize();
     let ray = Ray {
         origin: camera.eye.as_vec3().to_array(),
         tmin: 0.0,
         direction: direction.as_vec3().to_array(),
-        tmax: (0.15 * frame.shape.diagonal()) as f32,
+        tmax: (0.15 * frame.space.diagonal()) as f32,
     };
     let mut hit = [Hit::MISS];
     frame.scene.nearest_batch(&[ray], None, &mut hit);

@@ -14,6 +14,10 @@ pub(crate) enum Failure {
     Runtime(bth::Error),
     /// A compiled file that lacks what the mode needs (exit code 3).
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
+    /// A scene manifest that does not follow the format (exit code 3, or 4 when it could not be read).
+    BadManifest(bth_scene::Error),
+    /// A scene manifest that is not compiled (exit code 3).
+    Manifest { path: PathBuf, message: String, hint: String },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
     /// Standard output was closed by its reader.
@@ -36,6 +40,12 @@ impl From<bth::Error> for Failure {
     }
 }
 
+impl From<bth_scene::Error> for Failure {
+    fn from(error: bth_scene::Error) -> Self {
+        Self::BadManifest(error)
+    }
+}
+
 impl Failure {
     fn parts(&self) -> (&str, u8, String) {
         match self {
@@ -45,6 +55,13 @@ impl Failure {
                 if error.code() == bth::Code::Read { 4 } else { 3 },
                 error.to_string(),
             ),
+            Self::BadManifest(error) => {
+                let exit = if error.code == bth_scene::error::code::READ { 4 } else { 3 };
+                (error.code, exit, error.to_string())
+            }
+            Self::Manifest { path, message, hint } => {
+                ("BTH-P003", 3, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
+            }
             Self::Lacks { file, what, hint } => {
                 ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))
             }

@@ -1,14 +1,16 @@
 //! One frame: tiles in parallel, batches of rays per tile.
 
 use crate::args::{Args, Mode};
-use crate::camera::{self, Camera};
-use crate::clay::Studio;
+use crate::camera::{self, Camera, Sight};
+use crate::clay::{self, Studio};
 use crate::failure::Failure;
+use crate::lights::Lights;
 use crate::occlusion::{Queue, Start};
 use crate::picture::{Picture, quantized, srgb};
 use crate::sampling::{Sampler, cosine_hemisphere};
-use crate::surface::Shape;
-use crate::{inside, legend, ramp};
+use crate::stage::{Space, Stage};
+use crate::surface::Surfaces;
+use crate::{legend, path, ramp};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use glam::{DVec2, DVec3, Vec3};
@@ -31,7 +33,7 @@ const AO_BACKGROUND: Vec3 = Vec3::splat(0.14);
 pub(crate) struct Summary {
     /// Wall clock of the rendering, without opening the file and writing the picture.
     pub(crate) seconds: f64,
-    /// Camera rays.
+    /// Camera rays and those of bounces.
     pub(crate) nearest_rays: u64,
     /// Shadow and occlusion rays.
     pub(crate) any_rays: u64,
@@ -55,16 +57,18 @@ pub(crate) struct Sample {
     pub(crate) index: u32,
     /// Point of the picture, from (-1, -1) lower left to (1, 1) upper right.
     pub(crate) at: DVec2,
-    /// Direction of the camera ray, unit.
-    pub(crate) direction: DVec3,
+    /// The camera ray.
+    pub(crate) sight: Sight,
 }
 
 /// What the tiles share.
 pub(crate) struct Frame<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) shape: Shape<'a>,
+    pub(crate) surfaces: Surfaces<'a>,
+    /// What all frames take.
+    pub(crate) space: &'a Space,
     pub(crate) camera: Camera,
-    /// Whether the camera stands within the bounds of the model.
+    /// Whether the camera stands in a room.
     pub(crate) interior: bool,
     /// Length of occlusion rays, world space.
     pub(crate) reach: f64,
@@ -75,45 +79,75 @@ pub(crate) struct Frame<'a> {
 struct Tile {
     pixels: Vec<(u32, u32)>,
     colors: Vec<Vec3>,
+    /// Nearest-hit rays beyond those of the camera.
+    nearest_rays: u64,
     any_rays: u64,
     steps: Steps,
 }
 
-/// Renders a scene.
-pub(crate) fn render(scene: &Scene, file: &Path, args: &Args) -> Result<(Picture, Summary), Failure> {
-    let view = scene.object(0);
-    let shape = Shape::new(view);
-    if args.mode != Mode::Steps {
-        shape.require_geometry(file)?;
+/// Shades samples that have been traced.
+enum Shader {
+    Clay(Studio),
+    Path(Lights),
+    /// What the mode needs is at hand.
+    Plain,
+}
+
+/// Renders a scene at its time.
+pub(crate) fn render(
+    scene: &Scene,
+    file: &Path,
+    stage: &Stage,
+    args: &Args,
+    progress: &Progress,
+) -> Result<(Picture, Summary), Failure> {
+    let surfaces = Surfaces::new(scene);
+    if !matches!(args.mode, Mode::Steps) {
+        surfaces.require_geometry(file)?;
     }
-    let camera =
-        if args.inside { inside::camera(scene, &shape, args) } else { Camera::outside(args, &shape) };
-    let interior = args.inside || (camera.eye.cmpgt(shape.lower) & camera.eye.cmplt(shape.upper)).all();
-    let reach = shape.diagonal() * if interior { 0.08 } else { 0.5 };
-    let frame = Frame { scene, shape, camera, interior, reach, args };
-    Ok(frame.render())
+    let (camera, interior) = (stage.camera(scene, args), stage.interior);
+    let reach = stage.space.diagonal() * if interior { 0.08 } else { 0.5 };
+    let frame = Frame { scene, surfaces, space: &stage.space, camera, interior, reach, args };
+    Ok(frame.render(progress))
 }
 
 impl Frame<'_> {
-    fn render(&self) -> (Picture, Summary) {
+    fn render(&self, progress: &Progress) -> (Picture, Summary) {
         let start = Instant::now();
         let (width, height) = self.args.size;
         let columns = width.div_ceil(TILE);
         let count = columns * height.div_ceil(TILE);
-        let bar = progress(u64::from(count));
-        let studio = Studio::new(self, camera::vertical(self.args.up), !self.args.no_ground);
+        let vertical = camera::vertical(self.args.up);
+        let shader = match self.args.mode {
+            Mode::Shaded => {
+                let ground = !self.args.no_ground && self.scene.description().is_none();
+                Shader::Clay(Studio::new(self, vertical, ground))
+            }
+            Mode::Path => {
+                let lamp = self.interior.then(|| {
+                    let place = clay::lamp(self, vertical);
+                    (place, 1.5 * (place - self.camera.eye).length())
+                });
+                Shader::Path(Lights::new(self.scene, self.space, vertical, lamp))
+            }
+            Mode::Normals | Mode::Ao | Mode::Steps | Mode::Instances => Shader::Plain,
+        };
         let tiles: Vec<Tile> = (0..count)
             .into_par_iter()
             .map(|i| {
-                let tile = self.tile(i % columns * TILE, i / columns * TILE, &studio);
-                bar.inc(1);
+                let tile = self.tile(i % columns * TILE, i / columns * TILE, &shader);
+                progress.0.inc(1);
                 tile
             })
             .collect();
-        bar.finish_and_clear();
         let seconds = start.elapsed().as_secs_f64();
         let picture = self.picture(&tiles);
         (picture, self.summary(&tiles, seconds))
+    }
+
+    /// Times that light is reflected.
+    pub(crate) fn bounces(&self) -> u32 {
+        self.args.bounces
     }
 
     /// Pixels of a tile in Morton order, so that successive camera rays are close to each other.
@@ -133,33 +167,38 @@ impl Frame<'_> {
         let part = (DVec2::new(f64::from(x), f64::from(y)) + within)
             / DVec2::new(f64::from(width), f64::from(height));
         let at = DVec2::new(2.0 * part.x - 1.0, 1.0 - 2.0 * part.y);
-        Sample { sampler, index, at, direction: self.camera.direction(at) }
+        Sample { sampler, index, at, sight: self.camera.sight(at) }
     }
 
-    fn tile(&self, left: u32, top: u32, studio: &Studio) -> Tile {
+    fn tile(&self, left: u32, top: u32, shader: &Shader) -> Tile {
         let pixels = self.pixels(left, top);
         let mut tile = Tile { colors: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
         for index in 0..self.args.spp {
             let samples: Vec<Sample> = tile.pixels.iter().map(|&pixel| self.sample(pixel, index)).collect();
-            let origin = self.camera.eye.as_vec3().to_array();
-            let rays: Vec<Ray> = samples
-                .iter()
-                .map(|s| Ray {
-                    origin,
-                    tmin: 0.0,
-                    direction: s.direction.as_vec3().to_array(),
-                    tmax: f32::INFINITY,
-                })
-                .collect();
+            let ray = |s: &Sample| Ray {
+                origin: s.sight.origin.as_vec3().to_array(),
+                tmin: s.sight.range.0 as f32,
+                direction: s.sight.direction.as_vec3().to_array(),
+                tmax: s.sight.range.1 as f32,
+            };
+            let rays: Vec<Ray> = samples.iter().map(ray).collect();
             let colors = if self.args.mode == Mode::Steps {
                 self.count_steps(&rays, &mut tile.steps)
             } else {
                 let mut hits = vec![Hit::MISS; rays.len()];
                 self.scene.nearest_batch(&rays, None, &mut hits);
-                match self.args.mode {
-                    Mode::Shaded => studio.shade(self, &samples, &hits, &mut tile.any_rays),
-                    Mode::Ao => self.occlusion(&samples, &hits, &mut tile.any_rays),
-                    Mode::Normals | Mode::Steps => self.normals(&samples, &hits),
+                match (shader, self.args.mode) {
+                    (Shader::Clay(studio), _) => studio.shade(self, &samples, &hits, &mut tile.any_rays),
+                    (Shader::Path(lights), _) => {
+                        let mut counts = (0, 0);
+                        let colors = path::trace(self, lights, &samples, &hits, &mut counts);
+                        tile.nearest_rays += counts.0;
+                        tile.any_rays += counts.1;
+                        colors
+                    }
+                    (Shader::Plain, Mode::Ao) => self.occlusion(&samples, &hits, &mut tile.any_rays),
+                    (Shader::Plain, Mode::Instances) => self.instances(&samples, &hits),
+                    (Shader::Plain, _) => self.normals(&samples, &hits),
                 }
             };
             tile.colors.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color / self.args.spp as f32);
@@ -169,8 +208,8 @@ impl Frame<'_> {
 
     /// The point of a hit and its geometric normal, towards the camera.
     pub(crate) fn surface(&self, sample: &Sample, hit: &Hit) -> (DVec3, DVec3) {
-        let point = self.camera.eye + sample.direction * f64::from(hit.t);
-        (point, self.shape.geometric_normal(hit.surface.triangle, -sample.direction))
+        let point = sample.sight.origin + sample.sight.direction * f64::from(hit.t);
+        (point, self.surfaces.geometric_normal(hit.surface, -sample.sight.direction))
     }
 
     fn normals(&self, samples: &[Sample], hits: &[Hit]) -> Vec<Vec3> {
@@ -178,8 +217,21 @@ impl Frame<'_> {
             if !hit.is_hit() {
                 return Vec3::splat(0.09);
             }
-            let normal = self.shape.shading_normal(hit, self.surface(sample, hit).1);
+            let normal = self.surfaces.shading_normal(hit, self.surface(sample, hit).1);
             (normal * 0.5 + 0.5).as_vec3()
+        };
+        samples.iter().zip(hits).map(color).collect()
+    }
+
+    /// Each instance in a colour of its own, darker where it turns away.
+    fn instances(&self, samples: &[Sample], hits: &[Hit]) -> Vec<Vec3> {
+        let color = |(sample, hit): (&Sample, &Hit)| {
+            if !hit.is_hit() {
+                return Vec3::splat(0.02);
+            }
+            let (_, normal) = self.surface(sample, hit);
+            let facing = normal.dot(-sample.sight.direction) as f32;
+            hue(hit.surface.instance) * (0.25 + 0.75 * facing)
         };
         samples.iter().zip(hits).map(color).collect()
     }
@@ -188,7 +240,7 @@ impl Frame<'_> {
         let mut queue = Queue::default();
         for (sample, hit) in samples.iter().zip(hits).filter(|(_, hit)| hit.is_hit()) {
             let (point, normal) = self.surface(sample, hit);
-            let start = Start::above(point, normal, hit.surface, self.shape.diagonal());
+            let start = Start::above(point, normal, hit.surface, self.space.diagonal());
             for ray in 0..AO_RAYS {
                 let at = sample.sampler.point(1, sample.index * AO_RAYS + ray);
                 queue.push(start, cosine_hemisphere(normal, at), self.reach);
@@ -223,9 +275,12 @@ impl Frame<'_> {
     fn picture(&self, tiles: &[Tile]) -> Picture {
         let (width, height) = self.args.size;
         let mut picture = Picture { width, height, pixels: vec![[0; 3]; width as usize * height as usize] };
-        let maximum = if self.args.mode == Mode::Steps { high_end(tiles) } else { 0 };
+        let maximum = match self.args.mode {
+            Mode::Steps => self.args.scale.unwrap_or_else(|| high_end(tiles)),
+            _ => 0,
+        };
         let display = |color: Vec3| match self.args.mode {
-            Mode::Shaded | Mode::Ao => color.to_array().map(srgb),
+            Mode::Shaded | Mode::Ao | Mode::Path | Mode::Instances => color.to_array().map(srgb),
             Mode::Normals => color.to_array(),
             Mode::Steps => ramp::color(color.x / maximum as f32),
         };
@@ -242,9 +297,10 @@ impl Frame<'_> {
 
     fn summary(&self, tiles: &[Tile], seconds: f64) -> Summary {
         let pixels = u64::from(self.args.size.0) * u64::from(self.args.size.1);
-        let nearest_rays = pixels * u64::from(self.args.spp);
+        let camera_rays = pixels * u64::from(self.args.spp);
+        let nearest_rays = camera_rays + tiles.iter().map(|t| t.nearest_rays).sum::<u64>();
         let mean = |field: fn(&Steps) -> f64| {
-            tiles.iter().map(|t| field(&t.steps)).sum::<f64>() / nearest_rays as f64
+            tiles.iter().map(|t| field(&t.steps)).sum::<f64>() / camera_rays as f64
         };
         let steps = (self.args.mode == Mode::Steps).then(|| Steps {
             nodes: mean(|s| s.nodes),
@@ -266,10 +322,43 @@ fn high_end(tiles: &[Tile]) -> u32 {
     (value.ceil() as u32).max(1).next_multiple_of(4)
 }
 
-fn progress(tiles: u64) -> ProgressBar {
-    let visible = std::io::stderr().is_terminal();
-    let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-    let bar = ProgressBar::with_draw_target(Some(tiles), target);
-    let style = ProgressStyle::with_template("rendering {bar:30} {human_pos}/{human_len} tiles  {eta} left");
-    if let Ok(style) = style { bar.with_style(style) } else { bar }
+/// A colour for a number: hues far apart for successive ones (golden ratio), in linear light.
+pub(crate) fn hue(number: u32) -> Vec3 {
+    let angle = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * std::f32::consts::TAU;
+    let third = std::f32::consts::TAU / 3.0;
+    let wave = |shift: f32| (0.5 + 0.5 * (angle - shift).cos()).powf(1.5);
+    Vec3::new(wave(0.0), wave(third), wave(2.0 * third)) * 0.8 + 0.06
+}
+
+/// Progress on a terminal.
+pub(crate) struct Progress(ProgressBar);
+
+impl Progress {
+    /// For so many frames.
+    pub(crate) fn new(frames: &[i32], args: &Args) -> Self {
+        let (width, height) = args.size;
+        let tiles = u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE)) * frames.len() as u64;
+        let visible = std::io::stderr().is_terminal();
+        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(tiles), target);
+        let style = ProgressStyle::with_template(
+            "rendering {bar:30} {human_pos}/{human_len} tiles  {msg}  {eta} left",
+        );
+        let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
+        if frames.len() > 1 {
+            bar.set_message(format!("{} frames", frames.len()));
+        }
+        Self(bar)
+    }
+
+    /// Ends a frame.
+    pub(crate) fn done(&self) {
+        self.0.tick();
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
 }

@@ -4,7 +4,7 @@
 use crate::args::{Args, Axis};
 use crate::camera::{self, Camera};
 use crate::sampling::{Sampler, sphere};
-use crate::surface::Shape;
+use crate::stage::Space;
 use bth::Scene;
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
@@ -24,18 +24,18 @@ struct Sight {
 }
 
 /// The camera within the model.
-pub(crate) fn camera(scene: &Scene, shape: &Shape<'_>, args: &Args) -> Camera {
-    let eyes: Vec<DVec3> = (0..CANDIDATES).map(|i| candidate(shape, args.up, i)).collect();
+pub(crate) fn camera(scene: &Scene, space: &Space, args: &Args) -> Camera {
+    let eyes: Vec<DVec3> = (0..CANDIDATES).map(|i| candidate(space, args.up, i)).collect();
     let seen: Vec<Vec<Sight>> = eyes.par_iter().map(|eye| look_around(scene, *eye)).collect();
-    let scores: Vec<f64> = seen.iter().map(|sights| score(sights, shape.diagonal())).collect();
+    let scores: Vec<f64> = seen.iter().map(|sights| score(sights, space.diagonal())).collect();
     let best = (0..eyes.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
     let vertical = camera::vertical(args.up);
-    let forward = richest_view(&seen[best], vertical, shape.diagonal());
+    let forward = richest_view(&seen[best], vertical, space.diagonal());
     Camera::looking(eyes[best], forward, vertical, camera::extent(args, FOV) / args.zoom)
 }
 
 /// A point of the middle of the bounds, low enough for a standing person.
-fn candidate(shape: &Shape<'_>, up: Axis, index: u32) -> DVec3 {
+fn candidate(space: &Space, up: Axis, index: u32) -> DVec3 {
     let sampler = Sampler::new(0, 0);
     let flat = sampler.point(0, index) * 0.8 + 0.1;
     let high = sampler.point(1, index).x * 0.35 + 0.25;
@@ -43,7 +43,7 @@ fn candidate(shape: &Shape<'_>, up: Axis, index: u32) -> DVec3 {
         Axis::Y => DVec3::new(flat.x, high, flat.y),
         Axis::Z => DVec3::new(flat.x, flat.y, high),
     };
-    shape.lower + (shape.upper - shape.lower) * at
+    space.lower + (space.upper - space.lower) * at
 }
 
 fn look_around(scene: &Scene, eye: DVec3) -> Vec<Sight> {

@@ -1,4 +1,4 @@
-//! `bth-play`: renders compiled BTH files to PNG.
+//! `bth-play`: renders compiled BTH files and scenes to pictures and animations.
 
 mod args;
 mod camera;
@@ -7,11 +7,17 @@ mod failure;
 mod frame;
 mod inside;
 mod legend;
+mod lights;
+mod manifests;
 mod occlusion;
+mod path;
 mod picture;
 mod ramp;
 mod report;
 mod sampling;
+mod sequence;
+mod sink;
+mod stage;
 mod surface;
 
 use clap::{CommandFactory, Parser};
@@ -37,15 +43,21 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         return report::print(&String::from_utf8_lossy(&script));
     }
     let (file, output) = args.paths()?;
-    let scene = open(file, args.map)?;
+    let compiled;
+    let file = if manifests::is_manifest(file) {
+        compiled = manifests::compiled(file)?;
+        &compiled
+    } else {
+        file
+    };
+    let mut scene = open(file, args.map)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
         .build()
         .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
-    let (picture, summary) = pool.install(|| frame::render(&scene, file, args))?;
-    picture.write(output)?;
-    report::show(args, &scene, &summary, threads)
+    let (report, quiet) = pool.install(|| sequence::render(&mut scene, file, output, args))?;
+    report::show(args, &scene, file, &report, threads, quiet)
 }
 
 #[allow(unsafe_code)]

@@ -38,9 +38,7 @@ impl Picture {
     fn encoded(&self) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        describe(&mut encoder);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(self.pixels.as_flattened())?;
         writer.finish()?;
@@ -49,23 +47,44 @@ impl Picture {
 
     /// Writes a PNG file that is whole or absent.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
-        let failed = |e: &dyn std::fmt::Display| Failure::File { path: path.into(), message: e.to_string() };
-        let bytes = self.encoded().map_err(|e| failed(&e))?;
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".bth-play-").suffix(".png.tmp");
-        #[cfg(unix)]
-        {
-            // As for any new file: what the umask leaves of these.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
-        file.write_all(&bytes).map_err(|e| failed(&e))?;
-        file.persist(path).map_err(|e| failed(&e.error))?;
-        Ok(())
+        let bytes =
+            self.encoded().map_err(|e| Failure::File { path: path.into(), message: e.to_string() })?;
+        write_whole(path, &bytes)
     }
+}
+
+/// Sets what all our PNG files have in common.
+pub(crate) fn describe<W: Write>(encoder: &mut png::Encoder<'_, W>) {
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+}
+
+/// Whether a file is a whole PNG file of this size.
+pub(crate) fn is_whole(path: &Path, (width, height): (u32, u32)) -> bool {
+    let Ok(bytes) = std::fs::read(path) else { return false };
+    let end = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
+    let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
+    bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(16..24) == Some(&size) && bytes.ends_with(&end)
+}
+
+/// Writes a file that is whole or absent.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |e: &dyn std::fmt::Display| Failure::File { path: path.into(), message: e.to_string() };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".bth-play-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // As for any new file: what the umask leaves of these.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
+    file.write_all(bytes).map_err(|e| failed(&e))?;
+    file.persist(path).map_err(|e| failed(&e.error))?;
+    Ok(())
 }

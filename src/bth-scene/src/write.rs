@@ -53,13 +53,16 @@ impl Manifest {
         match node.transform {
             Transform::Matrix(rows) => writeln!(out, "matrix = {rows:?}"),
             Transform::Parts { translation, rotation, scale } => {
-                if translation != [0.0; 3] {
+                // By bits: a negative zero is no default.
+                let is =
+                    |a: &[f64], b: &[f64]| a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()));
+                if !is(&translation, &[0.0; 3]) {
                     writeln!(out, "translation = {translation:?}")?;
                 }
-                if rotation != [0.0, 0.0, 0.0, 1.0] {
+                if !is(&rotation, &[0.0, 0.0, 0.0, 1.0]) {
                     writeln!(out, "rotation = {rotation:?}")?;
                 }
-                if scale != [1.0; 3] {
+                if !is(&scale, &[1.0; 3]) {
                     writeln!(out, "scale = {scale:?}")?;
                 }
                 Ok(())

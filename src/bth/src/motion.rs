@@ -52,6 +52,14 @@ impl Scene {
         self.world().map_or(self.object_count(), |world| world.placed.len() as u32)
     }
 
+    /// The object of an instance.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn object_of(&self, instance: u32) -> u32 {
+        if self.world().is_some() { self.file().instances()[instance as usize].object } else { instance }
+    }
+
     /// An instance at the scene's time.
     ///
     /// # Panics

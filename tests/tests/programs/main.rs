@@ -8,5 +8,6 @@ mod inspect;
 mod interrupt;
 mod messy;
 mod play;
+mod scenes;
 mod support;
 mod trace;

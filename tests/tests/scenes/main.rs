@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout)] // a test that cannot run says so
 
 mod flattened;
+mod import;
 mod motion;
 mod poses;
 mod sources;

@@ -142,3 +142,36 @@ fn normals_stand_on_their_surfaces_in_the_world() {
         }
     }
 }
+
+#[test]
+fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
+    use bth_compile::pipeline::{Options, Structure};
+    let folder = models();
+    let mut options = Options { structure: Structure::Tets, ..Options::default() };
+    options.tets.worker = bth_tests::worker().map(Into::into);
+    if options.tets.worker.is_none() {
+        options.structure = Structure::Bvh;
+    }
+    let name = std::path::Path::new("x");
+    let compiled =
+        bth_compile::scene::compile(&varied(), folder.path(), name, &options, &bth_compile::Silent);
+    let mut scene = bth::from_bytes(&compiled.unwrap().0.bytes).unwrap();
+    let mut hinted = 0;
+    for frame in [0, 12, 35] {
+        scene.set_frame(frame).unwrap();
+        let first = rays(2000);
+        let starts = hits(&scene, &first);
+        let triangles = scene.object(0).triangles.len();
+        let onward = bth_tests::rays::onward(&first, &starts, triangles, 5);
+        let (rays, from): (Vec<Ray>, Vec<Surface>) = onward.into_iter().unzip();
+        let plain = hits(&scene, &rays);
+        let mut found = vec![Hit::MISS; rays.len()];
+        scene.nearest_batch(&rays, Some(&from), &mut found);
+        assert!(found == plain, "frame {frame}");
+        let mut any = vec![false; rays.len()];
+        scene.any_batch(&rays, Some(&from), &mut any);
+        assert!(any.iter().zip(&plain).all(|(any, hit)| *any == hit.is_hit()), "frame {frame}");
+        hinted += from.iter().zip(&plain).filter(|(f, h)| f.instance > 1 && h.is_hit()).count();
+    }
+    assert!(hinted > 300, "{hinted}");
+}

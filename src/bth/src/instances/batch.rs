@@ -2,10 +2,12 @@
 //! rays at once.
 
 use super::World;
+use super::affine::ObjectRay;
 use super::placed::Placed;
 use super::walk::Walk;
 use crate::file::File;
 use crate::layout::NONE;
+use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::trace::{self, Scratch, Steps};
 
@@ -20,12 +22,12 @@ struct Visit {
     instance: u32,
 }
 
-/// What a query makes of a ray in an instance.
+/// What a query makes of rays in an object.
 trait Query {
-    /// The range of t that is still of interest, as the ray's tmax; `None` when nothing is.
+    /// The greatest t of a ray that is still of interest; `None` when nothing is.
     fn tmax(&self, ray: usize) -> Option<f32>;
     /// Traces the visits of one object.
-    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]);
+    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]);
 }
 
 /// What the visits of a round share.
@@ -37,12 +39,9 @@ struct Round<'a> {
 }
 
 impl Round<'_> {
-    /// The ray of a visit in the object's space, its t times the second number is that of the world,
-    /// and the triangle that it starts on.
-    fn object_ray(&self, visit: Visit, tmax: f32) -> (Ray, f32, u32) {
-        let i = visit.ray as usize;
-        let object = self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[i] });
-        (object.ray, object.t_scale, self.hint(i, visit.instance))
+    /// The ray of a visit in the object's space.
+    fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
+        self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
     }
 
     fn hint(&self, ray: usize, instance: u32) -> u32 {
@@ -55,15 +54,19 @@ impl World {
     /// Nearest hits; of equal t the instance of least number is reported.
     pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         hits.fill(Hit::MISS);
-        let mut query = Nearest { rays, hits, scratch: Scratch::default() };
-        self.run(file, rays, from, &mut query);
+        trace::with_scratch(|scratch| {
+            let mut query = Nearest { rays, hits, scratch, batch: Batch::default() };
+            self.run(file, rays, from, &mut query);
+        });
     }
 
     /// Whether anything is hit.
     pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         found.fill(false);
-        let mut query = Any { rays, found, scratch: Scratch::default() };
-        self.run(file, rays, from, &mut query);
+        trace::with_scratch(|scratch| {
+            let mut query = Any { rays, found, scratch, batch: Batch::default() };
+            self.run(file, rays, from, &mut query);
+        });
     }
 
     /// As [`Self::nearest`] for one ray, with a count of the work within objects.
@@ -130,16 +133,38 @@ impl World {
         visits.sort_unstable_by_key(|v| (v.object, v.ray));
         for group in visits.chunk_by(|a, b| a.object == b.object) {
             self.touch(group[0].object);
-            query.trace(round, group);
+            let object = round.file.object(group[0].object).expect("checked when opened");
+            query.trace(round, &object, group);
         }
         visits.clear();
+    }
+}
+
+/// Rays that go through an object together.
+#[derive(Default)]
+struct Batch {
+    visits: Vec<(Visit, f32)>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+    found: Vec<bool>,
+}
+
+impl Batch {
+    fn clear(&mut self) {
+        self.visits.clear();
+        self.rays.clear();
+    }
+    fn push(&mut self, visit: Visit, ray: ObjectRay) {
+        self.visits.push((visit, ray.t_scale));
+        self.rays.push(ray.ray);
     }
 }
 
 struct Nearest<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
-    scratch: Scratch,
+    scratch: &'a mut Scratch,
+    batch: Batch,
 }
 
 /// t of the world from t of an object; its own where they are the same.
@@ -162,16 +187,29 @@ impl Query for Nearest<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
-    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
-        let object = round.file.object(visits[0].object).expect("checked when opened");
+    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+        self.batch.clear();
         for &visit in visits {
             let i = visit.ray as usize;
-            let tmax = self.rays[i].tmax.min(self.hits[i].t);
-            let (ray, scale, from) = round.object_ray(visit, tmax);
-            let hit = trace::nearest(&object, &ray, from, visit.instance, &mut self.scratch);
-            if let Some(hit) = better(&self.rays[i], &self.hits[i], &hit, scale) {
-                self.hits[i] = hit;
+            let object_ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
+            // Only in tetrahedra is a start of use.
+            let from = round.hint(i, visit.instance);
+            if from == NONE || object.triangle_homes.is_empty() {
+                self.batch.push(visit, object_ray);
+                continue;
             }
+            let hit = trace::nearest(object, &object_ray.ray, from, visit.instance, self.scratch);
+            self.hits[i] =
+                better(&round.rays[i], &self.hits[i], &hit, object_ray.t_scale).unwrap_or(self.hits[i]);
+        }
+        let Batch { visits, rays, hits, .. } = &mut self.batch;
+        hits.clear();
+        hits.resize(rays.len(), Hit::MISS);
+        trace::nearest_batch(object, rays, 0, self.scratch, hits);
+        for (&(visit, scale), hit) in visits.iter().zip(hits) {
+            hit.surface.instance = visit.instance;
+            let (i, hit) = (visit.ray as usize, *hit);
+            self.hits[i] = better(&round.rays[i], &self.hits[i], &hit, scale).unwrap_or(self.hits[i]);
         }
     }
 }
@@ -179,19 +217,32 @@ impl Query for Nearest<'_> {
 struct Any<'a> {
     rays: &'a [Ray],
     found: &'a mut [bool],
-    scratch: Scratch,
+    scratch: &'a mut Scratch,
+    batch: Batch,
 }
 
 impl Query for Any<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
-    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
-        let object = round.file.object(visits[0].object).expect("checked when opened");
+    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+        self.batch.clear();
         for &visit in visits {
             let i = visit.ray as usize;
-            let (ray, _, from) = round.object_ray(visit, self.rays[i].tmax);
-            self.found[i] |= trace::any(&object, &ray, from, &mut self.scratch);
+            let object_ray = round.object_ray(visit, self.rays[i].tmax);
+            let from = round.hint(i, visit.instance);
+            if from == NONE || object.triangle_homes.is_empty() {
+                self.batch.push(visit, object_ray);
+            } else {
+                self.found[i] |= trace::any(object, &object_ray.ray, from, self.scratch);
+            }
+        }
+        let Batch { visits, rays, found, .. } = &mut self.batch;
+        found.clear();
+        found.resize(rays.len(), false);
+        trace::any_batch(object, rays, self.scratch, found);
+        for ((visit, _), found) in visits.iter().zip(found) {
+            self.found[visit.ray as usize] |= *found;
         }
     }
 }
@@ -206,15 +257,13 @@ impl Query for Counted<'_> {
     fn tmax(&self, _: usize) -> Option<f32> {
         Some(self.ray.tmax.min(self.best.t))
     }
-    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
-        let object = round.file.object(visits[0].object).expect("checked when opened");
+    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
         for &visit in visits {
-            let (ray, scale, from) = round.object_ray(visit, self.ray.tmax.min(self.best.t));
-            let (hit, more) = trace::nearest_counted(&object, &ray, from, visit.instance);
+            let object_ray = round.object_ray(visit, self.ray.tmax.min(self.best.t));
+            let from = round.hint(visit.ray as usize, visit.instance);
+            let (hit, more) = trace::nearest_counted(object, &object_ray.ray, from, visit.instance);
             self.steps += more;
-            if let Some(hit) = better(self.ray, &self.best, &hit, scale) {
-                self.best = hit;
-            }
+            self.best = better(self.ray, &self.best, &hit, object_ray.t_scale).unwrap_or(self.best);
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::file::File;
 use crate::layout::*;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// What an update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +20,8 @@ pub struct Update {
     pub placed: usize,
     /// Instances that can be seen.
     pub visible: usize,
+    /// Time that the rebuilding of the top level took.
+    pub top_level: Duration,
 }
 
 /// The instances of a file with scene sections, placed for a time. Its sections have been checked.
@@ -104,19 +107,25 @@ impl World {
             }
             let world = self.pose.world(&view, instance.node);
             let place = Placed::new(&world, instance.object, object).map_err(|why| {
-                let (code, found) = match why {
-                    Misplaced::Singular => (Code::Singular, "one that cannot"),
-                    Misplaced::NotFinite => (Code::NotFinite, "one that is not"),
+                let (code, expected, found) = match why {
+                    Misplaced::Singular => {
+                        (Code::Singular, "a transform that can be inverted", "one that cannot")
+                    }
+                    Misplaced::NotFinite => {
+                        (Code::NotFinite, "a finite transform and world box", "one that is not")
+                    }
                 };
                 let name = view.node_name(instance.node).escape_debug();
                 let found = format!("{found}: node \"{name}\" at {seconds} s");
                 let at = u64::from(instance.node) * size_of::<Node>() as u64;
-                file.locate(Error::within_file(code, kind::NODES, at, code.rule(), found), NONE)
+                file.locate(Error::within_file(code, kind::NODES, at, expected, found), NONE)
             })?;
             self.placed[row] = Some(place);
         }
         if update.placed > 0 {
+            let start = Instant::now();
             self.top.build(&self.placed);
+            update.top_level = start.elapsed();
         }
         update.visible = self.placed.iter().flatten().count();
         Ok(update)

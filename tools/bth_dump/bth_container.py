@@ -12,6 +12,8 @@ VERSION = 0x00010000
 OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FACES, TRIANGLE_HOMES = range(1, 10)
 POSITIONS, TRIANGLES, CORNERS, NORMALS, UVS = range(16, 21)
 PROVENANCE = 32
+SCENE, NODES, INSTANCES, TRACKS, TIMES, VALUES, CAMERAS, LIGHTS, NAMES = range(48, 57)
+OF_FILE = {PROVENANCE, *range(SCENE, NAMES + 1)}
 
 # Kind: name, strides, most elements.
 KINDS = {
@@ -30,6 +32,15 @@ KINDS = {
     NORMALS: ("NORMALS", (12,), (1 << 32) - 2),
     UVS: ("UVS", (8,), (1 << 32) - 2),
     PROVENANCE: ("PROVENANCE", (1,), None),
+    SCENE: ("SCENE", (64,), (1 << 32) - 2),
+    NODES: ("NODES", (128,), (1 << 32) - 2),
+    INSTANCES: ("INSTANCES", (16,), (1 << 32) - 2),
+    TRACKS: ("TRACKS", (32,), (1 << 32) - 2),
+    TIMES: ("TIMES", (8,), (1 << 32) - 2),
+    VALUES: ("VALUES", (8,), (1 << 32) - 2),
+    CAMERAS: ("CAMERAS", (64,), (1 << 32) - 2),
+    LIGHTS: ("LIGHTS", (80,), (1 << 32) - 2),
+    NAMES: ("NAMES", (1,), (1 << 32) - 2),
 }
 
 Header = namedtuple(
@@ -119,7 +130,7 @@ class Container:
         for owner in owners:
             need(rows.get(owner) == 1, "F017", f"{rows.get(owner)} OBJECT rows in object {owner}", HEADER.size)
         for e in self.entries:
-            of_file = e.kind == PROVENANCE
+            of_file = e.kind in OF_FILE
             fits = e.kind not in KINDS or (e.object == NONE) == of_file
             need(fits, "F017", f"{kind_name(e.kind)} of object {e.object}", HEADER.size)
 

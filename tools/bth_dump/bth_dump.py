@@ -15,6 +15,7 @@ from bth_container import Container, Invalid, NONE, kind_name  # noqa: E402
 from bth_geometry import check_geometry  # noqa: E402
 from bth_indices import check_indices  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
+from bth_scene import SceneView, check_scene  # noqa: E402
 
 
 def describe(container):
@@ -55,6 +56,23 @@ def describe(container):
             for e in container.entries
         ],
         "objects": objects,
+        "scene": describe_scene(SceneView(container)),
+    }
+
+
+def describe_scene(view):
+    """What stands and moves, or None."""
+    if not view.exists:
+        return None
+    scene = view.scenes[0]
+    return {
+        "rate": scene.rate,
+        "frames": [scene.first_frame, scene.last_frame],
+        "nodes": [view.name(n) for n in view.nodes],
+        "instances": [[x.node, x.object] for x in view.instances],
+        "tracks": [[t.node, t.property, t.interpolation, t.keys] for t in view.tracks],
+        "cameras": [view.name(x) for x in view.cameras],
+        "lights": [view.name(x) for x in view.lights],
     }
 
 
@@ -69,6 +87,7 @@ def check(data, level):
             tets = check_indices(view)
             if level == "verify":
                 check_geometry(view, tets)
+        check_scene(SceneView(container))
     return container
 
 
@@ -86,6 +105,10 @@ def show(description):
         print(f"  bounds {o['lower']} to {o['upper']}")
         if o["tet_leaves"]:
             print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
+    scene = description["scene"]
+    if scene:
+        counts = ", ".join(f"{len(scene[k])} {k}" for k in ("nodes", "instances", "tracks", "cameras", "lights"))
+        print(f"scene: frames {scene['frames'][0]} to {scene['frames'][1]} at {scene['rate']} a second, {counts}")
 
 
 def main():

@@ -11,6 +11,7 @@ pub mod marks;
 pub mod mesh;
 pub mod monitor;
 pub mod pipeline;
+pub mod scene;
 pub mod tets;
 pub mod write;
 

@@ -90,6 +90,16 @@ codes! {
     Homes "F131" "TRIANGLE_HOMES is empty without tet leaves; else it leads from each triangle of a constrained face to that face, and from others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
     Positions "F141" "Positions are finite."
+    Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and zeros."
+    Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
+    NodeTransform "F152" "A node's transform is finite; one of parts has a quaternion that is not zero and ends with zeros."
+    Name "F153" "Names lie within NAMES and are UTF-8."
+    Instance "F154" "Instances refer to nodes and objects of the file; their other fields are zero."
+    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist, visibility changes in steps, of a node with a matrix only visibility, and reserved fields are zero."
+    TrackRanges "F156" "A track has at least one key; the ranges of successive tracks follow each other, lie within TIMES and VALUES and together cover them."
+    TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions among them not zero, and of visibility 0 or 1."
+    Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are such as the scene manifest allows, and its reserved fields are zero."
+    Light "F159" "A light's node and kind exist; its color, intensity, range and angles are such as the scene manifest allows, and its reserved fields are zero."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit."
@@ -98,6 +108,9 @@ codes! {
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
     ZeroArea "F207" "Exactly the triangles of zero area are dropped."
+
+    Singular "S001" "The transform of an instance that is seen can be inverted."
+    NotFinite "S002" "The transform and the world box of an instance that is seen are finite."
 }
 
 impl Code {
@@ -114,6 +127,10 @@ impl Code {
             Code::HeaderHash | Code::TableHash | Code::SectionHash | Code::Gap | Code::ContentId => {
                 "the file was damaged; copy or compile it again"
             }
+            Code::Singular => {
+                "scale by 0 to hide; else keep the scales of one node within 2^24 of each other"
+            }
+            Code::NotFinite => "keep translations and scales within the range of 32-bit numbers",
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }
@@ -162,6 +179,16 @@ impl Error {
     ) -> Self {
         let section = Some(Section { kind, object: 0 });
         Self { section, ..Self::at(code, offset, expected, found) }
+    }
+    /// As [`Self::within`], in a section of the whole file.
+    pub(crate) fn within_file(
+        code: Code,
+        kind: u32,
+        offset: u64,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::within(code, kind, offset, expected, found).in_object(NONE)
     }
     /// An error of the system.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
@@ -265,6 +292,15 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::NORMALS => "NORMALS",
         kind::UVS => "UVS",
         kind::PROVENANCE => "PROVENANCE",
+        kind::SCENE => "SCENE",
+        kind::NODES => "NODES",
+        kind::INSTANCES => "INSTANCES",
+        kind::TRACKS => "TRACKS",
+        kind::TIMES => "TIMES",
+        kind::VALUES => "VALUES",
+        kind::CAMERAS => "CAMERAS",
+        kind::LIGHTS => "LIGHTS",
+        kind::NAMES => "NAMES",
         _ => "unknown",
     }
 }

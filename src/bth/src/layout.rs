@@ -4,7 +4,19 @@
 //! All numbers are little-endian. Structures have no padding and no pointers:
 //! what refers to something else is an index, and [`NONE`] is no index.
 
+mod scene;
+
+pub use scene::*;
+
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+
+macro_rules! assert_layout {
+    ($($type:ident $size:literal { $($field:ident $at:literal),* })*) => { $(const _: () = {
+        assert!(size_of::<$type>() == $size);
+        $(assert!(std::mem::offset_of!($type, $field) == $at);)*
+    };)* };
+}
+use assert_layout;
 
 /// No index: an absent child, triangle, tetrahedron or surface.
 pub const NONE: u32 = u32::MAX;
@@ -110,6 +122,33 @@ pub mod kind {
     pub const UVS: u32 = 20;
     /// UTF-8 JSON: how the file came about. Not part of the content id.
     pub const PROVENANCE: u32 = 32;
+    /// One [`super::Scene`]; of the whole file, as the following.
+    pub const SCENE: u32 = 48;
+    /// [`super::Node`]s, parents before children.
+    pub const NODES: u32 = 49;
+    /// [`super::Instance`]s.
+    pub const INSTANCES: u32 = 50;
+    /// [`super::Track`]s, by node and property.
+    pub const TRACKS: u32 = 51;
+    /// `f64` seconds of the keys of all tracks.
+    pub const TIMES: u32 = 52;
+    /// `f64` values of the keys of all tracks.
+    pub const VALUES: u32 = 53;
+    /// [`super::Camera`]s.
+    pub const CAMERAS: u32 = 54;
+    /// [`super::Light`]s.
+    pub const LIGHTS: u32 = 55;
+    /// UTF-8 names of nodes, cameras and lights.
+    pub const NAMES: u32 = 56;
+
+    /// Whether sections of this kind describe the scene.
+    pub const fn is_scene(kind: u32) -> bool {
+        SCENE <= kind && kind <= NAMES
+    }
+    /// Whether a reader that does not know the kind must refuse the file.
+    pub const fn is_required(kind: u32) -> bool {
+        kind <= TRIANGLE_HOMES || is_scene(kind)
+    }
 }
 
 /// 64 bytes: the unit in which nodes and leaves are addressed.
@@ -389,12 +428,6 @@ pub struct Tet16 {
     pub next: [u32; 3],
 }
 
-macro_rules! assert_layout {
-    ($($type:ident $size:literal { $($field:ident $at:literal),* })*) => { $(const _: () = {
-        assert!(size_of::<$type>() == $size);
-        $(assert!(std::mem::offset_of!($type, $field) == $at);)*
-    };)* };
-}
 assert_layout! {
     Header 128 { writer_version 16, file_length 24, section_offset 32, section_count 40,
         required_features 48, optional_features 56, content_id 64, table_hash 96, header_hash 112 }

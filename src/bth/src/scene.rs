@@ -2,13 +2,15 @@
 
 use crate::error::Error;
 use crate::file::File;
+use crate::instances::World;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Scratch, Steps};
+use crate::trace::{self, Steps};
 use std::path::Path;
 
-/// An open file, ready to trace. Each object stands once in the world, untransformed: instance
+/// An open file, ready to trace. A file with a scene shows its instances at a time (see
+/// [`Scene::set_frame`]); in others each object stands once in the world, untransformed: instance
 /// and object numbers are the same.
 ///
 /// Queries take `&self` and may run on any number of threads. A ray whose origin or direction is not
@@ -17,9 +19,13 @@ use std::path::Path;
 /// Answers are exact: a ray hits a closed triangle if and only if its real line meets it within
 /// [`tmin`, `tmax`] (t as reported, rounded to f32), lines within the plane of a triangle excepted; of equal
 /// hits the triangle of least id is reported. They depend neither on hints nor on the structure in the file.
+/// In a scene the ray is first transformed into the object's space and rounded there: relative 2^-24 for each
+/// component of origin and direction. Of equal t the instance of least number is reported.
 #[derive(Debug)]
 pub struct Scene {
     file: File,
+    /// What the file's scene sections say, at a time; `None` without them.
+    world: Option<World>,
 }
 
 /// Reads a compiled file into memory and checks every index, so that tracing is safe whatever the
@@ -27,7 +33,7 @@ pub struct Scene {
 ///
 /// # Errors
 /// `BTH-O…` when it cannot be read, `BTH-F0…` when header or table, `BTH-F1…` when contents break the
-/// specification; the error names the section and byte.
+/// specification; the error names the section and byte. `BTH-S…` when the first frame of its scene cannot be shown.
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
     Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
@@ -41,7 +47,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
 }
 
-/// Maps a compiled file and checks header and section table only: ready at once whatever its size.
+/// Maps a compiled file and checks header, section table and scene only: ready at once whatever its size.
 ///
 /// # Safety
 /// Until the scene is dropped nobody may write to the file or truncate it (see [`File::map`]).
@@ -49,12 +55,12 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
 /// others, tracing may panic or never end; it does not read out of bounds.
 ///
 /// # Errors
-/// As [`open`], without those about contents.
+/// As [`open`], without those about contents of objects.
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     // SAFETY: the caller's contract includes that of `File::map`.
     let file = unsafe { File::map(path.as_ref())? };
-    Ok(Scene { file })
+    Scene::with_world(file)
 }
 
 impl Scene {
@@ -62,7 +68,22 @@ impl Scene {
         for object in 0..file.object_count() {
             file.check(object)?;
         }
-        Ok(Scene { file })
+        Scene::with_world(file)
+    }
+
+    fn with_world(file: File) -> Result<Scene, Error> {
+        let world = World::new(&file)?;
+        Ok(Scene { file, world })
+    }
+
+    /// The instances, if the file has a scene.
+    pub(crate) fn world(&self) -> Option<&World> {
+        self.world.as_ref()
+    }
+
+    /// The file and the instances, to move these.
+    pub(crate) fn parts_mut(&mut self) -> (&File, &mut Option<World>) {
+        (&self.file, &mut self.world)
     }
 
     /// The file behind the scene.
@@ -83,6 +104,10 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
+    fn view(&self, object: u32) -> &ObjectView<'_> {
+        self.file.view(object).expect("an object below object_count, checked when opened")
+    }
+
     /// Bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
         self.file.resident_bytes()
@@ -98,10 +123,13 @@ impl Scene {
 
     /// As [`Self::nearest`], with a count of the work.
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
+        if let Some(world) = &self.world {
+            return world.nearest_counted(&self.file, ray, from);
+        }
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
             let (hit, more) =
-                trace::nearest_counted(&self.object(instance), &ray, hint(from, instance), instance);
+                trace::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
             steps += more;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
@@ -123,19 +151,28 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
+        if let Some(world) = &self.world {
+            return world.nearest(&self.file, rays, from, hits);
+        }
         hits.fill(Hit::MISS);
-        let mut scratch = Scratch::default();
-        for instance in 0..self.object_count() {
-            let object = self.object(instance);
-            for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
-                let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
-                let hit =
-                    trace::nearest(&object, &ray, hint(surface(from, i), instance), instance, &mut scratch);
-                if hit.t < best.t {
-                    *best = hit;
+        trace::with_scratch(|scratch| {
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::nearest_batch(object, rays, from.as_deref(), 0, scratch, hits);
+            }
+            for instance in 0..self.object_count() {
+                let object = self.view(instance);
+                for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
+                    let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
+                    let hit =
+                        trace::nearest(object, &ray, hint(surface(from, i), instance), instance, scratch);
+                    if hit.t < best.t {
+                        *best = hit;
+                    }
                 }
             }
-        }
+        });
     }
 
     /// Whether each of many rays hits anything.
@@ -144,14 +181,23 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
-        found.fill(false);
-        let mut scratch = Scratch::default();
-        for instance in 0..self.object_count() {
-            let object = self.object(instance);
-            for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), &mut scratch);
-            }
+        if let Some(world) = &self.world {
+            return world.any(&self.file, rays, from, found);
         }
+        found.fill(false);
+        trace::with_scratch(|scratch| {
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::any_batch(object, rays, from.as_deref(), scratch, found);
+            }
+            for instance in 0..self.object_count() {
+                let object = self.view(instance);
+                for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
+                    *found = *found || trace::any(object, ray, hint(surface(from, i), instance), scratch);
+                }
+            }
+        });
     }
 }
 
@@ -162,6 +208,11 @@ fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
 
 fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
     from.map_or(Surface::NONE, |f| f[ray])
+}
+
+/// The triangles of the only object that rays start on, if that is of use.
+fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>) -> Option<Vec<u32>> {
+    from.filter(|_| !object.tet_leaves.is_empty()).map(|from| from.iter().map(|&f| hint(f, 0)).collect())
 }
 
 /// The triangle of an object that a ray starts on, or `NONE`.

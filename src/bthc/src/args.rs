@@ -26,6 +26,7 @@ pub(crate) struct Args {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Compile(Compile),
+    Import(Import),
     Info(Info),
     Verify(Verify),
     Explain(Explain),
@@ -36,15 +37,20 @@ pub(crate) enum Command {
     Man,
 }
 
-/// Compile a model (OBJ, glTF, GLB, PLY, STL, OFF) into a BTH file.
+/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, scene manifest) into a BTH file.
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Compile {
-    /// The model.
+    /// The model or scene; what ends with .manifest or .toml is a scene manifest.
     pub(crate) model: PathBuf,
     /// The compiled file; by default the model's name with the extension .bth, beside it.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
+    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "strict"])]
+    pub(crate) flatten: bool,
+    #[command(flatten)]
+    pub(crate) gltf: Gltf,
     /// What to build.
     #[arg(long, value_enum, default_value_t = Structure::Bth)]
     pub(crate) structure: Structure,
@@ -73,6 +79,62 @@ pub(crate) struct Compile {
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1_048_576))]
     pub(crate) tet_memory: Option<u64>,
     /// Print the reports of all stages as one JSON object on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// What of a glTF file becomes a scene.
+#[derive(Clone, Debug, Group)]
+#[command(next_help_heading = "Scenes from glTF")]
+pub(crate) struct Gltf {
+    /// Scene by name or number; by default the file's own choice.
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) scene: Option<String>,
+    /// Animation by name or number, `all` or `none`. Of two that move the same thing the first is taken.
+    #[arg(long, value_name = "ANIMATION", default_value = "all")]
+    pub(crate) animation: String,
+    /// Frames per second.
+    #[arg(long, default_value_t = 24.0, value_parser = positive)]
+    pub(crate) rate: f64,
+    /// Refuse what would be ignored: skins, morph targets, animations of other things.
+    #[arg(long)]
+    pub(crate) strict: bool,
+}
+
+impl Gltf {
+    /// The options of the import.
+    pub(crate) fn options(&self) -> bth_compile::scene::ImportOptions {
+        use bth_compile::scene::Chosen;
+        let animation = match self.animation.as_str() {
+            "all" => Chosen::All,
+            "none" => Chosen::None,
+            name => Chosen::One(name.to_owned()),
+        };
+        bth_compile::scene::ImportOptions {
+            scene: self.scene.clone(),
+            animation,
+            rate: self.rate,
+            strict: self.strict,
+        }
+    }
+}
+
+/// Write a scene manifest from a glTF scene, to be edited and compiled. It refers to the meshes of the glTF file,
+/// so it must stand beside it or in a folder above.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Import {
+    /// The glTF or GLB file.
+    pub(crate) model: PathBuf,
+    /// The manifest; by default the model's name with the extension .manifest, beside it.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) gltf: Gltf,
+    /// Print one JSON object.
     #[arg(long)]
     pub(crate) json: bool,
     /// Print nothing but errors.

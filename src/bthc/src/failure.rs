@@ -12,6 +12,8 @@ pub(crate) enum Failure {
     Compile(bth_compile::Error),
     /// The runtime's errors: a compiled file that cannot be used.
     Runtime(bth::Error),
+    /// A scene manifest that cannot be used (exit code 3, or 4 when it could not be read).
+    Manifest(bth_scene::Error),
     /// Arguments that do not fit together (exit code 2).
     Usage { message: String, hint: &'static str },
     /// A check failed; what there was to say has been said on standard output.
@@ -43,6 +45,12 @@ impl From<bth::Error> for Failure {
     }
 }
 
+impl From<bth_scene::Error> for Failure {
+    fn from(error: bth_scene::Error) -> Self {
+        Self::Manifest(error)
+    }
+}
+
 impl Failure {
     /// A file that could not be read or written.
     pub(crate) fn file(code: &'static str, path: &Path, message: &dyn std::fmt::Display) -> Self {
@@ -70,6 +78,8 @@ impl Failure {
             Self::Compile(Error::Cancelled) => 130,
             Self::Runtime(error) if error.code() == bth::Code::Read => 4,
             Self::Runtime(_) => 3,
+            Self::Manifest(error) if error.code == bth_scene::error::code::READ => 4,
+            Self::Manifest(_) => 3,
             Self::ClosedOutput => 0,
         }
     }
@@ -89,6 +99,8 @@ impl Failure {
             }
             Self::Compile(Error::Cancelled) => json!({"code": "BTH-C000", "message": "cancelled"}),
             Self::Runtime(error) => runtime_json(error),
+            Self::Manifest(error) => json!({"code": error.code, "place": error.path.to_string_lossy(),
+                "line": error.line, "column": error.column, "message": error.message, "hint": error.hint}),
             Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
             Self::Check | Self::ClosedOutput => serde_json::Value::Null,
         }
@@ -100,6 +112,7 @@ impl Failure {
             Self::Check | Self::ClosedOutput => return ExitCode::from(self.exit_code()),
             Self::Compile(error) => error.to_string(),
             Self::Runtime(error) => error.to_string(),
+            Self::Manifest(error) => error.to_string(),
             Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
         };
         output::error(&text);

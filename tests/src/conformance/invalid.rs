@@ -10,6 +10,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(tree());
     cases.extend(tets());
     cases.extend(geometry());
+    cases.extend(super::scenes::invalid());
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     cases
 }

@@ -5,6 +5,7 @@
 
 mod edit;
 mod invalid;
+mod scenes;
 mod valid;
 
 pub use edit::{Editor, Seal};

@@ -16,12 +16,13 @@ pub fn valid() -> Vec<Case> {
         Case::new("two-objects", two_objects()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
+    cases.extend(super::scenes::valid());
     cases.extend(RecordKind::ALL.map(|r| Case::new(&format!("tets-{}", r.name()), tets(r))));
     cases
 }
 
 /// An indexed leaf of these triangles; at most 16 distinct corners.
-fn indexed(corners: &[[[f32; 3]; 3]], first: u32) -> IndexedLeaf {
+pub(super) fn indexed(corners: &[[[f32; 3]; 3]], first: u32) -> IndexedLeaf {
     let mut points: Vec<[f32; 3]> = Vec::new();
     let mut corner = [[0; WIDTH]; 3];
     for (t, triangle) in corners.iter().enumerate() {
@@ -45,9 +46,9 @@ fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
     RawLeaf { corner, first, triangles: corners.len() as u32, reserved: [0; 14] }
 }
 
-type Bounds = ([f32; 3], [f32; 3]);
+pub(super) type Bounds = ([f32; 3], [f32; 3]);
 
-fn bounds<'a>(points: impl IntoIterator<Item = &'a [f32; 3]>) -> Bounds {
+pub(super) fn bounds<'a>(points: impl IntoIterator<Item = &'a [f32; 3]>) -> Bounds {
     let start = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     points
         .into_iter()
@@ -66,7 +67,7 @@ fn node(children: &[(Child, Bounds)]) -> WideNode {
     node
 }
 
-fn lines(block: &[u8]) -> Vec<Line> {
+pub(super) fn lines(block: &[u8]) -> Vec<Line> {
     let word = |b: &[u8]| u32::from_le_bytes(b.try_into().unwrap());
     block.chunks_exact(64).map(|b| Line(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
 }
@@ -77,7 +78,7 @@ fn file(parts: &ObjectParts) -> Vec<u8> {
     builder.finish()
 }
 
-const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+pub(super) const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 fn nothing_to_hit() -> Vec<u8> {
     let positions = [[0.0; 3], [1.0; 3], [2.0; 3]];

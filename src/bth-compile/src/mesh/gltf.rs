@@ -10,10 +10,11 @@ use super::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPP
 use crate::error::{Error, Place, Result};
 
 const EXTENSION: &str = "BTH-I011";
-const GRAPH: &str = "BTH-I012";
+/// The nodes do not make a forest, or refer to what is not there.
+pub(crate) const GRAPH: &str = "BTH-I012";
 
 /// Required extensions that do not change where triangles are, or that are read.
-const SUPPORTED: [&str; 17] = [
+pub(crate) const SUPPORTED: [&str; 17] = [
     "KHR_mesh_quantization",
     "KHR_animation_pointer",
     "KHR_lights_punctual",
@@ -33,8 +34,11 @@ const SUPPORTED: [&str; 17] = [
     "KHR_audio",
 ];
 
+/// Extensions of nodes that scenes read and flat models cannot.
+pub(crate) const SCENE_EXTENSIONS: [&str; 2] = ["EXT_mesh_gpu_instancing", "KHR_node_visibility"];
+
 /// The error for a required extension that is not read.
-pub(super) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
+pub(crate) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
     let message = format!("expected no required extension that changes geometry, found {name}");
     let hint = match name {
         "KHR_draco_mesh_compression" => "decompress the model, for example with gltf-transform copy",
@@ -50,21 +54,22 @@ pub(super) fn unsupported_extension(source: &Source<'_>, name: &str) -> Error {
 struct Span {
     first: [usize; 3],
     accessors: [Option<usize>; 3],
-    node: usize,
+    /// `None` when the mesh is read in its own space.
+    node: Option<usize>,
     mesh: usize,
     primitive: usize,
 }
 
-struct Reader<'a> {
-    accessors: Accessors<'a>,
+struct Reader<'r, 'a> {
+    accessors: Accessors<'r>,
     raw: Raw<'a>,
     spans: Vec<Span>,
     keep: Keep,
 }
 
-/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes. Skins and morph
-/// targets stay in the mesh's own pose. Lines count each segment, points each point as skipped.
-pub(super) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
+/// Reads the document of a glTF or GLB file and refuses required extensions that are not among `supported`
+/// (those that end with `_` stand for all that begin so). Also gives the binary chunk of a GLB.
+pub(crate) fn document<'a>(source: &Source<'a>, supported: &[&str]) -> Result<(Root, Option<&'a [u8]>)> {
     let (json, binary) = split(source)?;
     let root: Root = serde_json::from_slice(json).map_err(|e| {
         let message = format!("expected a glTF document, found: {e}");
@@ -75,32 +80,63 @@ pub(super) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
         return Err(source.error_in_part(UNSUPPORTED, "asset", message, "convert the model to glTF 2.0"));
     }
     let supported =
-        |name: &String| SUPPORTED.iter().any(|s| name == s || s.ends_with('_') && name.starts_with(s));
-    if let Some(name) = root.extensions_required.iter().find(|name| !supported(name)) {
-        return Err(unsupported_extension(source, name));
+        |name: &String| supported.iter().any(|s| name == s || s.ends_with('_') && name.starts_with(s));
+    match root.extensions_required.iter().find(|name| !supported(name)) {
+        Some(name) => Err(unsupported_extension(source, name)),
+        None => Ok((root, binary)),
     }
+}
+
+/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes. Skins and morph
+/// targets stay in the mesh's own pose. Lines count each segment, points each point as skipped.
+pub(super) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
+    let (root, binary) = document(source, &SUPPORTED)?;
     if root.extensions_used.iter().any(|name| name == "EXT_mesh_gpu_instancing") {
         source.monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
     }
-
     let instances = instances(source, &root)?;
     if instances.iter().any(|&(node, _, _)| root.nodes[node].skin.is_some()) {
         source.monitor.warn("skins are ignored: skinned meshes are read in their bind pose");
     }
-    let morphs = |&(_, mesh, _): &(usize, usize, Transform)| {
-        root.meshes.get(mesh).is_some_and(|m| m.primitives.iter().any(|p| !p.targets.is_empty()))
-    };
+    let morphs = |&(_, mesh, _): &(usize, usize, Transform)| has_targets(&root, mesh);
     if instances.iter().any(morphs) {
         source.monitor.warn("morph targets are ignored: meshes are read without them");
     }
-
     let buffers = Buffers::new(source, &root, binary);
-    let accessors = Accessors { source, root: &root, buffers };
+    let instances = instances.iter().map(|(node, mesh, transform)| (Some(*node), *mesh, transform));
+    read_instances(source, Accessors { source, root: &root, buffers }, keep, instances)
+}
+
+/// Reads one mesh of a document in its own space.
+pub(super) fn read_mesh<'a>(
+    source: &'a Source<'a>,
+    root: &Root,
+    binary: Option<&'a [u8]>,
+    mesh: usize,
+    keep: Keep,
+) -> Result<Raw<'a>> {
+    let buffers = Buffers::new(source, root, binary);
+    let instance = (None, mesh, &Transform::IDENTITY);
+    read_instances(source, Accessors { source, root, buffers }, keep, std::iter::once(instance))
+}
+
+/// Whether a mesh has morph targets.
+pub(crate) fn has_targets(root: &Root, mesh: usize) -> bool {
+    root.meshes.get(mesh).is_some_and(|m| m.primitives.iter().any(|p| !p.targets.is_empty()))
+}
+
+fn read_instances<'a, 't>(
+    source: &'a Source<'a>,
+    accessors: Accessors<'_>,
+    keep: Keep,
+    instances: impl ExactSizeIterator<Item = (Option<usize>, usize, &'t Transform)>,
+) -> Result<Raw<'a>> {
     let no_place = Box::new(|_: Row, _: usize| Place::File(source.path.to_owned()));
     let mut reader = Reader { accessors, raw: Raw::new("gltf", no_place), spans: Vec::new(), keep };
-    for (done, (node, mesh, transform)) in instances.iter().enumerate() {
-        source.progress(source.data.len() / instances.len() * done)?;
-        reader.mesh(*node, *mesh, transform)?;
+    let count = instances.len();
+    for (done, (node, mesh, transform)) in instances.enumerate() {
+        source.progress(source.data.len() / count * done)?;
+        reader.mesh(node, mesh, transform)?;
     }
     let Reader { mut raw, spans, .. } = reader;
     if raw.normals.is_empty() {
@@ -117,7 +153,8 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: Row, row: usize) -> Place {
     let span = &spans[spans.partition_point(|span| span.first[kind] <= row).saturating_sub(1)];
     let accessor = span.accessors[kind]
         .map_or(String::new(), |a| format!(" accessor {a} row {}", row - span.first[kind]));
-    let part = format!("node {} mesh {} primitive {}{accessor}", span.node, span.mesh, span.primitive);
+    let node = span.node.map_or(String::new(), |node| format!("node {node} "));
+    let part = format!("{node}mesh {} primitive {}{accessor}", span.mesh, span.primitive);
     Place::Part(source.path.to_owned(), part)
 }
 
@@ -167,21 +204,27 @@ fn local(node: &Node) -> Transform {
     }
 }
 
-impl Reader<'_> {
-    fn mesh(&mut self, node: usize, mesh: usize, transform: &Transform) -> Result<()> {
-        let Some(Mesh { primitives }) = self.accessors.root.meshes.get(mesh) else {
-            let message = format!("its mesh {mesh} does not exist");
-            let part = format!("node {node}");
+impl Reader<'_, '_> {
+    fn mesh(&mut self, node: Option<usize>, mesh: usize, transform: &Transform) -> Result<()> {
+        let Some(Mesh { primitives, .. }) = self.accessors.root.meshes.get(mesh) else {
+            let message = format!("expected a mesh below {}, found {mesh}", self.accessors.root.meshes.len());
+            let part = node.map_or_else(|| format!("mesh {mesh}"), |node| format!("node {node}"));
             return Err(self.accessors.source.error_in_part(GRAPH, part, message, "export the model again"));
         };
         for (index, primitive) in primitives.iter().enumerate() {
             self.accessors.source.monitor.check()?;
-            self.primitive([node, mesh, index], primitive, transform)?;
+            self.primitive(node, [mesh, index], primitive, transform)?;
         }
         Ok(())
     }
 
-    fn primitive(&mut self, [node, mesh, index]: [usize; 3], p: &Primitive, world: &Transform) -> Result<()> {
+    fn primitive(
+        &mut self,
+        node: Option<usize>,
+        [mesh, index]: [usize; 2],
+        p: &Primitive,
+        world: &Transform,
+    ) -> Result<()> {
         let source = self.accessors.source;
         let part = || format!("mesh {mesh} primitive {index}");
         let Some(&positions) = p.attributes.get("POSITION") else {

@@ -8,10 +8,10 @@ use crate::error::{Error, Result};
 const ACCESSOR: &str = "BTH-I013";
 
 /// Reads accessors of a document.
-pub(super) struct Accessors<'a> {
-    pub(super) source: &'a Source<'a>,
-    pub(super) root: &'a Root,
-    pub(super) buffers: Buffers<'a>,
+pub(crate) struct Accessors<'a> {
+    pub(crate) source: &'a Source<'a>,
+    pub(crate) root: &'a Root,
+    pub(crate) buffers: Buffers<'a>,
 }
 
 /// Component types.
@@ -86,8 +86,8 @@ impl<'b> Rows<'b> {
 }
 
 impl Accessors<'_> {
-    /// Rows of `N` numbers: VEC2 or VEC3 of floats or (KHR_mesh_quantization) integers.
-    pub(super) fn vectors<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
+    /// Rows of `N` numbers: VEC2, VEC3 or VEC4 of floats or (KHR_mesh_quantization) integers.
+    pub(crate) fn vectors<const N: usize>(&self, index: usize) -> Result<Vec<[f32; N]>> {
         let (accessor, component) = self.accessor(index, &format!("VEC{N}"))?;
         let size = component.size();
         let convert = |bytes: &[u8]| {
@@ -100,8 +100,15 @@ impl Accessors<'_> {
         self.rows(index, accessor, N * size, [0.0; N], convert)
     }
 
+    /// Rows of one number.
+    pub(crate) fn scalars(&self, index: usize) -> Result<Vec<f32>> {
+        let (accessor, component) = self.accessor(index, "SCALAR")?;
+        let convert = |bytes: &[u8]| component.float(bytes, accessor.normalized);
+        self.rows(index, accessor, component.size(), 0.0, convert)
+    }
+
     /// Rows of one unsigned integer.
-    pub(super) fn indices(&self, index: usize) -> Result<Vec<u32>> {
+    pub(crate) fn indices(&self, index: usize) -> Result<Vec<u32>> {
         let (accessor, component) = self.accessor(index, "SCALAR")?;
         if !matches!(component, Component::U8 | Component::U16 | Component::U32) {
             return Err(self.error(index, "expected unsigned integers as indices"));
@@ -110,7 +117,7 @@ impl Accessors<'_> {
     }
 
     /// Number of rows that an accessor claims, not checked against its bytes.
-    pub(super) fn count(&self, index: usize) -> Result<u64> {
+    pub(crate) fn count(&self, index: usize) -> Result<u64> {
         let accessor = self.root.accessors.get(index);
         accessor.map(|a| a.count).ok_or_else(|| self.error(index, "it does not exist"))
     }

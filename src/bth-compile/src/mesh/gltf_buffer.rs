@@ -14,7 +14,7 @@ const JSON_CHUNK: u32 = 0x4E4F_534A;
 const BIN_CHUNK: u32 = 0x004E_4942;
 
 /// Splits a GLB into its JSON and its binary chunk; a `.gltf` is all JSON.
-pub(super) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8]>)> {
+pub(crate) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let data = source.data;
     if !data.starts_with(b"glTF") {
         return Ok((data, None));
@@ -63,7 +63,7 @@ pub(super) fn split<'a>(source: &Source<'a>) -> Result<(&'a [u8], Option<&'a [u8
 }
 
 /// The buffers of a document, read when they are first used.
-pub(super) struct Buffers<'a> {
+pub(crate) struct Buffers<'a> {
     source: &'a Source<'a>,
     binary: Option<&'a [u8]>,
     loaded: Vec<OnceCell<Cow<'a, [u8]>>>,
@@ -71,7 +71,7 @@ pub(super) struct Buffers<'a> {
 
 impl<'a> Buffers<'a> {
     /// Buffers of a document; `binary` is the GLB's chunk.
-    pub(super) fn new(source: &'a Source<'a>, root: &Root, binary: Option<&'a [u8]>) -> Self {
+    pub(crate) fn new(source: &'a Source<'a>, root: &Root, binary: Option<&'a [u8]>) -> Self {
         Buffers { source, binary, loaded: root.buffers.iter().map(|_| OnceCell::new()).collect() }
     }
 
@@ -79,7 +79,7 @@ impl<'a> Buffers<'a> {
     ///
     /// # Errors
     /// When the view or its buffer does not exist, does not reach far enough, or is compressed.
-    pub(super) fn view(&self, root: &Root, view: usize) -> Result<(&[u8], Option<u64>)> {
+    pub(crate) fn view(&self, root: &Root, view: usize) -> Result<(&[u8], Option<u64>)> {
         let part = format!("buffer view {view}");
         let error = |message: String| {
             self.source.error_in_part(BUFFER, part.clone(), message, "export the model again")

@@ -26,11 +26,7 @@ enum Format {
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
 /// [`Error::Cancelled`].
 pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
-    let data = std::fs::read(path).map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    })?;
+    let data = read_file(path)?;
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(path, &data, monitor);
     let raw = match format(&source)? {
@@ -42,6 +38,39 @@ pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, R
     };
     source.progress(data.len())?;
     finish(raw, keep, monitor)
+}
+
+/// Reads meshes of a glTF or GLB file, by number, each in its own space and without the nodes that use it.
+///
+/// # Errors
+/// As [`import`]; also when the file is no glTF or a mesh does not exist.
+pub fn import_gltf_meshes(
+    path: &Path,
+    meshes: &[u32],
+    keep: Keep,
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Mesh, Report)>> {
+    let data = read_file(path)?;
+    monitor.stage("import", Some(data.len() as u64));
+    let source = Source::new(path, &data, monitor);
+    if format(&source)? != Format::Gltf {
+        let message = "expected a glTF or GLB file, of which single meshes can be named";
+        return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
+    }
+    let supported = [gltf::SUPPORTED.as_slice(), &gltf::SCENE_EXTENSIONS].concat();
+    let (root, binary) = gltf::document(&source, &supported)?;
+    let one =
+        |mesh: &u32| finish(gltf::read_mesh(&source, &root, binary, *mesh as usize, keep)?, keep, monitor);
+    meshes.iter().map(one).collect()
+}
+
+/// All bytes of a source.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    })
 }
 
 /// Welds what was read and counts.

@@ -5,10 +5,10 @@
 //! what the report tells.
 
 mod attributes;
-mod gltf;
-mod gltf_accessor;
-mod gltf_buffer;
-mod gltf_json;
+pub(crate) mod gltf;
+pub(crate) mod gltf_accessor;
+pub(crate) mod gltf_buffer;
+pub(crate) mod gltf_json;
 mod gltf_transform;
 mod import;
 mod number;
@@ -19,13 +19,14 @@ mod ply_ascii;
 mod ply_binary;
 mod ply_header;
 mod raw;
-mod source;
+pub(crate) mod source;
 mod stl;
 mod topology;
 mod weld;
 mod zero_area;
 
-pub use import::import;
+pub(crate) use import::read_file;
+pub use import::{import, import_gltf_meshes};
 pub use zero_area::is_zero_area;
 
 use serde::Serialize;

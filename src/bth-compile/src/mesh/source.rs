@@ -10,42 +10,42 @@ use crate::monitor::Monitor;
 const ROWS_BETWEEN_CHECKS: u64 = 1 << 16;
 
 /// A source file in memory.
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     /// Where it was read from.
-    pub(super) path: &'a Path,
+    pub(crate) path: &'a Path,
     /// All its bytes.
-    pub(super) data: &'a [u8],
+    pub(crate) data: &'a [u8],
     /// Who watches.
-    pub(super) monitor: &'a dyn Monitor,
+    pub(crate) monitor: &'a dyn Monitor,
     reported: Cell<u64>,
 }
 
 impl<'a> Source<'a> {
     /// A source whose reader starts at byte 0.
-    pub(super) fn new(path: &'a Path, data: &'a [u8], monitor: &'a dyn Monitor) -> Self {
+    pub(crate) fn new(path: &'a Path, data: &'a [u8], monitor: &'a dyn Monitor) -> Self {
         Source { path, data, monitor, reported: Cell::new(0) }
     }
 
     /// Now and then (by the row's number) reports how many bytes are read, and fails once cancelled.
     #[inline]
-    pub(super) fn tick(&self, row: u64, bytes: usize) -> Result<()> {
+    pub(crate) fn tick(&self, row: u64, bytes: usize) -> Result<()> {
         if row.is_multiple_of(ROWS_BETWEEN_CHECKS) { self.progress(bytes) } else { Ok(()) }
     }
 
     /// Reports how many bytes are read, and fails once cancelled.
-    pub(super) fn progress(&self, bytes: usize) -> Result<()> {
+    pub(crate) fn progress(&self, bytes: usize) -> Result<()> {
         let bytes = (bytes as u64).max(self.reported.get());
         self.monitor.advance(bytes - self.reported.replace(bytes));
         self.monitor.check()
     }
 
     /// An error of the whole file.
-    pub(super) fn error(&self, code: &'static str, message: impl Into<String>, hint: &str) -> Error {
+    pub(crate) fn error(&self, code: &'static str, message: impl Into<String>, hint: &str) -> Error {
         input_error(code, Place::File(self.path.to_owned()), message, hint)
     }
 
     /// An error at a line, from 1.
-    pub(super) fn error_at_line(
+    pub(crate) fn error_at_line(
         &self,
         code: &'static str,
         line: u64,
@@ -56,7 +56,7 @@ impl<'a> Source<'a> {
     }
 
     /// An error at a byte, from 0.
-    pub(super) fn error_at_byte(
+    pub(crate) fn error_at_byte(
         &self,
         code: &'static str,
         byte: usize,
@@ -67,7 +67,7 @@ impl<'a> Source<'a> {
     }
 
     /// An error in a named part.
-    pub(super) fn error_in_part(
+    pub(crate) fn error_in_part(
         &self,
         code: &'static str,
         part: impl Into<String>,
@@ -78,34 +78,34 @@ impl<'a> Source<'a> {
     }
 
     /// The place of a line, from 1.
-    pub(super) fn line(&self, line: u64) -> Place {
+    pub(crate) fn line(&self, line: u64) -> Place {
         Place::Line(self.path.to_owned(), line)
     }
 
     /// The place of a byte, from 0.
-    pub(super) fn byte(&self, byte: usize) -> Place {
+    pub(crate) fn byte(&self, byte: usize) -> Place {
         Place::Byte(self.path.to_owned(), byte as u64)
     }
 }
 
 /// An error of the source.
-pub(super) fn input_error(code: &'static str, place: Place, message: impl Into<String>, hint: &str) -> Error {
+pub(crate) fn input_error(code: &'static str, place: Place, message: impl Into<String>, hint: &str) -> Error {
     Error::Input { code, place, message: message.into(), hint: hint.to_owned() }
 }
 
 /// The file is cut off: use with [`TRUNCATED_HINT`].
-pub(super) const TRUNCATED: &str = "BTH-I003";
+pub(crate) const TRUNCATED: &str = "BTH-I003";
 /// What to do about a file that is cut off.
-pub(super) const TRUNCATED_HINT: &str = "the file is cut off; copy or export it again";
+pub(crate) const TRUNCATED_HINT: &str = "the file is cut off; copy or export it again";
 /// The text or structure does not follow the format.
-pub(super) const MALFORMED: &str = "BTH-I002";
+pub(crate) const MALFORMED: &str = "BTH-I002";
 /// A coordinate of a used position is not finite.
-pub(super) const NON_FINITE: &str = "BTH-I004";
+pub(crate) const NON_FINITE: &str = "BTH-I004";
 /// An index names a row that does not exist.
-pub(super) const INDEX: &str = "BTH-I005";
+pub(crate) const INDEX: &str = "BTH-I005";
 /// A variant of the format that this program does not read.
-pub(super) const UNSUPPORTED: &str = "BTH-I006";
+pub(crate) const UNSUPPORTED: &str = "BTH-I006";
 /// What to do about a text file that does not follow its format.
-pub(super) const MALFORMED_HINT: &str = "correct the file there, or export it again";
+pub(crate) const MALFORMED_HINT: &str = "correct the file there, or export it again";
 /// What to do about an index out of range.
-pub(super) const INDEX_HINT: &str = "export the model again; its faces do not belong to its vertices";
+pub(crate) const INDEX_HINT: &str = "export the model again; its faces do not belong to its vertices";

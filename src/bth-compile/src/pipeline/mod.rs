@@ -1,8 +1,8 @@
 //! The compiler: calls the stages in order.
 
 mod options;
-mod parts;
-mod provenance;
+pub(crate) mod parts;
+pub(crate) mod provenance;
 mod structure;
 
 pub use options::{Options, Structure};
@@ -74,11 +74,57 @@ pub struct FileReport {
 /// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
 pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
     let mut clock = Clock::default();
-
     let (mesh, mesh_report) = clock.time("mesh", || mesh::import(source, options.attributes, monitor))?;
     let source_blake3 = clock.time("hash", || provenance::hash(source))?;
-    let (tree, bvh_report) = clock.time("bvh", || bvh::build(&mesh, &options.bvh, monitor))?;
+    let (object, reports) = build(source, mesh, options, monitor, &mut clock)?;
+    let tetgen = provenance::tetgen(reports.tets.as_ref());
+    let provenance = provenance::json(&source_blake3, &mesh_report.format, tetgen, options)?;
+    let (bytes, resident_bytes) = clock.time("file", || parts::file(&object, provenance, options))?;
 
+    let triangles = object.mesh.triangles.len();
+    let file = FileReport {
+        bytes: bytes.len() as u64,
+        tet_leaves: object.tet_leaves,
+        tet_triangles: object.tet_triangles,
+        resident_bytes,
+        resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
+    };
+    let Reports { bvh, marks, costs, tets, collapse } = reports;
+    let seconds = clock.0;
+    let report =
+        Report { source_blake3, seconds, mesh: mesh_report, bvh, marks, costs, tets, collapse, file };
+    Ok((Compiled { bytes }, report))
+}
+
+/// An object that is ready to be written.
+pub(crate) struct Object {
+    pub(crate) mesh: mesh::Mesh,
+    tree: bvh::BinaryBvh,
+    wide: bvh::Wide,
+    /// Absent without tet leaves.
+    encoded: Option<tets::Encoded>,
+    pub(crate) tet_leaves: u64,
+    pub(crate) tet_triangles: u64,
+}
+
+/// What the stages from the mesh to the wide BVH found; see [`Report`].
+pub(crate) struct Reports {
+    bvh: bvh::Report,
+    marks: Option<marks::Report>,
+    costs: Option<costs::Report>,
+    pub(crate) tets: Option<tets::Report>,
+    collapse: bvh::CollapseReport,
+}
+
+/// Builds an object from its mesh; `source` is for messages.
+pub(crate) fn build(
+    source: &Path,
+    mesh: mesh::Mesh,
+    options: &Options,
+    monitor: &dyn Monitor,
+    clock: &mut Clock,
+) -> Result<(Object, Reports)> {
+    let (tree, bvh_report) = clock.time("bvh", || bvh::build(&mesh, &options.bvh, monitor))?;
     let (mut meshes, mut reports) = (Vec::new(), (None, None, None));
     if options.structure != Structure::Bvh {
         let (marks, marks_report) = clock.time("marks", || marks::mark(&mesh, &tree, monitor))?;
@@ -90,51 +136,32 @@ pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Resul
         meshes = built;
         reports = (Some(marks_report), costs_report, Some(tets_report));
     }
-
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = meshes.into_iter().unzip();
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
     let (wide, collapse) =
         clock.time("collapse", || bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor))?;
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
-
-    let provenance = provenance::json(&source_blake3, &mesh_report.format, reports.2.as_ref(), options)?;
-    let stages =
-        parts::Stages { mesh: &mesh, tree: &tree, wide: &wide, encoded: encoded.as_ref(), provenance };
-    let (bytes, resident_bytes) = clock.time("file", || parts::file(stages, options))?;
-
-    let triangles = mesh.triangles.len();
-    let file = FileReport {
-        bytes: bytes.len() as u64,
-        tet_leaves: meshes.len() as u64,
-        tet_triangles: meshes.iter().map(|m| m.faces.len() as u64).sum(),
-        resident_bytes,
-        resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
-    };
+    let (tet_leaves, tet_triangles) =
+        (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
     let (marks, costs, tets) = reports;
-    let report = Report {
-        source_blake3,
-        seconds: clock.0,
-        mesh: mesh_report,
-        bvh: bvh_report,
-        marks,
-        costs,
-        tets,
-        collapse,
-        file,
-    };
-    Ok((Compiled { bytes }, report))
+    let object = Object { mesh, tree, wide, encoded, tet_leaves, tet_triangles };
+    Ok((object, Reports { bvh: bvh_report, marks, costs, tets, collapse }))
 }
 
-/// Times the stages on the wall clock.
+/// Times the stages on the wall clock; a stage that comes again adds to its time.
 #[derive(Default)]
-struct Clock(Vec<StageTime>);
+pub(crate) struct Clock(pub(crate) Vec<StageTime>);
 
 impl Clock {
-    fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
-        self.0.push(StageTime { name, seconds: start.elapsed().as_secs_f64() });
+        let seconds = start.elapsed().as_secs_f64();
+        match self.0.iter_mut().find(|stage| stage.name == name) {
+            Some(stage) => stage.seconds += seconds,
+            None => self.0.push(StageTime { name, seconds }),
+        }
         result
     }
 }

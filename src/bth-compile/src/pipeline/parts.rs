@@ -1,33 +1,24 @@
 //! The file, from what the stages made.
 
-use super::Options;
+use super::{Object, Options};
 use crate::error::Result;
-use crate::{bvh, mesh, tets, write};
-use bth::layout::Object;
+use crate::write;
+use bth::layout::Object as Header;
 
-/// What goes into the file.
-pub(super) struct Stages<'a> {
-    pub(super) mesh: &'a mesh::Mesh,
-    pub(super) tree: &'a bvh::BinaryBvh,
-    pub(super) wide: &'a bvh::Wide,
-    /// Absent without tet leaves.
-    pub(super) encoded: Option<&'a tets::Encoded>,
-    pub(super) provenance: String,
-}
-
-/// The bytes of the file, checked as a reader will, and how many of them tracing reads.
-pub(super) fn file(stages: Stages<'_>, options: &Options) -> Result<(Vec<u8>, u64)> {
-    let parts = parts(&stages, options);
+/// The bytes of a file with one object, checked as a reader will, and how many of them tracing reads.
+pub(super) fn file(object: &Object, provenance: String, options: &Options) -> Result<(Vec<u8>, u64)> {
+    let parts = parts(object, options);
     let mut builder = write::FileBuilder::new();
     write::object(&mut builder, 0, &parts)?;
-    builder.provenance(stages.provenance)?;
+    builder.provenance(provenance)?;
     let bytes = builder.finish();
     write::self_check(&bytes, false)?;
     Ok((bytes, resident_bytes(&parts)))
 }
 
-fn parts<'a>(stages: &Stages<'a>, options: &Options) -> write::ObjectParts<'a> {
-    let Stages { mesh, tree, wide, .. } = stages;
+/// The sections of an object.
+pub(crate) fn parts<'a>(object: &'a Object, options: &Options) -> write::ObjectParts<'a> {
+    let Object { mesh, tree, wide, .. } = object;
     let mut parts = write::ObjectParts {
         bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
         root: wide.root,
@@ -37,7 +28,7 @@ fn parts<'a>(stages: &Stages<'a>, options: &Options) -> write::ObjectParts<'a> {
         triangle_ids: &wide.triangle_ids,
         ..Default::default()
     };
-    if let Some(encoded) = stages.encoded {
+    if let Some(encoded) = &object.encoded {
         parts.record = Some(options.record);
         parts.tet_leaves = &encoded.leaves;
         parts.tets = &encoded.tets;
@@ -60,8 +51,8 @@ fn parts<'a>(stages: &Stages<'a>, options: &Options) -> write::ObjectParts<'a> {
 }
 
 /// Bytes of the sections that tracing reads.
-fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
-    let bytes = size_of::<Object>()
+pub(crate) fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
+    let bytes = size_of::<Header>()
         + size_of_val(parts.lines)
         + size_of_val(parts.triangle_ids)
         + size_of_val(parts.tet_leaves)

@@ -8,7 +8,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// BLAKE3 of a file's bytes, hexadecimal.
-pub(super) fn hash(source: &Path) -> Result<String> {
+pub(crate) fn hash(source: &Path) -> Result<String> {
     let failed =
         |e: std::io::Error| Error::File { code: "BTH-O080", path: source.into(), message: e.to_string() };
     let mut hasher = blake3::Hasher::new();
@@ -16,32 +16,59 @@ pub(super) fn hash(source: &Path) -> Result<String> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
-/// The text of the provenance section.
+/// Version of TetGen that a compilation used.
+pub(super) fn tetgen(report: Option<&tets::Report>) -> Option<&str> {
+    match &report?.worker {
+        tets::WorkerStatus::Ready { tetgen } => Some(tetgen),
+        _ => None,
+    }
+}
+
+/// The text of the provenance section of a single object.
 pub(super) fn json(
     source_blake3: &str,
     format: &str,
-    tets: Option<&tets::Report>,
+    tetgen: Option<&str>,
     options: &Options,
 ) -> Result<String> {
-    let tetgen = match tets.map(|t| &t.worker) {
-        Some(tets::WorkerStatus::Ready { tetgen }) => Some(tetgen),
-        _ => None,
-    };
-    let value = json!({
+    text(json!({
         "tool": "bthc",
         "version": env!("CARGO_PKG_VERSION"),
         "tetgen": tetgen,
         "source": {"format": format, "blake3": source_blake3},
-        "options": {
-            "structure": options.structure,
-            "quality": options.bvh.quality,
-            "attributes": options.attributes,
-            "tets": options.record.name(),
-            "selection": options.costs,
-            "keep_subtrees": options.keep_subtrees,
-            "geometry": options.geometry,
-        },
-    });
+        "options": chosen(options),
+    }))
+}
+
+/// The text of the provenance section of a scene; `sources` are format and hash of each.
+pub(crate) fn of_scene(
+    sources: &[(String, String)],
+    tetgen: Option<&str>,
+    options: &Options,
+) -> Result<String> {
+    let source = |(format, blake3): &(String, String)| json!({"format": format, "blake3": blake3});
+    text(json!({
+        "tool": "bthc",
+        "version": env!("CARGO_PKG_VERSION"),
+        "tetgen": tetgen,
+        "sources": sources.iter().map(source).collect::<Vec<_>>(),
+        "options": chosen(options),
+    }))
+}
+
+fn chosen(options: &Options) -> serde_json::Value {
+    json!({
+        "structure": options.structure,
+        "quality": options.bvh.quality,
+        "attributes": options.attributes,
+        "tets": options.record.name(),
+        "selection": options.costs,
+        "keep_subtrees": options.keep_subtrees,
+        "geometry": options.geometry,
+    })
+}
+
+fn text(value: serde_json::Value) -> Result<String> {
     serde_json::to_string(&value).map_err(|e| Error::Internal {
         code: "BTH-X080",
         message: format!("provenance cannot be written: {e}"),

@@ -31,7 +31,7 @@ impl<'a> FileBuilder<'a> {
     }
 
     /// Adds a section of elements of `stride` bytes; `object` is `NONE` for sections of the whole file.
-    /// What tracing reads is flagged as required.
+    /// What tracing reads and what describes the scene is flagged as required.
     ///
     /// # Errors
     /// `BTH-X031` when the bytes are not whole elements or the section is there already.
@@ -49,7 +49,7 @@ impl<'a> FileBuilder<'a> {
                 bytes.len()
             )));
         }
-        let flags = if kind <= kind::TRIANGLE_HOMES { SECTION_REQUIRED } else { 0 };
+        let flags = if kind::is_required(kind) { SECTION_REQUIRED } else { 0 };
         let hash = hash128(&bytes);
         let before = self.sections.insert((object, kind), Section { flags, stride, hash, bytes });
         match before {

@@ -3,10 +3,12 @@
 mod atomic;
 mod builder;
 mod object;
+mod scene;
 
 pub use atomic::{write_atomically, write_atomically_with};
 pub use builder::FileBuilder;
 pub use object::{ObjectParts, Source, object};
+pub use scene::{SceneParts, scene};
 
 use crate::error::{Error, Result};
 
@@ -22,5 +24,6 @@ pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
     if deep {
         return bth::verify::verify(&file).map(|_| ()).map_err(|mut all| defect(all.swap_remove(0)));
     }
-    (0..file.object_count()).try_for_each(|i| file.check(i).map(|_| ()).map_err(defect))
+    (0..file.object_count()).try_for_each(|i| file.check(i).map(|_| ()).map_err(defect))?;
+    file.check_scene().map(|_| ()).map_err(defect)
 }

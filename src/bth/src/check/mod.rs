@@ -7,10 +7,12 @@
 mod leaves;
 mod links;
 mod nodes;
+mod scene;
 mod sources;
 mod tets;
 
 pub(crate) use links::Derived;
+pub use scene::scene;
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;

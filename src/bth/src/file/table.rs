@@ -45,7 +45,14 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::HULL_FACES => size_of::<HullFace>(),
         kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
         kind::UVS => 8,
-        kind::PROVENANCE => 1,
+        kind::PROVENANCE | kind::NAMES => 1,
+        kind::SCENE => size_of::<Scene>(),
+        kind::NODES => size_of::<Node>(),
+        kind::INSTANCES => size_of::<Instance>(),
+        kind::TRACKS => size_of::<Track>(),
+        kind::TIMES | kind::VALUES => 8,
+        kind::CAMERAS => size_of::<Camera>(),
+        kind::LIGHTS => size_of::<Light>(),
         _ => return None,
     })
 }
@@ -63,6 +70,7 @@ fn most(kind: u32) -> u64 {
         // Rows are referred to by 31 bits in links and by u32 elsewhere; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES => (FACE_BIT - 1) as u64,
         kind::POSITIONS | kind::NORMALS | kind::UVS => (NONE - 1) as u64,
+        kind if kind::is_scene(kind) => (NONE - 1) as u64,
         _ => u64::MAX,
     }
 }
@@ -230,12 +238,13 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         let whole_file = e.object == NONE;
         let first = !whole_file && e.object == objects;
         let wrong = if whole_file {
-            kind_stride(e.kind).is_some() && e.kind != kind::PROVENANCE
+            kind_stride(e.kind).is_some() && e.kind != kind::PROVENANCE && !kind::is_scene(e.kind)
         } else if e.kind == kind::OBJECT {
             !first || e.count != 1
         } else {
             // Kind 1 sorts first (kind 0 is not assigned), so an object's other sections follow its OBJECT.
-            e.object + 1 != objects || e.kind == kind::PROVENANCE || e.kind == 0
+            let of_file = e.kind == kind::PROVENANCE || kind::is_scene(e.kind);
+            e.object + 1 != objects || of_file || e.kind == 0
         };
         if wrong {
             let at = HEADER as u64 + i as u64 * ENTRY + offset_of!(SectionEntry, object) as u64;

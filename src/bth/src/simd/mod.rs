@@ -3,7 +3,8 @@
 //! An implementation is a token that exists only on machines that have its instructions, so its methods are
 //! safe to call, and every `unsafe` of the kernels lies in the files beside this one. All methods, and
 //! everything generic over [`Simd`], must be `#[inline(always)]`: only so does code end up
-//! inside the one function per instruction set that enables its features ([`Isa::run`]).
+//! inside the one function per instruction set that enables its features ([`Isa::run`]). A closure, or
+//! a library function that takes one (`array::map`), is compiled on its own and must not touch lanes.
 //!
 //! Kernels use these lanes only to *leave out* what certainly does not matter; hits are decided elsewhere, in f64
 //! (`trace::line`). So it does no harm that `fma` rounds once or twice, depending on the machine.
@@ -66,6 +67,8 @@ pub(crate) trait Simd: Copy {
     fn least(self, a: Self::F) -> f32;
     /// Elements of a slice, 0.0 where the mask is clear. Panics if a lane that is set lies outside.
     fn gather(self, m: Self::M, from: &[f32], at: Self::U) -> Self::F;
+    /// Elements of rows of four: `column[i] % 4` of row `row[i]`. Panics if a row of a lane that is set lies outside.
+    fn gather_rows(self, m: Self::M, from: &[[f32; 4]], row: Self::U, column: Self::U) -> Self::F;
     /// Where the mask is set, the next elements of `from` in order; else `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 
@@ -74,6 +77,9 @@ pub(crate) trait Simd: Copy {
     fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn sub_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// a + 1 where the mask is set, else `a`.
+    fn increment(self, a: Self::U, m: Self::M) -> Self::U;
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
@@ -103,6 +109,8 @@ pub(crate) trait Simd: Copy {
     /// Stores the lanes whose bit is set, in order, from `to[0]`; what follows them in `to` is undefined.
     /// Returns how many.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
+    /// As [`Self::compress`].
+    fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
     /// As [`Self::compress`], the greatest key first; keys are compared, and stored, but for their four lowest
     /// bits. Negative keys may come in any order.
     fn compress_far_to_near(
@@ -115,6 +123,9 @@ pub(crate) trait Simd: Copy {
     ) -> usize;
     /// Drops the elements whose key exceeds the limit, keeping the order. Returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
+
+    /// Row i becomes lane i of every row.
+    fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
 
     /// Asks for a cache line.
     fn prefetch<T>(self, place: *const T);

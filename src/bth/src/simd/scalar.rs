@@ -43,9 +43,8 @@ fn expand<T: Copy>(a: [T; LANES], bits: u32, from: &[T; LANES]) -> [T; LANES] {
     out
 }
 
-/// [`Simd::compress`] in plain code.
 #[inline(always)]
-pub(super) fn compress(bits: u32, a: &U, to: &mut U) -> usize {
+fn compress<T: Copy>(bits: u32, a: &[T; LANES], to: &mut [T; LANES]) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
         to[count % LANES] = a[lane];
@@ -69,6 +68,18 @@ pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: 
         count += 1;
     }
     count
+}
+
+/// [`Simd::transpose`] in plain code.
+#[inline(always)]
+pub(super) fn transpose(rows: [F; LANES]) -> [F; LANES] {
+    let mut out = [[0.0; LANES]; LANES];
+    for (i, row) in rows.iter().enumerate() {
+        for lane in 0..LANES {
+            out[lane][i] = row[lane];
+        }
+    }
+    out
 }
 
 /// [`Simd::keep_up_to`] in plain code.
@@ -160,6 +171,10 @@ impl Simd for Scalar {
         from_fn(|i| if set(m, i) { from[at[i] as usize] } else { 0.0 })
     }
     #[inline(always)]
+    fn gather_rows(self, m: u32, from: &[[f32; 4]], row: U, column: U) -> F {
+        from_fn(|i| if set(m, i) { from[row[i] as usize][column[i] as usize % 4] } else { 0.0 })
+    }
+    #[inline(always)]
     fn expand(self, a: F, m: u32, from: &F) -> F {
         expand(a, m, from)
     }
@@ -183,6 +198,14 @@ impl Simd for Scalar {
     #[inline(always)]
     fn add_u(self, a: U, b: U) -> U {
         from_fn(|i| a[i].wrapping_add(b[i]))
+    }
+    #[inline(always)]
+    fn sub_u(self, a: U, b: U) -> U {
+        from_fn(|i| a[i].wrapping_sub(b[i]))
+    }
+    #[inline(always)]
+    fn increment(self, a: U, m: u32) -> U {
+        from_fn(|i| a[i].wrapping_add(m >> i & 1))
     }
     #[inline(always)]
     fn and_u(self, a: U, b: U) -> U {
@@ -268,12 +291,20 @@ impl Simd for Scalar {
         compress(bits, &a, to)
     }
     #[inline(always)]
+    fn compress_f(self, bits: u32, a: F, to: &mut F) -> usize {
+        compress(bits, &a, to)
+    }
+    #[inline(always)]
     fn compress_far_to_near(self, bits: u32, key: F, a: U, to: &mut U, keys: &mut F) -> usize {
         compress_far_to_near(bits, &key, &a, to, keys)
     }
     #[inline(always)]
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
         keep_up_to(codes, keys, limit)
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
+        transpose(rows)
     }
     #[inline(always)]
     fn prefetch<T>(self, _place: *const T) {}

@@ -1,19 +1,29 @@
 //! What a traversal looks for: the nearest hit or any hit; and what it counts.
 
-use super::line::Crossing;
+use super::crossing::Crossing;
 use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
 
 /// A query in progress over one ray.
-pub(crate) trait Query {
+pub(crate) trait Query: Copy {
+    /// Whether any hit will do.
+    const ANY: bool;
+    fn new(ray: &Ray) -> Self;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
+    /// range if they do not; true if that is all the query wants to know.
+    fn settled_by(&mut self, _t: (f64, f64)) -> bool {
+        false
+    }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
+    /// A triangle is certainly hit within the ray's range; of use where any hit will do.
+    fn accept(&mut self);
 }
 
 /// `t` and all that could be taken for it: t is compared with the ray's range after rounding to f32, and
-/// computed only to 2^-28 of itself (`Line::crossing`), so of two equal hits one may seem nearer.
+/// computed only to 2^-28 of itself (`super::crossing`), so of two equal hits one may seem nearer.
 fn widened(t: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1 << 23) as f64;
     const LEAST: f64 = f32::from_bits(1) as f64;
@@ -30,18 +40,14 @@ pub(crate) struct Nearest {
 }
 
 impl Nearest {
-    pub(crate) fn new(ray: &Ray) -> Self {
-        let best = Crossing { t: f64::from(ray.tmax), u: 0.0, v: 0.0 };
-        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
-    }
-
     pub(crate) fn hit(&self, instance: u32) -> Hit {
         if self.triangle == NONE {
             return Hit::MISS;
         }
         let surface = Surface { instance, triangle: self.triangle };
+        let [u, v] = self.best.uv();
         // + 0.0 turns -0.0 into 0.0.
-        Hit { t: self.best.t as f32 + 0.0, u: self.best.u + 0.0, v: self.best.v + 0.0, surface }
+        Hit { t: self.best.t as f32 + 0.0, u: u + 0.0, v: v + 0.0, surface }
     }
 }
 
@@ -52,6 +58,11 @@ fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
 }
 
 impl Query for Nearest {
+    const ANY: bool = false;
+    fn new(ray: &Ray) -> Self {
+        let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
+        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
+    }
     #[inline(always)]
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool {
         let nearer = self.triangle == NONE
@@ -67,6 +78,7 @@ impl Query for Nearest {
     fn limit(&self) -> f64 {
         widened(self.best.t)
     }
+    fn accept(&mut self) {}
 }
 
 /// Ends at the first crossing in range.
@@ -77,21 +89,26 @@ pub(crate) struct Any {
     pub(crate) found: bool,
 }
 
-impl Any {
-    pub(crate) fn new(ray: &Ray) -> Self {
+impl Query for Any {
+    const ANY: bool = true;
+    fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
-}
-
-impl Query for Any {
     #[inline(always)]
     fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);
         self.found
     }
+    fn settled_by(&mut self, t: (f64, f64)) -> bool {
+        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
+        self.found
+    }
     #[inline(always)]
     fn limit(&self) -> f64 {
         widened(f64::from(self.tmax))
+    }
+    fn accept(&mut self) {
+        self.found = true;
     }
 }
 

@@ -2,57 +2,68 @@
 //!
 //! Slab test (Kay and Kajiya 1986) as one multiplication and one addition per plane,
 //! t = plane · r + (-o · r ∓ pad · |r|): the pad covers every rounding and the clamping of small
-//! direction components, so a box that the ray meets is never lost. t is in units of the direction
-//! scaled by a power of two such that its greatest component lies in [1, 2).
+//! direction components, so a box that the ray meets is never lost. t is measured as **depth**: in units of the
+//! greatest component of the direction, so that it has the size of coordinates.
 
-use crate::layout::{NONE, Object, WIDTH, WideNode};
+use crate::layout::{Object, WIDTH, WideNode};
 use crate::rays::Ray;
+use crate::simd::Simd;
 use crate::trace::line::Line;
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Pad of a plane relative to the greatest coordinate in play. Half of it covers the roundings
-/// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the clamping below.
-const PAD: f64 = 1.0 / (1 << 20) as f64;
-/// Components below this (of a greatest one in [1, 2)) are raised to it. Over the way to the farthest
-/// coordinate that moves the ray by less than half the pad, and it keeps products finite.
-const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
+/// Pad of a plane relative to the greatest coordinate in play. Half of it covers the roundings (reciprocal, product
+/// with the origin, addend, product with the plane and sum: at most 5 · 2^-24), half the clamping below.
+pub(crate) const PAD: f64 = 1.0 / (1 << 20) as f64;
+/// Components below this (of a greatest one of 1) are raised to it. Over the way to the farthest coordinate that moves
+/// the ray by less than half the pad, and it keeps products finite.
+pub(crate) const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
 /// Beyond this, products could overflow f32: every box is visited instead.
 const LARGEST_COORDINATE: f64 = 1e30;
 
+/// Where the upper ends of an axis lie, behind the lower ones.
+pub(crate) const FAR: u32 = WIDTH as u32;
+
 /// A ray prepared for box tests.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
 pub(crate) struct Slabs {
-    /// 0 or 1 per axis: which of (lower, upper) is met first.
-    near: [usize; 3],
-    reciprocal: [f32; 3],
-    near_addend: [f32; 3],
-    far_addend: [f32; 3],
-    /// Power of two from t to scaled t.
-    scale: f64,
-    tmin: f32,
+    pub(crate) reciprocal: [f32; 3],
+    /// Depth of t = 1.
+    pub(crate) scale: f32,
+    pub(crate) near_addend: [f32; 3],
+    /// Lower bound of the depth.
+    pub(crate) first: f32,
+    pub(crate) far_addend: [f32; 3],
+    /// Upper bound of the depth at the start of the query.
+    pub(crate) last: f32,
+    /// Per axis the row of the ends that are met first: 0 or [`FAR`].
+    pub(crate) near: [u32; 3],
+    pub(crate) reserved: u32,
 }
 
 impl Slabs {
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> Slabs {
-        let greatest = line.direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        // Exact: the exponent of a finite non-zero f32 is that of a normal f64.
-        let scale = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
+        let depth = line.direction[line.axis[2]].abs();
         let corners = object.lower.iter().chain(&object.upper);
         let farthest = corners.fold(0.0, |m: f64, &x| m.max(f64::from(x).abs()));
         let extent = farthest + line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let pad = PAD * extent;
         let mut slabs = Slabs {
-            near: [0; 3],
             reciprocal: [0.0; 3],
+            scale: depth as f32,
             near_addend: [f32::NEG_INFINITY; 3],
+            first: 0.0,
             far_addend: [f32::INFINITY; 3],
-            scale,
-            tmin: 0.0,
+            last: 0.0,
+            near: [0; 3],
+            reserved: 0,
         };
-        slabs.tmin = ((f64::from(ray.tmin) * scale) as f32).next_down();
+        slabs.first = ((f64::from(ray.tmin) * depth) as f32).next_down();
+        slabs.last = slabs.limit(f64::from(ray.tmax));
         for k in 0..3 {
-            let d = line.direction[k] / scale;
+            let d = line.direction[k] / depth;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
-            slabs.near[k] = (d.is_sign_negative()) as usize;
+            slabs.near[k] = if d.is_sign_negative() { FAR } else { 0 };
             if extent < LARGEST_COORDINATE {
                 slabs.reciprocal[k] = r as f32;
                 slabs.near_addend[k] = (-line.origin[k] * r - pad * r.abs()) as f32;
@@ -62,41 +73,61 @@ impl Slabs {
         slabs
     }
 
-    /// Upper bound of t in scaled units, for [`Self::children`].
+    /// Upper bound of the depth of t, for [`Self::children`].
+    #[inline(always)]
     pub(crate) fn limit(&self, t: f64) -> f32 {
-        // Rounding to f32 can lower t; one step up makes good for it, also where it underflows.
-        ((t * self.scale) as f32).next_up()
+        // Rounding to f32 can lower it; one step up makes good for it, also where it underflows.
+        ((t * f64::from(self.scale)) as f32).next_up()
     }
 
-    /// The children of a node whose boxes the ray may meet before `limit`: their slots and a lower
-    /// bound of t, in `found`; returns how many.
-    #[inline(always)]
-    pub(crate) fn children(&self, node: &WideNode, limit: f32, found: &mut [(f32, u32); WIDTH]) -> usize {
-        let (mut enter, mut leave) = ([self.tmin; WIDTH], [limit; WIDTH]);
-        for k in 0..3 {
-            let (near, far) = (&node.bounds[k][self.near[k]], &node.bounds[k][1 - self.near[k]]);
-            for i in 0..WIDTH {
-                let t = near[i] * self.reciprocal[k] + self.near_addend[k];
-                enter[i] = if t > enter[i] { t } else { enter[i] };
-                let t = far[i] * self.reciprocal[k] + self.far_addend[k];
-                leave[i] = if t < leave[i] { t } else { leave[i] };
-            }
-        }
-        let mut count = 0;
-        for i in 0..WIDTH {
-            if enter[i] <= leave[i] && node.child[i] != NONE {
-                found[count] = (enter[i], node.child[i]);
-                count += 1;
-            }
-        }
-        count
+    /// From which to which depth a hit certainly lies in the ray's range.
+    pub(crate) fn certain_range(&self, ray: &Ray) -> [f32; 2] {
+        let depth = |t: f32| (f64::from(t) * f64::from(self.scale)) as f32;
+        [depth(ray.tmin).next_up(), depth(ray.tmax.min(f32::MAX)).next_down()]
     }
+
+    /// The children of a node whose boxes the ray may meet before `limit`, a bit each, and lower bounds of
+    /// their t. Empty slots may be among them when coordinates are too great for f32.
+    #[inline(always)]
+    pub(crate) fn children<S: Simd>(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
+        let (mut enter, mut leave) = (s.splat(self.first), s.splat(limit));
+        for k in 0..3 {
+            let reciprocal = s.splat(self.reciprocal[k]);
+            let (first, second) =
+                (row(&node.bounds[k], self.near[k]), row(&node.bounds[k], self.near[k] ^ FAR));
+            let (first, second) = (s.load(first), s.load(second));
+            enter = s.max(s.fma(first, reciprocal, s.splat(self.near_addend[k])), enter);
+            leave = s.min(s.fma(second, reciprocal, s.splat(self.far_addend[k])), leave);
+        }
+        (s.mask_bits(s.le(enter, leave)), enter)
+    }
+}
+
+/// One of the two rows of an axis: lower ends at 0, upper ends at [`FAR`].
+#[inline(always)]
+fn row(rows: &[[f32; WIDTH]; 2], at: u32) -> &[f32; WIDTH] {
+    let at = (at & FAR) as usize;
+    rows.as_flattened()[at..at + WIDTH].try_into().expect("a row")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::NONE;
+    use crate::simd::{Isa, Kernel};
     use crate::testing::Rng;
+
+    /// The children as a kernel.
+    struct Children<'a>(&'a Slabs, &'a WideNode, f32);
+
+    impl Kernel for Children<'_> {
+        type Output = u32;
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> u32 {
+            let (bits, _) = self.0.children(s, self.1, self.2);
+            (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && self.1.child[i] != NONE).fold(0, |m, i| m | 1 << i)
+        }
+    }
 
     /// A node with one box, and the object whose bounds it has.
     fn boxed(corners: [[f32; 3]; 3]) -> (WideNode, Object) {
@@ -147,20 +178,20 @@ mod tests {
             let ray = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
             let Some(line) = Line::new(&ray) else { continue };
             let (node, object) = boxed(corners);
-            let projected = corners.map(|p| line.project(p));
-            let crossing = line.crossing(|| corners, projected.each_ref());
+            let crossing = line.crossing(corners);
             let t = crossing.map(|c| c.t).unwrap_or(f64::INFINITY);
-            let mut found = [(0.0, NONE); WIDTH];
             // Also with the range cut off right at the crossing.
             for (tmin, limit) in [(f32::NEG_INFINITY, f64::INFINITY), (t as f32, t)] {
                 let slabs = Slabs::new(&Ray { tmin, ..ray }, &line, &object);
-                let count = slabs.children(&node, slabs.limit(limit), &mut found);
-                assert!(
-                    crossing.is_none() || count == 1,
-                    "round {round}: {ray:?} crosses {corners:?} at {t}"
-                );
-                assert!(count <= 1, "empty slots are never entered");
-                missed += (count == 0) as u32;
+                for isa in Isa::ALL {
+                    let found = isa.run(Children(&slabs, &node, slabs.limit(limit)));
+                    assert!(
+                        crossing.is_none() || found == 1,
+                        "{isa}, round {round}: {ray:?} crosses {corners:?} at {t}"
+                    );
+                    assert!(found <= 1, "empty slots are never entered");
+                    missed += (found == 0) as u32;
+                }
             }
             crossings += crossing.is_some() as u32;
         }

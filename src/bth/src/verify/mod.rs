@@ -33,7 +33,7 @@ pub struct Report {
 ///
 /// # Errors
 /// What was found, at least one: all damaged sections and gaps, and for each object the first violation.
-/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F207`.
+/// Codes are `BTH-F020`, `BTH-F021` and `BTH-F101` to `BTH-F207`; the scene sections count as one object.
 pub fn verify(file: &File) -> Result<Report, Vec<Error>> {
     let mut errors = Vec::new();
     let mut report =
@@ -59,6 +59,7 @@ pub fn verify(file: &File) -> Result<Report, Vec<Error>> {
             .and_then(|view| geometry::check(&view, &mut report).map_err(|e| file.locate(e, object)));
         errors.extend(checked.err());
     }
+    errors.extend(file.check_scene().err());
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }
 

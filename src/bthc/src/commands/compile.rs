@@ -18,6 +18,9 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
         let message = "the output would replace the model".to_owned();
         return Err(Failure::Usage { message, hint: "name another output with -o" });
     }
+    if super::scene::is_scene(args) {
+        return super::scene::compile(args, &path);
+    }
     let options = args.options();
     let progress = Progress::new(args.quiet || args.json);
     let (compiled, report) =
@@ -72,7 +75,7 @@ fn summary(path: &Path, report: &Report) -> String {
     )
 }
 
-fn nonzero(table: &mut Table, name: &str, n: u64) {
+pub(super) fn nonzero(table: &mut Table, name: &str, n: u64) {
     if n > 0 {
         table.row([name, &count(n)]);
     }
@@ -80,7 +83,12 @@ fn nonzero(table: &mut Table, name: &str, n: u64) {
 
 /// Why chosen nodes were not tetrahedralized, if no worker did it.
 fn worker_note(report: &Report) -> String {
-    match report.tets.as_ref().map(|t| &t.worker) {
+    note(report.tets.as_ref().map(|t| &t.worker))
+}
+
+/// Why there are no tetrahedra, if the worker is the reason.
+pub(super) fn note(worker: Option<&WorkerStatus>) -> String {
+    match worker {
         Some(WorkerStatus::Missing { hint }) => format!("note: no tetrahedralization worker: {hint}\n"),
         Some(WorkerStatus::Unusable { reason }) => {
             format!("note: tetrahedralization worker unusable: {reason}\n")

@@ -62,8 +62,24 @@ fn describe(file: &File) -> Result<Value, Failure> {
         "minimum_reader_version": version(header.minimum_reader_version),
         "content_id": hex(&file.content_id()),
         "objects": (0..file.object_count()).map(object).collect::<Result<Vec<_>, _>>()?,
+        "scene": scene(file)?,
         "sections": file.sections().map(section).collect::<Vec<_>>(),
         "provenance": provenance(file),
+    }))
+}
+
+/// What stands and moves; null without scene sections.
+fn scene(file: &File) -> Result<Value, Failure> {
+    let Some(view) = file.check_scene()? else { return Ok(Value::Null) };
+    let scene = &view.scene[0];
+    let names = |count: usize, name: &dyn Fn(u32) -> String| (0..count as u32).map(name).collect::<Vec<_>>();
+    Ok(json!({
+        "first_frame": scene.first_frame, "last_frame": scene.last_frame, "rate": scene.rate,
+        "camera": (scene.camera != NONE).then(|| view.camera_name(scene.camera)),
+        "nodes": view.nodes.len(), "instances": view.instances.len(), "tracks": view.tracks.len(),
+        "keys": view.times.len(),
+        "cameras": names(view.cameras.len(), &|i| view.camera_name(i).to_owned()),
+        "lights": names(view.lights.len(), &|i| view.light_name(i).to_owned()),
     }))
 }
 
@@ -89,6 +105,16 @@ fn summary(file: &File) -> Result<String, Failure> {
         facts.row(["record", record(&view)]);
         let per_triangle = file.resident_bytes() as f64 / f64::from(view.header.triangles.max(1));
         facts.row(["bytes a triangle", &format!("{per_triangle:.1}")]);
+    }
+    if let Some(view) = file.check_scene()? {
+        let scene = &view.scene[0];
+        facts.row(["nodes", &count(view.nodes.len() as u64)]);
+        facts.row(["instances", &count(view.instances.len() as u64)]);
+        facts.row(["tracks", &count(view.tracks.len() as u64)]);
+        facts.row(["frames", &format!("{} to {} at {}/s", scene.first_frame, scene.last_frame, scene.rate)]);
+        for camera in 0..view.cameras.len() as u32 {
+            facts.row(["camera", &view.camera_name(camera).escape_debug().to_string()]);
+        }
     }
     let mut sections = Table::default();
     sections.row(["section", "rows", "size"]);

@@ -2,8 +2,10 @@
 
 mod compile;
 mod explain;
+mod import;
 mod info;
 mod marks;
+mod scene;
 mod trace;
 mod verify;
 
@@ -17,6 +19,7 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
     crate::progress::listen_for_interrupts();
     match command {
         Command::Compile(args) => compile::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Explain(args) => explain::run(&args),

@@ -1,0 +1,208 @@
+//! The rows of the scene sections, from a manifest.
+
+use crate::error::{Error, Result};
+use crate::write::SceneParts;
+use bth::layout as on_disk;
+use bth::layout::NONE;
+use bth_scene::{Lens, LightKind, Manifest, Transform};
+use std::collections::HashMap;
+
+/// The nodes with parents before children: as they stand where that holds, else by depth.
+pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
+    let nodes = &manifest.nodes;
+    let mut order: Vec<usize> = (0..nodes.len()).collect();
+    if nodes.iter().enumerate().all(|(row, node)| node.parent.is_none_or(|parent| parent < row)) {
+        return order;
+    }
+    let mut depth = vec![usize::MAX; nodes.len()];
+    let mut path = Vec::new();
+    for start in 0..nodes.len() {
+        let mut next = Some(start);
+        while let Some(node) = next.filter(|node| depth[*node] == usize::MAX) {
+            path.push(node);
+            next = nodes[node].parent;
+        }
+        let mut below = next.map_or(0, |node| depth[node] + 1);
+        while let Some(node) = path.pop() {
+            depth[node] = below;
+            below += 1;
+        }
+    }
+    order.sort_by_key(|node| depth[*node]);
+    order
+}
+
+/// What stands in NAMES: each name once.
+#[derive(Default)]
+struct Names<'a> {
+    bytes: Vec<u8>,
+    found: HashMap<&'a str, u32>,
+}
+
+impl<'a> Names<'a> {
+    /// First byte and length.
+    fn add(&mut self, name: &'a str) -> (u32, u32) {
+        let bytes = &mut self.bytes;
+        let first = *self.found.entry(name).or_insert_with(|| {
+            let first = bytes.len() as u32;
+            bytes.extend_from_slice(name.as_bytes());
+            first
+        });
+        (first, name.len() as u32)
+    }
+}
+
+/// The sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
+/// instance uses; `visible` says which nodes may be seen: instances at others are left out.
+///
+/// # Errors
+/// `BTH-L050` beyond the limits of the format.
+pub(super) fn encode(
+    manifest: &Manifest,
+    order: &[usize],
+    visible: &[bool],
+    objects: &[Option<u32>],
+) -> Result<SceneParts> {
+    check_limits(manifest)?;
+    let mut row_of = vec![NONE; manifest.nodes.len()];
+    order.iter().enumerate().for_each(|(row, node)| row_of[*node] = row as u32);
+    let mut names = Names::default();
+    let frames = manifest.frames;
+    let mut parts = SceneParts {
+        scene: on_disk::Scene {
+            rate: frames.rate,
+            first_frame: frames.first,
+            last_frame: frames.last,
+            camera: manifest.camera.map_or(NONE, |camera| camera as u32),
+            reserved: [0; 11],
+        },
+        nodes: Vec::with_capacity(order.len()),
+        instances: Vec::new(),
+        tracks: Vec::new(),
+        times: Vec::new(),
+        values: Vec::new(),
+        cameras: Vec::new(),
+        lights: Vec::new(),
+        names: Vec::new(),
+    };
+    for (row, &index) in order.iter().enumerate() {
+        let node = &manifest.nodes[index];
+        let (name, name_length) = names.add(&node.name);
+        let (transform, matrix) = transform(&node.transform);
+        let hidden = if node.visible { 0 } else { on_disk::NODE_HIDDEN };
+        parts.nodes.push(on_disk::Node {
+            transform,
+            parent: node.parent.map_or(NONE, |parent| row_of[parent]),
+            flags: hidden | matrix,
+            name,
+            name_length,
+            reserved: [0; 4],
+        });
+        if let Some(object) = node.object.filter(|_| visible[index]).and_then(|object| objects[object]) {
+            parts.instances.push(on_disk::Instance { node: row as u32, object, flags: 0, reserved: 0 });
+        }
+    }
+    add_tracks(&mut parts, manifest, &row_of);
+    for camera in &manifest.cameras {
+        let (name, name_length) = names.add(&camera.name);
+        let (projection, size) = match camera.lens {
+            Lens::Perspective(fov) => (0, fov),
+            Lens::Orthographic(height) => (1, height),
+        };
+        parts.cameras.push(on_disk::Camera {
+            node: row_of[camera.node],
+            projection,
+            name,
+            name_length,
+            size,
+            aspect: camera.aspect.unwrap_or(0.0),
+            near: camera.near.unwrap_or(0.0),
+            far: camera.far.unwrap_or(0.0),
+            reserved: [0; 4],
+        });
+    }
+    for light in &manifest.lights {
+        let (name, name_length) = names.add(&light.name);
+        let (kind, inner, outer) = match light.kind {
+            LightKind::Directional => (0, 0.0, 0.0),
+            LightKind::Point => (1, 0.0, 0.0),
+            LightKind::Spot { inner, outer } => (2, inner, outer),
+        };
+        parts.lights.push(on_disk::Light {
+            node: row_of[light.node],
+            kind,
+            name,
+            name_length,
+            color: light.color,
+            intensity: light.intensity,
+            range: light.range.unwrap_or(0.0),
+            inner,
+            outer,
+            reserved: [0; 2],
+        });
+    }
+    parts.names = names.bytes;
+    Ok(parts)
+}
+
+fn check_limits(manifest: &Manifest) -> Result<()> {
+    let name = |n: &String| n.len() as u64;
+    let names = manifest.nodes.iter().map(|n| name(&n.name)).sum::<u64>()
+        + manifest.cameras.iter().map(|c| name(&c.name)).sum::<u64>()
+        + manifest.lights.iter().map(|l| name(&l.name)).sum::<u64>();
+    let values = manifest.tracks.iter().map(|t| t.values.len() as u64).sum();
+    for (what, count) in
+        [("nodes", manifest.nodes.len() as u64), ("bytes of names", names), ("values", values)]
+    {
+        if count >= u64::from(i32::MAX as u32) {
+            let message = format!("a scene may have fewer than {} {what}; this one has {count}", i32::MAX);
+            return Err(Error::Limit { code: "BTH-L050", message });
+        }
+    }
+    Ok(())
+}
+
+fn transform(transform: &Transform) -> ([f64; 12], u32) {
+    let mut numbers = [0.0; 12];
+    match transform {
+        Transform::Parts { translation, rotation, scale } => {
+            numbers[..3].copy_from_slice(translation);
+            numbers[3..7].copy_from_slice(rotation);
+            numbers[7..10].copy_from_slice(scale);
+            (numbers, 0)
+        }
+        Transform::Matrix(rows) => {
+            numbers.copy_from_slice(rows.as_flattened());
+            (numbers, on_disk::NODE_MATRIX)
+        }
+    }
+}
+
+fn add_tracks(parts: &mut SceneParts, manifest: &Manifest, row_of: &[u32]) {
+    let mut tracks: Vec<_> = manifest.tracks.iter().collect();
+    tracks.sort_by_key(|t| (row_of[t.node], t.property));
+    for track in tracks {
+        let property = match track.property {
+            bth_scene::Property::Translation => on_disk::Property::Translation,
+            bth_scene::Property::Rotation => on_disk::Property::Rotation,
+            bth_scene::Property::Scale => on_disk::Property::Scale,
+            bth_scene::Property::Visible => on_disk::Property::Visible,
+        };
+        let interpolation = match track.interpolation {
+            bth_scene::Interpolation::Step => on_disk::Interpolation::Step,
+            bth_scene::Interpolation::Linear => on_disk::Interpolation::Linear,
+            bth_scene::Interpolation::Cubic => on_disk::Interpolation::Cubic,
+        };
+        parts.tracks.push(on_disk::Track {
+            node: row_of[track.node],
+            property: property as u32,
+            interpolation: interpolation as u32,
+            keys: track.times.len() as u32,
+            first_time: parts.times.len() as u32,
+            first_value: parts.values.len() as u32,
+            reserved: [0; 2],
+        });
+        parts.times.extend(&track.times);
+        parts.values.extend(&track.values);
+    }
+}

@@ -1,0 +1,72 @@
+//! Which nodes may be seen between the first frame and the last.
+
+use bth_scene::{Manifest, Property, Track, Transform};
+
+/// For each node whether it may be seen: true where one frame may show it, and perhaps where none does (when
+/// a node and its parent are seen at different times).
+pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
+    let frames = manifest.frames;
+    let range = [frames.first, frames.last].map(|f| f64::from(f) / frames.rate);
+    let mut shown: Vec<bool> = manifest.nodes.iter().map(|n| n.visible).collect();
+    let mut scaled: Vec<bool> = manifest.nodes.iter().map(|n| has_size(&n.transform)).collect();
+    for track in &manifest.tracks {
+        match track.property {
+            Property::Visible => shown[track.node] = some_value(track, range, |v| v[0] != 0.0),
+            // Between two keys without a zero a scale may still pass through it, for an instant.
+            Property::Scale => scaled[track.node] = true,
+            Property::Translation | Property::Rotation => {}
+        }
+    }
+    let mut visible = vec![false; manifest.nodes.len()];
+    for &node in order {
+        let above = manifest.nodes[node].parent.is_none_or(|parent| visible[parent]);
+        visible[node] = above && shown[node] && scaled[node];
+    }
+    visible
+}
+
+fn has_size(transform: &Transform) -> bool {
+    match transform {
+        Transform::Parts { scale, .. } => !scale.contains(&0.0),
+        Transform::Matrix(rows) => rows.iter().any(|row| row[..3].iter().any(|x| *x != 0.0)),
+    }
+}
+
+/// Whether a track in steps has such a value at some time of a range.
+fn some_value(track: &Track, [from, to]: [f64; 2], holds: impl Fn(&[f64]) -> bool) -> bool {
+    let first = track.times.partition_point(|t| *t <= from).saturating_sub(1);
+    let end = track.times.partition_point(|t| *t <= to).max(first + 1);
+    let width = track.property.width();
+    track.values.chunks(width).take(end).skip(first).any(holds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn seen(text: &str) -> Vec<bool> {
+        let manifest = bth_scene::parse(&format!("version = 1\n{text}"), Path::new("x")).unwrap();
+        visible(&manifest, &super::super::encode::order(&manifest))
+    }
+
+    #[test]
+    fn hidden_nodes_hide_what_is_below_in_whatever_order_they_stand() {
+        let text = r#"nodes = [{ name = "leaf", parent = "top" }, { name = "top", visible = false },
+            { name = "flat", scale = [1, 0, 1] }, { name = "below", parent = "flat" }, { name = "free" },
+            { name = "point", matrix = [[0, 0, 0, 1], [0, 0, 0, 1], [0, 0, 0, 1]] }]"#;
+        assert_eq!(seen(text), [false, false, false, false, true, false]);
+    }
+
+    #[test]
+    fn tracks_of_visibility_count_within_the_range_of_frames() {
+        let tracked = |first: i32, last: i32| {
+            seen(&format!(
+                r#"frames = {{ first = {first}, last = {last}, rate = 10 }}
+                nodes = [{{ name = "a" }}]
+                tracks = [{{ node = "a", property = "visible", times = [1, 2, 3], values = [false, true, false] }}]"#
+            ))[0]
+        };
+        assert!(!tracked(0, 19) && tracked(0, 20) && tracked(29, 40) && !tracked(30, 40) && tracked(25, 25));
+    }
+}

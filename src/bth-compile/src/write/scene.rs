@@ -1,0 +1,45 @@
+//! The sections of a scene.
+
+use super::FileBuilder;
+use crate::error::Result;
+use bth::layout::*;
+
+/// The rows of the scene sections.
+#[derive(Clone, Debug)]
+pub struct SceneParts {
+    /// Frames and camera.
+    pub scene: Scene,
+    /// Parents before children.
+    pub nodes: Vec<Node>,
+    /// What stands where.
+    pub instances: Vec<Instance>,
+    /// By node and property.
+    pub tracks: Vec<Track>,
+    /// Seconds of their keys.
+    pub times: Vec<f64>,
+    /// Values of their keys.
+    pub values: Vec<f64>,
+    /// Cameras.
+    pub cameras: Vec<Camera>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Names of all of these.
+    pub names: Vec<u8>,
+}
+
+/// Adds the sections of a scene; those without rows are left out.
+///
+/// # Errors
+/// `BTH-X031` when one is there already.
+pub fn scene<'a>(builder: &mut FileBuilder<'a>, parts: &'a SceneParts) -> Result<()> {
+    builder.rows(kind::SCENE, NONE, std::slice::from_ref(&parts.scene))?;
+    builder.rows(kind::NODES, NONE, &parts.nodes)?;
+    builder.rows(kind::INSTANCES, NONE, &parts.instances)?;
+    builder.rows(kind::TRACKS, NONE, &parts.tracks)?;
+    builder.rows(kind::TIMES, NONE, &parts.times)?;
+    builder.rows(kind::VALUES, NONE, &parts.values)?;
+    builder.rows(kind::CAMERAS, NONE, &parts.cameras)?;
+    builder.rows(kind::LIGHTS, NONE, &parts.lights)?;
+    builder.rows(kind::NAMES, NONE, &parts.names)?;
+    Ok(())
+}

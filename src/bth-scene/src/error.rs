@@ -1,0 +1,54 @@
+//! What can be wrong with a manifest, each with a stable code, a place and a hint.
+
+use std::path::PathBuf;
+
+/// Result of reading a manifest.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a manifest cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}:{line}:{column}: {code}: {message} (hint: {hint})", path.display())]
+pub struct Error {
+    /// Stable code, one of [`code`].
+    pub code: &'static str,
+    /// The manifest.
+    pub path: PathBuf,
+    /// Line, from 1; 0 when the file as a whole is meant.
+    pub line: usize,
+    /// Column in characters, from 1; 0 with line 0.
+    pub column: usize,
+    /// What was expected and what was found.
+    pub message: String,
+    /// What to do.
+    pub hint: String,
+}
+
+/// The codes of [`Error`]; their meanings never change.
+pub mod code {
+    /// The file cannot be read.
+    pub const READ: &str = "BTH-M001";
+    /// It is not TOML.
+    pub const SYNTAX: &str = "BTH-M002";
+    /// A key that the format does not have.
+    pub const UNKNOWN_KEY: &str = "BTH-M003";
+    /// A value of another type.
+    pub const TYPE: &str = "BTH-M004";
+    /// A value that the format does not allow.
+    pub const VALUE: &str = "BTH-M005";
+    /// A key that must be there is not.
+    pub const MISSING_KEY: &str = "BTH-M006";
+    /// A manifest of another version.
+    pub const VERSION: &str = "BTH-M007";
+    /// A name that is empty or used twice.
+    pub const NAME: &str = "BTH-M008";
+    /// A name that nothing has.
+    pub const REFERENCE: &str = "BTH-M009";
+    /// A node that is its own ancestor.
+    pub const CYCLE: &str = "BTH-M010";
+    /// A path that leaves the manifest's folder.
+    pub const PATH: &str = "BTH-M011";
+    /// Times or values of a track that do not fit together.
+    pub const TRACK: &str = "BTH-M012";
+    /// Two keys that exclude each other.
+    pub const CONFLICT: &str = "BTH-M013";
+}

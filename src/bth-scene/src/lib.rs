@@ -1,0 +1,35 @@
+//! Scene manifests: what stands in a scene and how it moves, as TOML that a person can write.
+//!
+//! `format-spec/scene-manifest.md` says what each key means. [`read`] is strict: unknown keys, wrong types,
+//! cycles, missing names and paths that leave the manifest's folder are errors with line and column.
+//! [`Manifest::to_toml`] writes what [`read`] reads back to an equal value.
+#![warn(missing_docs)]
+
+pub mod error;
+mod model;
+mod names;
+mod read;
+mod read_tracks;
+mod read_transform;
+mod table;
+mod write;
+
+pub use error::{Error, Result};
+pub use model::*;
+pub use read::{parse, read};
+
+/// Version of the manifest format that this crate reads and writes.
+pub const VERSION: i64 = 1;
+
+/// The keys that may stand in each table, by the name of the table in the specification.
+pub const KEYS: &[(&str, &[&str])] = &[
+    ("scene", read::SCENE_KEYS),
+    ("frames", read::FRAMES_KEYS),
+    ("object", read::OBJECT_KEYS),
+    ("node", read::NODE_KEYS),
+    ("camera", read::CAMERA_KEYS),
+    ("light", read::LIGHT_KEYS),
+    ("track", read_tracks::TRACK_KEYS),
+    ("turn", read_transform::TURN_KEYS),
+    ("look", read_transform::LOOK_KEYS),
+];

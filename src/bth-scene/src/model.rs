@@ -1,0 +1,257 @@
+//! A scene as a manifest describes it. References are rows of the tables here.
+
+/// A scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Manifest {
+    /// Which frames there are.
+    pub frames: Frames,
+    /// Row of `cameras` that is used when none is asked for.
+    pub camera: Option<usize>,
+    /// Geometries, each in its own space.
+    pub objects: Vec<Object>,
+    /// The hierarchy, in any order; no node is its own ancestor.
+    pub nodes: Vec<Node>,
+    /// Cameras.
+    pub cameras: Vec<Camera>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// What moves; no two of the same node and property.
+    pub tracks: Vec<Track>,
+}
+
+/// Frame `f` shows the scene at `f / rate` seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frames {
+    /// First frame.
+    pub first: i32,
+    /// Last frame, not before the first.
+    pub last: i32,
+    /// Frames per second, finite and positive.
+    pub rate: f64,
+}
+
+impl Default for Frames {
+    fn default() -> Self {
+        Self { first: 0, last: 0, rate: 24.0 }
+    }
+}
+
+/// A geometry in its own space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Unique among objects.
+    pub name: String,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it; their
+/// separator is `/`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Source {
+    /// A model that is to be compiled.
+    Model {
+        /// OBJ, glTF, GLB, PLY, STL or OFF file.
+        path: String,
+        /// Of a glTF file one mesh, by number, in its own space; without it the whole file.
+        mesh: Option<u32>,
+    },
+    /// A compiled file.
+    Compiled {
+        /// BTH file.
+        path: String,
+        /// Object of that file.
+        object: u32,
+    },
+}
+
+impl Source {
+    /// The file, relative to the manifest's folder.
+    pub fn path(&self) -> &str {
+        match self {
+            Source::Model { path, .. } | Source::Compiled { path, .. } => path,
+        }
+    }
+}
+
+/// A node of the hierarchy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Unique among nodes.
+    pub name: String,
+    /// Node that it moves with; `None` for the world.
+    pub parent: Option<usize>,
+    /// From its own space to its parent's, before tracks.
+    pub transform: Transform,
+    /// Object of which an instance stands here.
+    pub object: Option<usize>,
+    /// Whether it and what is below it can be seen, before tracks.
+    pub visible: bool,
+}
+
+/// From a node's space to its parent's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transform {
+    /// Scales, then rotates, then moves. All finite.
+    Parts {
+        /// Units of the parent.
+        translation: [f64; 3],
+        /// Quaternion x, y, z, w; not zero, normalized when used.
+        rotation: [f64; 4],
+        /// Per axis; a zero hides.
+        scale: [f64; 3],
+    },
+    /// Rows of a matrix that is applied to columns (x, y, z, 1). All finite. Cannot be animated.
+    Matrix([[f64; 4]; 3]),
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        Transform::Parts { translation: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] }
+    }
+}
+
+/// A camera. It looks along the negative z axis of its node, whose y axis points up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Unique among cameras.
+    pub name: String,
+    /// Node that carries it.
+    pub node: usize,
+    /// How it projects.
+    pub lens: Lens,
+    /// Width over height of the picture that it was made for.
+    pub aspect: Option<f64>,
+    /// Nothing nearer is seen.
+    pub near: Option<f64>,
+    /// Nothing farther is seen.
+    pub far: Option<f64>,
+}
+
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// Vertical field of view in degrees, between 0 and 180.
+    Perspective(f64),
+    /// Height of the picture in units of the node, positive.
+    Orthographic(f64),
+}
+
+/// A light. Directed ones shine along the negative z axis of their node. Units are those of glTF's
+/// KHR_lights_punctual.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// Unique among lights.
+    pub name: String,
+    /// Node that carries it.
+    pub node: usize,
+    /// What kind of light.
+    pub kind: LightKind,
+    /// Linear red, green and blue, not negative.
+    pub color: [f64; 3],
+    /// Lux for directional lights, candela for others; not negative.
+    pub intensity: f64,
+    /// Distance beyond which it does not shine; `None` for no end.
+    pub range: Option<f64>,
+}
+
+/// What kind of light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// Parallel rays from far away.
+    Directional,
+    /// From a point into all directions.
+    Point,
+    /// From a point into a cone.
+    Spot {
+        /// Angle from the axis at which it begins to fade, degrees, 0 to below `outer`.
+        inner: f64,
+        /// Angle at which it ends, degrees, up to 90.
+        outer: f64,
+    },
+}
+
+/// Keyframes of one property of one node, with the meanings of glTF. Before the first key and after the
+/// last the track has the value of that key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// Which node; it has no matrix, unless the property is its visibility.
+    pub node: usize,
+    /// Which property.
+    pub property: Property,
+    /// What is between keys.
+    pub interpolation: Interpolation,
+    /// Seconds, strictly ascending, at least one.
+    pub times: Vec<f64>,
+    /// For each key [`Property::width`] numbers; with [`Interpolation::Cubic`] those of the in-tangent, the
+    /// value and the out-tangent.
+    pub values: Vec<f64>,
+}
+
+/// What a track moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Property {
+    /// Three numbers.
+    Translation,
+    /// A quaternion x, y, z, w.
+    Rotation,
+    /// Three numbers.
+    Scale,
+    /// One number, 0 or 1; always in steps.
+    Visible,
+}
+
+impl Property {
+    /// All of them, in order.
+    pub const ALL: [Property; 4] = [Self::Translation, Self::Rotation, Self::Scale, Self::Visible];
+
+    /// Numbers of a value.
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Translation | Self::Scale => 3,
+            Self::Rotation => 4,
+            Self::Visible => 1,
+        }
+    }
+    /// As in a manifest.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+            Self::Scale => "scale",
+            Self::Visible => "visible",
+        }
+    }
+}
+
+/// What is between two keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interpolation {
+    /// The value of the key before.
+    Step,
+    /// Linear; rotations along the great circle, the shorter way.
+    Linear,
+    /// Hermite splines with tangents per key.
+    Cubic,
+}
+
+impl Interpolation {
+    /// All of them, in order.
+    pub const ALL: [Interpolation; 3] = [Self::Step, Self::Linear, Self::Cubic];
+
+    /// Values of a key: 3 with tangents.
+    pub const fn values_per_key(self) -> usize {
+        match self {
+            Self::Step | Self::Linear => 1,
+            Self::Cubic => 3,
+        }
+    }
+    /// As in a manifest.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Linear => "linear",
+            Self::Cubic => "cubic",
+        }
+    }
+}

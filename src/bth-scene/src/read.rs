@@ -1,0 +1,245 @@
+//! Reads a manifest strictly.
+
+use crate::error::{Error, Result, code};
+use crate::model::*;
+use crate::names::Names;
+use crate::read_tracks::{TRACK_KEYS, tracks};
+use crate::read_transform::transform;
+use crate::table::{Document, Table, Value};
+use std::path::Path;
+use toml::de::DeTable;
+
+pub(crate) const SCENE_KEYS: &[&str] =
+    &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "tracks"];
+pub(crate) const FRAMES_KEYS: &[&str] = &["first", "last", "rate"];
+pub(crate) const OBJECT_KEYS: &[&str] = &["name", "model", "mesh", "file", "object"];
+pub(crate) const NODE_KEYS: &[&str] =
+    &["name", "parent", "object", "visible", "translation", "rotation", "scale", "matrix", "look"];
+pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspect", "near", "far"];
+pub(crate) const LIGHT_KEYS: &[&str] =
+    &["name", "node", "kind", "color", "intensity", "range", "inner", "outer"];
+
+/// Frames are within this of 0: their times are exact enough at any rate.
+const FRAME_LIMIT: i64 = 1 << 24;
+
+/// Reads a manifest file.
+///
+/// # Errors
+/// [`code::READ`] when it cannot be read, else those of [`parse`].
+pub fn read(path: &Path) -> Result<Manifest> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error {
+        code: code::READ,
+        path: path.to_owned(),
+        line: 0,
+        column: 0,
+        message: format!("cannot read: {e}"),
+        hint: "check the path and its permissions; manifests are UTF-8".to_owned(),
+    })?;
+    parse(&text, path)
+}
+
+/// Reads the text of a manifest; `path` is for messages.
+///
+/// # Errors
+/// One of [`code`], with line and column.
+pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
+    let doc = Document { path, text };
+    let root = DeTable::parse(text).map_err(|e| {
+        let message = e.message().trim_end().replace('\n', "; ");
+        doc.error(e.span().unwrap_or(0..0), code::SYNTAX, message, "correct the TOML there")
+    })?;
+    let scene = Table::new(doc, root.get_ref(), 0..0, SCENE_KEYS)?;
+    check_version(&scene.need("version")?)?;
+
+    let objects = scene.tables("objects", OBJECT_KEYS)?;
+    let nodes = scene.tables("nodes", NODE_KEYS)?;
+    let cameras = scene.tables("cameras", CAMERA_KEYS)?;
+    let lights = scene.tables("lights", LIGHT_KEYS)?;
+    let object_names = Names::collect("object", &objects)?;
+    let node_names = Names::collect("node", &nodes)?;
+    let camera_names = Names::collect("camera", &cameras)?;
+    Names::collect("light", &lights)?;
+
+    let frames = scene.get("frames").map(|v| frames(&v)).transpose()?.unwrap_or_default();
+    let camera = scene.get("camera").map(|v| camera_names.row(&v)).transpose()?;
+    let read_nodes = nodes.iter().map(|t| node(t, &node_names, &object_names)).collect::<Result<Vec<_>>>()?;
+    check_cycles(&nodes, &read_nodes)?;
+    let tracks = tracks(&scene.tables("tracks", TRACK_KEYS)?, &node_names, &read_nodes)?;
+    Ok(Manifest {
+        frames,
+        camera,
+        objects: objects.iter().map(object).collect::<Result<_>>()?,
+        nodes: read_nodes,
+        cameras: cameras.iter().map(|t| self::camera(t, &node_names)).collect::<Result<_>>()?,
+        lights: lights.iter().map(|t| light(t, &node_names)).collect::<Result<_>>()?,
+        tracks,
+    })
+}
+
+fn check_version(value: &Value<'_>) -> Result<()> {
+    let version = value.integer(1..=i64::MAX)?;
+    if version == crate::VERSION {
+        return Ok(());
+    }
+    let message = format!("expected version {}, found {version}", crate::VERSION);
+    Err(value.error(code::VERSION, message, "a newer version of bthc can read the manifest"))
+}
+
+fn name(table: &Table<'_>) -> Result<String> {
+    Ok(table.need("name")?.string()?.to_owned())
+}
+
+fn frames(value: &Value<'_>) -> Result<Frames> {
+    let table = value.table(FRAMES_KEYS)?;
+    let frame = |key| -> Result<Option<i32>> {
+        table.get(key).map(|v| v.integer(-FRAME_LIMIT..=FRAME_LIMIT).map(|n| n as i32)).transpose()
+    };
+    let first = frame("first")?.unwrap_or(0);
+    let last = frame("last")?.unwrap_or(first);
+    if last < first {
+        return Err(table.need("last")?.not_allowed("a frame not before the first", last));
+    }
+    let rate = table.get("rate").map(|v| v.number_that("a number above 0", |n| n > 0.0)).transpose()?;
+    Ok(Frames { first, last, rate: rate.unwrap_or(Frames::default().rate) })
+}
+
+fn object(table: &Table<'_>) -> Result<Object> {
+    for (a, b) in [("model", "file"), ("model", "object"), ("file", "mesh")] {
+        table.exclude(a, b)?;
+    }
+    let index = |key| -> Result<Option<u32>> {
+        table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
+    };
+    let source = match table.get("file") {
+        Some(file) => Source::Compiled { path: path(&file)?, object: index("object")?.unwrap_or(0) },
+        None => Source::Model { path: path(&table.need("model")?)?, mesh: index("mesh")? },
+    };
+    Ok(Object { name: name(table)?, source })
+}
+
+/// A path that stays within the manifest's folder on every system.
+fn path(value: &Value<'_>) -> Result<String> {
+    let text = value.string()?;
+    let inside = |part: &str| !part.is_empty() && part != "." && part != "..";
+    if text.split('/').all(inside) && !text.contains(['\\', ':', '\0']) {
+        return Ok(text.to_owned());
+    }
+    let message = format!("expected a path within the manifest's folder, found \"{text}\"");
+    let hint =
+        "write a relative path with `/` between folders, without `..`; put the file below the manifest";
+    Err(value.error(code::PATH, message, hint))
+}
+
+fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Node> {
+    Ok(Node {
+        name: name(table)?,
+        parent: table.get("parent").map(|v| nodes.row(&v)).transpose()?,
+        transform: transform(table)?,
+        object: table.get("object").map(|v| objects.row(&v)).transpose()?,
+        visible: table.get("visible").map_or(Ok(true), |v| v.boolean())?,
+    })
+}
+
+/// Fails when a node is its own ancestor. Every node is walked up from once.
+fn check_cycles(tables: &[Table<'_>], nodes: &[Node]) -> Result<()> {
+    const UNSEEN: usize = usize::MAX;
+    let mut seen_from = vec![UNSEEN; nodes.len()];
+    for start in 0..nodes.len() {
+        let mut next = Some(start);
+        while let Some(at) = next.filter(|at| seen_from[*at] == UNSEEN) {
+            seen_from[at] = start;
+            next = nodes[at].parent;
+        }
+        // Seen on this very way up: the way leads in a circle.
+        if let Some(at) = next.filter(|at| seen_from[*at] == start) {
+            let message = format!("the node \"{}\" is its own ancestor", nodes[at].name);
+            let value = tables[at].need("parent")?;
+            return Err(value.error(code::CYCLE, message, "give one node of the circle another parent"));
+        }
+    }
+    Ok(())
+}
+
+fn camera(table: &Table<'_>, nodes: &Names<'_>) -> Result<Camera> {
+    table.exclude("fov", "height")?;
+    let positive = |key| -> Result<Option<f64>> {
+        table.get(key).map(|v| v.number_that("a number above 0", |n| n > 0.0)).transpose()
+    };
+    let lens = match positive("height")? {
+        Some(height) => Lens::Orthographic(height),
+        None => {
+            let fov =
+                table.need("fov")?.number_that("degrees between 0 and 180", |n| 0.0 < n && n < 180.0)?;
+            Lens::Perspective(fov)
+        }
+    };
+    let near = table.get("near").map(|v| v.number_that("a number from 0", |n| n >= 0.0)).transpose()?;
+    let far = positive("far")?;
+    if let (Some(near), Some(far)) = (near, far)
+        && near >= far
+    {
+        return Err(table.need("far")?.not_allowed("a number above `near`", far));
+    }
+    Ok(Camera {
+        name: name(table)?,
+        node: nodes.row(&table.need("node")?)?,
+        lens,
+        aspect: positive("aspect")?,
+        near,
+        far,
+    })
+}
+
+fn light(table: &Table<'_>, nodes: &Names<'_>) -> Result<Light> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Kind {
+        Directional,
+        Point,
+        Spot,
+    }
+    let kinds = [("directional", Kind::Directional), ("point", Kind::Point), ("spot", Kind::Spot)];
+    let kind_value = table.need("kind")?;
+    let kind = kind_value.choice(&kinds)?;
+    let not_negative = |v: Value<'_>| v.number_that("a number from 0", |n| n >= 0.0);
+    for key in ["inner", "outer"] {
+        if let Some(value) = table.get(key).filter(|_| kind != Kind::Spot) {
+            let message = format!("`{key}` belongs to lights of kind \"spot\"");
+            return Err(value.error(code::CONFLICT, message, "remove it, or make the light a spot"));
+        }
+    }
+    let kind = match kind {
+        Kind::Directional => LightKind::Directional,
+        Kind::Point => LightKind::Point,
+        Kind::Spot => {
+            let outer = table
+                .get("outer")
+                .map(|v| v.number_that("degrees above 0, up to 90", |n| 0.0 < n && n <= 90.0))
+                .transpose()?
+                .unwrap_or(45.0);
+            let inner = table
+                .get("inner")
+                .map(|v| v.number_that("degrees from 0 to below `outer`", |n| 0.0 <= n && n < outer))
+                .transpose()?
+                .unwrap_or(0.0);
+            LightKind::Spot { inner, outer }
+        }
+    };
+    let color = match table.get("color") {
+        None => [1.0; 3],
+        Some(value) => {
+            let color: [f64; 3] = value.numbers()?;
+            if color.iter().any(|c| *c < 0.0) {
+                return Err(value.not_allowed("three numbers from 0", format!("{color:?}")));
+            }
+            color
+        }
+    };
+    Ok(Light {
+        name: name(table)?,
+        node: nodes.row(&table.need("node")?)?,
+        kind,
+        color,
+        intensity: table.get("intensity").map(not_negative).transpose()?.unwrap_or(1.0),
+        range: table.get("range").map(|v| v.number_that("a number above 0", |n| n > 0.0)).transpose()?,
+    })
+}

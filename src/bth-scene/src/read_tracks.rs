@@ -1,0 +1,111 @@
+//! Tracks: keyframes of one property of one node.
+
+use crate::error::{Result, code};
+use crate::model::{Interpolation, Node, Property, Track, Transform};
+use crate::names::Names;
+use crate::read_transform::rotation;
+use crate::table::{Table, Value};
+use std::collections::HashSet;
+
+/// Keys of a track.
+pub(crate) const TRACK_KEYS: &[&str] = &["node", "property", "interpolation", "times", "values"];
+
+/// Reads the tracks of a manifest.
+pub(crate) fn tracks(tables: &[Table<'_>], names: &Names<'_>, nodes: &[Node]) -> Result<Vec<Track>> {
+    let mut seen = HashSet::new();
+    tables
+        .iter()
+        .map(|table| {
+            let track = track(table, names)?;
+            let node = &nodes[track.node];
+            if matches!(node.transform, Transform::Matrix(_)) && track.property != Property::Visible {
+                let message = format!("the node \"{}\" has a matrix, which tracks cannot move", node.name);
+                return Err(table.need("node")?.error(
+                    code::CONFLICT,
+                    message,
+                    "give the node translation, rotation and scale instead",
+                ));
+            }
+            if !seen.insert((track.node, track.property)) {
+                let message =
+                    format!("the {} of \"{}\" has a track already", track.property.name(), node.name);
+                return Err(table.error(code::TRACK, message, "keep one of them"));
+            }
+            Ok(track)
+        })
+        .collect()
+}
+
+fn track(table: &Table<'_>, names: &Names<'_>) -> Result<Track> {
+    let node = names.row(&table.need("node")?)?;
+    let property = table.need("property")?.choice(&Property::ALL.map(|p| (p.name(), p)))?;
+    let usual = if property == Property::Visible { Interpolation::Step } else { Interpolation::Linear };
+    let interpolation = match table.get("interpolation") {
+        None => usual,
+        Some(value) => {
+            let chosen = value.choice(&Interpolation::ALL.map(|i| (i.name(), i)))?;
+            if property == Property::Visible && chosen != Interpolation::Step {
+                return Err(value.not_allowed("\"step\" for visibility", format!("\"{}\"", chosen.name())));
+            }
+            chosen
+        }
+    };
+    let times = times(&table.need("times")?)?;
+    let values_value = table.need("values")?;
+    let keys = values_value.array()?;
+    if keys.len() != times.len() {
+        let message = format!("expected a value for each of {} times, found {}", times.len(), keys.len());
+        return Err(values_value.error(code::TRACK, message, "give as many values as times"));
+    }
+    let mut values = Vec::with_capacity(keys.len() * interpolation.values_per_key() * property.width());
+    for key in &keys {
+        if interpolation != Interpolation::Cubic {
+            value(key, property, &mut values)?;
+            continue;
+        }
+        let parts = key.array()?;
+        let [before, at, after] = parts.as_slice() else {
+            let message =
+                format!("expected an in-tangent, a value and an out-tangent, found {} rows", parts.len());
+            return Err(key.error(code::TRACK, message, "give three rows for each key"));
+        };
+        tangent(before, property, &mut values)?;
+        value(at, property, &mut values)?;
+        tangent(after, property, &mut values)?;
+    }
+    Ok(Track { node, property, interpolation, times, values })
+}
+
+fn times(value: &Value<'_>) -> Result<Vec<f64>> {
+    let keys = value.array()?;
+    if keys.is_empty() {
+        return Err(value.error(code::TRACK, "expected at least one time, found none", "remove the track"));
+    }
+    let mut times: Vec<f64> = Vec::with_capacity(keys.len());
+    for key in keys {
+        let time = key.number()?;
+        if let Some(last) = times.last().filter(|last| **last >= time) {
+            let message = format!("expected a time after {last}, found {time}");
+            return Err(key.error(code::TRACK, message, "order the keys by time, each time once"));
+        }
+        times.push(time);
+    }
+    Ok(times)
+}
+
+fn value(value: &Value<'_>, property: Property, into: &mut Vec<f64>) -> Result<()> {
+    match property {
+        Property::Translation | Property::Scale => into.extend(value.numbers::<3>()?),
+        Property::Rotation => into.extend(rotation(value)?),
+        Property::Visible => into.push(f64::from(u8::from(value.boolean()?))),
+    }
+    Ok(())
+}
+
+fn tangent(value: &Value<'_>, property: Property, into: &mut Vec<f64>) -> Result<()> {
+    match property {
+        Property::Rotation => into.extend(value.numbers::<4>()?),
+        _ => into.extend(value.numbers::<3>()?),
+    }
+    Ok(())
+}

@@ -1,0 +1,215 @@
+//! TOML tables and values with their places, read strictly.
+
+use crate::error::{Error, Result, code};
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// The text of a manifest and where it stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Document<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) text: &'a str,
+}
+
+impl Document<'_> {
+    /// An error at a range of bytes.
+    pub(crate) fn error(
+        &self,
+        at: Range<usize>,
+        code: &'static str,
+        message: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Error {
+        let before = self.text.get(..at.start).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Error {
+            code,
+            path: self.path.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: before[line_start..].chars().count() + 1,
+            message: message.into(),
+            hint: hint.into(),
+        }
+    }
+}
+
+/// A table whose keys are all known.
+#[derive(Clone, Debug)]
+pub(crate) struct Table<'a> {
+    doc: Document<'a>,
+    entries: &'a DeTable<'a>,
+    span: Range<usize>,
+    keys: &'static [&'static str],
+}
+
+impl<'a> Table<'a> {
+    /// Fails on keys that are not among `keys`.
+    pub(crate) fn new(
+        doc: Document<'a>,
+        entries: &'a DeTable<'a>,
+        span: Range<usize>,
+        keys: &'static [&'static str],
+    ) -> Result<Self> {
+        for (key, _) in entries.iter() {
+            if !keys.contains(&key.get_ref().as_ref()) {
+                let message = format!("unknown key `{}`", key.get_ref());
+                let hint = format!("the keys here are {}", keys.join(", "));
+                return Err(doc.error(key.span(), code::UNKNOWN_KEY, message, hint));
+            }
+        }
+        Ok(Self { doc, entries, span, keys })
+    }
+
+    /// The value of a key, if it is there.
+    pub(crate) fn get(&self, key: &'static str) -> Option<Value<'a>> {
+        debug_assert!(self.keys.contains(&key), "{key} is not in the list of keys");
+        self.entries.get(key).map(|value| Value { doc: self.doc, key, value })
+    }
+
+    /// The value of a key that must be there.
+    pub(crate) fn need(&self, key: &'static str) -> Result<Value<'a>> {
+        self.get(key).ok_or_else(|| {
+            self.error(code::MISSING_KEY, format!("the key `{key}` is missing"), "add it".to_owned())
+        })
+    }
+
+    /// The elements of an array of tables, if there is one.
+    pub(crate) fn tables(&self, key: &'static str, keys: &'static [&'static str]) -> Result<Vec<Table<'a>>> {
+        let Some(array) = self.get(key) else { return Ok(Vec::new()) };
+        array.array()?.iter().map(|v| v.table(keys)).collect()
+    }
+
+    /// An error about the table as a whole.
+    pub(crate) fn error(
+        &self,
+        code: &'static str,
+        message: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Error {
+        self.doc.error(self.span.clone(), code, message, hint)
+    }
+
+    /// Fails when both keys are there.
+    pub(crate) fn exclude(&self, a: &'static str, b: &'static str) -> Result<()> {
+        match (self.get(a), self.get(b)) {
+            (Some(_), Some(value)) => Err(value.error(
+                code::CONFLICT,
+                format!("`{a}` and `{b}` exclude each other"),
+                "keep one of them",
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A value, with the key that it stands under.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Value<'a> {
+    doc: Document<'a>,
+    key: &'static str,
+    value: &'a Spanned<DeValue<'a>>,
+}
+
+impl<'a> Value<'a> {
+    /// An error at this value.
+    pub(crate) fn error(
+        &self,
+        code: &'static str,
+        message: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> Error {
+        self.doc.error(self.value.span(), code, message, hint)
+    }
+
+    fn wrong_type(&self, expected: &str) -> Error {
+        let found = self.value.get_ref().type_str();
+        self.error(
+            code::TYPE,
+            format!("expected {expected} for `{}`, found a value of type {found}", self.key),
+            format!("write {expected}"),
+        )
+    }
+
+    /// An error for a value that is not allowed.
+    pub(crate) fn not_allowed(&self, expected: &str, found: impl std::fmt::Display) -> Error {
+        self.error(
+            code::VALUE,
+            format!("expected {expected} for `{}`, found {found}", self.key),
+            format!("write {expected}"),
+        )
+    }
+
+    pub(crate) fn is_table(&self) -> bool {
+        self.value.get_ref().is_table()
+    }
+
+    pub(crate) fn string(&self) -> Result<&'a str> {
+        self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a string"))
+    }
+
+    pub(crate) fn boolean(&self) -> Result<bool> {
+        self.value.get_ref().as_bool().ok_or_else(|| self.wrong_type("true or false"))
+    }
+
+    pub(crate) fn integer(&self, range: std::ops::RangeInclusive<i64>) -> Result<i64> {
+        let value = self.value.get_ref().as_integer().ok_or_else(|| self.wrong_type("a whole number"))?;
+        let number = i64::from_str_radix(value.as_str(), value.radix()).ok();
+        number.filter(|n| range.contains(n)).ok_or_else(|| {
+            let expected = format!("a whole number from {} to {}", range.start(), range.end());
+            self.not_allowed(&expected, value)
+        })
+    }
+
+    /// A finite number.
+    pub(crate) fn number(&self) -> Result<f64> {
+        let (parsed, text) = match self.value.get_ref() {
+            DeValue::Float(f) => (f.as_str().parse::<f64>().ok(), f.to_string()),
+            DeValue::Integer(i) => {
+                (i64::from_str_radix(i.as_str(), i.radix()).ok().map(|n| n as f64), i.to_string())
+            }
+            _ => return Err(self.wrong_type("a number")),
+        };
+        parsed.filter(|n| n.is_finite()).ok_or_else(|| self.not_allowed("a finite number", text))
+    }
+
+    /// A finite number that holds to a condition.
+    pub(crate) fn number_that(&self, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64> {
+        let number = self.number()?;
+        if holds(number) { Ok(number) } else { Err(self.not_allowed(expected, number)) }
+    }
+
+    pub(crate) fn array(&self) -> Result<Vec<Value<'a>>> {
+        let array = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type("an array"))?;
+        Ok(array.iter().map(|value| Value { value, ..*self }).collect())
+    }
+
+    /// An array of so many finite numbers.
+    pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N]> {
+        let array = self.array()?;
+        if array.len() != N {
+            return Err(self.not_allowed(&format!("{N} numbers"), array.len()));
+        }
+        let mut numbers = [0.0; N];
+        for (number, value) in numbers.iter_mut().zip(&array) {
+            *number = value.number()?;
+        }
+        Ok(numbers)
+    }
+
+    /// A table whose keys are all known.
+    pub(crate) fn table(&self, keys: &'static [&'static str]) -> Result<Table<'a>> {
+        let entries = self.value.get_ref().as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        Table::new(self.doc, entries, self.value.span(), keys)
+    }
+
+    /// One of some words.
+    pub(crate) fn choice<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
+        let word = self.string()?;
+        words.iter().find(|(name, _)| *name == word).map(|(_, value)| *value).ok_or_else(|| {
+            let names: Vec<_> = words.iter().map(|(name, _)| *name).collect();
+            self.not_allowed(&format!("one of {}", names.join(", ")), format!("\"{word}\""))
+        })
+    }
+}

@@ -1,0 +1,138 @@
+//! Writes a manifest.
+
+use crate::model::*;
+use std::fmt::Write;
+
+/// Keys on a line of a track.
+const KEYS_PER_LINE: usize = 8;
+
+impl Manifest {
+    /// The text of the manifest; reading it gives an equal value again.
+    pub fn to_toml(&self) -> String {
+        let mut out = String::new();
+        self.write(&mut out).expect("a string takes all text");
+        out
+    }
+
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(out, "version = {}", crate::VERSION)?;
+        if let Some(camera) = self.camera {
+            writeln!(out, "camera = {}", text(&self.cameras[camera].name))?;
+        }
+        let Frames { first, last, rate } = self.frames;
+        writeln!(out, "frames = {{ first = {first}, last = {last}, rate = {rate:?} }}")?;
+        for object in &self.objects {
+            writeln!(out, "\n[[objects]]\nname = {}", text(&object.name))?;
+            match &object.source {
+                Source::Model { path, mesh } => {
+                    writeln!(out, "model = {}", text(path))?;
+                    mesh.map_or(Ok(()), |mesh| writeln!(out, "mesh = {mesh}"))?;
+                }
+                Source::Compiled { path, object } => {
+                    writeln!(out, "file = {}\nobject = {object}", text(path))?;
+                }
+            }
+        }
+        self.nodes.iter().try_for_each(|node| self.write_node(out, node))?;
+        self.cameras.iter().try_for_each(|camera| self.write_camera(out, camera))?;
+        self.lights.iter().try_for_each(|light| self.write_light(out, light))?;
+        self.tracks.iter().try_for_each(|track| self.write_track(out, track))
+    }
+
+    fn write_node(&self, out: &mut String, node: &Node) -> std::fmt::Result {
+        writeln!(out, "\n[[nodes]]\nname = {}", text(&node.name))?;
+        if let Some(parent) = node.parent {
+            writeln!(out, "parent = {}", text(&self.nodes[parent].name))?;
+        }
+        if let Some(object) = node.object {
+            writeln!(out, "object = {}", text(&self.objects[object].name))?;
+        }
+        if !node.visible {
+            writeln!(out, "visible = false")?;
+        }
+        match node.transform {
+            Transform::Matrix(rows) => writeln!(out, "matrix = {rows:?}"),
+            Transform::Parts { translation, rotation, scale } => {
+                if translation != [0.0; 3] {
+                    writeln!(out, "translation = {translation:?}")?;
+                }
+                if rotation != [0.0, 0.0, 0.0, 1.0] {
+                    writeln!(out, "rotation = {rotation:?}")?;
+                }
+                if scale != [1.0; 3] {
+                    writeln!(out, "scale = {scale:?}")?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn write_camera(&self, out: &mut String, camera: &Camera) -> std::fmt::Result {
+        writeln!(out, "\n[[cameras]]\nname = {}", text(&camera.name))?;
+        writeln!(out, "node = {}", text(&self.nodes[camera.node].name))?;
+        match camera.lens {
+            Lens::Perspective(fov) => writeln!(out, "fov = {:?}", fov)?,
+            Lens::Orthographic(height) => writeln!(out, "height = {height:?}")?,
+        }
+        for (key, value) in [("aspect", camera.aspect), ("near", camera.near), ("far", camera.far)] {
+            value.map_or(Ok(()), |value| writeln!(out, "{key} = {value:?}"))?;
+        }
+        Ok(())
+    }
+
+    fn write_light(&self, out: &mut String, light: &Light) -> std::fmt::Result {
+        writeln!(out, "\n[[lights]]\nname = {}", text(&light.name))?;
+        writeln!(out, "node = {}", text(&self.nodes[light.node].name))?;
+        match light.kind {
+            LightKind::Directional => writeln!(out, "kind = \"directional\"")?,
+            LightKind::Point => writeln!(out, "kind = \"point\"")?,
+            LightKind::Spot { inner, outer } => {
+                writeln!(out, "kind = \"spot\"\ninner = {inner:?}\nouter = {outer:?}")?;
+            }
+        }
+        writeln!(out, "color = {:?}\nintensity = {:?}", light.color, light.intensity)?;
+        light.range.map_or(Ok(()), |range| writeln!(out, "range = {range:?}"))
+    }
+
+    fn write_track(&self, out: &mut String, track: &Track) -> std::fmt::Result {
+        writeln!(out, "\n[[tracks]]\nnode = {}", text(&self.nodes[track.node].name))?;
+        let (property, interpolation) = (track.property.name(), track.interpolation.name());
+        writeln!(out, "property = \"{property}\"\ninterpolation = \"{interpolation}\"")?;
+        list(out, "times", track.times.iter().map(|t| format!("{t:?}")))?;
+        let width = track.property.width();
+        let value = |v: &[f64]| match track.property {
+            Property::Visible => (v[0] != 0.0).to_string(),
+            _ => format!("{v:?}"),
+        };
+        let keys = track.values.chunks(width * track.interpolation.values_per_key());
+        list(
+            out,
+            "values",
+            keys.map(|key| match track.interpolation {
+                Interpolation::Cubic => {
+                    let rows: Vec<_> = key.chunks(width).map(value).collect();
+                    format!("[{}]", rows.join(", "))
+                }
+                _ => value(key),
+            }),
+        )
+    }
+}
+
+/// An array over lines.
+fn list(out: &mut String, key: &str, items: impl Iterator<Item = String>) -> std::fmt::Result {
+    let items: Vec<_> = items.collect();
+    if items.len() <= KEYS_PER_LINE {
+        return writeln!(out, "{key} = [{}]", items.join(", "));
+    }
+    writeln!(out, "{key} = [")?;
+    for line in items.chunks(KEYS_PER_LINE) {
+        writeln!(out, "    {},", line.join(", "))?;
+    }
+    writeln!(out, "]")
+}
+
+/// A TOML basic string.
+fn text(value: &str) -> String {
+    toml::Value::from(value).to_string()
+}

@@ -1,0 +1,103 @@
+//! Any scene that can be written is read back equal.
+
+use bth_scene::*;
+use proptest::prelude::*;
+
+fn name() -> impl Strategy<Value = String> {
+    // Quotes, backslashes and letters beyond ASCII must survive.
+    prop::collection::vec(prop::sample::select(vec!['a', '"', '\\', 'ß', ' ', '#', '\'', '字', '.']), 0..6)
+        .prop_map(String::from_iter)
+}
+
+fn finite() -> impl Strategy<Value = f64> {
+    prop_oneof![any::<f64>().prop_filter("finite", |x| x.is_finite()), (-100i32..100).prop_map(f64::from)]
+}
+
+fn transform() -> impl Strategy<Value = Transform> {
+    let vector = || prop::array::uniform3(finite());
+    let parts = (vector(), prop::array::uniform4(finite()), vector()).prop_map(|(translation, q, scale)| {
+        let rotation = if q == [0.0; 4] { [0.0, 0.0, 0.0, 1.0] } else { q };
+        Transform::Parts { translation, rotation, scale }
+    });
+    prop_oneof![parts, prop::array::uniform3(prop::array::uniform4(finite())).prop_map(Transform::Matrix)]
+}
+
+prop_compose! {
+    fn scene()(
+        nodes in prop::collection::vec((name(), transform(), any::<[bool; 3]>(), 0usize..100), 1..6),
+        keys in prop::collection::vec((finite(), prop::collection::vec(finite(), 12)), 1..20),
+        frames in (-50i32..50, 0i32..100, 0.001f64..1e6),
+        lens in (0.001f64..179.9, any::<bool>(), prop::option::of(0.1f64..10.0)),
+        property in 0usize..4, interpolation in 0usize..3,
+    ) -> Manifest {
+        let objects = vec![
+            Object { name: "model".into(), source: Source::Model { path: "a b/ü.ply".into(), mesh: None } },
+            Object { name: "mesh".into(), source: Source::Model { path: "x.glb".into(), mesh: Some(7) } },
+            Object { name: "file".into(), source: Source::Compiled { path: "x.bth".into(), object: 1 } },
+        ];
+        let row = |i: usize, (name, transform, flags, object): &(String, Transform, [bool; 3], usize)| Node {
+            name: format!("{name}{i}"),
+            parent: (flags[0] && i > 0).then(|| object % i),
+            transform: *transform,
+            object: flags[1].then_some(object % 3),
+            visible: flags[2],
+        };
+        let nodes: Vec<Node> = nodes.iter().enumerate().map(|(i, node)| row(i, node)).collect();
+        let property = Property::ALL[property];
+        let visible = property == Property::Visible;
+        let interpolation = if visible { Interpolation::Step } else { Interpolation::ALL[interpolation] };
+        let mut times: Vec<f64> = keys.iter().map(|k| k.0).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup_by(|a, b| a == b);
+        let numbers = interpolation.values_per_key() * property.width();
+        let value = |k: &(f64, Vec<f64>)| -> Vec<f64> {
+            k.1[..numbers].iter().enumerate().map(|(i, x)| match property {
+                Property::Visible => f64::from(u8::from(*x > 0.0)),
+                // No quaternion is zero.
+                Property::Rotation if i % 4 == 3 => 1.0,
+                _ => *x,
+            }).collect()
+        };
+        let values = keys[..times.len()].iter().flat_map(value).collect();
+        let movable = matches!(nodes[0].transform, Transform::Parts { .. }) || visible;
+        let track = Track { node: 0, property, interpolation, times, values };
+        let (fov, perspective, extra) = lens;
+        Manifest {
+            frames: Frames { first: frames.0, last: frames.0 + frames.1, rate: frames.2 },
+            camera: perspective.then_some(0),
+            objects,
+            cameras: vec![Camera {
+                name: "c".into(),
+                node: nodes.len() - 1,
+                lens: if perspective { Lens::Perspective(fov) } else { Lens::Orthographic(fov) },
+                aspect: extra,
+                near: extra,
+                far: extra.map(|x| 2.0 * x),
+            }],
+            lights: vec![
+                Light { name: "a".into(), node: 0, kind: LightKind::Point, color: [fov; 3], intensity: fov, range: extra },
+                Light {
+                    name: "b".into(), node: 0, kind: LightKind::Spot { inner: fov / 4.0, outer: fov / 2.0 },
+                    color: [0.0, 1.0, 0.5], intensity: 0.0, range: None,
+                },
+            ],
+            tracks: if movable { vec![track] } else { Vec::new() },
+            nodes,
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn what_is_written_is_read_back_equal(scene in scene()) {
+        let text = scene.to_toml();
+        let read = parse(&text, "x".as_ref()).map_err(|e| TestCaseError::fail(format!("{e}\n{text}")))?;
+        prop_assert_eq!(read, scene);
+    }
+
+    #[test]
+    fn no_text_makes_the_reader_panic(text in "[\\[\\]{}=\"a-e0-9.,\\n #version]{0,80}") {
+        let _ = parse(&text, "x".as_ref());
+        let _ = parse(&format!("version = 1\n{text}"), "x".as_ref());
+    }
+}

@@ -1,0 +1,361 @@
+//! Batches of rays through the instances: in rounds, sorted by object, so that each object gets many
+//! rays at once.
+
+use super::World;
+use super::placed::Placed;
+use super::walk::Walk;
+use crate::file::File;
+use crate::layout::NONE;
+use crate::rays::{Hit, Ray, Surface};
+use crate::trace::{self, Scratch, Steps};
+
+/// Rays that are under way together.
+const CHUNK: usize = 1024;
+
+/// A ray that is to be traced through an instance in this round.
+#[derive(Clone, Copy, Debug)]
+struct Visit {
+    object: u32,
+    ray: u32,
+    instance: u32,
+}
+
+/// What a query makes of a ray in an instance.
+trait Query {
+    /// The range of t that is still of interest, as the ray's tmax; `None` when nothing is.
+    fn tmax(&self, ray: usize) -> Option<f32>;
+    /// Traces the visits of one object.
+    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]);
+}
+
+/// What the visits of a round share.
+struct Round<'a> {
+    world: &'a World,
+    file: &'a File,
+    rays: &'a [Ray],
+    from: Option<&'a [Surface]>,
+}
+
+impl Round<'_> {
+    /// The ray of a visit in the object's space, its t times the second number is that of the world,
+    /// and the triangle that it starts on.
+    fn object_ray(&self, visit: Visit, tmax: f32) -> (Ray, f32, u32) {
+        let i = visit.ray as usize;
+        let object = self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[i] });
+        (object.ray, object.t_scale, self.hint(i, visit.instance))
+    }
+
+    fn hint(&self, ray: usize, instance: u32) -> u32 {
+        let from = self.from.map_or(Surface::NONE, |f| f[ray]);
+        if from.instance == instance { from.triangle } else { NONE }
+    }
+}
+
+impl World {
+    /// Nearest hits; of equal t the instance of least number is reported.
+    pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
+        hits.fill(Hit::MISS);
+        let mut query = Nearest { rays, hits, scratch: Scratch::default() };
+        self.run(file, rays, from, &mut query);
+    }
+
+    /// Whether anything is hit.
+    pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
+        found.fill(false);
+        let mut query = Any { rays, found, scratch: Scratch::default() };
+        self.run(file, rays, from, &mut query);
+    }
+
+    /// As [`Self::nearest`] for one ray, with a count of the work within objects.
+    pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: Surface) -> (Hit, Steps) {
+        let mut query = Counted { ray, best: Hit::MISS, steps: Steps::default() };
+        self.run(file, std::slice::from_ref(ray), Some(&[from]), &mut query);
+        (query.best, query.steps)
+    }
+
+    fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl Query) {
+        let round = Round { world: self, file, rays, from };
+        let mut walks: Vec<Walk> = Vec::new();
+        let mut active: Vec<u32> = Vec::new();
+        let mut visits: Vec<Visit> = Vec::new();
+        for first in (0..rays.len()).step_by(CHUNK) {
+            let end = (first + CHUNK).min(rays.len());
+            walks.resize_with(walks.len().max(end - first), Walk::default);
+            active.clear();
+            visits.clear();
+            // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
+            for i in first..end {
+                if walks[i - first].start(&rays[i], &self.top) {
+                    active.push(i as u32);
+                    visits.extend(self.start_of(from, i).map(|instance| self.visit(i, instance)));
+                }
+            }
+            self.trace(&round, query, &mut visits);
+            while !active.is_empty() {
+                active.retain(|&i| {
+                    let ray = i as usize;
+                    let start = self.start_of(from, ray);
+                    let Some(tmax) = query.tmax(ray) else { return false };
+                    let walk = &mut walks[ray - first];
+                    let mut next = walk.next(&self.top, tmax);
+                    if next.is_some() && next == start {
+                        next = walk.next(&self.top, tmax);
+                    }
+                    let Some(instance) = next else { return false };
+                    visits.push(self.visit(ray, instance));
+                    true
+                });
+                self.trace(&round, query, &mut visits);
+            }
+        }
+    }
+
+    /// The instance that a ray is said to start on, if it can be seen.
+    fn start_of(&self, from: Option<&[Surface]>, ray: usize) -> Option<u32> {
+        let instance = from?[ray].instance;
+        self.placed.get(instance as usize)?.is_some().then_some(instance)
+    }
+
+    fn visit(&self, ray: usize, instance: u32) -> Visit {
+        Visit { object: self.placed_at(instance).object(), ray: ray as u32, instance }
+    }
+
+    /// The place of an instance that the top level holds.
+    fn placed_at(&self, instance: u32) -> &Placed {
+        self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
+    }
+
+    fn trace(&self, round: &Round<'_>, query: &mut impl Query, visits: &mut Vec<Visit>) {
+        // Rays keep their order within an object: neighbours are likely to take the same way.
+        visits.sort_unstable_by_key(|v| (v.object, v.ray));
+        for group in visits.chunk_by(|a, b| a.object == b.object) {
+            self.touch(group[0].object);
+            query.trace(round, group);
+        }
+        visits.clear();
+    }
+}
+
+struct Nearest<'a> {
+    rays: &'a [Ray],
+    hits: &'a mut [Hit],
+    scratch: Scratch,
+}
+
+/// t of the world from t of an object; its own where they are the same.
+fn world_t(t: f32, scale: f32) -> f32 {
+    if scale == 1.0 { t } else { t * scale }
+}
+
+/// The better of two hits: least t, then least instance. A t that scaling moved out of the range is none.
+fn better(ray: &Ray, best: &Hit, hit: &Hit, scale: f32) -> Option<Hit> {
+    if !hit.is_hit() {
+        return None;
+    }
+    let hit = Hit { t: world_t(hit.t, scale), ..*hit };
+    let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
+    let nearer = hit.t < best.t || hit.t == best.t && hit.surface.instance < best.surface.instance;
+    (in_range && nearer).then_some(hit)
+}
+
+impl Query for Nearest<'_> {
+    fn tmax(&self, ray: usize) -> Option<f32> {
+        Some(self.rays[ray].tmax.min(self.hits[ray].t))
+    }
+    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
+        let object = round.file.object(visits[0].object).expect("checked when opened");
+        for &visit in visits {
+            let i = visit.ray as usize;
+            let tmax = self.rays[i].tmax.min(self.hits[i].t);
+            let (ray, scale, from) = round.object_ray(visit, tmax);
+            let hit = trace::nearest(&object, &ray, from, visit.instance, &mut self.scratch);
+            if let Some(hit) = better(&self.rays[i], &self.hits[i], &hit, scale) {
+                self.hits[i] = hit;
+            }
+        }
+    }
+}
+
+struct Any<'a> {
+    rays: &'a [Ray],
+    found: &'a mut [bool],
+    scratch: Scratch,
+}
+
+impl Query for Any<'_> {
+    fn tmax(&self, ray: usize) -> Option<f32> {
+        (!self.found[ray]).then(|| self.rays[ray].tmax)
+    }
+    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
+        let object = round.file.object(visits[0].object).expect("checked when opened");
+        for &visit in visits {
+            let i = visit.ray as usize;
+            let (ray, _, from) = round.object_ray(visit, self.rays[i].tmax);
+            self.found[i] |= trace::any(&object, &ray, from, &mut self.scratch);
+        }
+    }
+}
+
+struct Counted<'a> {
+    ray: &'a Ray,
+    best: Hit,
+    steps: Steps,
+}
+
+impl Query for Counted<'_> {
+    fn tmax(&self, _: usize) -> Option<f32> {
+        Some(self.ray.tmax.min(self.best.t))
+    }
+    fn trace(&mut self, round: &Round<'_>, visits: &[Visit]) {
+        let object = round.file.object(visits[0].object).expect("checked when opened");
+        for &visit in visits {
+            let (ray, scale, from) = round.object_ray(visit, self.ray.tmax.min(self.best.t));
+            let (hit, more) = trace::nearest_counted(&object, &ray, from, visit.instance);
+            self.steps += more;
+            if let Some(hit) = better(self.ray, &self.best, &hit, scale) {
+                self.best = hit;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::affine::Affine;
+    use super::*;
+    use crate::testing::Rng;
+
+    const FILES: [&[u8]; 2] = [
+        include_bytes!("../../../../format-spec/conformance/valid/two-objects.bth"),
+        include_bytes!("../../../../format-spec/conformance/valid/two-levels.bth"),
+    ];
+
+    fn unit(rng: &mut Rng) -> f64 {
+        rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0
+    }
+
+    /// Rigid, scaled, mirrored, sheared, and often on a coarse grid, so that rays meet edges exactly.
+    fn transform(rng: &mut Rng, spread: f64) -> Affine {
+        let coarse = rng.below(3) == 0;
+        let number = |rng: &mut Rng| if coarse { (unit(rng) * 2.0).round() } else { unit(rng) };
+        let mut parts = [0.0; 10];
+        parts.iter_mut().for_each(|x| *x = number(rng));
+        parts[6] += 1.5;
+        parts[7..].iter_mut().for_each(|x| *x += x.signum() * 0.01 + 0.02);
+        parts[..3].iter_mut().for_each(|x| *x *= spread);
+        let mut affine = Affine::from_parts(&parts);
+        if rng.below(4) == 0 {
+            let (row, column) = (rng.below(3) as usize, rng.below(3) as usize);
+            affine.linear[row][column] += number(rng) * 50.0;
+        }
+        affine
+    }
+
+    fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Affine>) {
+        let spread = [0.0, 1.0, 4.0, 1e4][rng.below(4) as usize];
+        let transforms: Vec<Affine> = (0..count).map(|_| transform(rng, spread)).collect();
+        let place = |transform: &Affine, number: u64| {
+            let number = (number % u64::from(file.object_count())) as u32;
+            Placed::new(transform, number, file.object_header(number)).ok()
+        };
+        let placed = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
+        (World::of_places(placed, file.object_count()), transforms)
+    }
+
+    /// All instances, one after another, without the top level.
+    fn brute(world: &World, file: &File, ray: &Ray) -> Hit {
+        let mut best = Hit::MISS;
+        for (number, placed) in world.placed.iter().enumerate() {
+            let Some(placed) = placed else { continue };
+            let object = placed.inverse.ray(ray);
+            let view = file.object(placed.object()).unwrap();
+            let hit = trace::nearest(&view, &object.ray, NONE, number as u32, &mut Scratch::default());
+            best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
+        }
+        best
+    }
+
+    fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
+        let targets = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.25, 0.0], [0.2, 0.3, 0.0]];
+        (0..count)
+            .map(|i| {
+                let transform = &transforms[rng.below(transforms.len() as u64) as usize];
+                let target = transform.apply(targets[rng.below(5) as usize]);
+                // From close by to so far away that the boxes must be widened for the ray.
+                let away = [0.0, 1.0, 10.0, 1e3, 1e5, 1e7, 1e12][rng.below(7) as usize];
+                let mut origin = [0, 1, 2].map(|k| (target[k] + unit(rng) * away) as f32);
+                if rng.below(3) == 0 {
+                    let k = rng.below(3) as usize;
+                    origin[k] = target[k] as f32;
+                }
+                let scale = [1.0, 1e-20, 1e15, 0.3][i % 4];
+                let direction = [0, 1, 2].map(|k| ((target[k] - f64::from(origin[k])) * scale) as f32);
+                let (tmin, tmax) = match rng.below(5) {
+                    0 => (0.0, (1.0 / scale) as f32),
+                    1 => ((1.0 / scale) as f32, f32::INFINITY),
+                    2 => (f32::NEG_INFINITY, f32::INFINITY),
+                    _ => (0.0, f32::INFINITY),
+                };
+                Ray { origin, tmin, direction, tmax }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_top_level_and_hints_change_no_answer() {
+        let mut rng = Rng(11);
+        let (mut hits_seen, mut far_hits, mut all) = (0, 0, 0);
+        for round in 0..600 {
+            let file = File::from_bytes(FILES[round % 2]).unwrap();
+            let count = [1, 2, 7, 16, 17, 40, 300][round % 7];
+            let (world, transforms) = world(&file, &mut rng, count);
+            let rays = rays(&mut rng, &transforms, 40);
+            let from: Vec<Surface> = rays
+                .iter()
+                .map(|_| Surface {
+                    instance: rng.below(count as u64 + 2) as u32,
+                    triangle: rng.below(3) as u32,
+                })
+                .collect();
+            for from in [None, Some(from.as_slice())] {
+                let mut hits = vec![Hit::MISS; rays.len()];
+                let mut found = vec![false; rays.len()];
+                world.nearest(&file, &rays, from, &mut hits);
+                world.any(&file, &rays, from, &mut found);
+                for (i, ray) in rays.iter().enumerate() {
+                    let expected = brute(&world, &file, ray);
+                    assert_eq!(hits[i], expected, "round {round}, ray {i}: {ray:?}");
+                    assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
+                    if i % 8 == 0 {
+                        assert_eq!(world.nearest_counted(&file, ray, Surface::NONE).0, expected);
+                    }
+                    let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+                    far_hits += u32::from(expected.is_hit() && start > world.top.reach);
+                    hits_seen += u32::from(expected.is_hit());
+                    all += 1;
+                }
+            }
+        }
+        assert!(hits_seen > all / 3 && far_hits > 500, "{hits_seen} of {all} hit, {far_hits} from afar");
+    }
+
+    #[test]
+    fn rays_without_a_line_hit_nothing() {
+        let file = File::from_bytes(FILES[0]).unwrap();
+        let world = world(&file, &mut Rng(3), 50).0;
+        let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
+        for ray in [
+            Ray { origin: [f32::NAN, 0.0, 0.0], ..good },
+            Ray { direction: [0.0, -0.0, 0.0], ..good },
+            Ray { direction: [f32::INFINITY, 0.0, 0.0], ..good },
+            Ray { tmin: 2.0, ..good },
+            Ray { tmax: f32::NAN, ..good },
+            Ray { tmin: f32::NAN, ..good },
+        ] {
+            let (mut hit, mut found) = ([Hit::MISS], [true]);
+            world.nearest(&file, &[ray], None, &mut hit);
+            world.any(&file, &[ray], None, &mut found);
+            assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
+        }
+    }
+}

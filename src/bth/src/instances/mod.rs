@@ -1,0 +1,18 @@
+//! Scenes of instances that move: per time the tracks and the hierarchy (`pose`), the instances' inverses
+//! and boxes (`placed`), a BVH over these (`top_level`), and batches of rays through it (`walk`, `batch`).
+//!
+//! A ray is transformed into the space of each object that it may meet and traced there, with t unchanged.
+
+mod affine;
+mod batch;
+mod placed;
+mod pose;
+mod top_level;
+mod tracks;
+mod view;
+mod walk;
+mod world;
+
+pub use view::SceneView;
+pub use world::Update;
+pub(crate) use world::World;

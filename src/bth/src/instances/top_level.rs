@@ -1,0 +1,222 @@
+//! The BVH over the instances of a frame: 16 children a node, midpoint splits, rebuilt for each frame.
+//!
+//! Sixteen instances or fewer are the children of one node: splitting them further would make nodes of two
+//! or three, whose empty slots cost memory and time.
+
+use super::placed::Placed;
+use crate::layout::{Child, NODE_LINES, NONE, WIDTH, WideNode};
+
+/// Rays whose origin has no greater coordinate than this times that of the world's boxes take the boxes as they
+/// are built; others widen them (see [`TopLevel::looseness`]).
+const REACH: f32 = 4.0;
+
+/// Set in child codes of instances; the other bits are its row.
+pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
+
+/// The BVH.
+#[derive(Debug, Default)]
+pub(crate) struct TopLevel {
+    /// The root is node 0. Children are codes: rows of `nodes`, or [`INSTANCE`] and a row of the instances.
+    pub(crate) nodes: Vec<WideNode>,
+    /// Greatest coordinate of the boxes.
+    pub(crate) extent: f32,
+    /// Rays that start farther than this from the world's origin widen the boxes by `looseness` times their own
+    /// greatest coordinate.
+    pub(crate) reach: f32,
+    /// Greatest of the instances'.
+    pub(crate) looseness: f32,
+}
+
+/// An instance while building. Boxes are stored with the lower end negated: the union is then a maximum.
+#[derive(Clone, Copy, Debug)]
+struct Item {
+    bounds: Bounds,
+    row: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Bounds([f32; 6]);
+
+impl Bounds {
+    const EMPTY: Bounds = Bounds([f32::NEG_INFINITY; 6]);
+
+    fn grow(&mut self, other: &Bounds) {
+        for i in 0..6 {
+            self.0[i] = if other.0[i] > self.0[i] { other.0[i] } else { self.0[i] };
+        }
+    }
+    /// Twice the centre along an axis.
+    fn center(&self, axis: usize) -> f32 {
+        self.0[3 + axis] - self.0[axis]
+    }
+    /// Half the surface, in f64 as f32 overflows early.
+    fn area(&self) -> f64 {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.0[3 + k]) + f64::from(self.0[k]));
+        x * y + y * z + z * x
+    }
+}
+
+/// A run of the order that becomes a node.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    first: u32,
+    end: u32,
+    bounds: Bounds,
+    /// Twice the least and the greatest centre per axis.
+    least: [f32; 3],
+    most: [f32; 3],
+}
+
+impl Run {
+    /// Without items yet, from `first`.
+    fn empty(first: u32) -> Run {
+        let (least, most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        Run { first, end: first, bounds: Bounds::EMPTY, least, most }
+    }
+
+    fn of(first: u32, items: &[Item]) -> Run {
+        let mut run = Run::empty(first);
+        items.iter().for_each(|item| run.add(&item.bounds));
+        run
+    }
+
+    #[inline(always)]
+    fn add(&mut self, bounds: &Bounds) {
+        self.end += 1;
+        self.bounds.grow(bounds);
+        for k in 0..3 {
+            let c = bounds.center(k);
+            self.least[k] = if c < self.least[k] { c } else { self.least[k] };
+            self.most[k] = if c > self.most[k] { c } else { self.most[k] };
+        }
+    }
+
+    fn len(&self) -> u32 {
+        self.end - self.first
+    }
+}
+
+/// A node to be filled.
+#[derive(Clone, Copy, Debug)]
+struct Task {
+    node: u32,
+    run: Run,
+}
+
+impl TopLevel {
+    /// Builds over the instances that have a place.
+    pub(crate) fn build(&mut self, placed: &[Option<Placed>]) {
+        // Rarely more than one node for seven instances.
+        self.nodes.clear();
+        self.nodes.reserve_exact(placed.len() / 7 + 1);
+        (self.extent, self.looseness) = (0.0, 0.0);
+        for place in placed.iter().flatten() {
+            self.looseness = self.looseness.max(place.looseness);
+            let ends = place.lower.iter().chain(&place.upper);
+            self.extent = ends.fold(self.extent, |m, x| m.max(x.abs()));
+        }
+        self.reach = REACH * self.extent;
+        let mut items = Vec::with_capacity(placed.len());
+        for (row, place) in placed.iter().enumerate() {
+            let Some(place) = place else { continue };
+            let pad = (place.looseness * self.reach).next_up();
+            let mut bounds = Bounds::EMPTY;
+            for k in 0..3 {
+                bounds.0[k] = -((place.lower[k] - pad).next_down().max(f32::MIN));
+                bounds.0[3 + k] = (place.upper[k] + pad).next_up().min(f32::MAX);
+            }
+            items.push(Item { bounds, row: row as u32 });
+        }
+        if items.is_empty() {
+            return;
+        }
+        self.nodes.push(EMPTY);
+        let mut tasks = vec![Task { node: 0, run: Run::of(0, &items) }];
+        while let Some(Task { node, run }) = tasks.pop() {
+            let items = &mut items[..];
+            if run.len() <= WIDTH as u32 {
+                for (slot, item) in items[run.first as usize..run.end as usize].iter().enumerate() {
+                    self.put(node, slot, INSTANCE | item.row, &item.bounds);
+                }
+                continue;
+            }
+            let mut runs = [run; WIDTH];
+            let count = split_into(items, &mut runs);
+            for (slot, run) in runs[..count].iter().enumerate() {
+                let child = self.nodes.len() as u32;
+                self.nodes.push(EMPTY);
+                self.put(node, slot, child, &run.bounds);
+                tasks.push(Task { node: child, run: *run });
+            }
+        }
+    }
+
+    fn put(&mut self, node: u32, slot: usize, code: u32, bounds: &Bounds) {
+        let node = &mut self.nodes[node as usize];
+        node.child[slot] = code;
+        for k in 0..3 {
+            node.bounds[k][0][slot] = -bounds.0[k];
+            node.bounds[k][1][slot] = bounds.0[3 + k];
+        }
+    }
+
+    /// Bytes on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<WideNode>()
+    }
+}
+
+/// Splits the first of these runs into up to 16: always the one of greatest area of those that are too large
+/// for one node. Returns how many there are then.
+fn split_into(items: &mut [Item], runs: &mut [Run; WIDTH]) -> usize {
+    let worth = |run: &Run| if run.len() > WIDTH as u32 { run.bounds.area() } else { f64::NEG_INFINITY };
+    let mut areas = [f64::NEG_INFINITY; WIDTH];
+    areas[0] = worth(&runs[0]);
+    let mut count = 1;
+    while count < WIDTH {
+        let widest = (0..count).fold(0, |best, i| if areas[i] > areas[best] { i } else { best });
+        if areas[widest] == f64::NEG_INFINITY {
+            break;
+        }
+        let (left, right) = split(items, runs[widest]);
+        (runs[widest], areas[widest]) = (left, worth(&left));
+        (runs[count], areas[count]) = (right, worth(&right));
+        count += 1;
+    }
+    count
+}
+
+/// Splits a run of two or more at the middle of the centres along the axis on which they lie
+/// farthest apart; where all lie on one side, into halves.
+fn split(items: &mut [Item], run: Run) -> (Run, Run) {
+    let items = &mut items[run.first as usize..run.end as usize];
+    // Differences of f32 may overflow, and infinity is as good a greatest as any.
+    let spread = [0, 1, 2].map(|k| run.most[k] - run.least[k]);
+    let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
+    let middle = run.least[axis] / 2.0 + run.most[axis] / 2.0;
+    let (mut left, mut right) = (Run::empty(run.first), Run::empty(0));
+    let (mut i, mut end) = (0, items.len());
+    while i < end {
+        let bounds = items[i].bounds;
+        if bounds.center(axis) < middle {
+            left.add(&bounds);
+            i += 1;
+        } else {
+            right.add(&bounds);
+            end -= 1;
+            items.swap(i, end);
+        }
+    }
+    if i == 0 || i == items.len() {
+        let half = items.len() / 2;
+        return (Run::of(run.first, &items[..half]), Run::of(run.first + half as u32, &items[half..]));
+    }
+    (right.first, right.end) = (left.end, run.end);
+    (left, right)
+}
+
+/// A node without children.
+const EMPTY: WideNode =
+    WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
+
+const _: () = assert!(NODE_LINES == 7);

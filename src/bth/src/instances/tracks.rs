@@ -1,0 +1,159 @@
+//! The value of a track at a time (glTF 2.0 specification, appendix C).
+
+use super::SceneView;
+use crate::layout::*;
+
+/// The value of a checked track; of its four numbers as many count as the property is wide. A quaternion is not
+/// normalized.
+pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 4] {
+    let property = Property::from_code(track.property).unwrap_or(Property::Visible);
+    let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
+    let width = property.width();
+    let per_key = width * interpolation.values_per_key();
+    let (times, values) = view.keys(track, per_key);
+    // Numbers of row 0, 1 or 2 of a key: with tangents the value is row 1.
+    let row = |key: usize, row: usize| -> [f64; 4] {
+        std::array::from_fn(|i| if i < width { values[key * per_key + row * width + i] } else { 0.0 })
+    };
+    let main = interpolation.values_per_key() / 2;
+    let after = times.partition_point(|t| *t <= seconds);
+    if after == 0 || after == times.len() || interpolation == Interpolation::Step {
+        return row(after.saturating_sub(1), main);
+    }
+    let (from, to) = (after - 1, after);
+    let duration = times[to] - times[from];
+    let part = (seconds - times[from]) / duration;
+    let (a, b) = (row(from, main), row(to, main));
+    if interpolation == Interpolation::Cubic {
+        return hermite(a, row(from, 2), b, row(to, 0), part, duration);
+    }
+    if property == Property::Rotation { great_circle(a, b, part) } else { mix(a, b, part) }
+}
+
+fn mix(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
+    std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
+}
+
+fn hermite(a: [f64; 4], a_out: [f64; 4], b: [f64; 4], b_in: [f64; 4], part: f64, duration: f64) -> [f64; 4] {
+    let (square, cube) = (part * part, part * part * part);
+    let weights = [
+        2.0 * cube - 3.0 * square + 1.0,
+        duration * (cube - 2.0 * square + part),
+        3.0 * square - 2.0 * cube,
+        duration * (cube - square),
+    ];
+    std::array::from_fn(|i| {
+        weights[0] * a[i] + weights[1] * a_out[i] + weights[2] * b[i] + weights[3] * b_in[i]
+    })
+}
+
+fn unit(q: [f64; 4]) -> [f64; 4] {
+    let greatest = q.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let q = q.map(|x| x / greatest);
+    let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    q.map(|x| x / length)
+}
+
+/// Spherical linear interpolation the shorter way (Shoemake 1985).
+fn great_circle(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
+    let (a, mut b) = (unit(a), unit(b));
+    let mut cosine: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
+    if cosine < 0.0 {
+        (b, cosine) = (b.map(|x| -x), -cosine);
+    }
+    let angle = cosine.min(1.0).acos();
+    let sine = angle.sin();
+    if sine == 0.0 {
+        return mix(a, b, part);
+    }
+    let (from, to) = (((1.0 - part) * angle).sin() / sine, (part * angle).sin() / sine);
+    std::array::from_fn(|i| from * a[i] + to * b[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The value of a single track.
+    fn sample(
+        property: Property,
+        interpolation: Interpolation,
+        times: &[f64],
+        values: &[f64],
+        t: f64,
+    ) -> Vec<f64> {
+        let track = Track {
+            node: 0,
+            property: property as u32,
+            interpolation: interpolation as u32,
+            keys: times.len() as u32,
+            first_time: 0,
+            first_value: 0,
+            reserved: [0; 2],
+        };
+        let view = SceneView {
+            scene: &[],
+            nodes: &[],
+            instances: &[],
+            tracks: &[],
+            times,
+            values,
+            cameras: &[],
+            lights: &[],
+            names: &[],
+        };
+        value(&view, &track, t)[..property.width()].to_vec()
+    }
+
+    #[test]
+    fn ends_hold_and_steps_keep_the_key_before() {
+        let keys: &[f64] = &[0.0, 0.0, 0.0, 4.0, 8.0, 2.0];
+        let at = |i, t| sample(Property::Translation, i, &[1.0, 3.0], keys, t);
+        for interpolation in [Interpolation::Step, Interpolation::Linear] {
+            assert_eq!(at(interpolation, -5.0), [0.0; 3]);
+            assert_eq!(at(interpolation, 1.0), [0.0; 3]);
+            assert_eq!(at(interpolation, 3.0), [4.0, 8.0, 2.0]);
+            assert_eq!(at(interpolation, 9.0), [4.0, 8.0, 2.0]);
+        }
+        assert_eq!(at(Interpolation::Step, 2.999), [0.0; 3]);
+        assert_eq!(at(Interpolation::Linear, 1.5), [1.0, 2.0, 0.5]);
+    }
+
+    #[test]
+    fn splines_pass_through_their_keys_with_their_tangents() {
+        let zero = [0.0; 3];
+        let keys = [zero, [1.0, 2.0, 3.0], [4.0, 0.0, 0.0], [0.0, -6.0, 0.0], [2.0, 2.0, 2.0], zero].concat();
+        let at = |t| sample(Property::Scale, Interpolation::Cubic, &[0.0, 2.0], &keys, t);
+        assert_eq!(at(0.0), [1.0, 2.0, 3.0]);
+        assert_eq!(at(2.0), [2.0, 2.0, 2.0]);
+        let slope =
+            |t: f64, step: f64| (0..3).map(|i| (at(t + step)[i] - at(t)[i]) / step).collect::<Vec<_>>();
+        for (found, expected) in [(slope(0.0, 1e-6), [4.0, 0.0, 0.0]), (slope(2.0, -1e-6), [0.0, -6.0, 0.0])]
+        {
+            for i in 0..3 {
+                assert!((found[i] - expected[i]).abs() < 1e-4, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rotations_turn_evenly_and_the_shorter_way() {
+        let half = |degrees: f64| (degrees.to_radians() / 2.0).sin_cos();
+        let ((s, c), sign) = (half(100.0), -3.0);
+        // The second key is the same rotation with the other sign, and not of unit length.
+        let keys = [0.0, 0.0, 0.0, 1.0, 0.0, s * sign, 0.0, c * sign];
+        for part in [0.1, 0.5, 0.9] {
+            let q = sample(Property::Rotation, Interpolation::Linear, &[0.0, 1.0], &keys, part);
+            let (s, c) = half(100.0 * part);
+            assert!((q[1] - s).abs() < 1e-15 && (q[3] - c).abs() < 1e-15, "{q:?}");
+        }
+        let same = sample(
+            Property::Rotation,
+            Interpolation::Linear,
+            &[0.0, 1.0],
+            &[0.0, 0.6, 0.0, 0.8, 0.0, 0.6, 0.0, 0.8],
+            0.3,
+        );
+        assert!((same[1] - 0.6).abs() < 1e-15 && (same[3] - 0.8).abs() < 1e-15, "{same:?}");
+    }
+}

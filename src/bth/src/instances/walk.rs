@@ -1,0 +1,112 @@
+//! The way of one ray through the top level: instance by instance, nearest boxes first.
+
+use super::top_level::{INSTANCE, TopLevel};
+use crate::layout::{NONE, WIDTH, WideNode};
+use crate::rays::Ray;
+
+/// Pad of a plane relative to the greatest coordinate in play. Half covers the roundings of the slab test
+/// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the raising of small components.
+const PAD: f64 = 1.0 / (1 << 20) as f64;
+/// Components below this (of a greatest one in [1, 2)) are raised to it.
+const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
+/// Beyond this, products could overflow f32: every box is visited instead.
+const LARGEST_COORDINATE: f64 = 1e30;
+
+/// A ray on its way. Boxes are met by the slab test of Kay and Kajiya (1986) as one multiplication and one
+/// addition per plane, conservatively; t is scaled by a power of two.
+#[derive(Debug, Default)]
+pub(crate) struct Walk {
+    near: [usize; 3],
+    reciprocal: [f32; 3],
+    near_addend: [f32; 3],
+    far_addend: [f32; 3],
+    scale: f64,
+    tmin: f32,
+    /// Children that wait: a lower bound of t (scaled) and the code. The nearest lies on top.
+    stack: Vec<(f32, u32)>,
+}
+
+impl Walk {
+    /// Starts a ray; false when it hits nothing for want of a line or of instances.
+    pub(crate) fn start(&mut self, ray: &Ray, top: &TopLevel) -> bool {
+        self.stack.clear();
+        let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
+        let greatest = direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
+        let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
+        if top.nodes.is_empty() || !finite || greatest == 0.0 {
+            return false;
+        }
+        // Exact: the exponent of a finite non-zero f32 is that of a normal f64.
+        self.scale = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
+        let start = origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let padded = f64::from(top.extent) + f64::from(top.looseness) * f64::from(top.reach);
+        let extent = padded + start;
+        let mut pad = PAD * extent;
+        if start > f64::from(top.reach) {
+            pad += f64::from(top.looseness) * start;
+        }
+        self.tmin = ((f64::from(ray.tmin) * self.scale) as f32).next_down();
+        (self.reciprocal, self.near_addend) = ([0.0; 3], [f32::NEG_INFINITY; 3]);
+        self.far_addend = [f32::INFINITY; 3];
+        for k in 0..3 {
+            let d = direction[k] / self.scale;
+            let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
+            self.near[k] = usize::from(d.is_sign_negative());
+            if extent + pad < LARGEST_COORDINATE {
+                self.reciprocal[k] = r as f32;
+                self.near_addend[k] = (-origin[k] * r - pad * r.abs()) as f32;
+                self.far_addend[k] = (-origin[k] * r + pad * r.abs()) as f32;
+            }
+        }
+        self.stack.push((f32::NEG_INFINITY, 0));
+        true
+    }
+
+    /// The next instance whose box the ray may meet at a t that, rounded to f32, is at most `tmax`; `None` at the
+    /// end of the way.
+    pub(crate) fn next(&mut self, top: &TopLevel, tmax: f32) -> Option<u32> {
+        const SLACK: f64 = 1.0 / (1 << 22) as f64;
+        let tmax = f64::from(tmax);
+        let limit =
+            (((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * self.scale) as f32).next_up();
+        while let Some((enter, code)) = self.stack.pop() {
+            if enter > limit {
+                continue;
+            }
+            if code & INSTANCE != 0 {
+                return Some(code & !INSTANCE);
+            }
+            self.open(&top.nodes[code as usize], limit);
+        }
+        None
+    }
+
+    #[inline(always)]
+    fn open(&mut self, node: &WideNode, limit: f32) {
+        let (mut enter, mut leave) = ([self.tmin; WIDTH], [limit; WIDTH]);
+        for k in 0..3 {
+            let (near, far) = (&node.bounds[k][self.near[k]], &node.bounds[k][1 - self.near[k]]);
+            for i in 0..WIDTH {
+                let t = near[i] * self.reciprocal[k] + self.near_addend[k];
+                enter[i] = if t > enter[i] { t } else { enter[i] };
+                let t = far[i] * self.reciprocal[k] + self.far_addend[k];
+                leave[i] = if t < leave[i] { t } else { leave[i] };
+            }
+        }
+        let base = self.stack.len();
+        for i in 0..WIDTH {
+            if enter[i] <= leave[i] && node.child[i] != NONE {
+                self.stack.push((enter[i], node.child[i]));
+            }
+        }
+        // Descending; at most sixteen.
+        let pushed = &mut self.stack[base..];
+        for i in 1..pushed.len() {
+            let mut at = i;
+            while at > 0 && pushed[at - 1].0 < pushed[at].0 {
+                pushed.swap(at - 1, at);
+                at -= 1;
+            }
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The instances of a scene at a time.
+
+#[cfg(test)]
+use super::SceneView;
+use super::placed::{Misplaced, Placed};
+use super::pose::Pose;
+use super::top_level::TopLevel;
+use crate::error::{Code, Error, Result};
+use crate::file::File;
+use crate::layout::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Update {
+    /// Nodes that moved, were hidden or came to sight, with all that is below them.
+    pub nodes: usize,
+    /// Instances that were placed anew.
+    pub placed: usize,
+    /// Instances that can be seen.
+    pub visible: usize,
+}
+
+/// The instances of a file with scene sections, placed for a time. Its sections have been checked.
+#[derive(Debug)]
+pub(crate) struct World {
+    pub(crate) seconds: f64,
+    pose: Pose,
+    /// Per instance its place; `None` for those that cannot be seen.
+    pub(crate) placed: Vec<Option<Placed>>,
+    pub(crate) top: TopLevel,
+    /// Per object whether a ray was traced in it.
+    touched: Vec<AtomicBool>,
+}
+
+impl World {
+    /// The scene of a file at a time; `None` when the file has none.
+    ///
+    /// # Errors
+    /// Those of the check of the scene sections and of [`Self::update`].
+    pub(crate) fn new(file: &File) -> Result<Option<World>> {
+        let Some(view) = file.check_scene()? else { return Ok(None) };
+        let scene = &view.scene[0];
+        let mut world = World {
+            seconds: f64::from(scene.first_frame) / scene.rate,
+            pose: Pose::new(&view),
+            placed: vec![None; view.instances.len()],
+            top: TopLevel::default(),
+            touched: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
+        };
+        world.place(file, world.seconds, true)?;
+        Ok(Some(world))
+    }
+
+    /// Instances at given places, without a hierarchy.
+    #[cfg(test)]
+    pub(crate) fn of_places(placed: Vec<Option<Placed>>, objects: u32) -> World {
+        let nothing = SceneView {
+            scene: &[],
+            nodes: &[],
+            instances: &[],
+            tracks: &[],
+            times: &[],
+            values: &[],
+            cameras: &[],
+            lights: &[],
+            names: &[],
+        };
+        let mut top = TopLevel::default();
+        top.build(&placed);
+        let touched = (0..objects).map(|_| AtomicBool::new(false)).collect();
+        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, touched }
+    }
+
+    /// Moves to a time. After an error all is as it was.
+    ///
+    /// # Errors
+    /// `BTH-S001` and `BTH-S002` with the node.
+    pub(crate) fn update(&mut self, file: &File, seconds: f64) -> Result<Update> {
+        let result = self.place(file, seconds, false);
+        match &result {
+            Ok(_) => self.seconds = seconds,
+            // What it was has been placed before, so it can be placed again.
+            Err(_) => drop(self.place(file, self.seconds, true)),
+        }
+        result
+    }
+
+    fn place(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
+        let view = file.scene().expect("checked when the scene was opened");
+        let mut update = Update { nodes: self.pose.update(&view, seconds, all), ..Update::default() };
+        for (row, instance) in view.instances.iter().enumerate() {
+            if !self.pose.moved(instance.node) {
+                continue;
+            }
+            self.placed[row] = None;
+            update.placed += 1;
+            if self.pose.hidden(instance.node) {
+                continue;
+            }
+            let object = file.object_header(instance.object);
+            if object.root == NONE {
+                continue;
+            }
+            let world = self.pose.world(&view, instance.node);
+            let place = Placed::new(&world, instance.object, object).map_err(|why| {
+                let (code, found) = match why {
+                    Misplaced::Singular => (Code::Singular, "one that cannot"),
+                    Misplaced::NotFinite => (Code::NotFinite, "one that is not"),
+                };
+                let name = view.node_name(instance.node).escape_debug();
+                let found = format!("{found}: node \"{name}\" at {seconds} s");
+                let at = u64::from(instance.node) * size_of::<Node>() as u64;
+                file.locate(Error::within_file(code, kind::NODES, at, code.rule(), found), NONE)
+            })?;
+            self.placed[row] = Some(place);
+        }
+        if update.placed > 0 {
+            self.top.build(&self.placed);
+        }
+        update.visible = self.placed.iter().flatten().count();
+        Ok(update)
+    }
+
+    /// From a node's space to the world, rows of four; whether the node can be seen.
+    pub(crate) fn node(&self, file: &File, node: u32) -> ([[f64; 4]; 3], bool) {
+        let view = file.scene().expect("checked when the scene was opened");
+        (self.pose.world(&view, node).rows(), !self.pose.hidden(node))
+    }
+
+    /// Notes that a ray is traced in an object.
+    pub(crate) fn touch(&self, object: u32) {
+        let touched = &self.touched[object as usize];
+        if !touched.load(Ordering::Relaxed) {
+            touched.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Objects that rays were traced in.
+    pub(crate) fn touched(&self) -> usize {
+        self.touched.iter().filter(|t| t.load(Ordering::Relaxed)).count()
+    }
+
+    /// Bytes on the heap: of the instances and the top level, and of the hierarchy.
+    pub(crate) fn bytes(&self) -> (usize, usize) {
+        (size_of_val(self.placed.as_slice()) + self.top.bytes(), self.pose.bytes())
+    }
+}

@@ -1,0 +1,197 @@
+//! The scene sections: what stands where and how it moves. They belong to the whole file.
+
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+
+/// Frames and the camera to begin with.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Scene {
+    /// Frames per second: frame f shows the scene at f / rate seconds.
+    pub rate: f64,
+    /// First frame.
+    pub first_frame: i32,
+    /// Last frame.
+    pub last_frame: i32,
+    /// Row of `CAMERAS` that is used when none is asked for, or `NONE`.
+    pub camera: u32,
+    /// Zero.
+    pub reserved: [u32; 11],
+}
+
+/// A node of the hierarchy.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Node {
+    /// From the node's space to its parent's, before tracks: translation (3), quaternion x, y, z, w (4), scale (3)
+    /// and two zeros; with [`NODE_MATRIX`] three rows of four, applied to columns (x, y, z, 1).
+    pub transform: [f64; 12],
+    /// Row of the node that it moves with, less than its own; `NONE` for the world.
+    pub parent: u32,
+    /// [`NODE_HIDDEN`], [`NODE_MATRIX`].
+    pub flags: u32,
+    /// First byte of its name in `NAMES`.
+    pub name: u32,
+    /// Bytes of its name.
+    pub name_length: u32,
+    /// Zero.
+    pub reserved: [u32; 4],
+}
+
+/// Flag of [`Node`]: it and all below it are not seen, unless a track says so.
+pub const NODE_HIDDEN: u32 = 1;
+/// Flag of [`Node`]: the transform is a matrix.
+pub const NODE_MATRIX: u32 = 2;
+
+/// An object that stands at a node. Rays name instances by their row.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Instance {
+    /// Row of `NODES`.
+    pub node: u32,
+    /// Object of the file.
+    pub object: u32,
+    /// Zero; deformations will be announced here.
+    pub flags: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// Keyframes of one property of one node.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Track {
+    /// Row of `NODES`.
+    pub node: u32,
+    /// A [`Property`].
+    pub property: u32,
+    /// An [`Interpolation`].
+    pub interpolation: u32,
+    /// Number of keys.
+    pub keys: u32,
+    /// Row of `TIMES` of the first key. The ranges of successive tracks follow each other, here and below.
+    pub first_time: u32,
+    /// First row of `VALUES`.
+    pub first_value: u32,
+    /// Zero.
+    pub reserved: [u32; 2],
+}
+
+/// What a track moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u32)]
+pub enum Property {
+    /// Three numbers.
+    Translation = 0,
+    /// A quaternion x, y, z, w.
+    Rotation = 1,
+    /// Three numbers.
+    Scale = 2,
+    /// One number, 0 or 1.
+    Visible = 3,
+}
+
+impl Property {
+    /// All of them, in order of their codes.
+    pub const ALL: [Property; 4] = [Self::Translation, Self::Rotation, Self::Scale, Self::Visible];
+
+    /// The property with this code.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| *p as u32 == code)
+    }
+    /// Numbers of a value.
+    pub const fn width(self) -> usize {
+        match self {
+            Self::Translation | Self::Scale => 3,
+            Self::Rotation => 4,
+            Self::Visible => 1,
+        }
+    }
+}
+
+/// What is between two keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u32)]
+pub enum Interpolation {
+    /// The value of the key before.
+    Step = 0,
+    /// Linear; rotations along the great circle.
+    Linear = 1,
+    /// Hermite splines; in-tangent, value and out-tangent per key.
+    Cubic = 2,
+}
+
+impl Interpolation {
+    /// All of them, in order of their codes.
+    pub const ALL: [Interpolation; 3] = [Self::Step, Self::Linear, Self::Cubic];
+
+    /// The interpolation with this code.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|i| *i as u32 == code)
+    }
+    /// Values of a key.
+    pub const fn values_per_key(self) -> usize {
+        match self {
+            Self::Step | Self::Linear => 1,
+            Self::Cubic => 3,
+        }
+    }
+}
+
+/// A camera: it looks along the negative z axis of its node, whose y axis points up.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Camera {
+    /// Row of `NODES`.
+    pub node: u32,
+    /// 0 perspective, 1 orthographic.
+    pub projection: u32,
+    /// First byte of its name in `NAMES`.
+    pub name: u32,
+    /// Bytes of its name.
+    pub name_length: u32,
+    /// Vertical field of view in degrees, or the height of the picture in the node's units.
+    pub size: f64,
+    /// Width over height of the picture that it was made for; 0 when it is not said.
+    pub aspect: f64,
+    /// Nothing nearer is seen.
+    pub near: f64,
+    /// Nothing farther is seen; 0 for no end.
+    pub far: f64,
+    /// Zero.
+    pub reserved: [u32; 4],
+}
+
+/// A light: it shines along the negative z axis of its node, where it has a direction.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct Light {
+    /// Row of `NODES`.
+    pub node: u32,
+    /// 0 directional, 1 point, 2 spot.
+    pub kind: u32,
+    /// First byte of its name in `NAMES`.
+    pub name: u32,
+    /// Bytes of its name.
+    pub name_length: u32,
+    /// Linear red, green and blue.
+    pub color: [f64; 3],
+    /// Lux for directional lights, candela for others.
+    pub intensity: f64,
+    /// Distance beyond which it does not shine; 0 for no end.
+    pub range: f64,
+    /// Of a spot: degrees from the axis at which it begins to fade; else 0.
+    pub inner: f64,
+    /// Of a spot: degrees at which it ends; else 0.
+    pub outer: f64,
+    /// Zero.
+    pub reserved: [u32; 2],
+}
+
+super::assert_layout! {
+    Scene 64 { first_frame 8, last_frame 12, camera 16, reserved 20 }
+    Node 128 { parent 96, flags 100, name 104, name_length 108, reserved 112 }
+    Instance 16 { object 4, flags 8, reserved 12 }
+    Track 32 { property 4, interpolation 8, keys 12, first_time 16, first_value 20, reserved 24 }
+    Camera 64 { projection 4, name 8, name_length 12, size 16, aspect 24, near 32, far 40, reserved 48 }
+    Light 80 { kind 4, name 8, name_length 12, color 16, intensity 40, range 48, inner 56, outer 64, reserved 72 }
+}

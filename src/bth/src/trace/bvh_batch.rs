@@ -1,0 +1,297 @@
+//! Many rays through the wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
+//! with the work of the others.
+
+use super::flight::{Flight, Found};
+use super::prepare::{Frame, Prepared};
+use super::query::Query;
+use super::stack::{BOTTOM, Place, Stacks};
+use crate::layout::{Child, NODE_LINES, NONE};
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+
+/// Rays on their way at once.
+const IN_FLIGHT: usize = 32;
+/// While at least this many rays stand before inner nodes, those before leaves wait.
+const ENOUGH: u8 = (IN_FLIGHT / 4) as u8;
+
+/// Slots of rays that wait for the same kind of step.
+struct List {
+    /// As long as any `u8` reaches; a list is never longer than the rays in flight, plus one.
+    slot: [u8; 256],
+    len: u8,
+}
+
+impl List {
+    fn new() -> Self {
+        List { slot: [0; 256], len: 0 }
+    }
+    #[inline(always)]
+    fn get(&self, i: u8) -> usize {
+        usize::from(self.slot[usize::from(i)]) % IN_FLIGHT
+    }
+    /// Adds a slot on a condition, without a branch.
+    #[inline(always)]
+    fn push_if(&mut self, slot: usize, condition: bool) {
+        self.slot[usize::from(self.len)] = slot as u8;
+        self.len += u8::from(condition);
+    }
+    /// Empties the list, whose entries can still be read if at most as many are added as were read.
+    #[inline(always)]
+    fn take(&mut self) -> u8 {
+        std::mem::replace(&mut self.len, 0)
+    }
+}
+
+/// The rays on their way, by what they do next.
+struct Lists {
+    inner: List,
+    leaf: List,
+    /// At the bottom of the stack, or before an empty slot of a node.
+    bottom: List,
+}
+
+impl Lists {
+    #[inline(always)]
+    fn sort(&mut self, slot: usize, code: u32) {
+        let (leaf, bottom) = (code & Child::LEAF_BIT != 0, code >= BOTTOM);
+        self.inner.push_if(slot, !leaf);
+        self.leaf.push_if(slot, leaf && !bottom);
+        self.bottom.push_if(slot, bottom);
+    }
+}
+
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Slot<Q> {
+    flight: Flight<Q>,
+    /// Place of the ray in the batch.
+    ray: usize,
+    /// Place of the top of its stack.
+    top: Place,
+}
+
+/// The rays still to be traced.
+pub(crate) struct Waiting<'a, Q> {
+    /// Places in the batch of those to trace, or all.
+    pub(crate) order: Option<&'a [u32]>,
+    /// Queries of all rays of the batch, if they have been asked elsewhere already.
+    pub(crate) queries: Option<&'a [Q]>,
+    /// Per ray of the batch the tet leaf that it has walked already, or `NONE`.
+    pub(crate) walked: Option<&'a [u32]>,
+}
+
+impl<Q> Waiting<'_, Q> {
+    /// All rays of a batch, that have been nowhere yet.
+    pub(crate) fn all() -> Self {
+        Waiting { order: None, queries: None, walked: None }
+    }
+}
+
+/// A batch on its way.
+pub(crate) struct BatchWalk<'a, Q, D> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) rays: &'a [Ray],
+    pub(crate) waiting: Waiting<'a, Q>,
+    pub(crate) stacks: &'a mut Stacks,
+    /// Takes the place of a ray in the batch, and its query as it ended.
+    pub(crate) done: D,
+}
+
+/// The next rays, sixteen at a time.
+struct Supply {
+    /// Where rays start.
+    root: u32,
+    frame: Frame,
+    prepared: Prepared,
+    /// Places in the batch of those prepared.
+    ray: [u32; LANES],
+    /// Lanes that are prepared, and of these those that are gone.
+    filled: usize,
+    used: usize,
+    /// Rays prepared before.
+    before: usize,
+}
+
+impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
+    /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
+    /// the query has what it wants.
+    #[inline(always)]
+    pub(crate) fn run<S: Simd>(mut self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
+        self.stacks.reserve(self.object, IN_FLIGHT);
+        let root = root(self.object);
+        let mut supply = Supply {
+            root,
+            frame: Frame::new(self.object.header),
+            prepared: Prepared::new(),
+            ray: [0; LANES],
+            filled: 0,
+            used: 0,
+            before: 0,
+        };
+        let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+        let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: Place::NOWHERE }; IN_FLIGHT];
+        let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
+        for (i, slot) in slots.iter_mut().enumerate() {
+            if self.launch(s, &mut supply, i, slot) {
+                lists.sort(i, root);
+            }
+        }
+        loop {
+            self.inner_steps(s, &mut slots, &mut lists);
+            if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
+                return;
+            }
+            for i in 0..lists.bottom.take() {
+                let at = lists.bottom.get(i);
+                let slot = &mut slots[at];
+                if slot.top > self.stacks.bottom(at) {
+                    // An empty slot of a node.
+                    slot.top = slot.top.below();
+                    lists.sort(at, self.stacks.code(slot.top));
+                    continue;
+                }
+                (self.done)(slot.ray, slot.flight.query());
+                if self.launch(s, &mut supply, at, &mut slots[at]) {
+                    lists.sort(at, root);
+                }
+            }
+            for i in 0..lists.leaf.take() {
+                let at = lists.leaf.get(i);
+                let slot = &mut slots[at];
+                let ray = &self.rays[slot.ray];
+                let found = match Child::from_code(self.stacks.code(slot.top)) {
+                    Some(Child::Indexed(line)) => {
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.indexed_leaf(line))
+                    }
+                    Some(Child::Raw(line)) => {
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
+                    }
+                    Some(Child::Tets(row)) => {
+                        if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
+                            Found::Nothing
+                        } else {
+                            enter_tets(self.object, row, ray, slot, self.stacks, &mut tets)
+                        }
+                    }
+                    _ => Found::Nothing,
+                };
+                let below = slot.top.below();
+                slot.top = match found {
+                    Found::Nothing => below,
+                    Found::Again => slot.top,
+                    Found::Nearer => self.stacks.keep_up_to(s, at, below, slot.flight.key_limit()),
+                    Found::Enough => self.stacks.bottom(at),
+                };
+                let code = self.stacks.code(slot.top);
+                prefetch(s, self.object, code);
+                lists.sort(at, code);
+            }
+        }
+    }
+
+    /// Steps through inner nodes until few rays stand before one.
+    #[inline(always)]
+    fn inner_steps<S: Simd>(&mut self, s: S, slots: &mut [Slot<Q>; IN_FLIGHT], lists: &mut Lists) {
+        while lists.inner.len > 0 {
+            for i in 0..lists.inner.take() {
+                let at = lists.inner.get(i);
+                let slot = &mut slots[at];
+                let node = self.object.node(self.stacks.code(slot.top));
+                let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
+                slot.top = self.stacks.replaced(slot.top, count);
+                let code = self.stacks.code(slot.top);
+                prefetch(s, self.object, code);
+                lists.sort(at, code);
+            }
+            if lists.inner.len < ENOUGH && lists.leaf.len + lists.bottom.len > 0 {
+                return;
+            }
+        }
+    }
+
+    /// Puts the next ray that can hit anything into a slot; false if there is none.
+    #[inline(always)]
+    fn launch<S: Simd>(&mut self, s: S, supply: &mut Supply, at: usize, slot: &mut Slot<Q>) -> bool {
+        loop {
+            if supply.used == supply.filled && !self.refill(s, supply) {
+                return false;
+            }
+            let lane = supply.used % LANES;
+            supply.used += 1;
+            let place = supply.ray[lane] as usize;
+            let ray = &self.rays[place];
+            let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
+            if let Some(aim) = supply.prepared.aim(lane) {
+                slot.flight.launch(aim, query);
+            } else {
+                *slot.flight.query() = query;
+                if !slot.flight.aim_at(self.object, &supply.frame, ray) {
+                    continue;
+                }
+            }
+            if self.waiting.queries.is_some() {
+                slot.flight.take_over();
+            }
+            slot.ray = place;
+            slot.top = self.stacks.start(at, supply.root);
+            return true;
+        }
+    }
+
+    /// Prepares the next sixteen rays; false if there are none.
+    #[inline(always)]
+    fn refill<S: Simd>(&mut self, s: S, supply: &mut Supply) -> bool {
+        let total = self.waiting.order.map_or(self.rays.len(), <[u32]>::len);
+        let count = (total - supply.before).min(LANES);
+        for i in 0..count {
+            let place = supply.before + i;
+            supply.ray[i] = self.waiting.order.map_or(place as u32, |order| order[place]);
+        }
+        supply.before += count;
+        (supply.used, supply.filled) = (0, count);
+        if count > 0 {
+            supply.prepared.fill(s, &supply.frame, self.rays, &supply.ray, count);
+        }
+        count > 0
+    }
+}
+
+/// Where rays start that need not enter tetrahedra.
+fn root(object: &ObjectView<'_>) -> u32 {
+    match Child::from_code(object.header.root) {
+        Some(Child::Tets(row)) if object.tet_leaves[row as usize].subtree != NONE => {
+            object.tet_leaves[row as usize].subtree
+        }
+        _ => object.header.root,
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn enter_tets<Q: Query>(
+    object: &ObjectView<'_>,
+    row: u32,
+    ray: &Ray,
+    slot: &mut Slot<Q>,
+    stacks: &mut Stacks,
+    tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
+) -> Found {
+    let subtree = object.tet_leaves[row as usize].subtree;
+    if subtree != NONE {
+        stacks.set_code(slot.top, subtree);
+        return Found::Again;
+    }
+    let done = tets(row, ray, slot.flight.query());
+    slot.flight.take_over();
+    if done { Found::Enough } else { Found::Nearer }
+}
+
+/// Asks for the lines of a node or of an indexed leaf.
+#[inline(always)]
+fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
+    let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
+    for i in (0..NODE_LINES).step_by(2) {
+        s.prefetch(first.wrapping_add(i));
+    }
+}

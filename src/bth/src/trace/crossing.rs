@@ -1,0 +1,144 @@
+//! Whether, where and how lines cross closed triangles: the one decision that every structure uses.
+//!
+//! Points are projected along the ray ([`super::line`]) and the origin's weights in the projected triangle are its
+//! barycentric coordinates. f64 decides; where its error bound leaves a sign, or a digit, open, exact sums
+//! decide ([`crate::expansion`]).
+
+use super::line::{Line, PROJECTION_ERROR};
+use crate::expansion::Expansion;
+
+/// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32.
+pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
+
+/// Where a triangle is hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Crossing {
+    /// In units of the direction. Order hits by this; report it rounded to f32.
+    pub(crate) t: f64,
+    /// u, v and 1 as multiples of the same.
+    pub(crate) weight: [f64; 3],
+}
+
+impl Crossing {
+    /// Barycentric weights of the triangle's second and third vertex.
+    pub(crate) fn uv(&self) -> [f32; 2] {
+        let [u, v, whole] = self.weight;
+        [(u / whole) as f32, (v / whole) as f32]
+    }
+}
+
+/// What f64 makes of a line and a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Estimate {
+    /// The line passes the triangle.
+    Missed,
+    /// It crosses, at t, u and v good to [`RATIO_ERROR`].
+    Crossed(Crossing),
+    /// Rounding hides the answer: weights, and the bound of their error.
+    Open([f64; 3], f64),
+}
+
+/// The least and the greatest. Compared in the way that vector instructions do; nothing is NaN here.
+#[inline(always)]
+fn ends([a, b, c]: [f64; 3]) -> (f64, f64) {
+    let least = if a < b { a } else { b };
+    let greatest = if a > b { a } else { b };
+    (if c < least { c } else { least }, if c > greatest { c } else { greatest })
+}
+
+/// Decides in f64, or leaves it open. Coordinates are along the axes of the line's projection: two in its plane, and the
+/// one along the line. No operation is fused, so the bits are the same on every machine.
+#[inline(always)]
+pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]) -> Estimate {
+    let inverse_depth = 1.0 / direction[2];
+    let shear = [direction[0] / direction[2], direction[1] / direction[2]];
+    let (mut x, mut y, mut z) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    for c in 0..3 {
+        z[c] = corner[c][2] - origin[2];
+        x[c] = (corner[c][0] - origin[0]) - shear[0] * z[c];
+        y[c] = (corner[c][1] - origin[1]) - shear[1] * z[c];
+    }
+    // Antisymmetric bit for bit, so two triangles never disagree about their shared edge.
+    let weight = [x[1] * y[2] - y[1] * x[2], x[2] * y[0] - y[2] * x[0], x[0] * y[1] - y[0] * x[1]];
+    let size = [x[0].abs() + y[0].abs(), x[1].abs() + y[1].abs(), x[2].abs() + y[2].abs()];
+    // A coordinate of a point is at most its sheared one plus its depth.
+    let (_, reach) = ends([size[0] + z[0].abs(), size[1] + z[1].abs(), size[2] + z[2].abs()]);
+    let error = PROJECTION_ERROR * reach;
+    let bound = 4.0 * error * (size[0] + size[1] + size[2] + error);
+    let (least, greatest) = ends(weight);
+    if least < -bound && greatest > bound {
+        return Estimate::Missed;
+    }
+    let sum = weight[0] + weight[1] + weight[2];
+    let depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / sum;
+    // Errors of the weights shift the depth within the triangle's range of depths.
+    let (shallow, deep) = ends(z);
+    let range = deep - shallow;
+    let tolerance = RATIO_ERROR * sum.abs();
+    let certain = least > bound || greatest < -bound;
+    if certain && bound <= tolerance && bound * range <= tolerance * depth.abs() {
+        return Estimate::Crossed(Crossing { t: depth * inverse_depth, weight: [weight[1], weight[2], sum] });
+    }
+    Estimate::Open(weight, bound)
+}
+
+fn wide(v: [f32; 3]) -> [f64; 3] {
+    v.map(f64::from)
+}
+
+impl Line {
+    /// Whether, where and how the line crosses the closed triangle with these corners.
+    pub(crate) fn crossing(&self, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+        let along = |p: [f64; 3]| self.axis.map(|k| p[k]);
+        let corner = corners.map(|p| along(wide(p)));
+        match estimate(along(self.origin), along(self.direction), corner) {
+            Estimate::Missed => None,
+            Estimate::Crossed(crossing) => Some(crossing),
+            Estimate::Open(weight, bound) => self.close_crossing(corners, weight, bound),
+        }
+    }
+
+    /// A crossing that f64 leaves open.
+    #[cold]
+    #[inline(never)]
+    fn close_crossing(&self, corners: [[f32; 3]; 3], mut weight: [f64; 3], bound: f64) -> Option<Crossing> {
+        let corners = corners.map(wide);
+        for i in 0..3 {
+            if weight[i].abs() <= bound {
+                weight[i] = self.exact_weight(corners[(i + 1) % 3], corners[(i + 2) % 3]);
+            }
+        }
+        let positive = weight.iter().any(|&w| w > 0.0);
+        let negative = weight.iter().any(|&w| w < 0.0);
+        if positive == negative {
+            return None; // passes outside, or lies in the plane
+        }
+        Some(self.exact_crossing(corners))
+    }
+
+    /// The weight of the edge p→q, with an exact sign: det[d, p-o, q-o] brought to the same unit and
+    /// handedness.
+    fn exact_weight(&self, p: [f64; 3], q: [f64; 3]) -> f64 {
+        let mut sum = Expansion::new();
+        sum.add_edge(self.origin, self.direction, p, q);
+        sum.value() * self.inverse_depth.abs()
+    }
+
+    /// t, u and v from exact sums.
+    fn exact_crossing(&self, corners: [[f64; 3]; 3]) -> Crossing {
+        let [a, b, c] = corners;
+        let edge = |p, q| {
+            let mut sum = Expansion::new();
+            sum.add_edge(self.origin, self.direction, p, q);
+            sum
+        };
+        let mut whole = Expansion::new();
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            whole.add_edge(self.origin, self.direction, p, q);
+        }
+        let mut volume = Expansion::new();
+        volume.add_volume(self.origin, a, b, c);
+        let whole = whole.value();
+        Crossing { t: volume.value() / whole, weight: [edge(c, a).value(), edge(a, b).value(), whole] }
+    }
+}

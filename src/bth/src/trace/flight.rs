@@ -1,0 +1,162 @@
+//! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
+//! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
+
+use super::crossing::{Crossing, Estimate, estimate};
+use super::line::Line;
+use super::prepare::{Aim, Frame};
+use super::query::Query;
+use super::sight::{Block, Sight};
+use super::slabs::Slabs;
+use crate::layout::{WIDTH, WideNode};
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::Simd;
+use zerocopy::FromZeros;
+
+/// What keys of the stack may exceed the true t by, relative: the four lowest bits of f32.
+const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
+
+/// A ray on its way.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Flight<Q> {
+    aim: Aim,
+    /// Nothing whose depth certainly exceeds this matters.
+    limit: f32,
+    query: Q,
+}
+
+/// What a leaf made of a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Found {
+    Nothing,
+    /// Something else in the place of the leaf, to be entered now.
+    Again,
+    /// A nearer hit than before: what waits farther off need not be entered.
+    Nearer,
+    /// What the query wants.
+    Enough,
+}
+
+impl<Q: Query> Flight<Q> {
+    /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
+    #[inline(always)]
+    pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
+        if !self.aim.set(frame, ray) && !self.aim_in_f64(object, ray) {
+            return false;
+        }
+        self.take_over();
+        true
+    }
+
+    /// As [`Self::aim_at`], for rays that f32 can't prepare too.
+    #[cold]
+    #[inline(never)]
+    fn aim_in_f64(&mut self, object: &ObjectView<'_>, ray: &Ray) -> bool {
+        let Some(line) = Line::new(ray) else { return false };
+        let slabs = Slabs::new(ray, &line, object.header);
+        let sight = Sight::new(ray, &line, &slabs, object.header);
+        self.aim = Aim { slabs, sight };
+        ray.tmin <= ray.tmax
+    }
+
+    /// A place for a ray.
+    pub(crate) fn vacant(query: Q) -> Self {
+        Flight { aim: Aim::new_zeroed(), limit: 0.0, query }
+    }
+
+    /// Takes in a ray that has been prepared.
+    #[inline(always)]
+    pub(crate) fn launch(&mut self, aim: &Aim, query: Q) {
+        self.aim = *aim;
+        self.limit = aim.slabs.last;
+        self.query = query;
+    }
+
+    #[inline(always)]
+    pub(crate) fn query(&mut self) -> &mut Q {
+        &mut self.query
+    }
+
+    /// Takes over what the query has found meanwhile.
+    pub(crate) fn take_over(&mut self) {
+        self.limit = self.aim.slabs.limit(self.query.limit());
+    }
+
+    /// Keys of the stack beyond this are of no interest any more.
+    #[inline(always)]
+    pub(crate) fn key_limit(&self) -> f32 {
+        self.limit + self.limit.abs() * KEY_SLACK
+    }
+
+    /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
+    #[inline(always)]
+    pub(crate) fn enter_node<S: Simd>(
+        &self,
+        s: S,
+        node: &WideNode,
+        (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+    ) -> usize {
+        let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
+        let children = s.load_u(&node.child);
+        if Q::ANY {
+            s.compress(bits, children, codes)
+        } else {
+            s.compress_far_to_near(bits, enter, children, codes, keys)
+        }
+    }
+
+    /// Tests the triangles of a leaf.
+    #[inline(always)]
+    pub(crate) fn enter_leaf<S: Simd, B: Block>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        ray: &Ray,
+        block: &B,
+    ) -> Found {
+        let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.limit);
+        if found.maybe == 0 {
+            return Found::Nothing;
+        }
+        if Q::ANY && found.sure != 0 {
+            self.query.accept();
+            return Found::Enough;
+        }
+        self.decide(object, ray, block, found.maybe)
+    }
+
+    /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.
+    #[inline(always)]
+    fn decide<B: Block>(&mut self, object: &ObjectView<'_>, ray: &Ray, block: &B, mut bits: u32) -> Found {
+        let axis = self.aim.sight.axis;
+        let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            origin[k] = ray.origin[axis[k] as usize].into();
+            direction[k] = ray.direction[axis[k] as usize].into();
+        }
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize % WIDTH;
+            bits &= bits - 1;
+            let crossing = match estimate(origin, direction, block.corners_along(axis, i)) {
+                Estimate::Missed => None,
+                Estimate::Crossed(crossing) => Some(crossing),
+                Estimate::Open(..) => open(ray, block.corners(i)),
+            };
+            let Some(crossing) = crossing else { continue };
+            if self.query.offer(object.triangle_ids[block.first() as usize + i], crossing) {
+                return Found::Enough;
+            }
+        }
+        let limit = self.limit;
+        self.take_over();
+        if self.limit < limit { Found::Nearer } else { Found::Nothing }
+    }
+}
+
+/// What f64 leaves open.
+#[cold]
+#[inline(never)]
+fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+    Line::new(ray)?.crossing(corners)
+}

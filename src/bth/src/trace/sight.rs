@@ -1,0 +1,234 @@
+//! A ray as f32 lanes see triangles: conservative, to leave out those that certainly do not matter.
+//!
+//! The same projection as [`super::line`], in f32 and for sixteen triangles at a time. Every
+//! triangle that `Line::crossing` could accept remains a candidate, and what is called sure is accepted by it
+//! without doubt; the rest is for f64 to decide. So the lanes of an instruction set never show in an answer.
+//!
+//! **Error of a weight.** u = 2^-24, and for the corners of one triangle M >= |x| + |y| as projected, r >= M + |depth|,
+//! which bounds their coordinates seen from the ray's origin. Differences are off by ur, the shear by a factor 1±2u,
+//! its product and the last sum by ur each at most (|shear| <= 1): sheared coordinates are off by less than
+//! δ = 8ur. A cross product of two is off by 2δM + 2δ² from its points and 3uM² <= δM from its own roundings,
+//! together below 4δ(M + δ). Products below the least normal number add at most that.
+//!
+//! **Error of a depth.** Moving three weights by e each moves the depth by at most 3e·range/(|sum| - 3e), range
+//! being that of the corners' depths, and never out of it; the depth's own roundings stay below 8u of the
+//! greatest |depth|.
+
+use super::line::Line;
+use super::slabs::Slabs;
+use crate::layout::{IndexedLeaf, Object, RawLeaf, WIDTH};
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+
+const _: () = assert!(WIDTH == LANES);
+
+/// 8 roundings of f32: bounds the error of a sheared coordinate relative to the ray's reach.
+pub(crate) const PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
+/// Farther coordinates could overflow the products of weights and depths: all triangles are candidates then.
+const FARTHEST: f64 = (1u64 << 40) as f64;
+/// Slack of depths, relative to the greatest: their roundings, with some to spare.
+const DEPTH_SLACK: f32 = 16.0 / (1 << 24) as f32;
+
+/// A ray prepared for the triangles of leaves. The depth of points, and t, are measured as in [`Slabs`].
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub(crate) struct Sight {
+    /// The two axes of the projection and the one along the ray.
+    pub(crate) axis: [u32; 3],
+    /// What underflow adds to the error of a weight; infinite where products may overflow.
+    pub(crate) floor: f32,
+    /// Along the axes of the plane.
+    pub(crate) origin: [f32; 2],
+    pub(crate) shear: [f32; 2],
+    /// Depth of a coordinate along the third axis: this times it,
+    pub(crate) forward: f32,
+    /// plus this; both exact.
+    pub(crate) start: f32,
+    /// Hits certainly lie in the ray's range from this depth
+    pub(crate) first: f32,
+    /// to this.
+    pub(crate) last: f32,
+    pub(crate) reserved: [u32; 4],
+}
+
+/// Triangles of a leaf that the ray may hit, a bit each.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidates {
+    /// Those that are not certainly missed.
+    pub(crate) maybe: u32,
+    /// Of these, those that are certainly hit, within the ray's range.
+    pub(crate) sure: u32,
+}
+
+/// Projected corners, sixteen triangles: `[corner][x, y, depth]`.
+type Corners<S> = [[<S as Simd>::F; 3]; 3];
+
+/// The triangles of a leaf.
+pub(crate) trait Block {
+    fn first(&self) -> u32;
+    fn triangles(&self) -> u32;
+    fn corners(&self, triangle: usize) -> [[f32; 3]; 3];
+    /// The corners along these axes.
+    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3];
+    fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
+}
+
+/// The points at these places.
+#[inline(always)]
+fn pick<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3] {
+    let at = s.load_bytes(row);
+    [s.lookup(x, at), s.lookup(y, at), s.lookup(depth, at)]
+}
+
+/// Twice the signed area of the triangle of the line and two points.
+#[inline(always)]
+fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
+    s.fnma(p[1], q[0], s.mul(p[0], q[1]))
+}
+
+/// |x| + |y|.
+#[inline(always)]
+fn size<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
+    s.add(s.abs(p[0]), s.abs(p[1]))
+}
+
+impl Block for IndexedLeaf {
+    #[inline(always)]
+    fn first(&self) -> u32 {
+        self.first
+    }
+    #[inline(always)]
+    fn triangles(&self) -> u32 {
+        self.triangles
+    }
+    #[inline(always)]
+    fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|row| self.vertex.map(|axis| axis[usize::from(row[triangle]) % WIDTH]))
+    }
+    #[inline(always)]
+    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {
+        let mut out = [[0.0; 3]; 3];
+        for k in 0..3 {
+            let row = &self.vertex[axis[k] as usize];
+            for c in 0..3 {
+                out[c][k] = row[usize::from(self.corner[c][triangle % WIDTH]) % WIDTH].into();
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S> {
+        let points = sight.project(s, &self.vertex);
+        [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
+    }
+}
+
+impl Block for RawLeaf {
+    #[inline(always)]
+    fn first(&self) -> u32 {
+        self.first
+    }
+    #[inline(always)]
+    fn triangles(&self) -> u32 {
+        self.triangles
+    }
+    #[inline(always)]
+    fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|axes| axes.map(|row| row[triangle]))
+    }
+    #[inline(always)]
+    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {
+        let mut out = [[0.0; 3]; 3];
+        for k in 0..3 {
+            for c in 0..3 {
+                out[c][k] = self.corner[c][axis[k] as usize][triangle % WIDTH].into();
+            }
+        }
+        out
+    }
+    #[inline(always)]
+    fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S> {
+        [
+            sight.project(s, &self.corner[0]),
+            sight.project(s, &self.corner[1]),
+            sight.project(s, &self.corner[2]),
+        ]
+    }
+}
+
+impl Sight {
+    pub(crate) fn new(ray: &Ray, line: &Line, slabs: &Slabs, object: &Object) -> Sight {
+        let reach = line.reach_of_box(object.lower, object.upper);
+        let [first, last] = slabs.certain_range(ray);
+        let forward = 1f32.copysign(line.direction[line.axis[2]] as f32);
+        Sight {
+            axis: line.axis.map(|k| k as u32),
+            floor: if reach < FARTHEST { f32::MIN_POSITIVE } else { f32::INFINITY },
+            origin: [ray.origin[line.axis[0]], ray.origin[line.axis[1]]],
+            shear: line.shear.map(|s| s as f32 * forward),
+            forward,
+            start: -forward * ray.origin[line.axis[2]],
+            first,
+            last,
+            reserved: [0; 4],
+        }
+    }
+
+    /// Projects points given as rows of x, y and z.
+    #[inline(always)]
+    fn project<S: Simd>(&self, s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
+        let depth = s.fma(s.load(&rows[self.axis[2] as usize]), s.splat(self.forward), s.splat(self.start));
+        let x = s.sub(s.load(&rows[self.axis[0] as usize]), s.splat(self.origin[0]));
+        let y = s.sub(s.load(&rows[self.axis[1] as usize]), s.splat(self.origin[1]));
+        [s.fnma(s.splat(self.shear[0]), depth, x), s.fnma(s.splat(self.shear[1]), depth, y), depth]
+    }
+
+    /// The triangles of a leaf that may be hit between the start of the ray's range and a depth.
+    #[inline(always)]
+    pub(crate) fn candidates<S: Simd, B: Block>(
+        &self,
+        s: S,
+        block: &B,
+        first: f32,
+        limit: f32,
+    ) -> Candidates {
+        let [a, b, c] = block.project(s, self);
+        let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
+        let size = s.max(s.max(size(s, a), size(s, b)), size(s, c));
+        let shallow = s.min(s.min(a[2], b[2]), c[2]);
+        let deep = s.max(s.max(a[2], b[2]), c[2]);
+        let greatest_depth = s.max(s.abs(shallow), s.abs(deep));
+        let reach = s.add(size, greatest_depth);
+        const DELTA: f32 = PROJECTION_ERROR as f32;
+        // A little more than 4δ(M + δ), for the roundings of δ itself.
+        let error = s.fma(
+            s.mul(reach, s.splat(4.001 * DELTA)),
+            s.fma(reach, s.splat(DELTA), size),
+            s.splat(self.floor),
+        );
+        let minus_error = s.sub(s.splat(0.0), error);
+        let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+        let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+        // By what is certain, so that NaN stays a candidate.
+        let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
+        let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
+
+        let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
+        let moment = s.fma(weight[2], c[2], s.fma(weight[1], b[2], s.mul(weight[0], a[2])));
+        let inverse = s.div(s.splat(1.0), sum);
+        let range = s.sub(deep, shallow);
+        // Where |sum| <= 6e this exceeds the range, and is cut to it.
+        let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
+        let shift = s.min(shift, range);
+        let depth = s.mul(moment, inverse);
+        let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+        let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
+        let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
+        let out = s.or(s.lt(farthest, s.splat(first)), s.lt(s.splat(limit), nearest));
+        let valid = (1 << block.triangles().min(WIDTH as u32)) - 1;
+        let maybe = valid & !s.mask_bits(s.or(out, missed));
+        let in_range = s.and(s.le(s.splat(self.first), nearest), s.le(farthest, s.splat(self.last)));
+        Candidates { maybe, sure: maybe & s.mask_bits(s.and(certain, in_range)) }
+    }
+}

@@ -1,0 +1,122 @@
+//! Stacks of children that wait to be entered, for many rays in one piece of memory.
+#![allow(unsafe_code)] // Places are checked when they are made, once a step, and not again when they are used.
+
+use crate::layout::WIDTH;
+use crate::limits::MAX_DEPTH;
+use crate::object::ObjectView;
+use crate::simd::{LANES, Simd};
+
+/// The code at the bottom of a stack: of no child, like `NONE`, but its line can be prefetched (an address that is not
+/// mapped costs a walk through the page tables).
+pub(crate) const BOTTOM: u32 = 7 << 29;
+
+/// Memory for stacks, kept from one batch to the next. An entry is a child code, and a lower bound of the t at which
+/// the ray enters it. At the bottom of each stack lies [`BOTTOM`], which is never dropped.
+///
+/// Places are counted through all stacks. A file that is deeper than it says, which only unchecked files are, makes
+/// a stack run into the next: rays go astray then, or tracing panics, but nothing is read or written outside.
+#[derive(Debug, Default)]
+pub(crate) struct Stacks {
+    codes: Vec<u32>,
+    keys: Vec<f32>,
+    /// Entries of one stack.
+    size: usize,
+}
+
+/// A place in the stacks: at least [`LANES`] entries before the end of both vectors of the [`Stacks`] that made it. They
+/// never become shorter, and a place is used with its own stacks only, within one batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Place(usize);
+
+impl Place {
+    /// A place that is not in use yet: the first of all.
+    pub(crate) const NOWHERE: Place = Place(0);
+
+    /// The place below, or the first of all.
+    #[inline(always)]
+    pub(crate) fn below(self) -> Place {
+        Place(self.0.saturating_sub(1))
+    }
+}
+
+impl Stacks {
+    /// Makes room for this many stacks, at least one, for rays through an object.
+    pub(crate) fn reserve(&mut self, object: &ObjectView<'_>, count: usize) {
+        let depth = (object.header.depth as usize).min(MAX_DEPTH);
+        // At every level all children but the one entered wait; whole vectors are written at the top. An odd
+        // number of cache lines keeps the tops of the stacks out of each other's cache sets.
+        let entries = 2 + depth * (WIDTH - 1) + LANES;
+        self.size = (entries.div_ceil(LANES) | 1) * LANES;
+        let total = self.size * count.max(1);
+        if self.codes.len() < total {
+            self.codes.resize(total, BOTTOM);
+            self.keys.resize(total, 0.0);
+        }
+    }
+
+    /// Checks a place.
+    #[inline(always)]
+    fn place(&self, at: usize) -> Place {
+        // Both vectors have this length, and `reserve` made it at least LANES.
+        assert!(at <= self.codes.len() - LANES, "the BVH is deeper than its header says");
+        Place(at)
+    }
+
+    /// The bottom of a stack.
+    #[inline(always)]
+    pub(crate) fn bottom(&self, stack: usize) -> Place {
+        self.place(stack * self.size)
+    }
+
+    /// Empties a stack and puts the root on it; returns the top.
+    #[inline(always)]
+    pub(crate) fn start(&mut self, stack: usize, root: u32) -> Place {
+        let bottom = stack * self.size;
+        self.codes[bottom] = BOTTOM;
+        self.codes[bottom + 1] = root;
+        self.keys[bottom + 1] = f32::NEG_INFINITY;
+        self.place(bottom + 1)
+    }
+
+    /// The code at a place.
+    #[inline(always)]
+    pub(crate) fn code(&self, at: Place) -> u32 {
+        debug_assert!(at.0 < self.codes.len());
+        // SAFETY: a place lies before the end of `codes`.
+        unsafe { *self.codes.get_unchecked(at.0) }
+    }
+
+    /// Puts another code in the place of the one there.
+    #[inline(always)]
+    pub(crate) fn set_code(&mut self, at: Place, code: u32) {
+        self.codes[at.0] = code;
+    }
+
+    /// Room for the children of a node from the top on, which they replace.
+    #[inline(always)]
+    pub(crate) fn room(&mut self, top: Place) -> (&mut [u32; LANES], &mut [f32; LANES]) {
+        debug_assert!(top.0 + LANES <= self.codes.len() && top.0 + LANES <= self.keys.len());
+        // SAFETY: a place has LANES entries from it on in both vectors, which are borrowed mutably together.
+        unsafe {
+            (
+                &mut *self.codes.as_mut_ptr().add(top.0).cast::<[u32; LANES]>(),
+                &mut *self.keys.as_mut_ptr().add(top.0).cast::<[f32; LANES]>(),
+            )
+        }
+    }
+
+    /// The top after `count` entries were written in place of it.
+    #[inline(always)]
+    pub(crate) fn replaced(&self, top: Place, count: usize) -> Place {
+        self.place((top.0 + count).wrapping_sub(1))
+    }
+
+    /// Drops all entries of a stack whose key exceeds the limit; returns the top.
+    #[inline(always)]
+    pub(crate) fn keep_up_to<S: Simd>(&mut self, s: S, stack: usize, top: Place, limit: f32) -> Place {
+        let bottom = stack * self.size;
+        let range = bottom + 1..top.0.max(bottom) + 1;
+        let kept = s.keep_up_to(&mut self.codes[range.clone()], &mut self.keys[range], limit);
+        self.place(bottom + kept)
+    }
+}

@@ -1,0 +1,73 @@
+//! `bthc import`: a scene manifest from a glTF file.
+
+use super::scene::{folder, is_gltf};
+use crate::args::Import;
+use crate::failure::Failure;
+use crate::output;
+use crate::progress::Progress;
+use crate::table::{Table, count};
+use bth_compile::scene::{self, ImportReport};
+use bth_compile::write;
+use serde_json::json;
+use std::path::{Component, Path};
+
+pub(crate) fn run(args: &Import) -> Result<(), Failure> {
+    if !is_gltf(&args.model) {
+        let message = format!("{} is no glTF or GLB file", args.model.display());
+        return Err(Failure::Usage { message, hint: "manifests of other models are written by hand" });
+    }
+    let path = args.output.clone().unwrap_or_else(|| args.model.with_extension("manifest"));
+    let name = name_from(folder(&path), &args.model)?;
+    let progress = Progress::new(args.quiet || args.json);
+    let (manifest, report) = scene::import(&args.model, &name, &args.gltf.options(), &progress)?;
+    let text = format!("# From {name}, scene {}.\n{}", comment(&report.scene), manifest.to_toml());
+    write::write_atomically(&path, text.as_bytes())?;
+    drop(progress);
+    if args.json {
+        output::json(&json!({"output": path.to_string_lossy(), "import": report}))?;
+    } else if !args.quiet {
+        output::text(&summary(&path, &report))?;
+    }
+    Ok(())
+}
+
+/// A text without what would end a comment.
+fn comment(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// The path of a model as it stands in a manifest of a folder.
+fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
+    let usage = |message: String| Failure::Usage {
+        message,
+        hint: "write the manifest beside the glTF file or in a folder above it",
+    };
+    let real = |path: &Path| std::fs::canonicalize(path).map_err(|e| Failure::file("BTH-O001", path, &e));
+    let (folder, model) = (real(folder)?, real(model)?);
+    let Ok(inside) = model.strip_prefix(&folder) else {
+        return Err(usage(format!("{} does not lie below {}", model.display(), folder.display())));
+    };
+    let parts: Option<Vec<&str>> = inside
+        .components()
+        .map(|c| match c {
+            Component::Normal(part) => part.to_str().filter(|p| !p.contains(['\\', ':'])),
+            _ => None,
+        })
+        .collect();
+    parts
+        .map(|parts| parts.join("/"))
+        .ok_or_else(|| usage(format!("{} has no portable name", model.display())))
+}
+
+fn summary(path: &Path, report: &ImportReport) -> String {
+    let mut table = Table::default();
+    table.row(["scene", &report.scene]);
+    table.row(["nodes", &count(report.nodes)]);
+    table.row(["instances", &count(report.instances)]);
+    table.row(["objects", &count(report.objects)]);
+    table.row(["animations", &report.animations.join(", ")]);
+    table.row(["tracks", &count(report.tracks)]);
+    table.row(["cameras", &count(report.cameras)]);
+    table.row(["lights", &count(report.lights)]);
+    format!("{}\nwrote {}\n", table.render(), path.display())
+}

@@ -145,6 +145,8 @@ impl World {
 struct Batch {
     visits: Vec<(Visit, f32)>,
     rays: Vec<Ray>,
+    /// The triangles that they start on, or `NONE`.
+    from: Vec<u32>,
     hits: Vec<Hit>,
     found: Vec<bool>,
 }
@@ -153,10 +155,12 @@ impl Batch {
     fn clear(&mut self) {
         self.visits.clear();
         self.rays.clear();
+        self.from.clear();
     }
-    fn push(&mut self, visit: Visit, ray: ObjectRay) {
+    fn push(&mut self, visit: Visit, ray: ObjectRay, from: u32) {
         self.visits.push((visit, ray.t_scale));
         self.rays.push(ray.ray);
+        self.from.push(from);
     }
 }
 
@@ -192,20 +196,12 @@ impl Query for Nearest<'_> {
         for &visit in visits {
             let i = visit.ray as usize;
             let object_ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
-            // Only in tetrahedra is a start of use.
-            let from = round.hint(i, visit.instance);
-            if from == NONE || object.triangle_homes.is_empty() {
-                self.batch.push(visit, object_ray);
-                continue;
-            }
-            let hit = trace::nearest(object, &object_ray.ray, from, visit.instance, self.scratch);
-            self.hits[i] =
-                better(&round.rays[i], &self.hits[i], &hit, object_ray.t_scale).unwrap_or(self.hits[i]);
+            self.batch.push(visit, object_ray, round.hint(i, visit.instance));
         }
-        let Batch { visits, rays, hits, .. } = &mut self.batch;
+        let Batch { visits, rays, from, hits, .. } = &mut self.batch;
         hits.clear();
         hits.resize(rays.len(), Hit::MISS);
-        trace::nearest_batch(object, rays, 0, self.scratch, hits);
+        trace::nearest_batch(object, rays, Some(from), 0, self.scratch, hits);
         for (&(visit, scale), hit) in visits.iter().zip(hits) {
             hit.surface.instance = visit.instance;
             let (i, hit) = (visit.ray as usize, *hit);
@@ -230,17 +226,12 @@ impl Query for Any<'_> {
         for &visit in visits {
             let i = visit.ray as usize;
             let object_ray = round.object_ray(visit, self.rays[i].tmax);
-            let from = round.hint(i, visit.instance);
-            if from == NONE || object.triangle_homes.is_empty() {
-                self.batch.push(visit, object_ray);
-            } else {
-                self.found[i] |= trace::any(object, &object_ray.ray, from, self.scratch);
-            }
+            self.batch.push(visit, object_ray, round.hint(i, visit.instance));
         }
-        let Batch { visits, rays, found, .. } = &mut self.batch;
+        let Batch { visits, rays, from, found, .. } = &mut self.batch;
         found.clear();
         found.resize(rays.len(), false);
-        trace::any_batch(object, rays, self.scratch, found);
+        trace::any_batch(object, rays, Some(from), self.scratch, found);
         for ((visit, _), found) in visits.iter().zip(found) {
             self.found[visit.ray as usize] |= *found;
         }

@@ -64,7 +64,7 @@ fn trace<Q: Query>(
     if object.header.root == NONE {
         return;
     }
-    let from = from.filter(|_| !object.tet_leaves.is_empty());
+    let from = from.filter(|from| !object.tet_leaves.is_empty() && from.iter().any(|&face| face != NONE));
     if from.is_some() || whole(object) != NONE {
         for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
             let from = from.map(|from| &from[part * PART..][..rays.len()]);

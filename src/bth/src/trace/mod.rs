@@ -1,4 +1,6 @@
 //! Tracing rays through one object: BVH walk, tet walk, and what both share.
+// Closures and iterators over lanes are compiled without the instructions that these need.
+#![allow(clippy::needless_range_loop)]
 
 mod batch;
 mod bvh_batch;

@@ -1,6 +1,6 @@
 //! Which rays of a batch go in packets.
 
-use super::coherence::{Guard, Span};
+use super::coherence::{Guard, Span, is_same_octant};
 use super::packet::{Entry, PACKET, Packets, Use};
 use super::packet_hull::{Beam, SegmentBox};
 use super::prepare::Frame;
@@ -122,12 +122,16 @@ fn choose<S: Simd, Q: Query>(
     if rays.len() < FEWEST {
         return None;
     }
-    let try_coherent = coherent.is_open();
+    let try_coherent = coherent.is_open() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
+    let try_short = Q::ANY && short.is_some_and(|guard| guard.is_open());
+    if !try_coherent && !try_short {
+        return None;
+    }
     let span = Span::of(s, rays);
     if try_coherent && span.is_coherent() {
         return Some(Run::Coherent(span));
     }
-    if Q::ANY && short.is_some_and(|guard| guard.is_open()) {
+    if try_short {
         return span.segments(s, frame, rays).map(Run::Short);
     }
     None

@@ -6,11 +6,13 @@ mod query;
 mod records;
 mod slabs;
 mod tet_batch;
+mod tet_decide;
 mod tet_flood;
 mod tet_hinted;
 mod tet_lanes;
 mod tet_locate;
 mod tet_queue;
+mod tet_rounds;
 mod tet_walk;
 
 pub use query::Steps;

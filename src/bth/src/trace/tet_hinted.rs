@@ -26,8 +26,10 @@ pub(crate) fn nearest_hinted(
 ) {
     let parts = rays.chunks(PART).zip(from.chunks(PART)).zip(hits.chunks_mut(PART));
     for ((rays, from), hits) in parts {
+        // Not `min`, which would take NaN for no limit.
+        let tmax = |ray: &Ray, hit: &Hit| if hit.t < ray.tmax { hit.t } else { ray.tmax };
         let shortened: Vec<Ray> =
-            rays.iter().zip(&*hits).map(|(ray, hit)| Ray { tmax: ray.tmax.min(hit.t), ..*ray }).collect();
+            rays.iter().zip(&*hits).map(|(ray, hit)| Ray { tmax: tmax(ray, hit), ..*ray }).collect();
         let mut queries: Vec<Nearest> = shortened.iter().map(Nearest::new).collect();
         trace(object, &shortened, from, &mut queries, scratch);
         for (query, best) in queries.iter().zip(hits) {
@@ -95,7 +97,9 @@ fn trace_with_records<R: LaneRecord, Q: Query + Copy>(
     let faces: Vec<u32> = from.iter().map(home).collect();
     let whole = whole(object);
     let nothing_to_walk = whole == NONE && faces.iter().all(|&face| face == NONE);
-    if !Batch::<R, Q>::fits(object, records) || nothing_to_walk {
+    let isa = Isa::chosen();
+    // Lanes of plain code would take half as long again as the walk of one ray.
+    if isa == Isa::Scalar || nothing_to_walk || !Batch::<R, Q>::fits(object, records) {
         for ((ray, &from), query) in rays.iter().zip(from).zip(queries) {
             trace_with(object, records, ray, from, scratch, query, &mut ());
         }
@@ -103,7 +107,7 @@ fn trace_with_records<R: LaneRecord, Q: Query + Copy>(
     }
     let mut walks = vec![Walk::Not; rays.len()];
     let leaves = vec![whole; rays.len()];
-    Isa::chosen().run(&mut Batch::new(object, records, rays, &faces, &leaves, queries, &mut walks));
+    isa.run(&mut Batch::new(object, records, rays, &faces, &leaves, queries, &mut walks));
     let root = Child::from_code(object.header.root);
     let only = whole != NONE || (matches!(root, Some(Child::Tets(_))) && object.tet_leaves.len() == 1);
     for (((ray, &face), query), &walk) in rays.iter().zip(&faces).zip(queries).zip(&walks) {

@@ -25,10 +25,12 @@ mod single;
 mod slabs;
 mod stack;
 mod tet_batch;
+mod tet_decide;
 mod tet_flood;
 mod tet_lanes;
 mod tet_locate;
 mod tet_queue;
+mod tet_rounds;
 mod tet_walk;
 mod tets;
 

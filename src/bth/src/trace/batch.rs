@@ -6,11 +6,11 @@ use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
 use super::packets::{self, LeastUse};
 use super::query::{Any, Nearest, Query};
-use super::records::LaneRecord;
+use super::records::LaneRecords;
 use super::tet_batch::{self, Walk};
 use super::tets::{enter_tets, leaf_of_face};
 use crate::layout::{Child, NONE};
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 
@@ -115,13 +115,7 @@ fn trace_hinted<Q: Query>(
     }
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
     let mut walks = vec![Walk::Not; rays.len()];
-    match object.records {
-        Records::None => {}
-        Records::Link32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet20(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet16(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-    }
+    walk_tets(object, rays, &faces, &mut queries, &mut walks);
     let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
     let mut walked = vec![NONE; rays.len()];
     order.retain(|&ray| {
@@ -140,9 +134,8 @@ fn trace_hinted<Q: Query>(
     }
 }
 
-fn walk_tets<R: LaneRecord, Q: Query>(
+fn walk_tets<Q: Query>(
     object: &ObjectView<'_>,
-    records: &[R],
     rays: &[Ray],
     faces: &[u32],
     queries: &mut [Q],
@@ -150,7 +143,8 @@ fn walk_tets<R: LaneRecord, Q: Query>(
 ) {
     let whole = whole(object);
     let any = whole != NONE || faces.iter().any(|&face| face != NONE);
-    if any && tet_batch::Batch::<R, Q>::fits(object, records) {
+    let records = LaneRecords::new(object.records).filter(|_| any && tet_batch::Batch::<Q>::fits(object));
+    if let Some(records) = records {
         let leaves = vec![whole; rays.len()];
         let mut batch = tet_batch::Batch::new(object, records, rays, faces, &leaves, queries, walks);
         // Without vectors the BVH is faster, and a hint of no use to it.

@@ -4,7 +4,7 @@
 
 use super::line::Line;
 use super::query::Query;
-use super::records::{Entered, LaneRecord};
+use super::records::{Entered, LaneRecords};
 use super::tet_lanes::{three, word};
 use super::tet_queue::{Queue, Ready};
 use super::tet_walk::{Outcome, Place};
@@ -45,9 +45,9 @@ pub(super) struct Reached {
 }
 
 /// The batch: rays, where they begin, and what is known of them.
-pub(crate) struct Batch<'a, R, Q> {
+pub(crate) struct Batch<'a, Q> {
     pub(super) object: &'a ObjectView<'a>,
-    pub(super) records: &'a [R],
+    pub(super) records: LaneRecords<'a>,
     pub(super) rays: &'a [Ray],
     /// For each ray the constrained face that it starts about, or [`NONE`].
     pub(super) faces: &'a [u32],
@@ -61,11 +61,11 @@ pub(crate) struct Batch<'a, R, Q> {
     pub(super) returns: Vec<u8>,
 }
 
-impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
+impl<'a, Q: Query + Copy> Batch<'a, Q> {
     /// None of the rays has been walked yet. All slices have one element a ray.
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
-        records: &'a [R],
+        records: LaneRecords<'a>,
         rays: &'a [Ray],
         faces: &'a [u32],
         leaves: &'a [u32],
@@ -89,9 +89,11 @@ impl<'a, R: LaneRecord, Q: Query + Copy> Batch<'a, R, Q> {
     }
 
     /// Whether lanes can address all parts of an object: their words by less than 2^31.
-    pub(crate) fn fits(object: &ObjectView<'_>, records: &[R]) -> bool {
+    pub(crate) fn fits(object: &ObjectView<'_>) -> bool {
         const MOST: usize = 1 << 31;
-        records.len() < MOST / 8 && object.tet_vertices.len() < MOST / 4 && object.tet_faces.len() < MOST / 8
+        object.records.len() < MOST / 8
+            && object.tet_vertices.len() < MOST / 4
+            && object.tet_faces.len() < MOST / 8
     }
 
     /// Gets sixteen rays ready, if there are as many.

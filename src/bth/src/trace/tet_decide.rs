@@ -6,7 +6,7 @@
 
 use super::line::Line;
 use super::query::Query;
-use super::records::{Entered, LaneRecord};
+use super::records::Entered;
 use super::tet_batch::{Batch, Reached, Start, Walk};
 use super::tet_lanes::DOUBT;
 use super::tet_walk::{Outcome, Place, TetSpace};
@@ -18,18 +18,18 @@ const MOST_RETURNS: u8 = 16;
 /// Depths and bounds of t are compared with this much to spare.
 const SPARE: f64 = 1.0 / (1 << 20) as f64;
 
-impl<R: LaneRecord, Q: Query + Copy> Batch<'_, R, Q> {
+impl<Q: Query + Copy> Batch<'_, Q> {
     pub(super) fn line(&self, slot: u32) -> Line {
         Line::new(&self.rays[slot as usize]).expect("a ray that was set up for lanes has a line")
     }
 
-    pub(super) fn space<'b>(&'b self, slot: u32, line: &'b Line) -> TetSpace<'b, R> {
+    pub(super) fn space<'b>(&'b self, slot: u32, line: &'b Line) -> TetSpace<'b> {
         let leaf = match (self.object.tet_leaves, self.leaves[slot as usize]) {
             ([_], _) => 0,
             (_, NONE) => leaf_of_face(self.object, self.faces[slot as usize]),
             (_, leaf) => leaf,
         };
-        space(self.object, self.records, leaf, line)
+        space(self.object, leaf, line)
     }
 
     pub(super) fn finish(&mut self, slot: u32, outcome: Outcome) {
@@ -75,7 +75,7 @@ impl<R: LaneRecord, Q: Query + Copy> Batch<'_, R, Q> {
         let line = self.line(slot);
         let space = self.space(slot, &line);
         let mut entered = start.entered;
-        entered.apex = self.records[start.tet as usize].apex(entered.face, entered.apex);
+        entered.apex = self.object.records.apex(start.tet, entered.face, entered.apex);
         let mut place = Place { tet: start.tet, entered, corner: entered.face.map(|v| space.project(v)) };
         let Some(link) = space.exit(&mut place) else { return self.flood(slot) };
         if link.next != NONE && link.next & FACE_BIT != 0 {

@@ -14,7 +14,7 @@
 //! The two signs that name the exit of the line are all that a step needs: the face left behind was crossed with certain
 //! signs, so those of the face ahead are certain too.
 
-use super::records::{EnteredLanes, LaneRecord};
+use super::records::{EnteredLanes, LaneRecords};
 use crate::layout::{FACE_BIT, NONE};
 use crate::simd::Simd;
 
@@ -208,16 +208,16 @@ impl<S: Simd> Lanes<S> {
 
     /// First part of a step, which takes every active walk one tetrahedron on: fetches the fourth vertex.
     #[inline(always)]
-    pub(super) fn fetch<R: LaneRecord>(
+    pub(super) fn fetch(
         &self,
         s: S,
         one: S::U,
         step: &mut Step<S>,
-        words: &[R::Word],
+        records: &LaneRecords<'_>,
         vertices: &[[f32; 4]],
     ) {
         let active = self.active(s);
-        step.apex = R::apex_lanes(s, words, active, &self.entered(one));
+        step.apex = records.apex(s, active, &self.entered(one));
         step.position = self.gather(s, active, vertices, step.apex);
     }
 
@@ -259,22 +259,22 @@ impl<S: Simd> Lanes<S> {
     /// pass their limit stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
     /// it was.
     #[inline(always)]
-    pub(super) fn follow<R: LaneRecord, const DEPTHS: bool>(
+    pub(super) fn follow<const DEPTHS: bool>(
         &mut self,
         s: S,
         one: S::U,
         step: &Step<S>,
-        words: &[R::Word],
+        records: &LaneRecords<'_>,
     ) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
         let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
-        let (mut next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
+        let (mut next, opposite) = records.link(s, step.go, &at, step.left);
         if DEPTHS {
             let f = &self.floats;
             let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
             next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
         }
-        if R::KNOWS_BEHIND {
+        if records.knows_behind() {
             self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
         }
         let next = s.select_u(step.go, next, s.or_u(tet, s.splat_u(DOUBT)));

@@ -4,7 +4,7 @@
 //! are filled from the queue.
 
 use super::query::Query;
-use super::records::{Entered, LaneRecord};
+use super::records::Entered;
 use super::tet_batch::{Batch, Start, vertices};
 use super::tet_lanes::{Lanes, Step, float, word};
 use super::tet_queue::Queue;
@@ -31,7 +31,7 @@ struct Clock {
     more: bool,
 }
 
-impl<R: LaneRecord, Q: Query + Copy> Batch<'_, R, Q> {
+impl<Q: Query + Copy> Batch<'_, Q> {
     #[inline(always)]
     fn refill<S: Simd>(&mut self, s: S, queue: &mut Queue, group: &mut Group<S>, clock: &mut Clock) {
         let active = s.mask_bits(group.lanes.active(s));
@@ -105,19 +105,19 @@ impl<R: LaneRecord, Q: Query + Copy> Batch<'_, R, Q> {
     }
 }
 
-impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
+impl<Q: Query + Copy> Kernel for &mut Batch<'_, Q> {
     type Output = ();
 
     /// Walks all rays.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let words = R::words(self.records);
+        let records = self.records;
         let vertices = vertices(self.object);
         let mut queue = Queue::new();
         let idle = Group { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
         let (mut a, mut b, mut c) = (idle, idle, idle);
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
-        let most = self.records.len();
+        let most = self.object.records.len();
         let mut clock = Clock { round: 0, more: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));
@@ -128,13 +128,13 @@ impl<R: LaneRecord, Q: Query + Copy> Kernel for &mut Batch<'_, R, Q> {
             if a.held | b.held | c.held == 0 {
                 return;
             }
-            a.lanes.fetch::<R>(s, one, &mut a.step, words, vertices);
-            b.lanes.fetch::<R>(s, one, &mut b.step, words, vertices);
-            c.lanes.fetch::<R>(s, one, &mut c.step, words, vertices);
+            a.lanes.fetch(s, one, &mut a.step, &records, vertices);
+            b.lanes.fetch(s, one, &mut b.step, &records, vertices);
+            c.lanes.fetch(s, one, &mut c.step, &records, vertices);
             macro_rules! onward {
                 ($depths:literal $($group:ident)*) => {
                     $($group.lanes.choose::<$depths>(s, &mut $group.step);)*
-                    $($group.lanes.follow::<R, $depths>(s, one, &$group.step, words);)*
+                    $($group.lanes.follow::<$depths>(s, one, &$group.step, &records);)*
                 };
             }
             if Q::KEEPS_DEPTHS {

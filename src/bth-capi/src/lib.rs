@@ -156,7 +156,7 @@ pub unsafe extern "C" fn bth_any(
     // SAFETY: not null, `count` bytes by contract.
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
     // `bool` has invalid bit patterns, so the caller's memory is not passed on as one.
-    const PART: usize = 256;
+    const PART: usize = 1024;
     let mut part = [false; PART];
     for (i, (rays, hit)) in rays.chunks(PART).zip(hit.chunks_mut(PART)).enumerate() {
         let from = from.map(|f| &f[i * PART..i * PART + rays.len()]);

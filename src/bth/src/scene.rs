@@ -104,6 +104,10 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
+    fn view(&self, object: u32) -> &ObjectView<'_> {
+        self.file.view(object).expect("an object below object_count, checked when opened")
+    }
+
     /// Bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
         self.file.resident_bytes()
@@ -125,7 +129,7 @@ impl Scene {
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
             let (hit, more) =
-                trace::nearest_counted(&self.object(instance), &ray, hint(from, instance), instance);
+                trace::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
             steps += more;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
@@ -152,15 +156,17 @@ impl Scene {
         }
         hits.fill(Hit::MISS);
         trace::with_scratch(|scratch| {
-            if from.is_none() && self.object_count() == 1 {
-                return trace::nearest_batch(&self.object(0), rays, 0, scratch, hits);
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::nearest_batch(object, rays, from.as_deref(), 0, scratch, hits);
             }
             for instance in 0..self.object_count() {
-                let object = self.object(instance);
+                let object = self.view(instance);
                 for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
                     let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
                     let hit =
-                        trace::nearest(&object, &ray, hint(surface(from, i), instance), instance, scratch);
+                        trace::nearest(object, &ray, hint(surface(from, i), instance), instance, scratch);
                     if hit.t < best.t {
                         *best = hit;
                     }
@@ -180,13 +186,15 @@ impl Scene {
         }
         found.fill(false);
         trace::with_scratch(|scratch| {
-            if from.is_none() && self.object_count() == 1 {
-                return trace::any_batch(&self.object(0), rays, scratch, found);
+            if self.object_count() == 1 && rays.len() >= trace::FEW {
+                let object = self.view(0);
+                let from = hints(object, from);
+                return trace::any_batch(object, rays, from.as_deref(), scratch, found);
             }
             for instance in 0..self.object_count() {
-                let object = self.object(instance);
+                let object = self.view(instance);
                 for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                    *found = *found || trace::any(&object, ray, hint(surface(from, i), instance), scratch);
+                    *found = *found || trace::any(object, ray, hint(surface(from, i), instance), scratch);
                 }
             }
         });
@@ -200,6 +208,11 @@ fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
 
 fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
     from.map_or(Surface::NONE, |f| f[ray])
+}
+
+/// The triangles of the only object that rays start on, if that is of use.
+fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>) -> Option<Vec<u32>> {
+    from.filter(|_| !object.tet_leaves.is_empty()).map(|from| from.iter().map(|&f| hint(f, 0)).collect())
 }
 
 /// The triangle of an object that a ray starts on, or `NONE`.

@@ -56,6 +56,14 @@ impl Failure {
     pub(crate) fn file(code: &'static str, path: &Path, message: &dyn std::fmt::Display) -> Self {
         Self::Compile(bth_compile::Error::File { code, path: path.into(), message: message.to_string() })
     }
+    /// An instruction set that cannot be used, named on the command line or by the environment.
+    pub(crate) fn isa(error: &bth::IsaError, in_environment: bool) -> Self {
+        let hint = match in_environment {
+            true => "unset BTH_ISA, or see `bthc info --cpu`",
+            false => "leave --isa out, or see `bthc info --cpu`",
+        };
+        Self::Usage { message: error.to_string(), hint }
+    }
     /// A ray file that cannot be used.
     pub(crate) fn ray_file(path: &Path, byte: u64, message: String, hint: &str) -> Self {
         Self::Compile(bth_compile::Error::Input {

@@ -17,8 +17,17 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => return failure::usage(&error, wants_json),
     };
-    match commands::run(args.command) {
+    match choose_isa(args.isa).and_then(|()| commands::run(args.command)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(wants_json),
     }
+}
+
+/// What the kernels use: what the command line says, else the environment.
+fn choose_isa(wanted: Option<bth::Isa>) -> Result<(), failure::Failure> {
+    let chosen = match wanted {
+        Some(isa) => isa.choose(),
+        None => bth::Isa::from_environment().map(|_| ()),
+    };
+    chosen.map_err(|error| failure::Failure::isa(&error, wanted.is_none()))
 }

@@ -190,8 +190,7 @@ fn every_mode_shows_the_scene_whatever_the_number_of_threads() {
     let mut pictures = Vec::new();
     for mode in ["shaded", "normals", "ao", "steps", "path", "instances"] {
         let picture = |threads: &str| {
-            play(folder.path(), &["-o", "x.png", "--mode", mode, "--threads", threads])
-                .expect(0);
+            play(folder.path(), &["-o", "x.png", "--mode", mode, "--threads", threads]).expect(0);
             std::fs::read(folder.path().join("x.png")).unwrap()
         };
         let one = picture("1");

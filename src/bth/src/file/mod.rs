@@ -15,6 +15,7 @@ use crate::layout::*;
 use crate::object::{ObjectView, Records};
 use buffer::Buffer;
 use std::path::Path;
+use std::sync::OnceLock;
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
 /// An open file. The header and the section table hold what `format-spec/` demands of them.
@@ -23,6 +24,8 @@ pub struct File {
     buffer: Buffer,
     /// Per object and kind the row of the section table, or `NONE`.
     rows: Vec<[u32; OBJECT_KINDS]>,
+    /// Views of the objects that have been asked for. They borrow from `buffer`, not from `'static`: see [`File::view`].
+    views: Vec<OnceLock<ObjectView<'static>>>,
 }
 
 /// Kinds that belong to objects are below this.
@@ -78,7 +81,8 @@ impl File {
             return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));
         }
         let objects = table::check(buffer.bytes())?;
-        let mut file = Self { buffer, rows: vec![[NONE; OBJECT_KINDS]; objects as usize] };
+        let views = (0..objects).map(|_| OnceLock::new()).collect();
+        let mut file = Self { buffer, rows: vec![[NONE; OBJECT_KINDS]; objects as usize], views };
         let mut rows = std::mem::take(&mut file.rows);
         for (row, entry) in file.table().iter().enumerate() {
             let object = rows.get_mut(entry.object as usize);
@@ -155,6 +159,26 @@ impl File {
     /// `BTH-O003` when there is no such object, `BTH-F101` when its tetrahedron records are of another kind
     /// than it says.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
+        self.view(object).copied()
+    }
+
+    /// As [`Self::object`], made only once.
+    #[allow(unsafe_code)]
+    pub(crate) fn view(&self, object: u32) -> Result<&ObjectView<'_>> {
+        let cell = self.views.get(object as usize);
+        if let Some(view) = cell.and_then(OnceLock::get) {
+            return Ok(view);
+        }
+        let view = self.make_view(object)?;
+        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`: memory on the heap or mapped, which
+        // does not move when `self` does, is never written to or replaced, and lives until `self` is dropped. What
+        // this function returns borrows from `self`, and `views` is private, so no view outlives `self`; dropping one
+        // does nothing.
+        let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
+        Ok(self.views[object as usize].get_or_init(|| view))
+    }
+
+    fn make_view(&self, object: u32) -> Result<ObjectView<'_>> {
         if object >= self.object_count() {
             let expected = format!("an object below {}", self.object_count());
             return Err(Error::at(Code::NoSuchObject, 0, expected, object.to_string()));

@@ -6,6 +6,7 @@
 
 use super::{Kernel, LANES, Simd, scalar};
 use std::arch::x86_64::*;
+use std::sync::LazyLock;
 
 /// Proof that this machine has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -19,13 +20,15 @@ type M = [__m256i; 2];
 impl Avx2 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        let found = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        found.then_some(Avx2(()))
+        static FOUND: LazyLock<bool> = LazyLock::new(|| {
+            is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt")
+        });
+        FOUND.then_some(Avx2(()))
     }
 
     /// Runs a kernel compiled for these features.
@@ -101,6 +104,35 @@ fn assert_within(simd: Avx2, m: M, at: U, len: usize) {
     assert!(simd.mask_bits(outside) == 0, "an index of a gather lies outside");
 }
 
+/// For each lane of eight whose bit is set, how many set bits lie below it: where its element is in a packed row.
+///
+/// # Safety
+/// The machine must have the features of [`Avx2`].
+#[inline(always)]
+unsafe fn expansion(bits: u8) -> __m256i {
+    // SAFETY: see above; registers only.
+    unsafe {
+        // A byte a lane: ones where the bit is set.
+        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
+        let places = _pdep_u64(0x0706_0504_0302_0100, bytes);
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
+    }
+}
+
+/// Places of the lanes of eight whose bit is set, in order: the inverse of [`expansion`].
+///
+/// # Safety
+/// As [`expansion`].
+#[inline(always)]
+unsafe fn compression(bits: u8) -> __m256i {
+    // SAFETY: see above; registers only.
+    unsafe {
+        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
+        let places = _pext_u64(0x0706_0504_0302_0100, bytes);
+        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
+    }
+}
+
 impl Simd for Avx2 {
     type F = F;
     type U = U;
@@ -120,7 +152,7 @@ impl Simd for Avx2 {
         le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
         select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));
         add_u(a: U, b: U) -> U = _mm256_add_epi32(a, b);
-        sub_u(a: U, b: U) -> U = _mm256_sub_epi32(a, b);
+        add_where(a: U, m: M, b: U) -> U = _mm256_add_epi32(a, _mm256_and_si256(m, b));
         and_u(a: U, b: U) -> U = _mm256_and_si256(a, b);
         or_u(a: U, b: U) -> U = _mm256_or_si256(a, b);
         xor_u(a: U, b: U) -> U = _mm256_xor_si256(a, b);
@@ -236,6 +268,22 @@ impl Simd for Avx2 {
         [half(0), half(1)]
     }
     #[inline(always)]
+    fn gather_rows(self, m: M, from: &[[f32; 4]], row: U, column: U) -> F {
+        assert_within(self, m, row, from.len().min(1 << 29));
+        let column = self.and_u(column, self.splat_u(3));
+        let at = self.or_u(self.shl_u::<2>(row), column);
+        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
+        let half = |i: usize| unsafe {
+            _mm256_mask_i32gather_ps::<4>(
+                _mm256_setzero_ps(),
+                from.as_ptr().cast(),
+                at[i],
+                _mm256_castsi256_ps(m[i]),
+            )
+        };
+        [half(0), half(1)]
+    }
+    #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
         assert_within(self, m, at, from.len());
         // SAFETY: as `gather`.
@@ -258,11 +306,17 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
-        let (mut out, _) = self.arrays(a, m);
-        for (next, lane) in scalar::lanes(self.mask_bits(m)).enumerate() {
-            out[lane] = from[next];
+        let bits = self.mask_bits(m);
+        let low = from.as_ptr();
+        // The high half goes on where the low one ends, after at most eight.
+        let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
+        // SAFETY: eight readable floats each; unaligned loads.
+        unsafe {
+            let (low, high) = (_mm256_loadu_ps(low), _mm256_loadu_ps(high));
+            let low = _mm256_permutevar8x32_ps(low, expansion(bits as u8));
+            let high = _mm256_permutevar8x32_ps(high, expansion((bits >> 8) as u8));
+            self.select(m, [low, high], a)
         }
-        self.load(&out)
     }
     #[inline(always)]
     fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
@@ -295,9 +349,24 @@ impl Simd for Avx2 {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
-        let mut lanes = [0; LANES];
-        self.store_u(a, &mut lanes);
-        scalar::compress(bits, &lanes, to)
+        let mut floats = [0.0; LANES];
+        let count = self.compress_f(bits, self.from_bits(a), &mut floats);
+        self.store_u(self.bits(self.load(&floats)), to);
+        count
+    }
+    #[inline(always)]
+    fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
+        let low = (bits as u8).count_ones() as usize;
+        // SAFETY: the first store fills to[..8]; the second begins after the lanes that count, at most eight.
+        unsafe {
+            let packed = [
+                _mm256_permutevar8x32_ps(a[0], compression(bits as u8)),
+                _mm256_permutevar8x32_ps(a[1], compression((bits >> 8) as u8)),
+            ];
+            _mm256_storeu_ps(to[..8].as_mut_ptr(), packed[0]);
+            _mm256_storeu_ps(to[low..][..8].as_mut_ptr(), packed[1]);
+        }
+        (bits & 0xffff).count_ones() as usize
     }
     #[inline(always)]
     fn compress_far_to_near(

@@ -6,6 +6,7 @@
 
 use super::{Kernel, LANES, Simd};
 use std::arch::x86_64::*;
+use std::sync::LazyLock;
 
 /// Proof that this machine has AVX-512 F, BW, CD, DQ and VL, AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Clone, Copy, Debug)]
@@ -14,18 +15,20 @@ pub(super) struct Avx512(());
 impl Avx512 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        let found = is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512cd")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl")
-            && is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("fma")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        found.then_some(Avx512(()))
+        static FOUND: LazyLock<bool> = LazyLock::new(|| {
+            is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512cd")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt")
+        });
+        FOUND.then_some(Avx512(()))
     }
 
     /// Runs a kernel compiled for these features.
@@ -156,7 +159,7 @@ impl Simd for Avx512 {
         least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
         splat_u(x: u32) -> __m512i = _mm512_set1_epi32(x as i32);
         add_u(a: __m512i, b: __m512i) -> __m512i = _mm512_add_epi32(a, b);
-        sub_u(a: __m512i, b: __m512i) -> __m512i = _mm512_sub_epi32(a, b);
+        add_where(a: __m512i, m: u16, b: __m512i) -> __m512i = _mm512_mask_add_epi32(a, m, a, b);
         and_u(a: __m512i, b: __m512i) -> __m512i = _mm512_and_si512(a, b);
         or_u(a: __m512i, b: __m512i) -> __m512i = _mm512_or_si512(a, b);
         xor_u(a: __m512i, b: __m512i) -> __m512i = _mm512_xor_si512(a, b);
@@ -208,6 +211,14 @@ impl Simd for Avx512 {
         assert_within(self, m, at, from.len());
         // SAFETY: only lanes of the mask are read, and those lie within the slice.
         unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr()) }
+    }
+    #[inline(always)]
+    fn gather_rows(self, m: u16, from: &[[f32; 4]], row: __m512i, column: __m512i) -> __m512 {
+        assert_within(self, m, row, from.len().min(1 << 29));
+        let column = self.and_u(column, self.splat_u(3));
+        let at = self.or_u(self.shl_u::<2>(row), column);
+        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
+        unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr().cast()) }
     }
     #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
@@ -269,6 +280,12 @@ impl Simd for Avx512 {
             // Compressing to a register and storing it whole is much faster than a compressing store.
             _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(bits as u16, a));
         }
+        (bits & 0xffff).count_ones() as usize
+    }
+    #[inline(always)]
+    fn compress_f(self, bits: u32, a: __m512, to: &mut [f32; LANES]) -> usize {
+        // SAFETY: as `compress`.
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), _mm512_maskz_compress_ps(bits as u16, a)) };
         (bits & 0xffff).count_ones() as usize
     }
     #[inline(always)]

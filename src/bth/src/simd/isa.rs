@@ -127,20 +127,30 @@ impl Isa {
     /// Runs a kernel with this instruction set, or with plain code if the machine lacks it.
     #[inline]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.run_wide(kernel) {
+            Ok(output) => output,
+            Err(kernel) => kernel.run(Scalar),
+        }
+    }
+
+    /// Runs a kernel with this instruction set unless that is plain code: gives it back then. For kernels that are no
+    /// gain without vectors, and a lot of code.
+    #[inline]
+    pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
         #[cfg(target_arch = "x86_64")]
         match self {
             Isa::Scalar => {}
             Isa::Avx2 => {
                 if let Some(simd) = super::avx2::Avx2::detect() {
-                    return simd.run(kernel);
+                    return Ok(simd.run(kernel));
                 }
             }
             Isa::Avx512 => {
                 if let Some(simd) = super::avx512::Avx512::detect() {
-                    return simd.run(kernel);
+                    return Ok(simd.run(kernel));
                 }
             }
         }
-        kernel.run(Scalar)
+        Err(kernel)
     }
 }

@@ -67,6 +67,8 @@ pub(crate) trait Simd: Copy {
     fn least(self, a: Self::F) -> f32;
     /// Elements of a slice, 0.0 where the mask is clear. Panics if a lane that is set lies outside.
     fn gather(self, m: Self::M, from: &[f32], at: Self::U) -> Self::F;
+    /// Elements of rows of four: `column[i] % 4` of row `row[i]`. Panics if a row of a lane that is set lies outside.
+    fn gather_rows(self, m: Self::M, from: &[[f32; 4]], row: Self::U, column: Self::U) -> Self::F;
     /// Where the mask is set, the next elements of `from` in order; else `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 
@@ -75,7 +77,8 @@ pub(crate) trait Simd: Copy {
     fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn sub_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// a + b where the mask is set, else `a`.
+    fn add_where(self, a: Self::U, m: Self::M, b: Self::U) -> Self::U;
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
@@ -105,6 +108,8 @@ pub(crate) trait Simd: Copy {
     /// Stores the lanes whose bit is set, in order, from `to[0]`; what follows them in `to` is undefined.
     /// Returns how many.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
+    /// As [`Self::compress`].
+    fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
     /// As [`Self::compress`], the greatest key first; keys are compared, and stored, but for their four lowest
     /// bits. Negative keys may come in any order.
     fn compress_far_to_near(

@@ -43,9 +43,8 @@ fn expand<T: Copy>(a: [T; LANES], bits: u32, from: &[T; LANES]) -> [T; LANES] {
     out
 }
 
-/// [`Simd::compress`] in plain code.
 #[inline(always)]
-pub(super) fn compress(bits: u32, a: &U, to: &mut U) -> usize {
+fn compress<T: Copy>(bits: u32, a: &[T; LANES], to: &mut [T; LANES]) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
         to[count % LANES] = a[lane];
@@ -172,6 +171,10 @@ impl Simd for Scalar {
         from_fn(|i| if set(m, i) { from[at[i] as usize] } else { 0.0 })
     }
     #[inline(always)]
+    fn gather_rows(self, m: u32, from: &[[f32; 4]], row: U, column: U) -> F {
+        from_fn(|i| if set(m, i) { from[row[i] as usize][column[i] as usize % 4] } else { 0.0 })
+    }
+    #[inline(always)]
     fn expand(self, a: F, m: u32, from: &F) -> F {
         expand(a, m, from)
     }
@@ -197,8 +200,8 @@ impl Simd for Scalar {
         from_fn(|i| a[i].wrapping_add(b[i]))
     }
     #[inline(always)]
-    fn sub_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i].wrapping_sub(b[i]))
+    fn add_where(self, a: U, m: u32, b: U) -> U {
+        from_fn(|i| if set(m, i) { a[i].wrapping_add(b[i]) } else { a[i] })
     }
     #[inline(always)]
     fn and_u(self, a: U, b: U) -> U {
@@ -281,6 +284,10 @@ impl Simd for Scalar {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut U) -> usize {
+        compress(bits, &a, to)
+    }
+    #[inline(always)]
+    fn compress_f(self, bits: u32, a: F, to: &mut F) -> usize {
         compress(bits, &a, to)
     }
     #[inline(always)]

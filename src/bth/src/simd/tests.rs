@@ -53,6 +53,9 @@ impl Kernel for Everything<'_> {
         let bytes: [u8; LANES] = self.u.map(|x| x as u8);
         let mut compressed = [0; LANES];
         let count = s.compress(self.bits, x, &mut compressed);
+        let mut compressed_f = [0.0; LANES];
+        assert_eq!(s.compress_f(self.bits, s.from_bits(x), &mut compressed_f), count);
+        assert_eq!(compressed_f.map(f32::to_bits)[..count], compressed[..count]);
         let ordered = self.a.map(|x| if x.is_nan() { 0.5 } else { x.abs() });
         let (mut codes, mut keys) = ([0; LANES], [0.0; LANES]);
         let sorted = s.compress_far_to_near(self.bits, s.load(&ordered), x, &mut codes, &mut keys);
@@ -88,10 +91,11 @@ impl Kernel for Everything<'_> {
             f(s.lookup(a, x)),
             vec![s.least(s.load(&ordered)).to_bits()],
             f(s.gather(mask, &table, index)),
+            f(s.gather_rows(mask, table.as_chunks().0, s.and_u(index, s.splat_u(7)), y)),
             f(s.expand(a, mask, self.b)),
             u(s.load_bytes(&bytes)),
             u(s.add_u(x, y)),
-            u(s.sub_u(x, y)),
+            u(s.add_where(x, mask, y)),
             u(s.and_u(x, y)),
             u(s.or_u(x, y)),
             u(s.xor_u(x, y)),

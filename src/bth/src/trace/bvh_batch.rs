@@ -77,6 +77,8 @@ pub(crate) struct Waiting<'a, Q> {
     pub(crate) order: Option<&'a [u32]>,
     /// Queries of all rays of the batch, if they have been asked elsewhere already.
     pub(crate) queries: Option<&'a [Q]>,
+    /// Per ray of the batch the tet leaf that it has walked already, or `NONE`.
+    pub(crate) walked: Option<&'a [u32]>,
 }
 
 /// A batch on its way.
@@ -158,13 +160,17 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                     Some(Child::Raw(line)) => {
                         slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
                     }
-                    Some(Child::Tets(row)) => enter_tets(self.object, row, ray, slot, self.stacks, &mut tets),
+                    Some(Child::Tets(row)) => {
+                        if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
+                            Found::Nothing
+                        } else {
+                            enter_tets(self.object, row, ray, slot, self.stacks, &mut tets)
+                        }
+                    }
                     _ => Found::Nothing,
                 };
                 let below = slot.top.below();
                 slot.top = match found {
-                    // Any-hit queries keep no keys, so nothing can be told of what waits.
-                    Found::Nearer if Q::ANY => below,
                     Found::Nothing => below,
                     Found::Again => slot.top,
                     Found::Nearer => self.stacks.keep_up_to(s, at, below, slot.flight.key_limit()),
@@ -211,10 +217,11 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
             if let Some(aim) = supply.prepared.aim(lane) {
                 slot.flight.launch(aim, query);
-            } else if let Some(flight) = Flight::new(self.object, ray, query) {
-                slot.flight = flight;
             } else {
-                continue;
+                *slot.flight.query() = query;
+                if !slot.flight.aim_at(self.object, &supply.frame, ray) {
+                    continue;
+                }
             }
             if self.waiting.queries.is_some() {
                 slot.flight.take_over();
@@ -269,8 +276,7 @@ fn enter_tets<Q: Query>(
         return Found::Again;
     }
     let done = tets(row, ray, slot.flight.query());
-    slot.flight.take_over();
-    if done { Found::Enough } else { Found::Nearer }
+    if done { Found::Enough } else { slot.flight.settled(Found::Nothing) }
 }
 
 /// Asks for the lines of a node or of an indexed leaf.

@@ -59,16 +59,13 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 }
                 count.leaf();
                 let outcome = tets(row, flight.query(), count);
-                flight.take_over();
-                if outcome == TetOutcome::Done { Found::Enough } else { Found::Nearer }
+                if outcome == TetOutcome::Done { Found::Enough } else { flight.settled(Found::Nothing) }
             }
             Some(Child::Tets(_)) | None => Found::Nothing,
         };
         top = top.below();
         match found {
             Found::Nothing | Found::Again => {}
-            // Any-hit queries keep no keys, so nothing can be told of what waits.
-            Found::Nearer if Q::ANY => {}
             Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
             Found::Enough => return,
         }

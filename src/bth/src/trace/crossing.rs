@@ -8,7 +8,7 @@ use super::line::{Line, PROJECTION_ERROR};
 use crate::expansion::Expansion;
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32.
-const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
+pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,10 +46,23 @@ fn ends([a, b, c]: [f64; 3]) -> (f64, f64) {
     (if c < least { c } else { least }, if c > greatest { c } else { greatest })
 }
 
-/// Decides in f64, or leaves it open. Coordinates are along the axes of the line's projection: two in its plane, and the
-/// one along the line. No operation is fused, so the bits are the same on every machine.
+/// What f64 makes of a line and a triangle, before anything is decided from it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Weighed {
+    pub(crate) weight: [f64; 3],
+    /// Of the error of each weight.
+    pub(crate) bound: f64,
+    /// The greatest difference of the corners' depths.
+    pub(crate) range: f64,
+    pub(crate) depth: f64,
+    pub(crate) t: f64,
+}
+
+/// Weighs a triangle. Coordinates are along the axes of the line's projection: two in its plane, and the
+/// one along the line. No operation is fused and none is conditional, so the bits are the same on every machine,
+/// one triangle at a time or many.
 #[inline(always)]
-pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]) -> Estimate {
+pub(crate) fn weigh(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]) -> Weighed {
     let inverse_depth = 1.0 / direction[2];
     let shear = [direction[0] / direction[2], direction[1] / direction[2]];
     let (mut x, mut y, mut z) = ([0.0; 3], [0.0; 3], [0.0; 3]);
@@ -65,21 +78,36 @@ pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3];
     let (_, reach) = ends([size[0] + z[0].abs(), size[1] + z[1].abs(), size[2] + z[2].abs()]);
     let error = PROJECTION_ERROR * reach;
     let bound = 4.0 * error * (size[0] + size[1] + size[2] + error);
-    let (least, greatest) = ends(weight);
-    if least < -bound && greatest > bound {
-        return Estimate::Missed;
-    }
     let sum = weight[0] + weight[1] + weight[2];
     let depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / sum;
-    // Errors of the weights shift the depth within the triangle's range of depths.
     let (shallow, deep) = ends(z);
-    let range = deep - shallow;
-    let tolerance = RATIO_ERROR * sum.abs();
-    let certain = least > bound || greatest < -bound;
-    if certain && bound <= tolerance && bound * range <= tolerance * depth.abs() {
-        return Estimate::Crossed(Crossing { t: depth * inverse_depth, weight: [weight[1], weight[2], sum] });
+    Weighed { weight, bound, range: deep - shallow, depth, t: depth * inverse_depth }
+}
+
+impl Weighed {
+    /// Decides, or leaves it open.
+    #[inline(always)]
+    pub(crate) fn judge(&self) -> Estimate {
+        let (weight, bound) = (self.weight, self.bound);
+        let (least, greatest) = ends(weight);
+        if least < -bound && greatest > bound {
+            return Estimate::Missed;
+        }
+        let sum = weight[0] + weight[1] + weight[2];
+        // Errors of the weights shift the depth within the triangle's range of depths.
+        let tolerance = RATIO_ERROR * sum.abs();
+        let certain = least > bound || greatest < -bound;
+        if certain && bound <= tolerance && bound * self.range <= tolerance * self.depth.abs() {
+            return Estimate::Crossed(Crossing { t: self.t, weight: [weight[1], weight[2], sum] });
+        }
+        Estimate::Open(weight, bound)
     }
-    Estimate::Open(weight, bound)
+}
+
+/// Decides in f64, or leaves it open; coordinates as for [`weigh`].
+#[inline(always)]
+pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]) -> Estimate {
+    weigh(origin, direction, corner).judge()
 }
 
 fn wide(v: [f32; 3]) -> [f64; 3] {

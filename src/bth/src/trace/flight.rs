@@ -3,7 +3,7 @@
 
 use super::crossing::{Crossing, Estimate, estimate};
 use super::line::Line;
-use super::prepare::Aim;
+use super::prepare::{Aim, Frame};
 use super::query::Query;
 use super::sight::{Block, Sight};
 use super::slabs::Slabs;
@@ -14,7 +14,7 @@ use crate::simd::Simd;
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true t by, relative: the four lowest bits of f32.
-const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
+pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
@@ -39,16 +39,25 @@ pub(crate) enum Found {
 }
 
 impl<Q: Query> Flight<Q> {
-    /// None if the ray hits nothing whatever there is: see [`Line::new`], or an empty range of t.
-    pub(crate) fn new(object: &ObjectView<'_>, ray: &Ray, query: Q) -> Option<Self> {
-        let line = Line::new(ray)?;
-        if ray.tmin.partial_cmp(&ray.tmax).is_none_or(|o| o.is_gt()) {
-            return None;
+    /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
+    #[inline(always)]
+    pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
+        if !self.aim.set(frame, ray) && !self.aim_in_f64(object, ray) {
+            return false;
         }
+        self.take_over();
+        true
+    }
+
+    /// As [`Self::aim_at`], for rays that f32 can't prepare too.
+    #[cold]
+    #[inline(never)]
+    fn aim_in_f64(&mut self, object: &ObjectView<'_>, ray: &Ray) -> bool {
+        let Some(line) = Line::new(ray) else { return false };
         let slabs = Slabs::new(ray, &line, object.header);
         let sight = Sight::new(ray, &line, &slabs, object.header);
-        let limit = slabs.last;
-        Some(Flight { aim: Aim { slabs, sight }, limit, query })
+        self.aim = Aim { slabs, sight };
+        ray.tmin <= ray.tmax
     }
 
     /// A place for a ray.
@@ -139,15 +148,25 @@ impl<Q: Query> Flight<Q> {
                 return Found::Enough;
             }
         }
+        self.settled(Found::Nothing)
+    }
+
+    /// Takes over what the query has found, and says what that means.
+    #[inline(always)]
+    pub(crate) fn settled(&mut self, otherwise: Found) -> Found {
+        // Any hit ends the query; until then nothing changes. (And the stack has no keys.)
+        if Q::ANY {
+            return otherwise;
+        }
         let limit = self.limit;
         self.take_over();
-        if self.limit < limit { Found::Nearer } else { Found::Nothing }
+        if self.limit < limit { Found::Nearer } else { otherwise }
     }
 }
 
 /// What f64 leaves open.
 #[cold]
 #[inline(never)]
-fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
     Line::new(ray)?.crossing(corners)
 }

@@ -9,6 +9,7 @@
 //! hits and misses are exact: a closed triangle is hit if and only if the real line of the
 //! ray meets it (rays that lie in its plane miss it).
 
+use super::crossing::RATIO_ERROR;
 use crate::rays::Ray;
 
 /// 8 units of f64 rounding (2^-53 each): bounds the error of a projected coordinate relative
@@ -135,5 +136,23 @@ impl Line {
     pub(crate) fn t_range(&self, corners: [&Projected; 3]) -> (f64, f64) {
         let t = corners.map(|p| p.depth * self.inverse_depth);
         (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]))
+    }
+
+    /// Whether the corners of a triangle that the line crosses for certain go around it clockwise.
+    pub(crate) fn turns_clockwise([a, b, c]: [&Projected; 3]) -> bool {
+        cross(b, c) + cross(c, a) + cross(a, b) < 0.0
+    }
+
+    /// A t before which the line does not cross a triangle that it certainly crosses, with coordinates of this error.
+    pub(crate) fn t_before(&self, [a, b, c]: [&Projected; 3], error: f64) -> f64 {
+        let weight = [cross(b, c), cross(c, a), cross(a, b)];
+        let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);
+        let sum = weight[0] + weight[1] + weight[2];
+        let depth = (weight[0] * a.depth + weight[1] * b.depth + weight[2] * c.depth) / sum;
+        let farthest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
+        // Errors of the weights shift the depth within the range of depths, those of this sum by less than 2^-48.
+        let shift =
+            2.0 * farthest * (4.0 * bound / (sum.abs() - 4.0 * bound).max(0.0)) + farthest * RATIO_ERROR;
+        depth * self.inverse_depth - shift * self.inverse_depth.abs()
     }
 }

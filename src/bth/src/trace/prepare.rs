@@ -31,6 +31,18 @@ impl Frame {
         let farthest = corners.fold(0.0, |m: f32, x| m.max(x.abs()));
         Frame { lower: object.lower, upper: object.upper, farthest }
     }
+
+    /// The greatest coordinate in play for origins whose coordinates do not exceed this, seen from any of them.
+    #[inline(always)]
+    pub(crate) fn extent(&self, farthest_origin: f32) -> f32 {
+        (self.farthest + farthest_origin) * UP
+    }
+
+    /// The longest side of the object's box.
+    #[inline(always)]
+    pub(crate) fn size(&self) -> f32 {
+        (0..3).fold(0.0, |m: f32, k| m.max(self.upper[k] - self.lower[k]))
+    }
 }
 
 /// A ray prepared for boxes and for triangles: two cache lines.
@@ -42,6 +54,70 @@ pub(crate) struct Aim {
 }
 
 const _: () = assert!(size_of::<Slabs>() == 64 && size_of::<Sight>() == 64);
+
+impl Aim {
+    /// A single ray, to the same bounds as [`Prepared::fill`]; false where f32 can't prepare it. Written in place: copies of
+    /// what was just written word by word stall.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, frame: &Frame, ray: &Ray) -> bool {
+        let (o, d) = (&ray.origin, &ray.direction);
+        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
+        let z = if size[0] > size[1] && size[0] > size[2] {
+            0
+        } else if size[1] > size[2] {
+            1
+        } else {
+            2
+        };
+        let greatest = size[z];
+        let (mut reach, mut farthest) = (0f32, 0f32);
+        for k in 0..3 {
+            reach = reach.max((frame.lower[k] - o[k]).abs()).max((frame.upper[k] - o[k]).abs());
+            farthest = farthest.max(o[k].abs());
+        }
+        let extent = (frame.farthest + farthest) * UP;
+        // Sums, because `max` drops NaN.
+        let finite = reach + (o[0] + o[1] + o[2]).abs() + (size[0] + size[1] + size[2]);
+        if !(greatest > 1.0 / LARGEST && finite < LARGEST && extent < LARGEST && ray.tmin <= ray.tmax) {
+            return false;
+        }
+        let pad = extent * slabs::PAD as f32;
+        let least = greatest * slabs::LEAST_COMPONENT as f32;
+        let Aim { slabs, sight } = self;
+        for k in 0..3 {
+            let magnitude = greatest / size[k].max(least);
+            let reciprocal = magnitude.copysign(d[k]);
+            let (middle, pad) = (o[k] * reciprocal, pad * magnitude);
+            slabs.reciprocal[k] = reciprocal;
+            slabs.near_addend[k] = -(middle + pad);
+            slabs.far_addend[k] = pad - middle;
+            slabs.near[k] = (d[k].to_bits() >> 31) * slabs::FAR;
+        }
+        let backward = d[z] < 0.0;
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let (x, y) = if backward { (y, x) } else { (x, y) };
+        let inverse = 1.0 / greatest;
+        let forward = if backward { -1.0 } else { 1.0 };
+        // Not a denormal number on the way: those cost a hundred cycles.
+        let least = (greatest + 1.0) * f32::MIN_POSITIVE;
+        let slack = |t: f32| t.abs() * (4.0 / (1 << 24) as f32) + least;
+        let first = (ray.tmin * greatest).max(-f32::MAX);
+        let limit = ray.tmax * greatest;
+        let last = (ray.tmax.min(f32::MAX) * greatest).min(f32::MAX);
+        slabs.scale = greatest;
+        slabs.first = first - slack(first);
+        slabs.last = limit + slack(limit);
+        sight.axis = [x as u32, y as u32, z as u32];
+        sight.floor = f32::MIN_POSITIVE;
+        sight.origin = [o[x], o[y]];
+        sight.shear = [d[x] * inverse, d[y] * inverse];
+        sight.forward = forward;
+        sight.start = -o[z] * forward;
+        sight.first = first + slack(first);
+        sight.last = last - slack(last);
+        true
+    }
+}
 
 /// Sixteen rays, prepared.
 #[derive(Debug)]
@@ -97,83 +173,9 @@ impl Prepared {
         for k in 0..8 {
             field[k] = s.gather(wanted, floats, at[k]);
         }
-        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = field;
-        let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
-        let size = [s.abs(dx), s.abs(dy), s.abs(dz)];
-        let zero = s.splat(0.0);
-        let is_x = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
-        let is_y = s.and_not(s.lt(size[2], size[1]), is_x);
-        let greatest = s.max(s.max(size[0], size[1]), size[2]);
-
-        let mut reach = zero;
-        let mut farthest = zero;
-        let mut finite = s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(greatest, s.splat(LARGEST)));
-        for k in 0..3 {
-            let far = s.max(
-                s.abs(s.sub(s.splat(frame.lower[k]), o[k])),
-                s.abs(s.sub(s.splat(frame.upper[k]), o[k])),
-            );
-            reach = s.max(far, reach);
-            farthest = s.max(s.abs(o[k]), farthest);
-            // Also false for NaN, which `max` may drop.
-            finite = s.and(finite, s.and(s.lt(far, s.splat(LARGEST)), s.lt(size[k], s.splat(LARGEST))));
-        }
-        let extent = s.mul(s.add(s.splat(frame.farthest), farthest), s.splat(UP));
-        finite = s.and(finite, s.lt(extent, s.splat(LARGEST)));
-        let pad = s.mul(extent, s.splat(slabs::PAD as f32));
-        let least = s.mul(greatest, s.splat(slabs::LEAST_COMPONENT as f32));
-        let mut aim = [zero; 2 * LANES];
-        for k in 0..3 {
-            let magnitude = s.div(greatest, s.max(size[k], least));
-            let sign = s.and_u(s.bits(d[k]), s.splat_u(1 << 31));
-            let reciprocal = s.from_bits(s.or_u(s.bits(magnitude), sign));
-            let (middle, pad) = (s.mul(o[k], reciprocal), s.mul(pad, magnitude));
-            let negative = s.lt_u(s.splat_u(i32::MAX as u32), sign);
-            aim[k] = reciprocal;
-            aim[4 + k] = s.sub(zero, s.add(middle, pad));
-            aim[8 + k] = s.sub(pad, middle);
-            aim[12 + k] = s.from_bits(s.select_u(negative, s.splat_u(slabs::FAR), s.splat_u(0)));
-        }
-
-        // The axes of the plane: in cyclic order for a ray that goes up along the third, else the other way round.
-        let depth = choose(s, is_x, is_y, d);
-        let backward = s.lt(depth, zero);
-        let (next, last) = ([d[1], d[2], d[0]], [d[2], d[0], d[1]]);
-        let (next, last) = (choose(s, is_x, is_y, next), choose(s, is_x, is_y, last));
-        let inverse = s.div(s.splat(1.0), greatest);
-        let shear = [s.select(backward, last, next), s.select(backward, next, last)];
-        let (next, last) = ([o[1], o[2], o[0]], [o[2], o[0], o[1]]);
-        let (next, last) = (choose(s, is_x, is_y, next), choose(s, is_x, is_y, last));
-        let origin = [s.select(backward, last, next), s.select(backward, next, last)];
-        let z = s.select_u(is_x, s.splat_u(0), s.select_u(is_y, s.splat_u(1), s.splat_u(2)));
-        let next = s.select_u(is_x, s.splat_u(1), s.select_u(is_y, s.splat_u(2), s.splat_u(0)));
-        let last = s.select_u(is_x, s.splat_u(2), s.select_u(is_y, s.splat_u(0), s.splat_u(1)));
-        let forward = s.select(backward, s.splat(-1.0), s.splat(1.0));
-        aim[16] = s.from_bits(s.select_u(backward, last, next));
-        aim[17] = s.from_bits(s.select_u(backward, next, last));
-        aim[18] = s.from_bits(z);
-        aim[19] = s.splat(f32::MIN_POSITIVE);
-        aim[20] = origin[0];
-        aim[21] = origin[1];
-        aim[22] = s.mul(shear[0], inverse);
-        aim[23] = s.mul(shear[1], inverse);
-        aim[24] = forward;
-        aim[25] = s.fnma(choose(s, is_x, is_y, o), forward, zero);
-
-        // What rounding and underflow can take from t, as depth.
-        let least = s.fma(greatest, s.splat(f32::MIN_POSITIVE), s.splat(f32::MIN_POSITIVE));
-        let ulps = s.splat(4.0 / (1 << 24) as f32);
-        let first = s.max(s.mul(tmin, greatest), s.splat(-f32::MAX));
-        let slack = s.fma(s.abs(first), ulps, least);
-        aim[3] = greatest;
-        aim[7] = s.sub(first, slack);
-        aim[26] = s.add(first, slack);
-        let last = s.mul(tmax, greatest);
-        aim[11] = s.add(last, s.fma(s.abs(last), ulps, least));
-        let last = s.min(s.mul(s.min(tmax, s.splat(f32::MAX)), greatest), s.splat(f32::MAX));
-        aim[27] = s.sub(last, s.fma(s.abs(last), ulps, least));
+        let (aim, usable) = rows(s, frame, field);
         for half in 0..2 {
-            let mut rows = [zero; LANES];
+            let mut rows = [s.splat(0.0); LANES];
             for i in 0..LANES {
                 rows[i] = aim[half * LANES + i];
             }
@@ -182,7 +184,86 @@ impl Prepared {
                 s.store(rows[lane], &mut self.aim[lane][half]);
             }
         }
-        let usable = s.and(s.and(wanted, finite), s.le(tmin, tmax));
-        self.ready = s.mask_bits(usable);
+        self.ready = s.mask_bits(s.and(wanted, usable));
     }
+}
+
+/// The floats of the [`Aim`]s of sixteen rays, a row of lanes for each, and the lanes that they are good for; from the rays'
+/// own floats.
+#[inline(always)]
+pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 * LANES], S::M) {
+    let [ox, oy, oz, tmin, dx, dy, dz, tmax] = field;
+    let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
+    let size = [s.abs(dx), s.abs(dy), s.abs(dz)];
+    let zero = s.splat(0.0);
+    let is_x = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
+    let is_y = s.and_not(s.lt(size[2], size[1]), is_x);
+    let greatest = s.max(s.max(size[0], size[1]), size[2]);
+
+    let mut reach = zero;
+    let mut farthest = zero;
+    let mut finite = s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(greatest, s.splat(LARGEST)));
+    for k in 0..3 {
+        let far =
+            s.max(s.abs(s.sub(s.splat(frame.lower[k]), o[k])), s.abs(s.sub(s.splat(frame.upper[k]), o[k])));
+        reach = s.max(far, reach);
+        farthest = s.max(s.abs(o[k]), farthest);
+        // Also false for NaN, which `max` may drop.
+        finite = s.and(finite, s.and(s.lt(far, s.splat(LARGEST)), s.lt(size[k], s.splat(LARGEST))));
+    }
+    let extent = s.mul(s.add(s.splat(frame.farthest), farthest), s.splat(UP));
+    finite = s.and(finite, s.lt(extent, s.splat(LARGEST)));
+    let pad = s.mul(extent, s.splat(slabs::PAD as f32));
+    let least = s.mul(greatest, s.splat(slabs::LEAST_COMPONENT as f32));
+    let mut aim = [zero; 2 * LANES];
+    for k in 0..3 {
+        let magnitude = s.div(greatest, s.max(size[k], least));
+        let sign = s.and_u(s.bits(d[k]), s.splat_u(1 << 31));
+        let reciprocal = s.from_bits(s.or_u(s.bits(magnitude), sign));
+        let (middle, pad) = (s.mul(o[k], reciprocal), s.mul(pad, magnitude));
+        let negative = s.lt_u(s.splat_u(i32::MAX as u32), sign);
+        aim[k] = reciprocal;
+        aim[4 + k] = s.sub(zero, s.add(middle, pad));
+        aim[8 + k] = s.sub(pad, middle);
+        aim[12 + k] = s.from_bits(s.select_u(negative, s.splat_u(slabs::FAR), s.splat_u(0)));
+    }
+
+    // The axes of the plane: in cyclic order for a ray that goes up along the third, else the other way round.
+    let depth = choose(s, is_x, is_y, d);
+    let backward = s.lt(depth, zero);
+    let (next, last) = ([d[1], d[2], d[0]], [d[2], d[0], d[1]]);
+    let (next, last) = (choose(s, is_x, is_y, next), choose(s, is_x, is_y, last));
+    let inverse = s.div(s.splat(1.0), greatest);
+    let shear = [s.select(backward, last, next), s.select(backward, next, last)];
+    let (next, last) = ([o[1], o[2], o[0]], [o[2], o[0], o[1]]);
+    let (next, last) = (choose(s, is_x, is_y, next), choose(s, is_x, is_y, last));
+    let origin = [s.select(backward, last, next), s.select(backward, next, last)];
+    let z = s.select_u(is_x, s.splat_u(0), s.select_u(is_y, s.splat_u(1), s.splat_u(2)));
+    let next = s.select_u(is_x, s.splat_u(1), s.select_u(is_y, s.splat_u(2), s.splat_u(0)));
+    let last = s.select_u(is_x, s.splat_u(2), s.select_u(is_y, s.splat_u(0), s.splat_u(1)));
+    let forward = s.select(backward, s.splat(-1.0), s.splat(1.0));
+    aim[16] = s.from_bits(s.select_u(backward, last, next));
+    aim[17] = s.from_bits(s.select_u(backward, next, last));
+    aim[18] = s.from_bits(z);
+    aim[19] = s.splat(f32::MIN_POSITIVE);
+    aim[20] = origin[0];
+    aim[21] = origin[1];
+    aim[22] = s.mul(shear[0], inverse);
+    aim[23] = s.mul(shear[1], inverse);
+    aim[24] = forward;
+    aim[25] = s.fnma(choose(s, is_x, is_y, o), forward, zero);
+
+    // What rounding and underflow can take from t, as depth.
+    let least = s.mul(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE));
+    let ulps = s.splat(4.0 / (1 << 24) as f32);
+    let first = s.max(s.mul(tmin, greatest), s.splat(-f32::MAX));
+    let slack = s.fma(s.abs(first), ulps, least);
+    aim[3] = greatest;
+    aim[7] = s.sub(first, slack);
+    aim[26] = s.add(first, slack);
+    let last = s.mul(tmax, greatest);
+    aim[11] = s.add(last, s.fma(s.abs(last), ulps, least));
+    let last = s.min(s.mul(s.min(tmax, s.splat(f32::MAX)), greatest), s.splat(f32::MAX));
+    aim[27] = s.sub(last, s.fma(s.abs(last), ulps, least));
+    (aim, s.and(finite, s.le(tmin, tmax)))
 }

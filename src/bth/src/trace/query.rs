@@ -8,9 +8,20 @@ use crate::rays::{Hit, Ray, Surface};
 pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
+    /// What the caller gets.
+    type Answer;
+    fn answer(&self, instance: u32) -> Self::Answer;
     fn new(ray: &Ray) -> Self;
+    /// Whether walks should keep an eye on how far they are: where rays are often short, and where
+    /// [`Self::settled_by`] has a use for it.
+    const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
+    /// range if they do not; true if that is all the query wants to know.
+    fn settled_by(&mut self, _t: (f64, f64)) -> bool {
+        false
+    }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
     /// t of the nearest hit so far, if the query wants the nearest.
@@ -36,8 +47,10 @@ pub(crate) struct Nearest {
     best: Crossing,
 }
 
-impl Nearest {
-    pub(crate) fn hit(&self, instance: u32) -> Hit {
+impl Query for Nearest {
+    const ANY: bool = false;
+    type Answer = Hit;
+    fn answer(&self, instance: u32) -> Hit {
         if self.triangle == NONE {
             return Hit::MISS;
         }
@@ -46,16 +59,6 @@ impl Nearest {
         // + 0.0 turns -0.0 into 0.0.
         Hit { t: self.best.t as f32 + 0.0, u: u + 0.0, v: v + 0.0, surface }
     }
-}
-
-/// Whether a t, rounded as it will be reported, lies in the ray's range.
-fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
-    let t = t as f32;
-    tmin <= t && t <= tmax && t < f32::INFINITY
-}
-
-impl Query for Nearest {
-    const ANY: bool = false;
     fn new(ray: &Ray) -> Self {
         let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
         Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
@@ -81,22 +84,37 @@ impl Query for Nearest {
     fn accept(&mut self) {}
 }
 
+/// Whether a t, rounded as it will be reported, lies in the ray's range.
+fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
+    let t = t as f32;
+    tmin <= t && t <= tmax && t < f32::INFINITY
+}
+
 /// Ends at the first crossing in range.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Any {
     tmin: f32,
     tmax: f32,
-    pub(crate) found: bool,
+    found: bool,
 }
 
 impl Query for Any {
     const ANY: bool = true;
+    type Answer = bool;
+    fn answer(&self, _instance: u32) -> bool {
+        self.found
+    }
     fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
+    const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
     fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
         self.found |= in_range(crossing.t, self.tmin, self.tmax);
+        self.found
+    }
+    fn settled_by(&mut self, t: (f64, f64)) -> bool {
+        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
         self.found
     }
     #[inline(always)]

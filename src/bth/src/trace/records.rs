@@ -4,6 +4,8 @@
 //! The rest follows: the fourth vertex, and what lies behind the other faces.
 
 use crate::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
+use crate::simd::Simd;
+use zerocopy::{FromBytes, IntoBytes};
 
 /// A tetrahedron as entered through a face.
 #[derive(Clone, Copy, Debug)]
@@ -81,5 +83,126 @@ impl Record for Tet16 {
         let combined = |rank: usize| self.next.get(rank).copied().unwrap_or(0);
         let last = at.behind ^ combined(at.rank(at.apex));
         Link { next: last ^ combined(at.rank(vertex)), opposite: NONE }
+    }
+}
+
+/// Sixteen tetrahedra as entered through faces, one a lane.
+#[derive(Clone, Copy)]
+pub(crate) struct EnteredLanes<S: Simd> {
+    pub(crate) tet: S::U,
+    pub(crate) face: [S::U; 3],
+    pub(crate) apex: S::U,
+    pub(crate) behind: S::U,
+    /// 1 in every lane: not a constant, since compilers make more of adding that where a mask is set than it is.
+    pub(crate) one: S::U,
+}
+
+impl<S: Simd> EnteredLanes<S> {
+    /// Place of a vertex among the four in ascending order.
+    #[inline(always)]
+    fn rank(&self, s: S, vertex: S::U) -> S::U {
+        let mut rank = s.splat_u(0);
+        for v in [self.apex, self.face[0], self.face[1], self.face[2]] {
+            rank = s.add_where(rank, s.lt_u(v, vertex), self.one);
+        }
+        rank
+    }
+}
+
+/// [`Record`] for sixteen at a time: the same answers by gathers from the records as plain words.
+pub(crate) trait LaneRecord: Record + IntoBytes + zerocopy::Immutable {
+    /// Whether [`EnteredLanes::behind`] is of use.
+    const KNOWS_BEHIND: bool;
+    /// What gathers read, a whole number a record.
+    type Word: FromBytes + zerocopy::Immutable + Copy;
+
+    /// The records as words.
+    fn words(records: &[Self]) -> &[Self::Word] {
+        <[Self::Word]>::ref_from_bytes(records.as_bytes()).expect("records are a whole number of words")
+    }
+    /// See [`Record::apex`].
+    fn apex_lanes<S: Simd>(s: S, words: &[Self::Word], m: S::M, at: &EnteredLanes<S>) -> S::U;
+    /// `next` and `opposite` of [`Record::link`]; those of lanes that are not in the mask are undefined.
+    fn link_lanes<S: Simd>(
+        s: S,
+        words: &[Self::Word],
+        m: S::M,
+        at: &EnteredLanes<S>,
+        vertex: S::U,
+    ) -> (S::U, S::U);
+}
+
+/// The fourth vertices from the words that hold the exclusive or of all.
+#[inline(always)]
+fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor: S::U) -> S::U {
+    let [a, b, c] = at.face;
+    s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
+}
+
+impl LaneRecord for Link32 {
+    const KNOWS_BEHIND: bool = false;
+    type Word = [u32; 2];
+    #[inline(always)]
+    fn apex_lanes<S: Simd>(_s: S, _words: &[[u32; 2]], _m: S::M, at: &EnteredLanes<S>) -> S::U {
+        at.apex
+    }
+    #[inline(always)]
+    fn link_lanes<S: Simd>(
+        s: S,
+        words: &[[u32; 2]],
+        m: S::M,
+        at: &EnteredLanes<S>,
+        vertex: S::U,
+    ) -> (S::U, S::U) {
+        s.gather_pair(m, words, s.add_u(s.shl_u::<2>(at.tet), at.rank(s, vertex)))
+    }
+}
+
+impl LaneRecord for Tet32 {
+    const KNOWS_BEHIND: bool = false;
+    type Word = u32;
+    #[inline(always)]
+    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
+        fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(3)))
+    }
+    #[inline(always)]
+    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
+        let first = s.add_u(s.shl_u::<3>(at.tet), s.splat_u(4));
+        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
+    }
+}
+
+impl LaneRecord for Tet20 {
+    const KNOWS_BEHIND: bool = false;
+    type Word = u32;
+    #[inline(always)]
+    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
+        fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<2>(at.tet), at.tet))
+    }
+    #[inline(always)]
+    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
+        let first = s.add_u(s.add_u(s.shl_u::<2>(at.tet), at.tet), s.splat_u(1));
+        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
+    }
+}
+
+impl LaneRecord for Tet16 {
+    const KNOWS_BEHIND: bool = true;
+    type Word = u32;
+    #[inline(always)]
+    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
+        fourth_lanes(s, words, m, at, s.shl_u::<2>(at.tet))
+    }
+    #[inline(always)]
+    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
+        let first = s.add_u(s.shl_u::<2>(at.tet), s.splat_u(1));
+        // The link behind us, and with it the fourth; then the one that is wanted.
+        let mut link = at.behind;
+        for v in [at.apex, vertex] {
+            let rank = at.rank(s, v);
+            let stored = s.and(m, s.lt_u(rank, s.splat_u(3)));
+            link = s.xor_u(link, s.gather_u(stored, words, s.add_u(first, rank)));
+        }
+        (link, s.splat_u(NONE))
     }
 }

@@ -62,7 +62,7 @@ pub(crate) struct Candidates {
 }
 
 /// Projected corners, sixteen triangles: `[corner][x, y, depth]`.
-type Corners<S> = [[<S as Simd>::F; 3]; 3];
+pub(crate) type Corners<S> = [[<S as Simd>::F; 3]; 3];
 
 /// The triangles of a leaf.
 pub(crate) trait Block {
@@ -83,13 +83,13 @@ fn pick<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3]
 
 /// Twice the signed area of the triangle of the line and two points.
 #[inline(always)]
-fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
+pub(crate) fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
     s.fnma(p[1], q[0], s.mul(p[0], q[1]))
 }
 
 /// |x| + |y|.
 #[inline(always)]
-fn size<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
+pub(crate) fn size<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
     s.add(s.abs(p[0]), s.abs(p[1]))
 }
 
@@ -193,42 +193,65 @@ impl Sight {
         first: f32,
         limit: f32,
     ) -> Candidates {
-        let [a, b, c] = block.project(s, self);
-        let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
-        let size = s.max(s.max(size(s, a), size(s, b)), size(s, c));
-        let shallow = s.min(s.min(a[2], b[2]), c[2]);
-        let deep = s.max(s.max(a[2], b[2]), c[2]);
-        let greatest_depth = s.max(s.abs(shallow), s.abs(deep));
-        let reach = s.add(size, greatest_depth);
-        const DELTA: f32 = PROJECTION_ERROR as f32;
-        // A little more than 4δ(M + δ), for the roundings of δ itself.
-        let error = s.fma(
-            s.mul(reach, s.splat(4.001 * DELTA)),
-            s.fma(reach, s.splat(DELTA), size),
-            s.splat(self.floor),
-        );
-        let minus_error = s.sub(s.splat(0.0), error);
-        let least = s.min(s.min(weight[0], weight[1]), weight[2]);
-        let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-        // By what is certain, so that NaN stays a candidate.
-        let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
-        let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
-
-        let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
-        let moment = s.fma(weight[2], c[2], s.fma(weight[1], b[2], s.mul(weight[0], a[2])));
-        let inverse = s.div(s.splat(1.0), sum);
-        let range = s.sub(deep, shallow);
-        // Where |sum| <= 6e this exceeds the range, and is cut to it.
-        let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
-        let shift = s.min(shift, range);
-        let depth = s.mul(moment, inverse);
-        let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
-        let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
-        let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
-        let out = s.or(s.lt(farthest, s.splat(first)), s.lt(s.splat(limit), nearest));
+        let corners = block.project(s, self);
+        let weighed = weigh(s, corners, s.splat(self.floor), s.splat(first), s.splat(limit));
         let valid = (1 << block.triangles().min(WIDTH as u32)) - 1;
-        let maybe = valid & !s.mask_bits(s.or(out, missed));
-        let in_range = s.and(s.le(s.splat(self.first), nearest), s.le(farthest, s.splat(self.last)));
-        Candidates { maybe, sure: maybe & s.mask_bits(s.and(certain, in_range)) }
+        let maybe = valid & !s.mask_bits(weighed.out);
+        let in_range =
+            s.and(s.le(s.splat(self.first), weighed.nearest), s.le(weighed.farthest, s.splat(self.last)));
+        Candidates { maybe, sure: maybe & s.mask_bits(s.and(weighed.certain, in_range)) }
     }
+}
+
+/// What f32 makes of sixteen pairs of a line and a triangle.
+#[derive(Clone, Copy)]
+pub(crate) struct Weighed<S: Simd> {
+    /// Certainly missed, or out of range.
+    pub(crate) out: S::M,
+    /// Certainly hit, in range or not.
+    pub(crate) certain: S::M,
+    /// Bounds of the depth of a hit.
+    pub(crate) nearest: S::F,
+    pub(crate) farthest: S::F,
+}
+
+/// Bound of the error of weights, from the greatest size and depth of projected corners.
+#[inline(always)]
+pub(crate) fn error<S: Simd>(s: S, size: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
+    let reach = s.add(size, greatest_depth);
+    const DELTA: f32 = PROJECTION_ERROR as f32;
+    // A little more than 4δ(M + δ), for the roundings of δ itself.
+    s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), size), floor)
+}
+
+/// Weighs triangles for hits between two depths; see the top of this file.
+#[inline(always)]
+pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, floor: S::F, first: S::F, limit: S::F) -> Weighed<S> {
+    let [a, b, c] = corners;
+    let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
+    let size = s.max(s.max(size(s, a), size(s, b)), size(s, c));
+    let shallow = s.min(s.min(a[2], b[2]), c[2]);
+    let deep = s.max(s.max(a[2], b[2]), c[2]);
+    let greatest_depth = s.max(s.abs(shallow), s.abs(deep));
+    let error = error(s, size, greatest_depth, floor);
+    let minus_error = s.sub(s.splat(0.0), error);
+    let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+    let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+    // By what is certain, so that NaN stays a candidate.
+    let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
+    let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
+
+    let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
+    let moment = s.fma(weight[2], c[2], s.fma(weight[1], b[2], s.mul(weight[0], a[2])));
+    let inverse = s.div(s.splat(1.0), sum);
+    let range = s.sub(deep, shallow);
+    // Where |sum| <= 6e this exceeds the range, and is cut to it.
+    let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
+    let shift = s.min(shift, range);
+    let depth = s.mul(moment, inverse);
+    let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+    let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
+    let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
+    let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));
+    Weighed { out: s.or(out, missed), certain, nearest, farthest }
 }

@@ -105,7 +105,7 @@ impl Slabs {
 
 /// One of the two rows of an axis: lower ends at 0, upper ends at [`FAR`].
 #[inline(always)]
-fn row(rows: &[[f32; WIDTH]; 2], at: u32) -> &[f32; WIDTH] {
+pub(crate) fn row(rows: &[[f32; WIDTH]; 2], at: u32) -> &[f32; WIDTH] {
     let at = (at & FAR) as usize;
     rows.as_flattened()[at..at + WIDTH].try_into().expect("a row")
 }

@@ -9,7 +9,7 @@
 use super::line::{Line, Projected, Sign};
 use super::query::{Count, Query};
 use super::records::{Entered, Record};
-use crate::layout::{FACE_BIT, HullFace, NONE, TetFace, TetLeaf, TetVertex};
+use crate::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 
 /// The parts of a tet leaf that a walk reads, and what it knows about the ray.
 pub(crate) struct TetSpace<'a, R> {
@@ -84,12 +84,7 @@ impl<'a, R: Record> TetSpace<'a, R> {
     /// The tetrahedron on the other side of a link, with its fourth vertex, and how that one's
     /// record stores the face between; `None` outside the hull.
     #[inline(always)]
-    pub(crate) fn beyond(
-        &self,
-        from: u32,
-        link: crate::layout::Link,
-        face: [u32; 3],
-    ) -> Option<(u32, u32, u32)> {
+    pub(crate) fn beyond(&self, from: u32, link: Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
         if link.next == NONE {
             return None;
         }
@@ -102,24 +97,31 @@ impl<'a, R: Record> TetSpace<'a, R> {
         Some((link.next, apex, from))
     }
 
+    /// Moves a place's face to the one through which the line leaves the tetrahedron, and says what lies behind
+    /// that; `None` if a sign is uncertain, and nothing has changed then.
+    #[inline(always)]
+    pub(crate) fn exit(&self, at: &mut Place) -> Option<Link> {
+        use Sign::{Negative, Positive};
+        let apex = self.project(at.entered.apex);
+        let [s0, s1, s2] = at.corner.each_ref().map(|p| Line::side(&apex, p, self.error));
+        let out = match (s0, s1, s2) {
+            (Positive, Negative, _) => 2,
+            (Negative, _, Positive) => 1,
+            (_, Positive, Negative) => 0,
+            _ => return None,
+        };
+        let link = self.records[at.tet as usize].link(&at.entered, at.entered.face[out]);
+        at.entered.face[out] = at.entered.apex;
+        at.corner[out] = apex;
+        Some(link)
+    }
+
     /// Walks on from a place until the query is done, the hull, the query's limit or an uncertain sign.
     pub(crate) fn walk<Q: Query, C: Count>(&self, mut at: Place, query: &mut Q, count: &mut C) -> Outcome {
-        use Sign::{Negative, Positive};
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
         for _ in 0..self.leaf.tets {
             count.tet();
-            let apex = self.project(at.entered.apex);
-            let [s0, s1, s2] = at.corner.each_ref().map(|p| Line::side(&apex, p, self.error));
-            let out = match (s0, s1, s2) {
-                (Positive, Negative, _) => 2,
-                (Negative, _, Positive) => 1,
-                (_, Positive, Negative) => 0,
-                _ => return Outcome::Uncertain,
-            };
-            let record = &self.records[at.tet as usize];
-            let link = record.link(&at.entered, at.entered.face[out]);
-            at.entered.face[out] = at.entered.apex;
-            at.corner[out] = apex;
+            let Some(link) = self.exit(&mut at) else { return Outcome::Uncertain };
             if link.next & FACE_BIT != 0
                 && link.next != NONE
                 && self.offer(&self.faces[(link.next & !FACE_BIT) as usize], query)

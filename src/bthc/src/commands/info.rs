@@ -4,10 +4,10 @@ use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::{Table, bytes, count};
-use bth::File;
 use bth::error::kind_name;
 use bth::layout::{NONE, RecordKind};
 use bth::object::ObjectView;
+use bth::{File, Isa};
 use serde_json::{Value, json};
 
 pub(crate) fn run(args: &Info) -> Result<(), Failure> {
@@ -139,5 +139,12 @@ fn cpu() -> Value {
     });
     #[cfg(not(target_arch = "x86_64"))]
     let features = json!({});
-    json!({"architecture": std::env::consts::ARCH, "features": features})
+    let available: Vec<String> =
+        Isa::ALL.iter().filter(|isa| isa.is_available()).map(Isa::to_string).collect();
+    json!({
+        "architecture": std::env::consts::ARCH,
+        "isa": Isa::chosen().to_string(),
+        "available": available,
+        "features": features,
+    })
 }

@@ -1,0 +1,185 @@
+//! Batches of rays through one object: those that start on a known surface walk its tetrahedra first, all together;
+//! the rest goes through the BVH.
+
+use super::Scratch;
+use super::bvh_batch::{BatchWalk, Waiting};
+use super::bvh_walk::TetOutcome;
+use super::packets;
+use super::query::{Any, Nearest, Query};
+use super::records::LaneRecord;
+use super::tet_batch::{self, Walk};
+use super::tets::{enter_tets, leaf_of_face};
+use crate::layout::{Child, NONE};
+use crate::object::{ObjectView, Records};
+use crate::rays::{Hit, Ray};
+use crate::simd::{Isa, Kernel, Simd};
+
+/// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
+const PART: usize = 2048;
+
+/// Nearest hits of rays in object space that start on the triangles `from` of the object, or on none (`NONE`). A hint
+/// changes where the search begins, never what is found.
+pub(crate) fn nearest_batch(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    hits: &mut [Hit],
+) {
+    trace::<Nearest>(object, rays, from, scratch, Sink { answers: hits, instance });
+}
+
+/// Whether rays in object space hit anything; `from` as for [`nearest_batch`].
+pub(crate) fn any_batch(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    scratch: &mut Scratch,
+    found: &mut [bool],
+) {
+    trace::<Any>(object, rays, from, scratch, Sink { answers: found, instance: 0 });
+}
+
+/// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.
+struct Sink<'a, Q: Query> {
+    answers: &'a mut [Q::Answer],
+    instance: u32,
+}
+
+impl<Q: Query> Sink<'_, Q> {
+    #[inline(always)]
+    fn put(&mut self, ray: usize, query: &Q) {
+        self.answers[ray] = query.answer(self.instance);
+    }
+}
+
+fn trace<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    scratch: &mut Scratch,
+    mut sink: Sink<'_, Q>,
+) {
+    if object.header.root == NONE {
+        return;
+    }
+    if let Some(from) = from.filter(|_| !object.tet_leaves.is_empty()) {
+        let parts = rays.chunks(PART).zip(from.chunks(PART)).zip(sink.answers.chunks_mut(PART));
+        for ((rays, from), answers) in parts {
+            trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, instance: sink.instance });
+        }
+        return;
+    }
+    let packed = Isa::chosen().run(Together { object, rays, with_short: true, scratch, sink: &mut sink });
+    if packed < rays.len() {
+        let rest = std::mem::take(&mut scratch.packets.rest);
+        let order = (packed > 0).then_some(&rest[..]);
+        let waiting = Waiting { order, queries: None, walked: None };
+        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
+        scratch.packets.rest = rest;
+    }
+}
+
+/// Traces at most [`PART`] rays, some of which start on known surfaces.
+fn trace_hinted<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: &[u32],
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_, Q>,
+) {
+    // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
+    let packed = Isa::chosen().run(Together { object, rays, with_short: false, scratch, sink });
+    let mut faces = vec![NONE; rays.len()];
+    let home = |ray: usize| object.triangle_homes.get(from[ray] as usize).copied().unwrap_or(NONE);
+    let mut order: Vec<u32> = match packed {
+        0 => (0..rays.len() as u32).collect(),
+        _ => scratch.packets.rest.clone(),
+    };
+    for &ray in &order {
+        faces[ray as usize] = home(ray as usize);
+    }
+    let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
+    let mut walks = vec![Walk::Not; rays.len()];
+    match object.records {
+        Records::None => {}
+        Records::Link32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
+        Records::Tet32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
+        Records::Tet20(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
+        Records::Tet16(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
+    }
+    let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
+    let mut walked = vec![NONE; rays.len()];
+    order.retain(|&ray| {
+        let ray = ray as usize;
+        let done = walks[ray] == Walk::Done || walks[ray] == Walk::Left && is_all;
+        if done {
+            sink.put(ray, &queries[ray]);
+        } else if walks[ray] == Walk::Left {
+            walked[ray] = leaf_of_face(object, faces[ray]);
+        }
+        !done
+    });
+    if !order.is_empty() {
+        let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
+        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink });
+    }
+}
+
+fn walk_tets<R: LaneRecord, Q: Query>(
+    object: &ObjectView<'_>,
+    records: &[R],
+    rays: &[Ray],
+    faces: &[u32],
+    queries: &mut [Q],
+    walks: &mut [Walk],
+) {
+    if tet_batch::Batch::<R, Q>::fits(object, records) && faces.iter().any(|&face| face != NONE) {
+        let mut batch = tet_batch::Batch::new(object, records, rays, faces, queries, walks);
+        // Without vectors the BVH is faster, and a hint of no use to it.
+        let _ = Isa::chosen().run_wide(&mut batch);
+    }
+}
+
+/// Packets of rays that go together, as a kernel; returns how many rays went in them. If any did, the others are in the
+/// scratch's rest.
+struct Together<'a, 'b, Q: Query> {
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    /// Also short rays that fill a small box.
+    with_short: bool,
+    scratch: &'a mut Scratch,
+    sink: &'a mut Sink<'b, Q>,
+}
+
+impl<Q: Query> Kernel for Together<'_, '_, Q> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> usize {
+        let (packets, sink) = (&mut self.scratch.packets, self.sink);
+        let done = |ray: usize, query: &Q| sink.put(ray, query);
+        packets::trace(s, self.object, self.rays, self.with_short, packets, done).rays
+    }
+}
+
+/// Rays through the BVH, each on its own, as a kernel.
+struct ThroughBvh<'a, 'b, Q: Query> {
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    waiting: Waiting<'a, Q>,
+    scratch: &'a mut Scratch,
+    sink: &'a mut Sink<'b, Q>,
+}
+
+impl<Q: Query> Kernel for ThroughBvh<'_, '_, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let (object, rays, waiting, sink) = (self.object, self.rays, self.waiting, self.sink);
+        let stacks = &mut self.scratch.stacks;
+        let done = |ray: usize, query: &Q| sink.put(ray, query);
+        let walk = BatchWalk { object, rays, waiting, stacks, done };
+        walk.run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
+    }
+}

@@ -1,0 +1,239 @@
+//! Packets: up to 64 rays that go together through the wide BVH.
+//!
+//! A node's sixteen children are tested against what all the rays together can meet ([`super::packet_hull`]), and those that
+//! remain against the rays, sixteen at a time. f32 lanes leave out what certainly does not matter, as everywhere;
+//! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
+//! be computed at the end; what is not certain is decided at once ([`super::packet_settle`]).
+
+use super::flight::KEY_SLACK;
+use super::packet_group::Group;
+use super::packet_hull::Hull;
+use super::packet_leaf::{Leaf, Points, Rays, no_points};
+use super::packet_settle::Last;
+use super::query::Query;
+use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
+use crate::limits::MAX_DEPTH;
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+
+/// Groups of sixteen rays in a packet.
+const GROUPS: usize = 4;
+/// Rays in a packet at most.
+pub(crate) const PACKET: usize = GROUPS * LANES;
+
+/// A child that waits to be entered.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Entry {
+    /// Rays that entered the parent.
+    rays: u64,
+    /// Line of the parent, and the slot there.
+    parent: u32,
+    slot: u32,
+    /// Lower bound of the depth at which any ray enters it.
+    key: f32,
+}
+
+/// Memory that packets need.
+pub(crate) struct Packets<'a, S: Simd, Q> {
+    pub(crate) groups: [Group<S>; GROUPS],
+    points: Points<S>,
+    stack: &'a mut Vec<Entry>,
+    queries: [Q; PACKET],
+}
+
+/// How a packet did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Use {
+    /// Rays that took part in an average step, per cent.
+    Lanes(u32),
+    /// There is something that only single rays can do; nothing has been handed on.
+    Refused,
+}
+
+impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
+    #[inline(always)]
+    pub(crate) fn new(s: S, object: &ObjectView<'_>, stack: &'a mut Vec<Entry>, ray: &Ray) -> Self {
+        // At every level all children but the one entered wait.
+        let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
+        if stack.len() < entries {
+            stack.resize(entries, Entry::default());
+        }
+        Packets {
+            groups: [Group::vacant(s); GROUPS],
+            points: no_points(s),
+            stack,
+            queries: [Q::new(ray); PACKET],
+        }
+    }
+
+    /// Traces rays for which the groups have been prepared, and hands on the place and query of those that hit
+    /// something.
+    #[inline(always)]
+    pub(crate) fn trace<H: Hull<S>>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        hull: &H,
+        rays: &[Ray],
+        mut done: impl FnMut(usize, &Q),
+    ) -> Use {
+        let Packets { groups, points, stack, queries } = self;
+        let groups = &mut groups[..rays.len().div_ceil(LANES)];
+        let all = u64::MAX >> (PACKET - rays.len());
+        let mut rays = Rays { object, rays, queries, asked: 0, alive: all, settled: 0 };
+        if let Some(group) = groups.last_mut() {
+            // Lanes without a ray hold nothing up.
+            let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
+            group.limit = s.select(valid, group.limit, s.splat(f32::MIN));
+        }
+        let mut limit = farthest_limit(s, groups);
+        let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+        let (mut code, mut mask, mut top) = (object.header.root, all, 0);
+        let (mut steps, mut used) = (0, 0);
+        'steps: loop {
+            steps += 1;
+            used += mask.count_ones();
+            match Child::from_code(code) {
+                Some(Child::Node(line)) => {
+                    let (bits, keys) = hull.children(s, object.node(line), limit);
+                    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
+                    let count = if Q::ANY {
+                        s.compress(bits, slots, &mut slot)
+                    } else {
+                        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
+                    };
+                    let room: &mut [Entry; WIDTH] =
+                        stack[top..].first_chunk_mut().expect("as many levels as the header says");
+                    for i in 0..count {
+                        room[i % WIDTH] = Entry { rays: mask, parent: line, slot: slot[i], key: key[i] };
+                    }
+                    top += count;
+                }
+                Some(Child::Indexed(line)) => {
+                    let leaf = Leaf { block: object.indexed_leaf(line), code };
+                    if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
+                        limit = farthest_limit(s, groups);
+                    }
+                }
+                Some(Child::Raw(line)) => {
+                    let leaf = Leaf { block: object.raw_leaf(line), code };
+                    if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
+                        limit = farthest_limit(s, groups);
+                    }
+                }
+                Some(Child::Tets(row)) => {
+                    code = object.tet_leaves[row as usize].subtree;
+                    if code == NONE {
+                        return Use::Refused;
+                    }
+                    continue;
+                }
+                None => {}
+            }
+            if rays.alive == 0 {
+                break;
+            }
+            loop {
+                if top == 0 {
+                    break 'steps;
+                }
+                top -= 1;
+                let entry = stack[top];
+                mask = entry.rays & rays.alive;
+                if mask == 0 || (!Q::ANY && entry.key > limit + limit.abs() * KEY_SLACK) {
+                    continue;
+                }
+                let (node, slot) = (object.node(entry.parent), entry.slot as usize % WIDTH);
+                code = node.child[slot];
+                prefetch(s, object, code);
+                let corners = hull.corners(node, slot);
+                let mut meets = 0;
+                for (i, group) in groups.iter().enumerate() {
+                    if mask >> (i * LANES) & 0xffff != 0 {
+                        let bits = if H::MIXED {
+                            group.meets::<true>(s, corners)
+                        } else {
+                            group.meets::<false>(s, corners)
+                        };
+                        meets |= u64::from(bits) << (i * LANES);
+                    }
+                }
+                mask &= meets;
+                if mask != 0 {
+                    break;
+                }
+            }
+        }
+        finish(s, groups, &mut rays, all, &mut done);
+        // Deciding one candidate alone costs about as much as a step.
+        let steps = u64::from(steps + rays.settled);
+        Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
+    }
+}
+
+/// Computes what is still to be computed, and hands on what was found.
+#[inline(always)]
+fn finish<S: Simd, Q: Query>(
+    s: S,
+    groups: &[Group<S>],
+    rays: &mut Rays<'_, Q>,
+    all: u64,
+    done: &mut impl FnMut(usize, &Q),
+) {
+    if Q::ANY {
+        let mut hit = all & !rays.alive;
+        let mut query = Q::new(&rays.rays[0]);
+        query.accept();
+        while hit != 0 {
+            done(hit.trailing_zeros() as usize, &query);
+            hit &= hit - 1;
+        }
+        return;
+    }
+    for (i, group) in groups.iter().enumerate() {
+        let own = &rays.rays[i * LANES..];
+        let own = &own[..own.len().min(LANES)];
+        let (axis, none) = ([[0; LANES]; 3], [0; LANES]);
+        let mut last = Last { object: rays.object, rays: own, axis, leaf: none, triangle: none };
+        for k in 0..3 {
+            s.store_u(group.axis[k], &mut last.axis[k]);
+        }
+        s.store_u(group.leaf, &mut last.leaf);
+        s.store_u(group.triangle, &mut last.triangle);
+        let (asked, queries) = (&mut rays.asked, &mut *rays.queries);
+        last.compute(|lane, id, crossing| {
+            let ray = i * LANES + lane;
+            let mut query = if *asked >> ray & 1 != 0 { queries[ray] } else { Q::new(&own[lane]) };
+            query.offer(id, crossing);
+            *asked &= !(1 << ray);
+            done(ray, &query);
+        });
+    }
+    // Those whose last word was said before.
+    let mut asked = rays.asked;
+    while asked != 0 {
+        let ray = asked.trailing_zeros() as usize;
+        asked &= asked - 1;
+        done(ray, &rays.queries[ray]);
+    }
+}
+
+/// The greatest limit of all rays.
+#[inline(always)]
+fn farthest_limit<S: Simd>(s: S, groups: &[Group<S>]) -> f32 {
+    let mut farthest = groups[0].limit;
+    for group in groups {
+        farthest = s.max(farthest, group.limit);
+    }
+    -s.least(s.sub(s.splat(0.0), farthest))
+}
+
+/// Asks for the lines of a node or of an indexed leaf.
+#[inline(always)]
+fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
+    let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
+    for i in 0..NODE_LINES {
+        s.prefetch(first.wrapping_add(i));
+    }
+}

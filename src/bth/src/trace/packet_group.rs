@@ -1,0 +1,202 @@
+//! Sixteen rays of a packet, a lane each.
+//!
+//! What [`super::slabs`] and [`super::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
+//! one box or triangle: the same operations on the same prepared floats ([`super::prepare`]), so the same bounds hold.
+//! The axes of the plane need not be swapped for rays that go backward: the tests do not see handedness.
+
+use super::prepare::{self, Aim, Frame};
+use crate::layout::NONE;
+use crate::simd::{LANES, Simd};
+use std::mem::offset_of;
+
+/// Floats of a ray.
+const FLOATS: usize = 8;
+
+/// Sixteen rays, and what they have found.
+#[derive(Clone, Copy)]
+pub(crate) struct Group<S: Simd> {
+    pub(crate) origin: [S::F; 3],
+    pub(crate) direction: [S::F; 3],
+    pub(crate) reciprocal: [S::F; 3],
+    near_addend: [S::F; 3],
+    far_addend: [S::F; 3],
+    /// Rays that go down along each axis.
+    negative: [S::M; 3],
+    /// Depth of t = 1.
+    pub(crate) scale: S::F,
+    /// Nothing whose depth is certainly less than this matters,
+    pub(crate) first: S::F,
+    /// or certainly exceeds this.
+    pub(crate) limit: S::F,
+    /// The axes of f64's projection ([`super::line`]).
+    pub(crate) axis: [S::U; 3],
+    is_x: S::M,
+    is_y: S::M,
+    /// The axes of the projection, if they are the same for all.
+    common: Option<[usize; 3]>,
+    plane_origin: [S::F; 2],
+    shear: [S::F; 2],
+    forward: S::F,
+    start: S::F,
+    /// From which to which depth hits are certainly in range.
+    pub(crate) certain: [S::F; 2],
+    /// Lower bound of the depth of the nearest hit so far.
+    pub(crate) nearest: S::F,
+    /// The leaf of the nearest hit so far if it is still to be computed, else `NONE`;
+    pub(crate) leaf: S::U,
+    /// and the triangle within.
+    pub(crate) triangle: S::U,
+}
+
+/// Place of a field of [`Aim`] among its floats.
+macro_rules! row {
+    ($($field:tt)*) => { offset_of!(Aim, $($field)*) / size_of::<f32>() };
+}
+
+/// Three successive rows.
+#[inline(always)]
+fn three<T: Copy>(rows: &[T; 2 * LANES], at: usize) -> [T; 3] {
+    [rows[at], rows[at + 1], rows[at + 2]]
+}
+
+impl<S: Simd> Group<S> {
+    /// A place for rays.
+    #[inline(always)]
+    pub(crate) fn vacant(s: S) -> Self {
+        let (zero, none, no) = (s.splat(0.0), s.splat_u(NONE), s.mask(0));
+        Group {
+            origin: [zero; 3],
+            direction: [zero; 3],
+            reciprocal: [zero; 3],
+            near_addend: [zero; 3],
+            far_addend: [zero; 3],
+            negative: [no; 3],
+            scale: zero,
+            first: zero,
+            limit: zero,
+            axis: [none; 3],
+            is_x: no,
+            is_y: no,
+            common: None,
+            plane_origin: [zero; 2],
+            shear: [zero; 2],
+            forward: zero,
+            start: zero,
+            certain: [zero; 2],
+            nearest: zero,
+            leaf: none,
+            triangle: none,
+        }
+    }
+
+    /// Prepares the first sixteen of rays that are given as floats; the last fills up lanes that are too many. False
+    /// if one of them can't be prepared.
+    #[inline(always)]
+    pub(crate) fn prepare(&mut self, s: S, frame: &Frame, floats: &[f32]) -> bool {
+        let field = fields(s, floats);
+        let (rows, usable) = prepare::rows(s, frame, field);
+        let zero = s.splat(0.0);
+        self.origin = [field[0], field[1], field[2]];
+        self.direction = [field[4], field[5], field[6]];
+        self.reciprocal = three(&rows, row!(slabs.reciprocal));
+        self.near_addend = three(&rows, row!(slabs.near_addend));
+        self.far_addend = three(&rows, row!(slabs.far_addend));
+        let near = three(&rows, row!(slabs.near));
+        for k in 0..3 {
+            self.negative[k] = s.lt_u(s.splat_u(0), s.bits(near[k]));
+        }
+        self.scale = rows[row!(slabs.scale)];
+        self.first = rows[row!(slabs.first)];
+        self.limit = rows[row!(slabs.last)];
+        let axis = three(&rows, row!(sight.axis));
+        for k in 0..3 {
+            self.axis[k] = s.bits(axis[k]);
+        }
+        self.is_x = s.eq_u(self.axis[2], s.splat_u(0));
+        self.is_y = s.eq_u(self.axis[2], s.splat_u(1));
+        self.common = match (s.mask_bits(self.is_x), s.mask_bits(self.is_y)) {
+            (0xffff, _) => Some([1, 2, 0]),
+            (_, 0xffff) => Some([2, 0, 1]),
+            (0, 0) => Some([0, 1, 2]),
+            _ => None,
+        };
+        self.forward = rows[row!(sight.forward)];
+        self.start = rows[row!(sight.start)];
+        let backward = s.lt(self.forward, zero);
+        let (origin, shear) = (row!(sight.origin), row!(sight.shear));
+        for k in 0..2 {
+            self.plane_origin[k] = s.select(backward, rows[origin + 1 - k], rows[origin + k]);
+            self.shear[k] = s.select(backward, rows[shear + 1 - k], rows[shear + k]);
+        }
+        self.certain = [rows[row!(sight.first)], rows[row!(sight.last)]];
+        self.nearest = s.splat(f32::INFINITY);
+        self.leaf = s.splat_u(NONE);
+        s.mask_bits(usable) == 0xffff
+    }
+
+    /// The rays that may meet a box within their range. Where all go into the same octant (not `MIXED`) the corners
+    /// are that at which they enter and the one at which they leave, else the lower and the upper one.
+    #[inline(always)]
+    pub(crate) fn meets<const MIXED: bool>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
+        let (mut enter, mut leave) = (self.first, self.limit);
+        for k in 0..3 {
+            let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
+            if MIXED {
+                (near, far) = (s.select(self.negative[k], far, near), s.select(self.negative[k], near, far));
+            }
+            enter = s.max(s.fma(near, self.reciprocal[k], self.near_addend[k]), enter);
+            leave = s.min(s.fma(far, self.reciprocal[k], self.far_addend[k]), leave);
+        }
+        s.mask_bits(s.le(enter, leave))
+    }
+
+    /// A point as the rays see it: its place in the plane of projection, and its depth.
+    #[inline(always)]
+    pub(crate) fn project(&self, s: S, point: [f32; 3]) -> [S::F; 3] {
+        let (x, y, z) = if let Some([x, y, z]) = self.common {
+            (s.splat(point[x]), s.splat(point[y]), s.splat(point[z]))
+        } else {
+            let [x, y, z] = [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])];
+            (self.choose(s, y, z, x), self.choose(s, z, x, y), self.choose(s, x, y, z))
+        };
+        let depth = s.fma(z, self.forward, self.start);
+        let x = s.sub(x, self.plane_origin[0]);
+        let y = s.sub(y, self.plane_origin[1]);
+        [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
+    }
+
+    /// By the axis along the ray.
+    #[inline(always)]
+    fn choose(&self, s: S, x: S::F, y: S::F, z: S::F) -> S::F {
+        s.select(self.is_x, x, s.select(self.is_y, y, z))
+    }
+}
+
+/// The fields of the first sixteen rays.
+#[inline(always)]
+fn fields<S: Simd>(s: S, floats: &[f32]) -> [S::F; FLOATS] {
+    // A row is a ray, and whatever follows it.
+    const NEEDED: usize = (LANES + 1) * FLOATS;
+    let mut filled = [0.0; NEEDED];
+    let floats: &[f32; NEEDED] = match floats.first_chunk() {
+        Some(enough) => enough,
+        None => {
+            let last = floats.len() - FLOATS;
+            for ray in 0..LANES {
+                let from = (ray * FLOATS).min(last);
+                filled[ray * FLOATS..][..FLOATS].copy_from_slice(&floats[from..from + FLOATS]);
+            }
+            &filled
+        }
+    };
+    let mut rows = [s.splat(0.0); LANES];
+    for ray in 0..LANES {
+        rows[ray] = s.load(floats[ray * FLOATS..].first_chunk().expect("sixteen floats"));
+    }
+    let columns = s.transpose(rows);
+    let mut out = [columns[0]; FLOATS];
+    for k in 0..FLOATS {
+        out[k] = columns[k];
+    }
+    out
+}

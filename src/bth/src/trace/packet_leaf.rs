@@ -1,0 +1,258 @@
+//! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time.
+//!
+//! Points are projected once for a group of sixteen rays. Most triangles are left out by the error bound of the whole
+//! leaf, which is that of [`super::sight`] for the greatest corner of all; only for the others is it worked out.
+
+use super::packet_group::Group;
+use super::packet_hull::Hull;
+use super::packet_settle::{Candidate, Settled, settle};
+use super::query::Query;
+use super::sight::{self, Block};
+use crate::layout::{IndexedLeaf, RawLeaf, WIDTH};
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+
+/// Points of a leaf at most.
+const POINTS: usize = 3 * WIDTH;
+
+/// Projected points of a leaf: x, y and depth.
+pub(crate) type Points<S> = [[<S as Simd>::F; 3]; POINTS];
+
+/// A place for points.
+#[inline(always)]
+pub(crate) fn no_points<S: Simd>(s: S) -> Points<S> {
+    [[s.splat(0.0); 3]; POINTS]
+}
+
+/// A leaf as points, and triangles between them.
+pub(crate) trait Mesh: Block {
+    /// A point; its number is taken modulo [`POINTS`].
+    fn point(&self, at: usize) -> [f32; 3];
+    /// The points of a triangle, below [`POINTS`].
+    fn points_of(&self, triangle: usize) -> [usize; 3];
+    /// The triangles that have no corner inside, and none on another side of the hull than the others: missed by
+    /// all rays.
+    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32;
+}
+
+/// Lanes that have a bit in common.
+#[inline(always)]
+fn common<S: Simd>(s: S, [a, b, c]: [S::U; 3]) -> u32 {
+    s.mask_bits(s.lt_u(s.splat_u(0), s.and_u(a, s.and_u(b, c))))
+}
+
+/// Three rows of lanes.
+#[inline(always)]
+fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
+    [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
+}
+
+impl Mesh for IndexedLeaf {
+    #[inline(always)]
+    fn point(&self, at: usize) -> [f32; 3] {
+        let at = at % WIDTH;
+        [self.vertex[0][at], self.vertex[1][at], self.vertex[2][at]]
+    }
+    #[inline(always)]
+    fn points_of(&self, triangle: usize) -> [usize; 3] {
+        let at = triangle % WIDTH;
+        let [a, b, c] = &self.corner;
+        [usize::from(a[at]) % WIDTH, usize::from(b[at]) % WIDTH, usize::from(c[at]) % WIDTH]
+    }
+    #[inline(always)]
+    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
+        let sides = hull.sides(s, load(s, &self.vertex));
+        let [a, b, c] = &self.corner;
+        let of = [s.load_bytes(a), s.load_bytes(b), s.load_bytes(c)];
+        common(s, [s.lookup_u(sides, of[0]), s.lookup_u(sides, of[1]), s.lookup_u(sides, of[2])])
+    }
+}
+
+impl Mesh for RawLeaf {
+    #[inline(always)]
+    fn point(&self, at: usize) -> [f32; 3] {
+        let (corner, at) = (at / WIDTH % 3, at % WIDTH);
+        [self.corner[corner][0][at], self.corner[corner][1][at], self.corner[corner][2][at]]
+    }
+    #[inline(always)]
+    fn points_of(&self, triangle: usize) -> [usize; 3] {
+        let at = triangle % WIDTH;
+        [at, WIDTH + at, 2 * WIDTH + at]
+    }
+    #[inline(always)]
+    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
+        let [a, b, c] = &self.corner;
+        let sides = [hull.sides(s, load(s, a)), hull.sides(s, load(s, b)), hull.sides(s, load(s, c))];
+        common(s, sides)
+    }
+}
+
+/// The rays of a packet, and what has been found for them.
+pub(crate) struct Rays<'a, Q> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) rays: &'a [Ray],
+    /// Queries of rays for which anything has been decided, where their bit is set.
+    pub(crate) queries: &'a mut [Q],
+    pub(crate) asked: u64,
+    /// Those that are not done.
+    pub(crate) alive: u64,
+    /// Candidates that were decided one at a time.
+    pub(crate) settled: u32,
+}
+
+/// A leaf and its code.
+pub(crate) struct Leaf<'a, B> {
+    pub(crate) block: &'a B,
+    pub(crate) code: u32,
+}
+
+impl<Q: Query> Rays<'_, Q> {
+    /// Tests the triangles of a leaf for rays of the packet, a bit each. Returns whether any has a nearer hit.
+    #[inline(always)]
+    pub(crate) fn enter_leaf<S: Simd, H: Hull<S>, B: Mesh>(
+        &mut self,
+        s: S,
+        hull: &H,
+        groups: &mut [Group<S>],
+        points: &mut Points<S>,
+        leaf: &Leaf<'_, B>,
+        rays: u64,
+    ) -> bool {
+        let count = leaf.block.triangles().min(WIDTH as u32);
+        let triangles = !leaf.block.outside(s, hull) & ((1 << count) - 1);
+        let (mut used, mut rest) = (0u64, triangles);
+        while rest != 0 {
+            let [a, b, c] = leaf.block.points_of(rest.trailing_zeros() as usize);
+            used |= 1 << a | 1 << b | 1 << c;
+            rest &= rest - 1;
+        }
+        if triangles == 0 {
+            return false;
+        }
+        let mut nearer = false;
+        for (i, group) in groups.iter_mut().enumerate() {
+            let active = (rays >> (i * LANES)) as u32 & 0xffff;
+            if active != 0 {
+                nearer |= self.enter_group(s, group, i, points, leaf, (triangles, used), active);
+            }
+        }
+        nearer
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments)]
+    fn enter_group<S: Simd, B: Mesh>(
+        &mut self,
+        s: S,
+        group: &mut Group<S>,
+        at: usize,
+        points: &mut Points<S>,
+        leaf: &Leaf<'_, B>,
+        (mut triangles, mut used): (u32, u64),
+        mut active: u32,
+    ) -> bool {
+        let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
+        while used != 0 {
+            let i = used.trailing_zeros() as usize % POINTS;
+            used &= used - 1;
+            let point = group.project(s, leaf.block.point(i));
+            size = s.max(sight::size(s, point), size);
+            depth = s.max(s.abs(point[2]), depth);
+            points[i] = point;
+        }
+        let floor = s.splat(f32::MIN_POSITIVE);
+        let error = sight::error(s, size, depth, floor);
+        let minus_error = s.sub(s.splat(0.0), error);
+        let mut nearer = false;
+        while triangles != 0 {
+            let triangle = triangles.trailing_zeros();
+            triangles &= triangles - 1;
+            let [a, b, c] = leaf.block.points_of(triangle as usize);
+            let (a, b, c) = (points[a], points[b], points[c]);
+            let weight = [sight::cross(s, b, c), sight::cross(s, c, a), sight::cross(s, a, b)];
+            let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+            let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+            let missed = s.mask_bits(s.and(s.lt(least, minus_error), s.lt(error, greatest)));
+            if active & !missed == 0 {
+                continue;
+            }
+            let weighed = sight::weigh(s, [a, b, c], floor, group.first, group.limit);
+            let maybe = active & !s.mask_bits(weighed.out);
+            let in_range =
+                s.and(s.le(group.certain[0], weighed.nearest), s.le(weighed.farthest, group.certain[1]));
+            let sure = maybe & s.mask_bits(s.and(weighed.certain, in_range));
+            let candidate = Candidate { leaf: leaf.code, triangle };
+            let clear = if Q::ANY {
+                self.alive &= !(u64::from(sure) << (at * LANES));
+                active &= !sure;
+                sure
+            } else {
+                let clear = sure & s.mask_bits(s.lt(weighed.farthest, group.nearest));
+                let m = s.mask(clear);
+                group.nearest = s.select(m, weighed.nearest, group.nearest);
+                group.limit = s.select(m, weighed.farthest, group.limit);
+                group.leaf = s.select_u(m, s.splat_u(leaf.code), group.leaf);
+                group.triangle = s.select_u(m, s.splat_u(triangle), group.triangle);
+                nearer |= clear != 0;
+                clear
+            };
+            if maybe & !clear != 0 {
+                self.settle_lanes(s, group, at, candidate, maybe & !clear);
+                nearer = true;
+                active &= (self.alive >> (at * LANES)) as u32;
+            }
+            if active == 0 {
+                break;
+            }
+        }
+        nearer
+    }
+
+    /// Decides a candidate for a few rays of a group, and with it the one that waits.
+    #[inline(always)]
+    fn settle_lanes<S: Simd>(
+        &mut self,
+        s: S,
+        group: &mut Group<S>,
+        at: usize,
+        candidate: Candidate,
+        mut lanes: u32,
+    ) {
+        let (mut axis, mut leaf, mut triangle) = ([[0; LANES]; 3], [0; LANES], [0; LANES]);
+        for k in 0..3 {
+            s.store_u(group.axis[k], &mut axis[k]);
+        }
+        s.store_u(group.leaf, &mut leaf);
+        s.store_u(group.triangle, &mut triangle);
+        let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        s.store(group.scale, &mut scale);
+        s.store(group.limit, &mut limit);
+        s.store(group.nearest, &mut nearest);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let ray = at * LANES + lane;
+            if self.asked >> ray & 1 == 0 {
+                self.queries[ray] = Q::new(&self.rays[ray]);
+                self.asked |= 1 << ray;
+            }
+            self.settled += 1;
+            let waiting = Candidate { leaf: leaf[lane], triangle: triangle[lane] };
+            let axis = [axis[0][lane], axis[1][lane], axis[2][lane]];
+            match settle(self.object, &self.rays[ray], axis, [waiting, candidate], &mut self.queries[ray]) {
+                Settled::Enough => self.alive &= !(1 << ray),
+                Settled::Found(t) => {
+                    let [near, far] = t.map(|t| t * f64::from(scale[lane]));
+                    nearest[lane] = (near as f32).next_down();
+                    limit[lane] = limit[lane].min((far as f32).next_up());
+                }
+                Settled::Nothing => {}
+            }
+            leaf[lane] = crate::layout::NONE;
+        }
+        group.leaf = s.load_u(&leaf);
+        group.limit = s.load(&limit);
+        group.nearest = s.load(&nearest);
+    }
+}

@@ -1,0 +1,135 @@
+//! Which rays of a batch go in packets.
+
+use super::coherence::{Guard, Span};
+use super::packet::{Entry, PACKET, Packets, Use};
+use super::packet_hull::{Beam, SegmentBox};
+use super::prepare::Frame;
+use super::query::Query;
+use crate::layout::NONE;
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use zerocopy::{FromBytes, IntoBytes};
+
+/// Fewer rays make no packet.
+const FEWEST: usize = 2 * LANES;
+/// Per cent of the rays that a step must serve on average: with less, one ray at a time is faster.
+const COHERENT_USE: u32 = 40;
+const SHORT_USE: u32 = 15;
+
+/// Memory kept from one batch to the next.
+#[derive(Debug, Default)]
+pub(crate) struct PacketScratch {
+    stack: Vec<Entry>,
+    /// Places of the rays that are left.
+    pub(crate) rest: Vec<u32>,
+}
+
+/// How many rays went in packets, and how many packets served too few of theirs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct PacketCount {
+    pub(crate) rays: usize,
+    pub(crate) coherent: usize,
+    pub(crate) short: usize,
+    pub(crate) poor: usize,
+}
+
+/// A run of rays that go together.
+enum Run {
+    Coherent(Span),
+    Short([[f32; 3]; 2]),
+}
+
+/// Traces those rays of a batch that are better traced in packets, and leaves the others in `scratch.rest`, unless it does
+/// not try at all. `with_short`: also short rays that fill a small box. Hands on places and queries of rays that hit something.
+#[inline(always)]
+pub(crate) fn trace<S: Simd, Q: Query>(
+    s: S,
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    with_short: bool,
+    scratch: &mut PacketScratch,
+    mut done: impl FnMut(usize, &Q),
+) -> PacketCount {
+    let mut count = PacketCount::default();
+    // Where tetrahedra have no subtree beside them, rays go alone.
+    if rays.len() < FEWEST || object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE) {
+        return count;
+    }
+    let frame = Frame::new(object.header);
+    let (mut coherent, mut short) = (Guard::new(), with_short.then(Guard::new));
+    let PacketScratch { stack, rest } = scratch;
+    rest.clear();
+    let mut packets = None;
+    for (i, own) in rays.chunks(PACKET).enumerate() {
+        let at = i * PACKET;
+        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, short.as_mut()) else {
+            rest.extend(at as u32..(at + own.len()) as u32);
+            continue;
+        };
+        if packets.is_none() {
+            packets = Some(Packets::<S, Q>::new(s, object, &mut *stack, &own[0]));
+        }
+        let packets = packets.as_mut().expect("just made");
+        let done = |ray: usize, query: &Q| done(at + ray, query);
+        let (outcome, guard, least, kind) = match run {
+            _ if !prepare(s, &frame, packets, own) => {
+                (Use::Refused, &mut coherent, COHERENT_USE, &mut count.coherent)
+            }
+            Run::Coherent(span) => {
+                let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
+                let outcome = packets.trace(s, object, &beam, own, done);
+                (outcome, &mut coherent, COHERENT_USE, &mut count.coherent)
+            }
+            Run::Short(bounds) => {
+                let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
+                (outcome, short.as_mut().unwrap_or(&mut coherent), SHORT_USE, &mut count.short)
+            }
+        };
+        match outcome {
+            Use::Refused => rest.extend(at as u32..(at + own.len()) as u32),
+            Use::Lanes(share) => {
+                guard.learn(share >= least);
+                count.rays += own.len();
+                *kind += 1;
+                count.poor += usize::from(share < least);
+            }
+        }
+    }
+    count
+}
+
+/// How rays may go together, if they may.
+#[inline(always)]
+fn choose<S: Simd, Q: Query>(
+    s: S,
+    frame: &Frame,
+    rays: &[Ray],
+    coherent: &mut Guard,
+    short: Option<&mut Guard>,
+) -> Option<Run> {
+    if rays.len() < FEWEST {
+        return None;
+    }
+    let try_coherent = coherent.is_open();
+    let span = Span::of(s, rays);
+    if try_coherent && span.is_coherent() {
+        return Some(Run::Coherent(span));
+    }
+    if Q::ANY && short.is_some_and(|guard| guard.is_open()) {
+        return span.segments(s, frame, rays).map(Run::Short);
+    }
+    None
+}
+
+/// Prepares all groups; false if a ray can't be.
+#[inline(always)]
+fn prepare<S: Simd, Q: Query>(s: S, frame: &Frame, packets: &mut Packets<'_, S, Q>, rays: &[Ray]) -> bool {
+    let floats = <[f32]>::ref_from_bytes(rays.as_bytes()).expect("rays are made of f32");
+    let each = LANES * size_of::<Ray>() / size_of::<f32>();
+    let mut ready = true;
+    for i in 0..rays.len().div_ceil(LANES) {
+        ready &= packets.groups[i].prepare(s, frame, &floats[i * each..]);
+    }
+    ready
+}

@@ -1,0 +1,284 @@
+//! Sixteen tet walks side by side: the step from one tetrahedron to the next, in f32.
+//!
+//! As [`super::tet_walk`], but a sign counts only where f32 makes it certain. With u = 2^-24, the computed projection
+//! (x, y, z) of a point, z its depth, and W = |x| + |y| + |z|: the differences from the origin are off by a factor of
+//! 1 + u, the shear, at most 1, too, and with the roundings of the product and the last difference x and y are off by
+//! u (2|x| + 4|z|), less than δ = 4.1 u W. For two points a and b with S = |x| + |y| the cross product is then off
+//! by δa Sb + δb Sa + 2 δa δb, and by 2 u Sa Sb for its own roundings; where B is at least the W of both, that is
+//! less than 5.1 u B (Sa + Sb) + 34 u² B². What is computed is a bound of E = 6 u B (Sa + T + 8 u B).
+//!
+//! B and T are the greatest W and S that the lane has met, and B at least 2^-38: so E exceeds 2^-119 and with it
+//! whatever underflow does. From 2^61 on, where products might overflow, B makes E infinite and nothing is certain.
+//! One E for a step is all it takes: of the rays that bounce about a scan it leaves fewer than one in 500 in doubt.
+//!
+//! The two signs that name the exit of the line are all that a step needs: the face left behind was crossed with certain
+//! signs, so those of the face ahead are certain too.
+
+use super::records::{EnteredLanes, LaneRecord};
+use crate::layout::{FACE_BIT, NONE};
+use crate::simd::Simd;
+
+/// 2^-24.
+const U: f32 = 1.0 / (1 << 24) as f32;
+/// Least B; see above.
+const LEAST_REACH: f32 = 1.0 / (1u64 << 38) as f32;
+/// Turns a B of 2^61 into infinity.
+const TO_INFINITY: f32 = (1u128 << 67) as f32;
+
+/// An array of three, without the closure that keeps `array::map` from being compiled for the instruction set.
+macro_rules! three {
+    (|$i:ident| $element:expr) => {
+        [
+            {
+                let $i = 0;
+                $element
+            },
+            {
+                let $i = 1;
+                $element
+            },
+            {
+                let $i = 2;
+                $element
+            },
+        ]
+    };
+}
+pub(super) use three;
+
+/// Added to the tetrahedron of a lane that is in doubt; with [`FACE_BIT`] it makes a lane stop.
+pub(super) const DOUBT: u32 = FACE_BIT | 1 << 30;
+
+/// Names of the u32 of a lane.
+pub(super) mod word {
+    /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link, or
+    /// the tetrahedron and [`super::DOUBT`].
+    pub(crate) const TET: usize = 0;
+    /// The vertex that the link hither named.
+    pub(crate) const APEX: usize = 1;
+    /// What lies behind the face entered, as the record of the tetrahedron stores it.
+    pub(crate) const BEHIND: usize = 2;
+    /// The first of three vertices of the face entered.
+    pub(crate) const FACE: usize = 3;
+    /// The first of three axes: two of the plane of projection, and the depth.
+    pub(crate) const AXIS: usize = 6;
+    /// Sign bit of the direction along the depth.
+    pub(crate) const SIGN: usize = 9;
+    /// Which of the batch's rays it is.
+    pub(crate) const SLOT: usize = 10;
+    pub(crate) const COUNT: usize = 11;
+}
+
+/// Names of the f32 of a lane. What has three elements is named by the first.
+pub(super) mod float {
+    /// The ray's origin along the three axes.
+    pub(crate) const ORIGIN: usize = 0;
+    /// Two: the direction over the absolute of its depth.
+    pub(crate) const SHEAR: usize = 3;
+    /// The projected face: x, y, depth in the ray's direction.
+    pub(crate) const X: usize = 5;
+    pub(crate) const Y: usize = 8;
+    pub(crate) const DEPTH: usize = 11;
+    /// B and T.
+    pub(crate) const REACH: usize = 14;
+    pub(crate) const SIZE: usize = 15;
+    /// Depth beyond which nothing is of interest.
+    pub(crate) const LIMIT: usize = 16;
+    pub(crate) const COUNT: usize = 17;
+}
+
+/// The state of sixteen walks.
+#[derive(Clone, Copy)]
+pub(super) struct Lanes<S: Simd> {
+    pub(super) words: [S::U; word::COUNT],
+    pub(super) floats: [S::F; float::COUNT],
+}
+
+/// Points as seen along the rays of the lanes.
+#[derive(Clone, Copy)]
+pub(super) struct ProjectedLanes<S: Simd> {
+    pub(super) x: S::F,
+    pub(super) y: S::F,
+    pub(super) depth: S::F,
+}
+
+/// B and T.
+#[derive(Clone, Copy)]
+pub(super) struct Extent<S: Simd> {
+    pub(super) reach: S::F,
+    pub(super) size: S::F,
+}
+
+impl<S: Simd> Extent<S> {
+    /// Before any point was met.
+    #[inline(always)]
+    pub(super) fn least(s: S) -> Self {
+        Extent { reach: s.splat(LEAST_REACH), size: s.splat(0.0) }
+    }
+    /// With one more point; also its S.
+    #[inline(always)]
+    pub(super) fn with(self, s: S, p: &ProjectedLanes<S>) -> (Self, S::F) {
+        let size = s.add(s.abs(p.x), s.abs(p.y));
+        let reach = s.add(size, s.abs(p.depth));
+        (Extent { reach: s.max(reach, self.reach), size: s.max(size, self.size) }, size)
+    }
+    /// E for a point of size S with any of the points met.
+    #[inline(always)]
+    pub(super) fn bound(&self, s: S, size: S::F) -> S::F {
+        let factor = s.mul(s.mul(self.reach, s.splat(TO_INFINITY)), s.splat(6.0 * U / TO_INFINITY));
+        s.mul(factor, s.add(size, s.fma(s.splat(8.0 * U), self.reach, self.size)))
+    }
+}
+
+/// Twice the area of the triangle (ray, a, b), to within E.
+#[inline(always)]
+pub(super) fn cross<S: Simd>(s: S, a: &ProjectedLanes<S>, b: &ProjectedLanes<S>) -> S::F {
+    s.fnma(a.y, b.x, s.mul(a.x, b.y))
+}
+
+impl<S: Simd> Lanes<S> {
+    /// No walk at all.
+    #[inline(always)]
+    pub(super) fn idle(s: S) -> Self {
+        let mut lanes = Lanes { words: [s.splat_u(0); word::COUNT], floats: [s.splat(0.0); float::COUNT] };
+        lanes.words[word::TET] = s.splat_u(NONE);
+        lanes
+    }
+
+    /// Walks under way.
+    #[inline(always)]
+    pub(super) fn active(&self, s: S) -> S::M {
+        s.lt_u(self.words[word::TET], s.splat_u(FACE_BIT))
+    }
+
+    #[inline(always)]
+    pub(super) fn corner(&self, i: usize) -> ProjectedLanes<S> {
+        let f = &self.floats;
+        ProjectedLanes { x: f[float::X + i], y: f[float::Y + i], depth: f[float::DEPTH + i] }
+    }
+
+    /// Vertices seen from the rays' origins, given as rows of x, y, z and one more.
+    #[inline(always)]
+    pub(super) fn gather(&self, s: S, m: S::M, vertices: &[[f32; 4]], vertex: S::U) -> [S::F; 3] {
+        three!(|k| {
+            let at = s.gather_rows(m, vertices, vertex, self.words[word::AXIS + k]);
+            s.sub(at, self.floats[float::ORIGIN + k])
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> ProjectedLanes<S> {
+        let depth = s.from_bits(s.xor_u(s.bits(z), self.words[word::SIGN]));
+        let x = s.fnma(self.floats[float::SHEAR], depth, x);
+        let y = s.fnma(self.floats[float::SHEAR + 1], depth, y);
+        ProjectedLanes { x, y, depth }
+    }
+}
+
+/// A step that is under way: so that the gathers of several groups of lanes can overlap, it is made in three parts.
+#[derive(Clone, Copy)]
+pub(super) struct Step<S: Simd> {
+    apex: S::U,
+    position: [S::F; 3],
+    go: S::M,
+    left: S::U,
+    face: [S::U; 3],
+}
+
+impl<S: Simd> Step<S> {
+    #[inline(always)]
+    pub(super) fn none(s: S) -> Self {
+        let (u, f) = (s.splat_u(0), s.splat(0.0));
+        Step { apex: u, position: [f; 3], go: s.mask(0), left: u, face: [u; 3] }
+    }
+}
+
+impl<S: Simd> Lanes<S> {
+    #[inline(always)]
+    fn entered(&self, one: S::U) -> EnteredLanes<S> {
+        let w = &self.words;
+        EnteredLanes {
+            tet: w[word::TET],
+            face: three!(|i| w[word::FACE + i]),
+            apex: w[word::APEX],
+            behind: w[word::BEHIND],
+            one,
+        }
+    }
+
+    /// First part of a step, which takes every active walk one tetrahedron on: fetches the fourth vertex.
+    #[inline(always)]
+    pub(super) fn fetch<R: LaneRecord>(
+        &self,
+        s: S,
+        one: S::U,
+        step: &mut Step<S>,
+        words: &[R::Word],
+        vertices: &[[f32; 4]],
+    ) {
+        let active = self.active(s);
+        step.apex = R::apex_lanes(s, words, active, &self.entered(one));
+        step.position = self.gather(s, active, vertices, step.apex);
+    }
+
+    /// Second part: finds the face through which the line leaves. Depths are kept only if asked for.
+    #[inline(always)]
+    pub(super) fn choose<const DEPTHS: bool>(&mut self, s: S, step: &mut Step<S>) {
+        let apex = self.project(s, step.position);
+        let extent = Extent { reach: self.floats[float::REACH], size: self.floats[float::SIZE] };
+        let (extent, size) = extent.with(s, &apex);
+        let bound = extent.bound(s, size);
+        let minus = s.sub(s.splat(0.0), bound);
+        let side = three!(|i| cross(s, &apex, &self.corner(i)));
+        let positive = three!(|i| s.lt(bound, side[i]));
+        let negative = three!(|i| s.lt(side[i], minus));
+        let active = self.active(s);
+        let out = [
+            s.and(active, s.and(positive[1], negative[2])),
+            s.and(active, s.and(positive[2], negative[0])),
+            s.and(active, s.and(positive[0], negative[1])),
+        ];
+        step.go = s.or(out[0], s.or(out[1], out[2]));
+        step.face = three!(|i| self.words[word::FACE + i]);
+        step.left = s.select_u(out[2], step.face[2], s.select_u(out[1], step.face[1], step.face[0]));
+        self.floats[float::REACH] = extent.reach;
+        self.floats[float::SIZE] = extent.size;
+        for (i, &out) in out.iter().enumerate() {
+            let word = &mut self.words[word::FACE + i];
+            *word = s.select_u(out, step.apex, *word);
+            let corner = self.corner(i);
+            self.floats[float::X + i] = s.select(out, apex.x, corner.x);
+            self.floats[float::Y + i] = s.select(out, apex.y, corner.y);
+            if DEPTHS {
+                self.floats[float::DEPTH + i] = s.select(out, apex.depth, corner.depth);
+            }
+        }
+    }
+
+    /// Third part: goes through that face. Walks that come to a constrained face, leave the hull or, if depths are kept,
+    /// pass their limit stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
+    /// it was.
+    #[inline(always)]
+    pub(super) fn follow<R: LaneRecord, const DEPTHS: bool>(
+        &mut self,
+        s: S,
+        one: S::U,
+        step: &Step<S>,
+        words: &[R::Word],
+    ) {
+        let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
+        let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
+        let (mut next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
+        if DEPTHS {
+            let f = &self.floats;
+            let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
+            next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
+        }
+        if R::KNOWS_BEHIND {
+            self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
+        }
+        let next = s.select_u(step.go, next, s.or_u(tet, s.splat_u(DOUBT)));
+        self.words[word::TET] = s.select_u(self.active(s), next, tet);
+        self.words[word::APEX] = s.select_u(step.go, opposite, self.words[word::APEX]);
+    }
+}

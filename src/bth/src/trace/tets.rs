@@ -1,0 +1,123 @@
+//! One ray through the tetrahedra of a leaf, whichever record they have.
+
+use super::bvh_walk::TetOutcome;
+use super::line::Line;
+use super::query::{Count, Query};
+use super::records::Record;
+use super::tet_walk::{Outcome, TetSpace};
+use crate::layout::NONE;
+use crate::object::{ObjectView, Records};
+use crate::rays::Ray;
+
+/// What became of a ray where it starts.
+pub(crate) enum Start {
+    Done,
+    /// Goes on without this tet leaf, if any.
+    Walked(u32),
+}
+
+/// A hint changes where the search begins, never what is found: the tet leaf of the surface is walked first, from
+/// the surface, and left out later.
+pub(crate) fn start_in_tets<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    query: &mut Q,
+    count: &mut C,
+) -> Start {
+    let row = object.triangle_homes.get(from as usize).copied().unwrap_or(NONE);
+    // Such a walk sees only what lies ahead of the origin. One ray alone is faster through the BVH, if there is one.
+    if row == NONE || ray.tmin < 0.0 {
+        return Start::Walked(NONE);
+    }
+    let leaf = leaf_of_face(object, row);
+    if object.tet_leaves[leaf as usize].subtree != NONE {
+        return Start::Walked(NONE);
+    }
+    let Some(line) = Line::new(ray) else { return Start::Done };
+    let outcome = match object.records {
+        Records::None => None,
+        Records::Link32(records) => start(object, records, leaf, row, &line, query, count),
+        Records::Tet32(records) => start(object, records, leaf, row, &line, query, count),
+        Records::Tet20(records) => start(object, records, leaf, row, &line, query, count),
+        Records::Tet16(records) => start(object, records, leaf, row, &line, query, count),
+    };
+    match outcome {
+        Some(Outcome::Done) => Start::Done,
+        Some(_) => Start::Walked(leaf),
+        None => Start::Walked(NONE),
+    }
+}
+
+fn start<R: Record, Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    records: &[R],
+    leaf: u32,
+    row: u32,
+    line: &Line,
+    query: &mut Q,
+    count: &mut C,
+) -> Option<Outcome> {
+    let space = space(object, records, leaf, line);
+    let place = space.locate(row)?;
+    count.leaf();
+    Some(match space.walk(place, query, count) {
+        Outcome::Uncertain => space.flood(query, count),
+        outcome => outcome,
+    })
+}
+
+/// Walks through a tet leaf that has no subtree, from its hull.
+#[inline(never)]
+pub(crate) fn enter_tets<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    leaf: u32,
+    ray: &Ray,
+    query: &mut Q,
+    count: &mut C,
+) -> TetOutcome {
+    let Some(line) = Line::new(ray) else { return TetOutcome::Done };
+    match object.records {
+        Records::None => TetOutcome::GoOn,
+        Records::Link32(records) => enter(object, records, leaf, &line, query, count),
+        Records::Tet32(records) => enter(object, records, leaf, &line, query, count),
+        Records::Tet20(records) => enter(object, records, leaf, &line, query, count),
+        Records::Tet16(records) => enter(object, records, leaf, &line, query, count),
+    }
+}
+
+fn enter<R: Record, Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    records: &[R],
+    leaf: u32,
+    line: &Line,
+    query: &mut Q,
+    count: &mut C,
+) -> TetOutcome {
+    let space = space(object, records, leaf, line);
+    let outcome = match space.enter_hull() {
+        Ok(place) => space.walk(place, query, count),
+        Err(outcome) => outcome,
+    };
+    let outcome = match outcome {
+        Outcome::Uncertain => space.flood(query, count),
+        outcome => outcome,
+    };
+    if outcome == Outcome::Done { TetOutcome::Done } else { TetOutcome::GoOn }
+}
+
+/// The tet leaf that a constrained face belongs to.
+pub(crate) fn leaf_of_face(object: &ObjectView<'_>, row: u32) -> u32 {
+    object.tet_leaves.partition_point(|leaf| leaf.first_face <= row) as u32 - 1
+}
+
+pub(crate) fn space<'a, R: Record>(
+    object: &ObjectView<'a>,
+    records: &'a [R],
+    leaf: u32,
+    line: &'a Line,
+) -> TetSpace<'a, R> {
+    let leaf = &object.tet_leaves[leaf as usize];
+    let hull = &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
+    TetSpace::new(leaf, records, object.tet_vertices, object.tet_faces, hull, line)
+}

@@ -1,0 +1,143 @@
+//! Batches with hints against the same rays one at a time, bit for bit, on every instruction set.
+
+use bth::layout::RecordKind;
+use bth::rays::{Hit, Ray, Surface};
+use bth::{Isa, Scene};
+use bth_compile::Silent;
+use bth_compile::pipeline::{Options, Structure, compile};
+use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
+use bth_tests::rays::{assorted, onward};
+use bth_tests::rng::Rng;
+use std::sync::{Mutex, MutexGuard};
+
+/// The instruction set is the process's: tests that choose it take turns.
+fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtrees: bool) -> Scene {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("model.ply");
+    bth_scenes::write::file(model, &path).expect("a model file");
+    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
+    options.costs.minimum_triangles = 32;
+    options.costs.c_tet = 1e-3;
+    options.tets.worker = bth_tests::worker().map(Into::into);
+    options.tets.minimum = 1;
+    let (compiled, _) = compile(&path, &options, &Silent).expect("a model that compiles");
+    bth::from_bytes(&compiled.bytes).expect("a file that opens")
+}
+
+fn bits(hit: &Hit) -> [u32; 5] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
+}
+
+/// Rays as programs send them on: off the surface a little, or exactly on it, or cut right about a hit; and the rays
+/// of [`onward`], from wrong triangles too.
+fn hinted_rays(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<(Ray, Surface)> {
+    let first = assorted(corners, count, seed);
+    let mut hits = vec![Hit::MISS; first.len()];
+    plain.nearest_batch(&first, None, &mut hits);
+    let mut rays = onward(&first, &hits, corners.len(), seed + 1);
+    let mut rng = Rng(seed + 2);
+    for i in 0..rays.len() {
+        let (mut ray, from) = rays[i];
+        match i % 7 {
+            // Along an edge or through a vertex of some triangle, from the surface.
+            0 => {
+                let [a, b, c] = corners[rng.below(corners.len() as u64) as usize];
+                let to = [a, [0, 1, 2].map(|k| 0.5 * (b[k] + c[k]))][i / 7 % 2];
+                ray.direction = [0, 1, 2].map(|k| to[k] - ray.origin[k]);
+            }
+            // In the plane of the triangle that it starts on.
+            1 if from.triangle < corners.len() as u32 => {
+                let [a, b, c] = corners[from.triangle as usize];
+                ray.origin = [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]));
+                ray.direction = [0, 1, 2].map(|k| c[k] - a[k]);
+            }
+            // Through the surface that it starts on, with a tmin beyond it or before it.
+            2 => {
+                ray.origin = [0, 1, 2].map(|k| ray.origin[k] - 0.01 * ray.direction[k]);
+                ray.tmin = [0.0, 0.02, 0.01, -0.5][i / 7 % 4];
+            }
+            // An axis, exactly.
+            3 => {
+                ray.direction = [0.0; 3];
+                ray.direction[i / 7 % 3] = 1.0;
+            }
+            _ => {}
+        }
+        if ray.direction.iter().any(|d| *d != 0.0) {
+            rays[i].0 = ray;
+        }
+        // Cut right about the hit.
+        let hit = plain.nearest(&ray, Surface::NONE);
+        if hit.is_hit() {
+            let t = [hit.t, hit.t.next_up(), hit.t.next_down()][i % 3];
+            let cut = if i % 2 == 0 { Ray { tmax: t, ..ray } } else { Ray { tmin: t, ..ray } };
+            rays.push((cut, from));
+        }
+    }
+    rays
+}
+
+fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
+    if bth_tests::worker().is_none() {
+        return;
+    }
+    let _turn = turn();
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let plain = compiled(model, Structure::Bvh, RecordKind::Link32, false);
+    let (rays, from): (Vec<Ray>, Vec<Surface>) =
+        hinted_rays(&plain, &corners, rays, seed).into_iter().unzip();
+    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray, Surface::NONE)).collect();
+    let some_hits = expected.iter().filter(|hit| hit.is_hit()).count();
+    assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits} of {} hit", rays.len());
+    for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {
+        let scene = compiled(model, structure, record, keep);
+        assert!(!scene.object(0).tet_leaves.is_empty());
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            isa.choose().expect("an instruction set that is available");
+            let mut hits = vec![Hit::MISS; rays.len()];
+            scene.nearest_batch(&rays, Some(&from), &mut hits);
+            let mut any = vec![false; rays.len()];
+            scene.any_batch(&rays, Some(&from), &mut any);
+            for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
+                let context = || format!("{isa}, {}: {ray:?} from {from:?}", record.name());
+                assert_eq!(bits(&hits[i]), bits(&expected[i]), "{}", context());
+                assert_eq!(any[i], expected[i].is_hit(), "any hit, {}", context());
+            }
+        }
+    }
+    Isa::best().choose().expect("the best is available");
+}
+
+fn scaled(mut model: Model, scale: f32, offset: [f32; 3]) -> Model {
+    for p in &mut model.positions {
+        *p = [0, 1, 2].map(|k| p[k] * scale + offset[k]);
+    }
+    model
+}
+
+#[test]
+fn a_batch_through_one_tetrahedralization_has_the_bits_of_single_rays() {
+    check(&torus_knot(720), Structure::Tets, 3000, 1);
+}
+
+#[test]
+fn a_batch_through_several_tet_leaves_has_the_bits_of_single_rays() {
+    check(&gyroid(3000), Structure::Bth, 3000, 2);
+}
+
+#[test]
+fn batches_far_from_the_origin_have_the_bits_of_single_rays() {
+    check(&scaled(torus_knot(600), 1.0, [300.0, -700.0, 1100.0]), Structure::Tets, 1500, 3);
+}
+
+#[test]
+fn batches_at_all_scales_have_the_bits_of_single_rays() {
+    for scale in [1e30, 1e18, 1e12, 1e-9, 1e-14, 1e-20, 1e-30] {
+        check(&scaled(torus_knot(400), scale, [0.0; 3]), Structure::Tets, 700, 4);
+    }
+}

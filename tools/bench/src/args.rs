@@ -1,0 +1,149 @@
+//! The command line.
+
+use crate::names::Names;
+use crate::rays::View;
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Measures bth beside other CPU ray tracers on identical rays.
+#[derive(Debug, Parser)]
+#[command(name = "bth-bench", version, max_term_width = 100)]
+pub struct Arguments {
+    /// What to measure.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The measurements.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Rays per second of our structures and the rivals.
+    Speed(Speed),
+    /// Opening a compiled file and tracing the first rays, against building at the start.
+    Load(Load),
+    /// One start in a process of its own; `load` calls this.
+    #[command(hide = true)]
+    Probe(Probe),
+}
+
+/// Which models, and from where they are seen.
+#[derive(Debug, Args)]
+pub struct Models {
+    /// Model files, or models of `bth-scenes list` by NAME or NAME:FACES.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    /// Stand within the models, as is right for rooms; decided by each model when absent.
+    #[arg(long, conflicts_with = "outside")]
+    pub inside: bool,
+    /// Stand outside of the models.
+    #[arg(long)]
+    pub outside: bool,
+}
+
+impl Models {
+    /// The view that was asked for.
+    pub fn view(&self) -> Option<View> {
+        match (self.inside, self.outside) {
+            (true, _) => Some(View::Inside),
+            (_, true) => Some(View::Outside),
+            _ => None,
+        }
+    }
+}
+
+/// Where results go besides standard output.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Output {
+    /// Write JSON there.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Draw SVG charts into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub svg: Option<PathBuf>,
+    /// Keep a record in this folder: DATE-NAME.md, DATE-NAME.json and charts.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Name of the record; by default that of the measurement.
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+}
+
+/// `speed`.
+#[derive(Debug, Args)]
+pub struct Speed {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 200_000)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before and warms up.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Numbers of threads to trace on: CPU time is measured for 1, wall-clock time for more.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1", value_parser = at_least_one)]
+    pub threads: Vec<usize>,
+    /// Only these tracers; a star at the end stands for any ending.
+    #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub tracers: Names,
+    /// Only these ray sets.
+    #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub sets: Names,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    /// Small pictures and one round: whether it works, not how fast it is.
+    #[arg(long)]
+    pub quick: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `load`.
+#[derive(Debug, Args)]
+pub struct Load {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// First rays to trace.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Numbers of threads to build and trace on.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_value = "1,2", value_parser = at_least_one)]
+    pub threads: Vec<usize>,
+    /// Folder for the compiled files: its storage is what a cold start reads from.
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `probe`.
+#[derive(Debug, Args)]
+pub struct Probe {
+    /// How to start.
+    #[arg(long, value_enum)]
+    pub start: crate::load::probe::Start,
+    /// Numbers of threads to build and trace on.
+    #[arg(long)]
+    pub threads: usize,
+    /// Vector instructions of our kernels.
+    #[arg(long)]
+    pub isa: Option<String>,
+    /// Compiled file, or for a rival the triangles.
+    pub file: PathBuf,
+    /// The rays, the first of which hits.
+    pub rays: PathBuf,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a number from 1".to_owned())
+}

@@ -1,0 +1,61 @@
+//! Clocks. The CPU clock of a thread leaves out the time in which other jobs run, so it is what one
+//! thread is timed by; several threads are timed by the wall clock.
+
+use rustix::time::{ClockId, clock_gettime};
+use serde::Serialize;
+use std::time::Instant;
+
+/// What a time was measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Clock {
+    /// CPU time of the calling thread.
+    ThreadCpu,
+    /// Wall clock.
+    Wall,
+}
+
+impl Clock {
+    /// The clock to measure work on so many threads by.
+    pub fn for_threads(threads: usize) -> Clock {
+        if threads <= 1 { Clock::ThreadCpu } else { Clock::Wall }
+    }
+
+    /// What a table calls a second of this clock.
+    pub fn second(self) -> &'static str {
+        match self {
+            Clock::ThreadCpu => "CPU second",
+            Clock::Wall => "second",
+        }
+    }
+
+    /// Seconds that the work takes.
+    pub fn time(self, work: impl FnOnce()) -> f64 {
+        match self {
+            Clock::ThreadCpu => {
+                let start = thread_cpu();
+                work();
+                thread_cpu() - start
+            }
+            Clock::Wall => {
+                let start = Instant::now();
+                work();
+                start.elapsed().as_secs_f64()
+            }
+        }
+    }
+}
+
+fn thread_cpu() -> f64 {
+    read(ClockId::ThreadCPUTime)
+}
+
+/// CPU seconds of this process so far, over all its threads.
+pub fn process_cpu() -> f64 {
+    read(ClockId::ProcessCPUTime)
+}
+
+fn read(clock: ClockId) -> f64 {
+    let now = clock_gettime(clock);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}

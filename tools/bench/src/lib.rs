@@ -1,0 +1,23 @@
+//! Measures bth beside other CPU ray tracers on identical rays.
+//!
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed` and `load` are
+//! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
+#![warn(missing_docs)]
+
+pub mod args;
+pub mod chart;
+pub mod clock;
+pub mod isa;
+pub mod load;
+pub mod machine;
+pub mod markdown;
+pub mod model;
+pub mod names;
+pub mod ours;
+pub mod output;
+pub mod progress;
+pub mod rays;
+pub mod rivals;
+pub mod rounds;
+pub mod speed;
+pub mod tracer;

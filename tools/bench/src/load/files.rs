@@ -1,0 +1,130 @@
+//! The files that a start reads, and what of them is in memory.
+
+use anyhow::{Context, Result, ensure};
+use bth::rays::Ray;
+use bth_compile::mesh::Mesh;
+use serde::Serialize;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use zerocopy::{FromBytes, IntoBytes};
+
+/// A folder that goes away with this value.
+pub(super) struct Scratch(TempDir);
+
+impl Scratch {
+    pub(super) fn new(place: Option<&Path>) -> Result<Scratch> {
+        let folder = match place {
+            Some(place) => tempfile::tempdir_in(place).with_context(|| place.display().to_string())?,
+            None => tempfile::tempdir()?,
+        };
+        Ok(Scratch(folder))
+    }
+
+    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<PathBuf> {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, bytes)?;
+        // Only clean pages can be dropped from the cache.
+        File::open(&path)?.sync_all()?;
+        Ok(path)
+    }
+}
+
+/// How much of a file is in memory when a process starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum PageCache {
+    /// Nothing: the system was asked to drop it.
+    Cold,
+    /// All: it was just read.
+    Warm,
+}
+
+impl PageCache {
+    /// Both.
+    pub(super) const ALL: [PageCache; 2] = [PageCache::Warm, PageCache::Cold];
+
+    /// A word for tables.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            PageCache::Cold => "cold",
+            PageCache::Warm => "warm",
+        }
+    }
+
+    /// Brings a file into this state.
+    pub(super) fn prepare(self, path: &Path) -> Result<()> {
+        match self {
+            PageCache::Warm => {
+                std::fs::read(path)?;
+            }
+            PageCache::Cold => drop_pages(&File::open(path)?)?,
+        }
+        Ok(())
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn drop_pages(file: &File) -> Result<()> {
+    Ok(rustix::fs::fadvise(file, 0, None, rustix::fs::Advice::DontNeed)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn drop_pages(_: &File) -> Result<()> {
+    anyhow::bail!("a cold page cache can be had on Linux only")
+}
+
+/// Rays as they are in memory.
+pub(super) fn ray_bytes(rays: &[Ray]) -> &[u8] {
+    rays.as_bytes()
+}
+
+/// Reads what [`ray_bytes`] gave.
+pub(super) fn read_rays(path: &Path) -> Result<Vec<Ray>> {
+    let bytes = std::fs::read(path)?;
+    let rays = bytes.chunks(size_of::<Ray>()).map(|b| Ray::read_from_bytes(b).ok());
+    rays.collect::<Option<_>>().context("not a file of rays")
+}
+
+/// The number of positions and those, then the triangles.
+pub(super) fn mesh_bytes(mesh: &Mesh) -> Vec<u8> {
+    let mut bytes = (mesh.positions.len() as u64).to_le_bytes().to_vec();
+    bytes.extend_from_slice(mesh.positions.as_slice().as_bytes());
+    bytes.extend_from_slice(mesh.triangles.as_slice().as_bytes());
+    bytes
+}
+
+/// Positions and triangles.
+pub(super) type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
+/// Reads what [`mesh_bytes`] gave.
+pub(super) fn read_mesh(path: &Path) -> Result<Triangles> {
+    let bytes = std::fs::read(path)?;
+    let (head, rest) = bytes.split_at_checked(8).context("not a file of triangles")?;
+    let count = u64::from_le_bytes(head.try_into()?) as usize;
+    let end = count.checked_mul(12).filter(|end| *end <= rest.len()).context("not a file of triangles")?;
+    let (positions, triangles) = rest.split_at(end);
+    ensure!(triangles.len().is_multiple_of(12), "not a file of triangles");
+    let position = |b: &[u8]| <[f32; 3]>::read_from_bytes(b).expect("chunks of the right size");
+    let triangle = |b: &[u8]| <[u32; 3]>::read_from_bytes(b).expect("chunks of the right size");
+    Ok((positions.chunks(12).map(position).collect(), triangles.chunks(12).map(triangle).collect()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_and_triangles_come_back_from_their_files() {
+        let scratch = Scratch::new(None).unwrap();
+        let ray = Ray { origin: [1.0, 2.0, 3.0], tmin: 0.5, direction: [0.0, 1.0, 0.0], tmax: 9.0 };
+        let path = scratch.write("rays", ray_bytes(&[ray, Ray { tmin: 0.0, ..ray }])).unwrap();
+        assert_eq!(read_rays(&path).unwrap(), [ray, Ray { tmin: 0.0, ..ray }]);
+
+        let (positions, triangles) = (vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+        let mesh = Mesh { positions: positions.clone(), triangles: triangles.clone(), attributes: None };
+        let path = scratch.write("mesh", &mesh_bytes(&mesh)).unwrap();
+        assert_eq!(read_mesh(&path).unwrap(), (positions, triangles));
+        assert!(read_rays(&path).is_err());
+    }
+}

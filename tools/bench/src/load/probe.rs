@@ -1,0 +1,130 @@
+//! One start: open or build, then trace the first rays. Runs in a process of its own and prints its times
+//! as JSON.
+#![allow(unsafe_code)]
+
+use super::files;
+use crate::args::Probe;
+use crate::clock::process_cpu;
+use crate::isa;
+use crate::ours::BATCH;
+use crate::rivals::embree;
+use crate::tracer::{Batch, Tracer, spread};
+use anyhow::Result;
+use bth::rays::{Hit, Ray};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::time::Instant;
+
+/// How a program comes to a structure that it can trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// `bth::map`.
+    Map,
+    /// `bth::open`: reads and checks.
+    Read,
+    /// Embree builds from triangles in memory, as by default.
+    Embree,
+    /// As above, for its robust mode.
+    EmbreeRobust,
+}
+
+impl Start {
+    /// As on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Start::Map => "map",
+            Start::Read => "read",
+            Start::Embree => "embree",
+            Start::EmbreeRobust => "embree-robust",
+        }
+    }
+}
+
+/// What a start took; wall-clock seconds since before the file was opened or the build began.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Probed {
+    /// Until rays could be traced.
+    pub ready_s: f64,
+    /// Until the first hit.
+    pub first_hit_s: f64,
+    /// Until all rays were traced.
+    pub total_s: f64,
+    /// CPU seconds of all threads until then.
+    pub cpu_s: f64,
+    /// Bytes that came from storage meanwhile, where the system tells.
+    pub storage_bytes: Option<u64>,
+    /// Rays that hit.
+    pub hits: usize,
+}
+
+/// Starts and prints what it took.
+///
+/// # Errors
+/// If the file or library cannot be used.
+pub fn run(arguments: &Probe) -> Result<()> {
+    isa::select(arguments.isa.as_deref())?;
+    let rays = files::read_rays(&arguments.rays)?;
+    let (file, threads) = (&arguments.file, arguments.threads);
+    let probed = match arguments.start {
+        // SAFETY: `load` wrote the file into a folder of its own and does not touch it while we run.
+        Start::Map => probe(&rays, threads, || Ok(Opened(unsafe { bth::map(file)? })))?,
+        Start::Read => probe(&rays, threads, || Ok(Opened(bth::open(file)?)))?,
+        Start::Embree | Start::EmbreeRobust => {
+            // Neither the library nor the triangles are part of a build.
+            embree::available()?;
+            let (positions, triangles) = files::read_mesh(file)?;
+            let positions = embree::padded(&positions);
+            let robust = arguments.start == Start::EmbreeRobust;
+            let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
+            probe(&rays, threads, || embree::build(positions, triangles, variant, threads))?
+        }
+    };
+    writeln!(std::io::stdout().lock(), "{}", serde_json::to_string(&probed)?)?;
+    Ok(())
+}
+
+/// An opened file.
+struct Opened(bth::Scene);
+
+impl Tracer for Opened {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            self.0.nearest_batch(batch.rays, None, hits);
+        }
+    }
+
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        self.0.any_batch(batch.rays, None, found);
+    }
+}
+
+fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result<T>) -> Result<Probed> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let batch = |rays| Batch { rays, from: None, coherent: true };
+    let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
+    let tracer = start()?;
+    let ready_s = clock.elapsed().as_secs_f64();
+    tracer.nearest(batch(&rays[..1]), &mut hits[..1]);
+    let first_hit_s = clock.elapsed().as_secs_f64();
+    let share = rays.len().div_ceil(threads);
+    spread(batch(rays), &mut hits, threads, share, |batch, hits| tracer.nearest(batch, hits));
+    let total_s = clock.elapsed().as_secs_f64();
+    let cpu_s = process_cpu() - cpu;
+    anyhow::ensure!(hits[0].is_hit(), "the first ray hits nothing");
+    let storage_bytes = storage_bytes().zip(before).map(|(after, before)| after - before);
+    Ok(Probed {
+        ready_s,
+        first_hit_s,
+        total_s,
+        cpu_s,
+        storage_bytes,
+        hits: hits.iter().filter(|h| h.is_hit()).count(),
+    })
+}
+
+/// Bytes that this process has fetched from storage so far (Linux).
+fn storage_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/io").ok()?;
+    text.lines().find_map(|line| line.strip_prefix("read_bytes:"))?.trim().parse().ok()
+}

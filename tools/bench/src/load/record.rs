@@ -1,0 +1,125 @@
+//! What `load` measured, as it is written to JSON.
+
+use super::files::PageCache;
+use super::probe::{Probed, Start};
+use crate::output::Head;
+use crate::rays::View;
+use crate::rounds::median;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Name of the start that others are compared with.
+pub(super) const BASE: &str = "embree";
+
+/// Everything that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LoadRecord {
+    /// When and where.
+    #[serde(flatten)]
+    pub head: Head,
+    /// First rays that were traced.
+    pub rays: usize,
+    /// In the order of the command line.
+    pub models: Vec<ModelStarts>,
+}
+
+/// What was measured on a model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelStarts {
+    /// Name without folder.
+    pub name: String,
+    /// Triangles.
+    pub triangles: usize,
+    /// Where it was seen from.
+    pub view: View,
+    /// Bytes of our compiled files.
+    pub file_bytes: BTreeMap<&'static str, usize>,
+    /// What could not be measured, and why.
+    pub left_out: Vec<(String, String)>,
+    /// One for each number of threads.
+    pub runs: Vec<Run>,
+}
+
+/// All starts on so many threads.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Run {
+    /// Threads that built, where a build can use them, and traced.
+    pub threads: usize,
+    /// By name, in the order of the tables.
+    pub starts: Vec<(String, Times)>,
+}
+
+/// Medians of a start's times and bytes; see [`Probed`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Times {
+    /// Seconds until rays could be traced.
+    pub ready_s: f64,
+    /// Seconds until the first hit.
+    pub first_hit_s: f64,
+    /// Seconds until all rays were traced.
+    pub total_s: f64,
+    /// CPU seconds of all threads until then.
+    pub cpu_s: f64,
+    /// Bytes that came from storage, where the system tells.
+    pub storage_bytes: Option<u64>,
+}
+
+impl Times {
+    /// Of at least one start.
+    pub(super) fn medians(probed: &[Probed]) -> Times {
+        let of = |field: fn(&Probed) -> f64| median(probed.iter().map(field).collect()).unwrap_or(f64::NAN);
+        let storage: Option<Vec<f64>> = probed.iter().map(|p| p.storage_bytes.map(|b| b as f64)).collect();
+        Times {
+            ready_s: of(|p| p.ready_s),
+            first_hit_s: of(|p| p.first_hit_s),
+            total_s: of(|p| p.total_s),
+            cpu_s: of(|p| p.cpu_s),
+            storage_bytes: storage.and_then(median).map(|b| b as u64),
+        }
+    }
+}
+
+impl Run {
+    /// How many times faster than Embree's build a start is, first rays included.
+    pub(super) fn faster(&self, name: &str) -> Option<f64> {
+        let total = |name: &str| self.starts.iter().find(|(n, _)| n == name).map(|(_, t)| t.total_s);
+        Some(total(BASE)? / total(name)?)
+    }
+}
+
+/// A way to start.
+#[derive(Clone, Debug)]
+pub(super) struct Case {
+    /// Its name in tables.
+    pub(super) name: String,
+    /// Our structure, or empty.
+    pub(super) structure: &'static str,
+    /// What is started.
+    pub(super) start: Start,
+    /// State of the file's pages before.
+    pub(super) cache: PageCache,
+    /// What is read.
+    pub(super) file: PathBuf,
+    /// Its bytes, if it is a compiled file.
+    pub(super) file_bytes: usize,
+}
+
+impl Case {
+    pub(super) fn of_file(
+        structure: &'static str,
+        start: Start,
+        cache: PageCache,
+        file: PathBuf,
+        file_bytes: usize,
+    ) -> Case {
+        let name = format!("{structure} {} {}", start.name(), cache.name());
+        Case { name, structure, start, cache, file, file_bytes }
+    }
+
+    /// The triangles are in memory before the clock starts, so the cache does not matter.
+    pub(super) fn of_rival(start: Start, file: PathBuf) -> Case {
+        let name = start.name().replace('-', " ");
+        Case { name, structure: "", start, cache: PageCache::Warm, file, file_bytes: 0 }
+    }
+}

@@ -1,0 +1,21 @@
+//! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
+
+use bth_bench::args::{Arguments, Command};
+use bth_bench::{load, output, speed};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Speed(arguments) => speed::run(&arguments),
+        Command::Load(arguments) => load::run(&arguments),
+        Command::Probe(arguments) => load::probe::run(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::note(&format!("error: {error:#}"));
+            ExitCode::FAILURE
+        }
+    }
+}

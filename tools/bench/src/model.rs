@@ -1,0 +1,130 @@
+//! The models that are measured: files, or models that `bth-scenes` makes by name.
+
+use anyhow::{Context, Result, anyhow};
+use bth_compile::mesh::{self, Mesh};
+use bth_scenes::{catalogue, write};
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A model, imported.
+#[derive(Debug)]
+pub struct Model {
+    /// File name without folder and extension, or name of the generated model.
+    pub name: String,
+    /// What the compiler reads.
+    pub path: PathBuf,
+    /// Positions and triangles; the index of a triangle is its id in every tracer.
+    pub mesh: Mesh,
+    /// Holds the file of a generated model.
+    _folder: Option<TempDir>,
+}
+
+impl Model {
+    /// Imports a file, or makes the model `NAME` or `NAME:FACES` of `bth-scenes list`.
+    ///
+    /// # Errors
+    /// If there is neither, or the file cannot be imported or has no triangles.
+    pub fn load(which: &str) -> Result<Model> {
+        let path = Path::new(which);
+        if path.exists() {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            return Self::import(name, path.to_owned(), None);
+        }
+        let (name, faces) = match which.split_once(':') {
+            Some((name, faces)) => (name, Some(faces)),
+            None => (which, None),
+        };
+        let entry = catalogue::find(name)
+            .ok_or_else(|| anyhow!("{which}: neither a file nor a model of `bth-scenes list`"))?;
+        let faces = match faces {
+            Some(text) => text.parse().ok().filter(|f| (1..=catalogue::MAX_FACES).contains(f)),
+            None => Some(entry.faces),
+        }
+        .with_context(|| format!("{which}: expected a number of faces, 1 to {}", catalogue::MAX_FACES))?;
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("model.ply");
+        write::file(&(entry.make)(faces), &path)?;
+        Self::import(entry.name.to_owned(), path, Some(folder))
+    }
+
+    fn import(name: String, path: PathBuf, folder: Option<TempDir>) -> Result<Model> {
+        let (mesh, _) = mesh::import(&path, mesh::Keep::None, &bth_compile::Silent)?;
+        anyhow::ensure!(!mesh.triangles.is_empty(), "{name}: no triangles");
+        Ok(Model { name, path, mesh, _folder: folder })
+    }
+
+    /// Triangles.
+    pub fn triangles(&self) -> usize {
+        self.mesh.triangles.len()
+    }
+
+    /// Corners of a triangle.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.mesh.corners(triangle).map(position)
+    }
+
+    /// Unit normal of a triangle, counter-clockwise seen from its front; zero if it has no area.
+    pub fn normal(&self, triangle: u32) -> DVec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Bounding box.
+    pub fn bounds(&self) -> Bounds {
+        let empty = Bounds { lower: DVec3::INFINITY, upper: DVec3::NEG_INFINITY };
+        self.mesh
+            .positions
+            .iter()
+            .map(|p| position(*p))
+            .fold(empty, |bounds, p| Bounds { lower: bounds.lower.min(p), upper: bounds.upper.max(p) })
+    }
+}
+
+/// A position in double precision.
+pub fn position(p: [f32; 3]) -> DVec3 {
+    DVec3::from_array(p.map(f64::from))
+}
+
+/// An axis-aligned box, object space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Least corner.
+    pub lower: DVec3,
+    /// Greatest corner.
+    pub upper: DVec3,
+}
+
+impl Bounds {
+    /// Its middle.
+    pub fn center(&self) -> DVec3 {
+        (self.lower + self.upper) * 0.5
+    }
+
+    /// Length of its diagonal.
+    pub fn diagonal(&self) -> f64 {
+        (self.upper - self.lower).length()
+    }
+
+    /// Whether a point lies inside or on it.
+    pub fn holds(&self, p: DVec3) -> bool {
+        p.cmpge(self.lower).all() && p.cmple(self.upper).all()
+    }
+
+    /// Whether the ray from `origin`, t >= 0, meets the box (slab method).
+    pub fn meets(&self, origin: DVec3, direction: DVec3) -> bool {
+        let (mut near, mut far) = (0.0f64, f64::INFINITY);
+        for k in 0..3 {
+            if direction[k] == 0.0 {
+                if origin[k] < self.lower[k] || origin[k] > self.upper[k] {
+                    return false;
+                }
+                continue;
+            }
+            let (a, b) =
+                ((self.lower[k] - origin[k]) / direction[k], (self.upper[k] - origin[k]) / direction[k]);
+            (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+        }
+        near <= far
+    }
+}

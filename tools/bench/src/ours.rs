@@ -1,0 +1,171 @@
+//! Our own structures, compiled through the compiler library.
+
+use crate::model::Model;
+use crate::tracer::{Batch, Contender, Tracer};
+use anyhow::{Context, Result};
+use bth::Scene;
+use bth::layout::RecordKind;
+use bth::rays::{Hit, Surface};
+use bth_compile::pipeline::{self, Options, Structure};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Rays in one call of a batch.
+pub const BATCH: usize = 1024;
+
+/// A structure that can be compiled.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
+    /// Its name in tables.
+    pub name: &'static str,
+    structure: Structure,
+    record: RecordKind,
+}
+
+/// The structures. The default file comes first, then the plain BVH, which is also what finds the hits
+/// that secondary rays start from.
+pub const KINDS: [Kind; 6] = [
+    Kind { name: "bth", structure: Structure::Bth, record: RecordKind::Link32 },
+    Kind { name: "bvh", structure: Structure::Bvh, record: RecordKind::Link32 },
+    Kind { name: "tets link32", structure: Structure::Tets, record: RecordKind::Link32 },
+    Kind { name: "tets tet32", structure: Structure::Tets, record: RecordKind::Tet32 },
+    Kind { name: "tets tet20", structure: Structure::Tets, record: RecordKind::Tet20 },
+    Kind { name: "tets tet16", structure: Structure::Tets, record: RecordKind::Tet16 },
+];
+
+/// The default file.
+pub const BTH: Kind = KINDS[0];
+/// The plain BVH.
+pub const BVH: Kind = KINDS[1];
+
+impl Kind {
+    /// Whether it is a tetrahedralization of the whole model, which not every model has.
+    pub fn is_tets(&self) -> bool {
+        self.structure == Structure::Tets
+    }
+
+    /// Whether it can hold tetrahedra, so that hints can matter.
+    fn takes_hints(&self) -> bool {
+        self.structure != Structure::Bvh
+    }
+
+    /// Names of the ways to trace it.
+    pub fn uses(&self) -> impl Iterator<Item = (String, Use)> {
+        let hinted = self.takes_hints().then(|| (format!("{} from", self.name), Use::Hinted));
+        let plain = [(self.name.to_owned(), Use::Batch), (format!("{} single", self.name), Use::Single)];
+        let [batch, single] = plain;
+        [Some(batch), hinted, Some(single)].into_iter().flatten()
+    }
+
+    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would take the
+    /// rays without hints; all else is the default.
+    fn options(&self) -> Options {
+        Options {
+            structure: self.structure,
+            record: self.record,
+            keep_subtrees: !self.is_tets(),
+            ..Options::default()
+        }
+    }
+}
+
+/// How a file is traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// In batches, without hints.
+    Batch,
+    /// In batches, with the surface that each ray starts on.
+    Hinted,
+    /// One ray a call, without hints.
+    Single,
+}
+
+/// A compiled file.
+#[derive(Clone, Debug)]
+pub struct Compiled {
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Wall-clock seconds that the compiler took, all cores.
+    pub seconds: f64,
+    /// Share of the model's triangles that are in tetrahedralizations.
+    pub in_tets: f64,
+}
+
+/// Compiles a model.
+///
+/// # Errors
+/// As the compiler: a whole tetrahedralization needs the worker and a model without bad contacts.
+pub fn compile(model: &Model, kind: &Kind) -> Result<Compiled> {
+    let start = Instant::now();
+    let (compiled, report) = pipeline::compile(&model.path, &kind.options(), &bth_compile::Silent)
+        .map_err(|e| anyhow::anyhow!("{}", reason(&e)))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let in_tets = report.file.tet_triangles as f64 / model.triangles() as f64;
+    Ok(Compiled { bytes: compiled.bytes, seconds, in_tets })
+}
+
+/// The message of an error without its path, which belongs into no record.
+fn reason(error: &bth_compile::Error) -> String {
+    match error {
+        bth_compile::Error::Input { message, hint, .. } => format!("{message} (hint: {hint})"),
+        other => other.to_string(),
+    }
+}
+
+/// Opens a compiled file and makes a contender of each way to trace it.
+///
+/// # Errors
+/// If the runtime refuses the file, which would be a fault of ours.
+pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
+    let scene = Arc::new(bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?);
+    let contender = |(name, usage)| Contender {
+        name,
+        ours: true,
+        build_s: compiled.seconds,
+        bytes: Some(scene.resident_bytes()),
+        tracer: Box::new(Ours { scene: scene.clone(), usage }),
+    };
+    Ok(kind.uses().map(contender).collect())
+}
+
+/// A scene and how it is traced.
+struct Ours {
+    scene: Arc<Scene>,
+    usage: Use,
+}
+
+impl Tracer for Ours {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        if self.usage == Use::Single {
+            for (ray, hit) in batch.rays.iter().zip(hits) {
+                *hit = self.scene.nearest(ray, Surface::NONE);
+            }
+            return;
+        }
+        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            self.scene.nearest_batch(batch.rays, self.hints(&batch), hits);
+        }
+    }
+
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        if self.usage == Use::Single {
+            for (ray, found) in batch.rays.iter().zip(found) {
+                *found = self.scene.any(ray, Surface::NONE);
+            }
+            return;
+        }
+        for (batch, found) in batch.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
+            self.scene.any_batch(batch.rays, self.hints(&batch), found);
+        }
+    }
+
+    fn needs_hints(&self) -> bool {
+        self.usage == Use::Hinted
+    }
+}
+
+impl Ours {
+    fn hints<'a>(&self, batch: &Batch<'a>) -> Option<&'a [Surface]> {
+        if self.usage == Use::Hinted { batch.from } else { None }
+    }
+}

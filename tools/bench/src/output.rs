@@ -1,0 +1,122 @@
+//! Where results go: standard output, and the files that were asked for.
+
+use crate::args::Output;
+use crate::machine::{self, Machine};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use serde_json::Value;
+use std::io::Write;
+use std::path::Path;
+
+/// What every record begins with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Head {
+    /// Which measurement.
+    pub measurement: &'static str,
+    /// Day, UTC.
+    pub date: String,
+    /// The commit that was measured.
+    pub commit: Option<String>,
+    /// Type of machine.
+    pub machine: Machine,
+    /// Vector instructions that our kernels used.
+    pub isa: String,
+    /// The options that matter.
+    pub options: Value,
+}
+
+impl Head {
+    /// Of a measurement that is made now.
+    pub fn now(measurement: &'static str, isa: String, options: Value) -> Head {
+        let (date, commit, machine) = (machine::today(), machine::commit(), Machine::this());
+        Head { measurement, date, commit, machine, isa, options }
+    }
+
+    /// A paragraph of Markdown.
+    pub fn markdown(&self) -> String {
+        let commit = self.commit.as_deref().unwrap_or("unknown");
+        let machine = &self.machine;
+        format!(
+            "{}; commit {commit}. {}, {}, {} logical cores, {}. Our kernels: {}. Options: `{}`. \
+             Only ratios within this record mean something.\n",
+            self.date,
+            machine.cpu,
+            machine.isa.join("/"),
+            machine.logical_cores,
+            machine.os,
+            self.isa,
+            self.options,
+        )
+    }
+}
+
+/// A chart and the name of its file, without extension.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// Such as `means-1-thread`.
+    pub name: String,
+    /// SVG text.
+    pub svg: String,
+}
+
+/// A finished record.
+#[derive(Clone, Debug)]
+pub struct Record<'a> {
+    /// What it begins with.
+    pub head: &'a Head,
+    /// Title of the page.
+    pub title: &'a str,
+    /// Tables and what is said of them.
+    pub body: String,
+    /// Everything that was measured.
+    pub json: Value,
+    /// Charts.
+    pub charts: Vec<Chart>,
+}
+
+impl Record<'_> {
+    /// Prints the Markdown and writes the files.
+    ///
+    /// # Errors
+    /// If something cannot be written.
+    pub fn write(&self, to: &Output) -> Result<()> {
+        let page = |charts: &str| {
+            format!("# {}, {}\n\n{}\n{charts}{}", self.title, self.head.date, self.head.markdown(), self.body)
+        };
+        let json = format!("{:#}\n", self.json);
+        if let Some(path) = &to.json {
+            write(path, &json)?;
+        }
+        if let Some(folder) = &to.svg {
+            for chart in &self.charts {
+                write(&folder.join(format!("{}.svg", chart.name)), &chart.svg)?;
+            }
+        }
+        if let Some(folder) = &to.out {
+            let stem = format!("{}-{}", self.head.date, to.name.as_deref().unwrap_or(self.head.measurement));
+            let mut pictures = String::new();
+            for chart in &self.charts {
+                let file = format!("{stem}-{}.svg", chart.name);
+                write(&folder.join(&file), &chart.svg)?;
+                pictures.push_str(&format!("![{}]({file})\n\n", chart.name));
+            }
+            write(&folder.join(format!("{stem}.json")), &json)?;
+            write(&folder.join(format!("{stem}.md")), &page(&pictures))?;
+        }
+        std::io::stdout().lock().write_all(page("").as_bytes())?;
+        Ok(())
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
+    std::fs::write(path, text).with_context(|| path.display().to_string())
+}
+
+/// Says something that the user should know on standard error.
+pub fn note(what: &str) {
+    // Nothing can be done when standard error is closed.
+    let _ = writeln!(std::io::stderr().lock(), "{what}");
+}

@@ -1,0 +1,113 @@
+//! Pinhole cameras.
+
+use super::ray;
+use bth::rays::Ray;
+use glam::DVec3;
+
+/// Pixels of a tile's side. Neighbours in a camera's rays come from one tile.
+const TILE: u32 = 4;
+
+/// A pinhole camera; up is +y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it stands.
+    pub eye: DVec3,
+    /// What it looks at.
+    pub target: DVec3,
+    /// Tangent of half the vertical field of view.
+    pub tangent: f64,
+    /// Pixels across and down, multiples of the tile's side.
+    pub size: (u32, u32),
+}
+
+impl Camera {
+    /// Unit vectors to the front, right and top.
+    pub fn axes(&self) -> (DVec3, DVec3, DVec3) {
+        let front = (self.target - self.eye).normalize();
+        let up = if front.y.abs() > 0.99 { DVec3::X } else { DVec3::Y };
+        let right = front.cross(up).normalize();
+        (front, right, right.cross(front))
+    }
+
+    fn aspect(&self) -> f64 {
+        f64::from(self.size.0) / f64::from(self.size.1)
+    }
+
+    /// Whether a point is in the picture.
+    fn sees(&self, p: DVec3) -> bool {
+        let ((front, right, top), to) = (self.axes(), p - self.eye);
+        let depth = to.dot(front);
+        depth > 0.0
+            && to.dot(right).abs() <= depth * self.tangent * self.aspect()
+            && to.dot(top).abs() <= depth * self.tangent
+    }
+
+    /// A ray through the centre of every pixel, tile by tile.
+    pub fn rays(&self) -> Vec<Ray> {
+        let ((width, height), (front, right, top)) = (self.size, self.axes());
+        let through = |x: u32, y: u32| {
+            let across = 2.0 * (f64::from(x) + 0.5) / f64::from(width) - 1.0;
+            let down = 2.0 * (f64::from(y) + 0.5) / f64::from(height) - 1.0;
+            let direction =
+                front + right * (across * self.tangent * self.aspect()) - top * (down * self.tangent);
+            ray(self.eye, direction.normalize(), f64::INFINITY)
+        };
+        let tiles = (0..height / TILE).flat_map(|y| (0..width / TILE).map(move |x| (x, y)));
+        tiles
+            .flat_map(|(x, y)| (0..TILE * TILE).map(move |i| (x * TILE + i % TILE, y * TILE + i / TILE)))
+            .map(|(x, y)| through(x, y))
+            .collect()
+    }
+
+    /// A camera in this direction from the middle, as near as all of the points allow.
+    pub fn framing(points: &[DVec3], middle: DVec3, diagonal: f64, from: DVec3, size: (u32, u32)) -> Camera {
+        let from = from.normalize();
+        let at = |distance: f64| Camera {
+            eye: middle + from * distance,
+            target: middle,
+            tangent: 20f64.to_radians().tan(),
+            size,
+        };
+        // Whether the camera sees everything changes once only on the way out, so bisect.
+        let (mut near, mut far) = (0.0, 20.0 * diagonal);
+        for _ in 0..30 {
+            let half = 0.5 * (near + far);
+            let camera = at(half);
+            if points.iter().all(|p| camera.sees(*p)) { far = half } else { near = half }
+        }
+        at(far)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_framing_camera_sees_all_points_and_is_near() {
+        let points: Vec<DVec3> =
+            (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
+        let middle = DVec3::splat(0.5);
+        let camera = Camera::framing(&points, middle, 3f64.sqrt(), DVec3::new(0.8, 0.5, 1.0), (64, 36));
+        assert!(points.iter().all(|p| camera.sees(*p)));
+        let nearer = Camera { eye: middle + (camera.eye - middle) * 0.99, ..camera };
+        assert!(!points.iter().all(|p| nearer.sees(*p)));
+    }
+
+    #[test]
+    fn every_pixel_has_one_ray_and_neighbours_share_a_tile() {
+        let camera = Camera { eye: DVec3::ZERO, target: -DVec3::Z, tangent: 1.0, size: (8, 8) };
+        let pixel = |r: &Ray| {
+            let scale = -1.0 / r.direction[2];
+            let x = (r.direction[0] * scale + 1.0) * 4.0 - 0.5;
+            let y = (1.0 - r.direction[1] * scale) * 4.0 - 0.5;
+            (x.round() as u32, y.round() as u32)
+        };
+        let mut pixels: Vec<_> = camera.rays().iter().map(pixel).collect();
+        assert_eq!(pixels[..5], [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1)]);
+        assert_eq!(pixels[16], (4, 0));
+        pixels.sort_unstable();
+        pixels.dedup();
+        assert_eq!(pixels.len(), 64);
+    }
+}

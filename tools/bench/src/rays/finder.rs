@@ -1,0 +1,41 @@
+//! Finds the hits that the secondary rays start from, with our own plain BVH: its answers are exact and
+//! the same everywhere, so the rays are too.
+
+use crate::model::{Model, position};
+use crate::tracer::{BLOCK, Batch, spread};
+use bth::Scene;
+use bth::rays::{Hit, Ray};
+use glam::DVec3;
+
+/// A model and the compiled scene of it.
+pub struct Finder<'a> {
+    pub(super) model: &'a Model,
+    scene: &'a Scene,
+    threads: usize,
+    lift: f64,
+}
+
+impl<'a> Finder<'a> {
+    /// For a model and its compiled scene; uses all processors.
+    pub fn new(model: &'a Model, scene: &'a Scene) -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+        Finder { model, scene, threads, lift: super::LIFT * model.bounds().diagonal() }
+    }
+
+    /// Nearest hits.
+    pub(super) fn nearest(&self, rays: &[Ray]) -> Vec<Hit> {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let batch = Batch { rays, from: None, coherent: false };
+        spread(batch, &mut hits, self.threads, BLOCK, |b, h| self.scene.nearest_batch(b.rays, None, h));
+        hits
+    }
+
+    /// Where a ray goes on from a hit: the point, lifted off the surface to the ray's side, and the unit
+    /// normal to that side.
+    pub(super) fn start(&self, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
+        let normal = self.model.normal(hit.surface.triangle);
+        let direction = position(ray.direction);
+        let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        (position(ray.origin) + direction * f64::from(hit.t) + normal * self.lift, normal)
+    }
+}

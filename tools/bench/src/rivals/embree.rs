@@ -1,0 +1,361 @@
+//! Embree 4 through its C interface (`embree4/rtcore.h`).
+#![allow(unsafe_code)]
+
+use super::library;
+use crate::model::Model;
+use crate::tracer::{Batch, Contender, Tracer};
+use anyhow::{Result, ensure};
+use bth::layout::NONE;
+use bth::rays::{Hit, Ray, Surface};
+use std::ffi::{c_char, c_int, c_void};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Instant;
+
+type Handle = *mut c_void;
+type Function = *const c_void;
+
+/// How a scene is built and traced.
+#[derive(Clone, Copy, Debug)]
+pub struct Variant {
+    quality: c_int,
+    flags: c_int,
+    packets: bool,
+}
+
+const QUALITY_MEDIUM: c_int = 1;
+const QUALITY_HIGH: c_int = 2;
+const FLAG_ROBUST: c_int = 4;
+
+/// What a caller gets who sets nothing; one ray a call.
+pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false };
+/// The robust mode, which has no high quality; one ray a call.
+pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
+/// High quality (spatial splits); 16 rays a call.
+pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
+
+const TYPE_TRIANGLE: c_int = 0;
+const BUFFER_INDEX: c_int = 0;
+const BUFFER_VERTEX: c_int = 1;
+const FORMAT_UINT3: c_int = 0x5003;
+const FORMAT_FLOAT3: c_int = 0x9003;
+const QUERY_COHERENT: c_int = 1 << 16;
+
+/// `RTCRayHit` for one lane and `RTCRayHitN` for more; rays whose `RTCRay` part alone is used too.
+#[repr(C, align(64))]
+struct RayHit<const N: usize> {
+    origin: [[f32; N]; 3],
+    near: [f32; N],
+    direction: [[f32; N]; 3],
+    time: [f32; N],
+    far: [f32; N],
+    mask: [u32; N],
+    id: [u32; N],
+    flags: [u32; N],
+    normal: [[f32; N]; 3],
+    u: [f32; N],
+    v: [f32; N],
+    primitive: [u32; N],
+    geometry: [u32; N],
+    /// Instance, and row in an instance array in libraries that were built with those.
+    instance: [[u32; N]; 2],
+}
+
+impl<const N: usize> RayHit<N> {
+    const EMPTY: Self = RayHit {
+        origin: [[0.0; N]; 3],
+        near: [0.0; N],
+        direction: [[0.0; N]; 3],
+        time: [0.0; N],
+        far: [0.0; N],
+        mask: [u32::MAX; N],
+        id: [0; N],
+        flags: [0; N],
+        normal: [[0.0; N]; 3],
+        u: [0.0; N],
+        v: [0.0; N],
+        primitive: [NONE; N],
+        geometry: [NONE; N],
+        instance: [[NONE; N]; 2],
+    };
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, ray: &Ray) {
+        for k in 0..3 {
+            self.origin[k][lane] = ray.origin[k];
+            self.direction[k][lane] = ray.direction[k];
+        }
+        (self.near[lane], self.far[lane]) = (ray.tmin, ray.tmax);
+        self.geometry[lane] = NONE;
+    }
+
+    #[inline(always)]
+    fn hit(&self, lane: usize) -> Hit {
+        if self.geometry[lane] == NONE {
+            return Hit::MISS;
+        }
+        let surface = Surface { instance: 0, triangle: self.primitive[lane] };
+        Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], surface }
+    }
+
+    /// The library marks an occluded ray so.
+    #[inline(always)]
+    fn occluded(&self, lane: usize) -> bool {
+        self.far[lane] == f32::NEG_INFINITY
+    }
+}
+
+/// `RTCIntersectArguments`, and `RTCOccludedArguments`, which is the same.
+#[repr(C)]
+struct Arguments {
+    flags: c_int,
+    features: u32,
+    context: Handle,
+    filter: Function,
+    callback: Function,
+    /// In libraries that were built with a minimal width of curves.
+    min_width: f32,
+}
+
+impl Arguments {
+    fn new(coherent: bool) -> Self {
+        Arguments {
+            flags: if coherent { QUERY_COHERENT } else { 0 },
+            features: u32::MAX,
+            context: std::ptr::null_mut(),
+            filter: std::ptr::null(),
+            callback: std::ptr::null(),
+            min_width: 0.0,
+        }
+    }
+}
+
+/// Which lanes of a packet hold rays: -1, else 0.
+#[repr(C, align(64))]
+struct Lanes([c_int; 16]);
+
+type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut Arguments);
+type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut Arguments);
+
+struct Api {
+    new_device: unsafe extern "C" fn(*const c_char) -> Handle,
+    release_device: unsafe extern "C" fn(Handle),
+    device_error: unsafe extern "C" fn(Handle) -> c_int,
+    monitor: unsafe extern "C" fn(Handle, unsafe extern "C" fn(Handle, isize, bool) -> bool, Handle),
+    new_scene: unsafe extern "C" fn(Handle) -> Handle,
+    release_scene: unsafe extern "C" fn(Handle),
+    scene_flags: unsafe extern "C" fn(Handle, c_int),
+    scene_quality: unsafe extern "C" fn(Handle, c_int),
+    commit_scene: unsafe extern "C" fn(Handle),
+    new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
+    geometry_quality: unsafe extern "C" fn(Handle, c_int),
+    shared_buffer: unsafe extern "C" fn(Handle, c_int, u32, c_int, *const c_void, usize, usize, usize),
+    commit_geometry: unsafe extern "C" fn(Handle),
+    attach_geometry: unsafe extern "C" fn(Handle, Handle) -> u32,
+    release_geometry: unsafe extern "C" fn(Handle),
+    intersect1: Trace1,
+    occluded1: Trace1,
+    intersect16: Trace16,
+    occluded16: Trace16,
+}
+
+impl Api {
+    fn get() -> Result<&'static Api> {
+        static API: OnceLock<std::result::Result<Api, String>> = OnceLock::new();
+        API.get_or_init(|| Api::load().map_err(|e| format!("{e:#}")))
+            .as_ref()
+            .map_err(|e| anyhow::anyhow!("{e}"))
+    }
+
+    fn load() -> Result<Api> {
+        // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and whose
+        // functions have the types above (rtcore_device.h, rtcore_scene.h, rtcore_geometry.h).
+        // Occluded rays are passed as the `RTCRay` that a `RTCRayHit` begins with.
+        unsafe {
+            let library = library::load("EMBREE_LIB", "libembree4.so")?;
+            Ok(Api {
+                new_device: *library.get(b"rtcNewDevice\0")?,
+                release_device: *library.get(b"rtcReleaseDevice\0")?,
+                device_error: *library.get(b"rtcGetDeviceError\0")?,
+                monitor: *library.get(b"rtcSetDeviceMemoryMonitorFunction\0")?,
+                new_scene: *library.get(b"rtcNewScene\0")?,
+                release_scene: *library.get(b"rtcReleaseScene\0")?,
+                scene_flags: *library.get(b"rtcSetSceneFlags\0")?,
+                scene_quality: *library.get(b"rtcSetSceneBuildQuality\0")?,
+                commit_scene: *library.get(b"rtcCommitScene\0")?,
+                new_geometry: *library.get(b"rtcNewGeometry\0")?,
+                geometry_quality: *library.get(b"rtcSetGeometryBuildQuality\0")?,
+                shared_buffer: *library.get(b"rtcSetSharedGeometryBuffer\0")?,
+                commit_geometry: *library.get(b"rtcCommitGeometry\0")?,
+                attach_geometry: *library.get(b"rtcAttachGeometry\0")?,
+                release_geometry: *library.get(b"rtcReleaseGeometry\0")?,
+                intersect1: *library.get(b"rtcIntersect1\0")?,
+                occluded1: *library.get(b"rtcOccluded1\0")?,
+                intersect16: *library.get(b"rtcIntersect16\0")?,
+                occluded16: *library.get(b"rtcOccluded16\0")?,
+            })
+        }
+    }
+}
+
+/// Loads the library, so that a build that is timed does not.
+///
+/// # Errors
+/// If it is missing.
+pub fn available() -> Result<()> {
+    Api::get().map(|_| ())
+}
+
+/// A built scene.
+pub struct Scene {
+    api: &'static Api,
+    device: Handle,
+    scene: Handle,
+    packets: bool,
+    /// The library refers to these.
+    _positions: Vec<[f32; 3]>,
+    _triangles: Vec<[u32; 3]>,
+    allocated: Box<AtomicI64>,
+}
+
+// SAFETY: the library's queries may run on any number of threads at once, and everything else is done
+// by `build` and `drop`, which have the scene for themselves.
+unsafe impl Send for Scene {}
+// SAFETY: as above.
+unsafe impl Sync for Scene {}
+
+/// Adds up what the library allocates and frees.
+///
+/// # Safety
+/// `total` must point to an `AtomicI64`.
+unsafe extern "C" fn count(total: Handle, bytes: isize, _after: bool) -> bool {
+    // SAFETY: by the contract.
+    unsafe { &*total.cast::<AtomicI64>() }.fetch_add(bytes as i64, Ordering::Relaxed);
+    true
+}
+
+/// Builds a scene on so many threads. The positions must end with one more than the triangles use: the
+/// library may read 16 bytes at the last.
+///
+/// # Errors
+/// If the library is missing or reports an error.
+pub fn build(
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    variant: &Variant,
+    threads: usize,
+) -> Result<Scene> {
+    let api = Api::get()?;
+    let count_of_positions = positions.len().saturating_sub(1);
+    ensure!(
+        triangles.iter().flatten().all(|v| (*v as usize) < count_of_positions),
+        "a triangle uses a position that does not exist"
+    );
+    let allocated = Box::new(AtomicI64::new(0));
+    let total: *const AtomicI64 = &raw const *allocated;
+    let config = std::ffi::CString::new(format!("threads={threads}"))?;
+    // SAFETY: the calls are in the order and with the constants that the library's documentation asks
+    // for. The buffers hold as many items as is said, plus the padding that it asks for, every index
+    // is below the number of positions, and all of it, the counter too, lives in the `Scene` until
+    // after the device is released: moving a `Vec` or `Box` does not move what it points to.
+    let (device, scene, error) = unsafe {
+        let device = (api.new_device)(config.as_ptr());
+        ensure!(!device.is_null(), "the library makes no device");
+        (api.monitor)(device, count, total.cast_mut().cast());
+        let scene = (api.new_scene)(device);
+        (api.scene_flags)(scene, variant.flags);
+        (api.scene_quality)(scene, variant.quality);
+        let geometry = (api.new_geometry)(device, TYPE_TRIANGLE);
+        (api.geometry_quality)(geometry, variant.quality);
+        let (vertices, indices) = (positions.as_ptr().cast(), triangles.as_ptr().cast());
+        (api.shared_buffer)(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, vertices, 0, 12, count_of_positions);
+        (api.shared_buffer)(geometry, BUFFER_INDEX, 0, FORMAT_UINT3, indices, 0, 12, triangles.len());
+        (api.commit_geometry)(geometry);
+        (api.attach_geometry)(scene, geometry);
+        (api.release_geometry)(geometry);
+        (api.commit_scene)(scene);
+        (device, scene, (api.device_error)(device))
+    };
+    let packets = variant.packets;
+    let built =
+        Scene { api, device, scene, packets, _positions: positions, _triangles: triangles, allocated };
+    ensure!(error == 0, "the library reports error {error}");
+    Ok(built)
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: both were made by `build` and are released once.
+        unsafe {
+            (self.api.release_scene)(self.scene);
+            (self.api.release_device)(self.device);
+        }
+    }
+}
+
+/// Builds a scene of a model.
+///
+/// # Errors
+/// As [`build`].
+pub fn contender(model: &Model, name: &str, variant: &Variant, threads: usize) -> Result<Contender> {
+    available()?;
+    let (positions, triangles) = (padded(&model.mesh.positions), model.mesh.triangles.clone());
+    let start = Instant::now();
+    let scene = build(positions, triangles, variant, threads)?;
+    let build_s = start.elapsed().as_secs_f64();
+    let bytes = u64::try_from(scene.allocated.load(Ordering::Relaxed)).ok();
+    Ok(Contender { name: name.to_owned(), ours: false, tracer: Box::new(scene), build_s, bytes })
+}
+
+/// Positions as [`build`] wants them.
+pub fn padded(positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    positions.iter().copied().chain([[0.0; 3]]).collect()
+}
+
+impl Scene {
+    fn singly(&self, batch: Batch<'_>, trace: Trace1, mut done: impl FnMut(usize, &RayHit<1>)) {
+        let mut arguments = Arguments::new(batch.coherent);
+        let mut lane = RayHit::<1>::EMPTY;
+        for (i, ray) in batch.rays.iter().enumerate() {
+            lane.set(0, ray);
+            // SAFETY: the scene is committed, and both structures are as the library defines them.
+            unsafe { trace(self.scene, &mut lane, &mut arguments) };
+            done(i, &lane);
+        }
+    }
+
+    fn packets(&self, batch: Batch<'_>, trace: Trace16, mut done: impl FnMut(usize, &RayHit<16>, usize)) {
+        let mut arguments = Arguments::new(batch.coherent);
+        let mut lanes = RayHit::<16>::EMPTY;
+        for (packet, rays) in batch.rays.chunks(16).enumerate() {
+            let mut used = Lanes([0; 16]);
+            for (lane, ray) in rays.iter().enumerate() {
+                lanes.set(lane, ray);
+                used.0[lane] = -1;
+            }
+            // SAFETY: as above; the mask and the packet have the alignment that the library asks for.
+            unsafe { trace(&used, self.scene, &mut lanes, &mut arguments) };
+            for lane in 0..rays.len() {
+                done(packet * 16 + lane, &lanes, lane);
+            }
+        }
+    }
+}
+
+impl Tracer for Scene {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        if self.packets {
+            self.packets(batch, self.api.intersect16, |i, lanes, lane| hits[i] = lanes.hit(lane));
+        } else {
+            self.singly(batch, self.api.intersect1, |i, lane| hits[i] = lane.hit(0));
+        }
+    }
+
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        if self.packets {
+            self.packets(batch, self.api.occluded16, |i, lanes, lane| found[i] = lanes.occluded(lane));
+        } else {
+            self.singly(batch, self.api.occluded1, |i, lane| found[i] = lane.occluded(0));
+        }
+    }
+}

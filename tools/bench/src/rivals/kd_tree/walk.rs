@@ -1,0 +1,117 @@
+//! Walks the tree: front to back, far children on a stack, done at a hit within the current cell.
+
+use super::{KdTree, Node};
+use bth::rays::{Hit, Ray, Surface};
+
+/// A child to be looked at later, and the part of the ray in it.
+pub(super) type Later = (u32, f32, f32);
+
+impl KdTree {
+    /// Nearest hit, or with `ANY` whichever is found first.
+    pub(super) fn walk<const ANY: bool>(&self, ray: &Ray, stack: &mut Vec<Later>) -> Hit {
+        let mut best = Hit { t: ray.tmax, ..Hit::MISS };
+        let reciprocal = ray.direction.map(|d| 1.0 / d);
+        let Some((mut near, mut far)) = self.clip(ray, &reciprocal) else { return Hit::MISS };
+        stack.clear();
+        let mut at = 0u32;
+        loop {
+            match self.nodes[at as usize] {
+                Node::Inner { axis, split, upper } => {
+                    let axis = axis as usize;
+                    let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
+                    let t = (split - origin) * reciprocal[axis];
+                    let lower_first = origin < split || origin == split && direction <= 0.0;
+                    let (first, second) = if lower_first { (at + 1, upper) } else { (upper, at + 1) };
+                    if t.is_nan() {
+                        // The ray lies in the plane.
+                        stack.push((second, near, far));
+                        at = first;
+                    } else if t > far || t <= 0.0 {
+                        at = first;
+                    } else if t < near {
+                        at = second;
+                    } else {
+                        stack.push((second, t, far));
+                        (at, far) = (first, t);
+                    }
+                    continue;
+                }
+                Node::Leaf { first, count } => {
+                    for &triangle in &self.lists[first as usize..(first + count) as usize] {
+                        if self.test(ray, triangle, &mut best) && ANY {
+                            return best;
+                        }
+                    }
+                }
+            }
+            match stack.pop() {
+                Some((node, start, end)) if start <= best.t => (at, near, far) = (node, start, end),
+                // Those below on the stack begin no nearer.
+                _ => break,
+            }
+        }
+        if best.surface == Surface::NONE { Hit::MISS } else { best }
+    }
+
+    /// The part of the ray in the bounds, a little widened (as pbrt does).
+    fn clip(&self, ray: &Ray, reciprocal: &[f32; 3]) -> Option<(f32, f32)> {
+        let (mut near, mut far) = (ray.tmin, ray.tmax);
+        for (k, inverse) in reciprocal.iter().enumerate() {
+            if ray.direction[k] == 0.0 {
+                if ray.origin[k] < self.lower[k] || ray.origin[k] > self.upper[k] {
+                    return None;
+                }
+                continue;
+            }
+            let a = (self.lower[k] - ray.origin[k]) * inverse;
+            let b = (self.upper[k] - ray.origin[k]) * inverse;
+            near = near.max(a.min(b));
+            far = far.min(a.max(b) * (1.0 + 4.0 * f32::EPSILON));
+        }
+        (near <= far).then_some((near, far))
+    }
+
+    /// Möller and Trumbore 1997. Keeps the hit if it is nearer.
+    fn test(&self, ray: &Ray, triangle: u32, best: &mut Hit) -> bool {
+        let [a, b, c] = self.corners[triangle as usize];
+        let (edge1, edge2) = (sub(b, a), sub(c, a));
+        let p = cross(ray.direction, edge2);
+        let determinant = dot(edge1, p);
+        if determinant == 0.0 {
+            return false;
+        }
+        let inverse = 1.0 / determinant;
+        let from = sub(ray.origin, a);
+        let u = dot(from, p) * inverse;
+        let q = cross(from, edge1);
+        let v = dot(ray.direction, q) * inverse;
+        let t = dot(edge2, q) * inverse;
+        let hit = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= ray.tmin && t <= best.t;
+        if hit {
+            *best = Hit { t, u, v, surface: Surface { instance: 0, triangle } };
+        }
+        hit
+    }
+
+    /// Nearest hit among these triangles.
+    #[cfg(test)]
+    pub(super) fn nearest_of(&self, ray: &Ray, triangles: &[u32]) -> Hit {
+        let mut best = Hit { t: ray.tmax, ..Hit::MISS };
+        for &triangle in triangles {
+            self.test(ray, triangle, &mut best);
+        }
+        if best.surface == Surface::NONE { Hit::MISS } else { best }
+    }
+}
+
+fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,40 @@
+//! The rivals. One that is missing on a machine is left out, with the reason.
+
+pub mod embree;
+pub mod kd_tree;
+mod library;
+mod obvhs;
+mod tinybvh;
+
+use crate::model::Model;
+use crate::tracer::Contender;
+use anyhow::Result;
+
+/// A rival that can be measured.
+pub struct Rival {
+    /// Its name in tables.
+    pub name: &'static str,
+    build: fn(&Model, &'static str, usize) -> Result<Contender>,
+}
+
+/// All rivals, in the order of the tables.
+pub const RIVALS: [Rival; 8] = [
+    Rival { name: "embree", build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
+    Rival { name: "embree robust", build: |m, n, t| embree::contender(m, n, &embree::ROBUST, t) },
+    Rival { name: "embree hq packet16", build: |m, n, t| embree::contender(m, n, &embree::PACKETS, t) },
+    Rival { name: "tinybvh bvh8 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Eight) },
+    Rival { name: "tinybvh bvh4 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Four) },
+    Rival { name: "obvhs cwbvh", build: |m, n, _| obvhs::cwbvh(m, n) },
+    Rival { name: "obvhs bvh2", build: |m, n, _| obvhs::bvh2(m, n) },
+    Rival { name: "k-d tree", build: |m, n, _| kd_tree::contender(m, n) },
+];
+
+impl Rival {
+    /// Builds it; where it can be told, on so many threads.
+    ///
+    /// # Errors
+    /// If its library is missing or fails.
+    pub fn build(&self, model: &Model, threads: usize) -> Result<Contender> {
+        (self.build)(model, self.name, threads)
+    }
+}

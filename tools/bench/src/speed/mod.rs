@@ -1,0 +1,208 @@
+//! Rays per second of our structures and the rivals, on identical rays.
+
+mod charts;
+mod contenders;
+pub mod record;
+mod tables;
+
+pub use charts::draw;
+pub use record::{ModelRecord, Run, SpeedRecord};
+pub use tables::markdown;
+
+use crate::args::Speed;
+use crate::clock::Clock;
+use crate::model::Model;
+use crate::output::{Head, Record, note};
+use crate::progress::Progress;
+use crate::rays::{self, Finder, RaySet};
+use crate::rounds::medians;
+use crate::tracer::Contender;
+use crate::{isa, ours, rivals};
+use anyhow::{Result, bail, ensure};
+use bth::rays::{Hit, Surface};
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// Smaller sets are not timed: that would measure the clock.
+const FEWEST: usize = 1024;
+/// Pixels of the cameras; a quick run has fewer.
+const SIZE: (u32, u32) = (1024, 576);
+const QUICK_SIZE: (u32, u32) = (128, 72);
+
+/// Measures, prints and writes the record.
+///
+/// # Errors
+/// If an option or model cannot be used or a file cannot be written, and, when all is written, if one of
+/// our own structures gave another answer than the plain BVH.
+pub fn run(arguments: &Speed) -> Result<()> {
+    check_names(arguments)?;
+    let record = measure(arguments)?;
+    for model in &record.models {
+        for left_out in &model.left_out {
+            note(&format!("{}: {}: not measured: {}", model.name, left_out.name, left_out.why));
+        }
+    }
+    Record {
+        head: &record.head,
+        title: "Rays per second",
+        body: markdown(&record),
+        json: serde_json::to_value(&record)?,
+        charts: draw(&record),
+    }
+    .write(&arguments.output)?;
+    let wrong = record.models.iter().flat_map(|m| m.runs.iter().map(move |r| (m, r)));
+    let wrong: Vec<String> = wrong
+        .flat_map(|(model, run)| run.wrong().map(move |name| format!("{} on {}", name, model.name)))
+        .collect();
+    ensure!(wrong.is_empty(), "answers differ from those of the plain BVH: {}", wrong.join(", "));
+    Ok(())
+}
+
+/// Measures all models.
+///
+/// # Errors
+/// If a model cannot be used.
+pub fn measure(arguments: &Speed) -> Result<SpeedRecord> {
+    let isa = isa::select(arguments.isa.as_deref())?;
+    let rounds = if arguments.quick { 1 } else { arguments.rounds };
+    let options = json!({
+        "rays": arguments.rays,
+        "rounds": rounds,
+        "quick": arguments.quick,
+        "rays_per_batch": ours::BATCH,
+    });
+    let mut record = SpeedRecord { head: Head::now("speed", isa, options), models: Vec::new() };
+    let progress = Progress::new();
+    for which in &arguments.models.models {
+        record.models.push(measure_model(which, arguments, rounds, &progress)?);
+    }
+    Ok(record)
+}
+
+fn check_names(arguments: &Speed) -> Result<()> {
+    let own = ours::KINDS.iter().flat_map(|k| k.uses().map(|(name, _)| name));
+    let all: Vec<String> = own.chain(rivals::RIVALS.iter().map(|r| r.name.to_owned())).collect();
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    if let Some(name) = arguments.tracers.unknown(&all).first() {
+        bail!("--tracer {name}: there are {}", all.join(", "));
+    }
+    if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
+        bail!("--set {name}: there are {}", rays::NAMES.join(", "));
+    }
+    Ok(())
+}
+
+fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progress) -> Result<ModelRecord> {
+    let model = Model::load(which)?;
+    progress.say(format!("{}: compiling the BVH", model.name));
+    let bvh = ours::compile(&model, &ours::BVH)?;
+    let scene = bth::from_bytes(&bvh.bytes)?;
+
+    progress.say(format!("{}: making rays", model.name));
+    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
+    let (view, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
+    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
+    let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&scene, s)).collect();
+
+    let most_threads = arguments.threads.iter().copied().max().unwrap_or(1);
+    let (contenders, notes) = contenders::build(&model, bvh, &arguments.tracers, most_threads, progress)?;
+    let mut runs = Vec::new();
+    for &threads in &arguments.threads {
+        let mut run = Run::new(threads, &contenders);
+        for (set, expected) in sets.iter().zip(&expected) {
+            progress.say(format!("{}: {} on {threads} thread(s)", model.name, set.name));
+            measure_set(set, expected, &contenders, rounds, &mut run);
+        }
+        runs.push(run);
+    }
+    Ok(ModelRecord {
+        name: model.name.clone(),
+        triangles: model.triangles(),
+        view,
+        rays: sets.iter().map(|s| (s.name, s.rays.len())).collect(),
+        structures: notes.structures,
+        left_out: notes.left_out,
+        runs,
+    })
+}
+
+fn measure_set(set: &RaySet, expected: &Answers, contenders: &[Contender], rounds: usize, run: &mut Run) {
+    let clock = Clock::for_threads(run.threads);
+    let mut hits = vec![Hit::MISS; set.rays.len()];
+    let mut found = vec![false; set.rays.len()];
+    let mut differ: BTreeMap<String, usize> = BTreeMap::new();
+    let times = medians(contenders, rounds, |round, contender| {
+        if contender.tracer.needs_hints() && set.from.is_none() {
+            return None;
+        }
+        let seconds = clock.time(|| {
+            if set.any {
+                contender.any(set.batch(), &mut found, run.threads);
+            } else {
+                contender.nearest(set.batch(), &mut hits, run.threads);
+            }
+        });
+        if round == 0 {
+            differ.insert(contender.name.clone(), expected.differ(contender.ours, &hits, &found));
+        }
+        Some(seconds)
+    });
+    for (row, seconds) in run.tracers.iter_mut().zip(times) {
+        if let Some(seconds) = seconds {
+            row.mrays_per_s.insert(set.name, set.rays.len() as f64 / seconds / 1e6);
+        }
+        if let Some(&count) = differ.get(&row.name) {
+            row.differ.insert(set.name, count);
+        }
+    }
+}
+
+/// The exact answers to a set.
+enum Answers {
+    Nearest(Vec<Hit>),
+    Any(Vec<bool>),
+}
+
+impl Answers {
+    fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
+        if set.any {
+            let mut found = vec![false; set.rays.len()];
+            scene.any_batch(&set.rays, None, &mut found);
+            Answers::Any(found)
+        } else {
+            let mut hits = vec![Hit::MISS; set.rays.len()];
+            scene.nearest_batch(&set.rays, None, &mut hits);
+            Answers::Nearest(hits)
+        }
+    }
+
+    /// How many answers differ: of ours in any bit, of rivals in whether something is hit.
+    fn differ(&self, ours: bool, hits: &[Hit], found: &[bool]) -> usize {
+        let bits = |h: &Hit| -> ([u32; 3], Surface) { ([h.t, h.u, h.v].map(f32::to_bits), h.surface) };
+        match self {
+            Answers::Any(expected) => expected.iter().zip(found).filter(|(a, b)| a != b).count(),
+            Answers::Nearest(expected) => {
+                let same =
+                    |a: &Hit, b: &Hit| if ours { bits(a) == bits(b) } else { a.is_hit() == b.is_hit() };
+                expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_answers_are_counted_to_the_last_bit_for_ours() {
+        let hit = Hit { t: 1.0, u: 0.25, v: 0.5, surface: Surface { instance: 0, triangle: 7 } };
+        let nudged = Hit { u: 0.25f32.next_up(), ..hit };
+        let expected = Answers::Nearest(vec![hit, hit, Hit::MISS, Hit::MISS]);
+        let hits = [hit, nudged, Hit::MISS, hit];
+        assert_eq!(expected.differ(true, &hits, &[]), 2);
+        assert_eq!(expected.differ(false, &hits, &[]), 1);
+        assert_eq!(Answers::Any(vec![true, false]).differ(false, &[], &[true, true]), 1);
+    }
+}

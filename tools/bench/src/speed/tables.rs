@@ -1,0 +1,111 @@
+//! The tables of `speed`.
+
+use super::record::{BASE, ModelRecord, Run, SpeedRecord};
+use crate::markdown::{count, table, two_decimals};
+use crate::rays::{NAMES, View};
+
+/// All tables of a record.
+pub fn markdown(record: &SpeedRecord) -> String {
+    let mut text = String::new();
+    if record.models.len() > 1 {
+        for threads in record.threads() {
+            text.push_str(&means(record, threads));
+        }
+    }
+    for model in &record.models {
+        text.push_str(&page(model));
+    }
+    text
+}
+
+/// Sets that have figures, in order.
+pub(super) fn sets_of<'a>(models: impl Iterator<Item = &'a ModelRecord> + Clone) -> Vec<&'static str> {
+    NAMES.into_iter().filter(|set| models.clone().any(|m| m.rays.contains_key(set))).collect()
+}
+
+fn head(first: &str, sets: &[&str], more: &[&str]) -> Vec<String> {
+    [first].iter().chain(sets).chain(more).map(|s| (*s).to_owned()).collect()
+}
+
+fn on_threads(threads: usize) -> String {
+    if threads == 1 { "one thread".to_owned() } else { format!("{threads} threads") }
+}
+
+fn means(record: &SpeedRecord, threads: usize) -> String {
+    let sets = sets_of(record.models.iter());
+    let tracers = record.tracers(threads);
+    if !tracers.contains(&BASE) {
+        return String::new();
+    }
+    let row = |tracer: &&str| {
+        let mean = |set: &&str| {
+            let Some((ratio, models)) = record.mean_ratio(threads, tracer, set) else {
+                return "-".to_owned();
+            };
+            // Of fewer models than the others: not comparable with them.
+            let all = record.runs(threads).filter(|r| r.ratio(BASE, set).is_some()).count();
+            if models < all { format!("{ratio:.2} ({models})") } else { format!("{ratio:.2}") }
+        };
+        [(*tracer).to_owned()].into_iter().chain(sets.iter().map(mean)).collect()
+    };
+    let rows: Vec<Vec<String>> = tracers.iter().map(row).collect();
+    format!(
+        "## Speed over that of Embree's single rays, {}\n\nGeometric means over {} models; in brackets: over how many, if not all.\n\n{}\n",
+        on_threads(threads),
+        record.models.len(),
+        table(&head("tracer", &sets, &[]), &rows)
+    )
+}
+
+fn page(model: &ModelRecord) -> String {
+    let view = match model.view {
+        View::Outside => "seen from outside",
+        View::Inside => "seen from inside",
+    };
+    let mut text = format!("## {} ({} triangles, {view})\n\n", model.name, count(model.triangles as u64));
+    let share = |s: &super::record::Structure| {
+        format!("{} {:.2} s, {:.0} % of the triangles in tets", s.name, s.compile_s, 100.0 * s.in_tets)
+    };
+    if !model.structures.is_empty() {
+        let compiled: Vec<String> = model.structures.iter().map(share).collect();
+        text.push_str(&format!("Compiled: {}.\n\n", compiled.join("; ")));
+    }
+    for run in &model.runs {
+        text.push_str(&rates(model, run));
+    }
+    for left_out in &model.left_out {
+        text.push_str(&format!("- {}: not measured: {}\n", left_out.name, left_out.why));
+    }
+    if !model.left_out.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+fn rates(model: &ModelRecord, run: &Run) -> String {
+    let sets = sets_of(std::iter::once(model));
+    let mut rows: Vec<Vec<String>> = Vec::new();
+    for tracer in &run.tracers {
+        let mut row = vec![tracer.name.clone()];
+        row.extend(sets.iter().map(|set| two_decimals(tracer.mrays_per_s.get(set).copied())));
+        row.push(
+            tracer.bytes.map_or("?".to_owned(), |b| format!("{:.0}", b as f64 / model.triangles as f64)),
+        );
+        row.push(two_decimals(Some(tracer.build_s)));
+        row.push(match tracer.differ.values().sum::<usize>() {
+            0 => String::new(),
+            n => count(n as u64),
+        });
+        rows.push(row);
+    }
+    let mut last = vec!["(rays)".to_owned()];
+    last.extend(sets.iter().map(|set| count(model.rays[set] as u64)));
+    last.extend([const { String::new() }; 3]);
+    rows.push(last);
+    format!(
+        "Mrays per {}, {}:\n\n{}\n",
+        run.clock.second(),
+        on_threads(run.threads),
+        table(&head("tracer", &sets, &["B/tri", "build s", "differ"]), &rows)
+    )
+}

@@ -1,0 +1,91 @@
+//! What all tracers have in common: one interface for batches of rays.
+
+use bth::rays::{Hit, Ray, Surface};
+use std::sync::Mutex;
+
+/// Rays to trace, and what a tracer may know about them.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// The rays, model space.
+    pub rays: &'a [Ray],
+    /// The surface that each starts on, where the set knows.
+    pub from: Option<&'a [Surface]>,
+    /// Whether neighbours are alike; a rival may be told.
+    pub coherent: bool,
+}
+
+impl<'a> Batch<'a> {
+    /// The same in pieces of at most `most` rays.
+    pub fn chunks(self, most: usize) -> impl Iterator<Item = Batch<'a>> {
+        (0..self.rays.len()).step_by(most).map(move |first| {
+            let part = first..self.rays.len().min(first + most);
+            Batch { rays: &self.rays[part.clone()], from: self.from.map(|f| &f[part]), ..self }
+        })
+    }
+}
+
+/// Traces rays through one model. What it takes to turn our rays into its own and its hits into ours
+/// belongs to the time of a tracer.
+pub trait Tracer: Send + Sync {
+    /// Nearest hit of every ray; the instance in a surface is 0.
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
+    /// Whether anything lies within [tmin, tmax] of every ray.
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]);
+    /// Whether it is the same as another tracer where a set has no hints, and so need not be measured.
+    fn needs_hints(&self) -> bool {
+        false
+    }
+}
+
+/// A tracer that is measured.
+pub struct Contender {
+    /// Its name in tables and charts.
+    pub name: String,
+    /// Whether it is one of ours, whose answers have to be the same to the last bit.
+    pub ours: bool,
+    /// What traces.
+    pub tracer: Box<dyn Tracer>,
+    /// Wall-clock seconds to compile or build the structure.
+    pub build_s: f64,
+    /// Bytes that traversal reads, where that is known.
+    pub bytes: Option<u64>,
+}
+
+impl Contender {
+    /// Nearest hits, on so many threads.
+    pub fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit], threads: usize) {
+        spread(batch, hits, threads, BLOCK, |batch, hits| self.tracer.nearest(batch, hits));
+    }
+
+    /// Any hits, on so many threads.
+    pub fn any(&self, batch: Batch<'_>, found: &mut [bool], threads: usize) {
+        spread(batch, found, threads, BLOCK, |batch, found| self.tracer.any(batch, found));
+    }
+}
+
+/// Rays that a thread takes at a time.
+pub const BLOCK: usize = 4096;
+
+/// Calls `trace` for blocks of so many rays, from so many threads, each of which takes the next block.
+pub fn spread<T: Send>(
+    batch: Batch<'_>,
+    answers: &mut [T],
+    threads: usize,
+    block: usize,
+    trace: impl Fn(Batch<'_>, &mut [T]) + Sync,
+) {
+    if threads <= 1 {
+        return trace(batch, answers);
+    }
+    let blocks = Mutex::new(batch.chunks(block).zip(answers.chunks_mut(block)));
+    let next = || blocks.lock().expect("no thread panics while it holds the lock").next();
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some((batch, answers)) = next() {
+                    trace(batch, answers);
+                }
+            });
+        }
+    });
+}

@@ -1,0 +1,166 @@
+//! The rays are the same for every tracer and run, and rivals answer them as we do, up to their own errors.
+
+use bth::rays::{Hit, Ray, Surface};
+use bth_bench::model::Model;
+use bth_bench::rays::{Finder, Options, RaySet, View, sets};
+use bth_bench::rivals::RIVALS;
+use bth_bench::tracer::{BLOCK, Batch, Contender, spread};
+use bth_bench::{ours, rays};
+
+const OPTIONS: Options = Options { size: (128, 72), most: usize::MAX, view: None };
+
+fn knot() -> (Model, bth::Scene) {
+    let model = Model::load("torus-knot:720").unwrap();
+    let compiled = ours::compile(&model, &ours::BVH).unwrap();
+    let scene = bth::from_bytes(&compiled.bytes).unwrap();
+    (model, scene)
+}
+
+fn exact(scene: &bth::Scene, set: &RaySet) -> (Vec<Hit>, Vec<bool>) {
+    let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
+    scene.nearest_batch(&set.rays, None, &mut hits);
+    scene.any_batch(&set.rays, None, &mut found);
+    (hits, found)
+}
+
+/// Hits that miss in the exact answer or the other way round, and the worst relative error of t of the rest.
+fn compare(expected: &[Hit], hits: &[Hit]) -> (usize, f32) {
+    let (mut wrong, mut error) = (0, 0f32);
+    for (a, b) in expected.iter().zip(hits) {
+        if a.is_hit() != b.is_hit() {
+            wrong += 1;
+        } else if a.is_hit() {
+            error = error.max((a.t - b.t).abs() / a.t.max(1.0));
+        }
+    }
+    (wrong, error)
+}
+
+#[test]
+fn ray_sets_are_the_same_in_every_run() {
+    let (model, scene) = knot();
+    let (view, first) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    let (again, second) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    assert_eq!(view, View::Outside);
+    assert_eq!((view, &first), (again, &second));
+    assert_eq!(first.iter().map(|s| s.name).collect::<Vec<_>>(), rays::NAMES);
+}
+
+#[test]
+fn ray_sets_are_what_their_names_say() {
+    let (model, scene) = knot();
+    let (_, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    let diagonal = model.bounds().diagonal() as f32;
+    for set in &sets {
+        assert!(set.rays.len() > 500, "{}: {} rays", set.name, set.rays.len());
+        for Ray { direction: [x, y, z], .. } in &set.rays {
+            assert!((x * x + y * y + z * z - 1.0).abs() < 1e-5, "{}", set.name);
+        }
+        let starts =
+            set.from.as_ref().map(|from| from.iter().all(|s| (s.triangle as usize) < model.triangles()));
+        assert_eq!(starts, ["diffuse", "ao", "shadow"].contains(&set.name).then_some(true), "{}", set.name);
+        let (hits, _) = exact(&scene, set);
+        match set.name {
+            "miss" => assert!(hits.iter().all(|h| !h.is_hit())),
+            "ao" => assert!(set.rays.iter().all(|r| (r.tmax - 0.05 * diagonal).abs() < 1e-4 * diagonal)),
+            "closeup" => assert!(hits.iter().filter(|h| h.is_hit()).count() * 2 > hits.len()),
+            _ => assert!(hits.iter().any(Hit::is_hit)),
+        }
+    }
+}
+
+#[test]
+fn rooms_are_seen_from_inside() {
+    let model = Model::load("torus-knots-in-a-box:10000").unwrap();
+    let compiled = ours::compile(&model, &ours::BVH).unwrap();
+    let scene = bth::from_bytes(&compiled.bytes).unwrap();
+    let (view, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    assert_eq!(view, View::Inside);
+    let (hits, _) = exact(&scene, &sets[0]);
+    assert!(hits.iter().all(Hit::is_hit), "a closed room is seen everywhere");
+}
+
+#[test]
+fn thinned_sets_keep_hints_with_their_rays() {
+    let (model, scene) = knot();
+    let finder = Finder::new(&model, &scene);
+    let (_, whole) = sets(&finder, &OPTIONS);
+    let (_, thinned) = sets(&finder, &Options { most: 1000, ..OPTIONS });
+    for (whole, thinned) in whole.iter().zip(&thinned) {
+        assert!(thinned.rays.len() < 1000 + 64, "{}: {}", thinned.name, thinned.rays.len());
+        let Some((from, all)) = thinned.from.as_ref().zip(whole.from.as_ref()) else { continue };
+        for (ray, surface) in thinned.rays.iter().zip(from) {
+            assert!(whole.rays.iter().zip(all).any(|(r, s)| r == ray && s == surface));
+        }
+    }
+}
+
+#[test]
+fn our_structures_answer_with_the_same_bits_in_every_use() {
+    let (model, scene) = knot();
+    let (_, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    for kind in [ours::BTH, ours::BVH] {
+        let compiled = ours::compile(&model, &kind).unwrap();
+        for contender in ours::contenders(&kind, &compiled).unwrap() {
+            for set in &sets {
+                let (hits, found) = traced(&contender, set, 1);
+                assert_eq!((hits, found), exact(&scene, set), "{} on {}", contender.name, set.name);
+            }
+        }
+    }
+}
+
+fn traced(contender: &Contender, set: &RaySet, threads: usize) -> (Vec<Hit>, Vec<bool>) {
+    let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
+    contender.nearest(set.batch(), &mut hits, threads);
+    contender.any(set.batch(), &mut found, threads);
+    (hits, found)
+}
+
+/// Rivals that are no crates take part where they are installed; the others always.
+#[test]
+fn rivals_agree_with_the_exact_answers_up_to_their_errors() {
+    let (model, scene) = knot();
+    let (_, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
+    let mut measured = Vec::new();
+    for rival in &RIVALS {
+        let contender = match rival.build(&model, 1) {
+            Ok(contender) => contender,
+            Err(error) => {
+                let native = ["embree", "tinybvh"].iter().any(|n| rival.name.starts_with(n));
+                assert!(native, "{}: {error:#}", rival.name);
+                continue;
+            }
+        };
+        measured.push(rival.name);
+        for set in &sets {
+            let (hits, found) = traced(&contender, set, 2);
+            let (expected, expected_found) = exact(&scene, set);
+            let (wrong, error) = compare(&expected, &hits);
+            let wrong_found = found.iter().zip(&expected_found).filter(|(a, b)| a != b).count();
+            let most = set.rays.len() / 1000;
+            assert!(wrong <= most, "{}, {}: {wrong} of {}", rival.name, set.name, set.rays.len());
+            assert!(wrong_found <= most, "{}, {}: any: {wrong_found}", rival.name, set.name);
+            assert!(error < 1e-3, "{}, {}: t is off by {error}", rival.name, set.name);
+            let beyond = |h: &Hit| h.is_hit() && h.surface.triangle as usize >= model.triangles();
+            assert!(!hits.iter().any(beyond), "{}, {}: no such triangle", rival.name, set.name);
+        }
+    }
+    assert!(measured.len() >= 3, "{measured:?}");
+}
+
+#[test]
+fn threads_share_all_rays_out_once() {
+    let ray = |i: usize| Ray { origin: [i as f32; 3], tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: 1.0 };
+    let rays: Vec<Ray> = (0..3 * BLOCK + 17).map(ray).collect();
+    let from: Vec<Surface> = (0..rays.len()).map(|i| Surface { instance: 0, triangle: i as u32 }).collect();
+    let mut seen = vec![0; rays.len()];
+    let batch = Batch { rays: &rays, from: Some(&from), coherent: false };
+    spread(batch, &mut seen, 3, BLOCK, |batch, seen| {
+        for ((ray, from), seen) in batch.rays.iter().zip(batch.from.unwrap()).zip(seen) {
+            assert_eq!(ray.origin[0], from.triangle as f32);
+            *seen += 1 + from.triangle;
+        }
+    });
+    assert!(seen.iter().enumerate().all(|(i, n)| *n == 1 + i as u32));
+}

@@ -1,0 +1,89 @@
+//! The program as it is called, without any rival that has to be installed.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn bench(arguments: &[&str]) -> Output {
+    // Whatever is installed on this machine is not there.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
+    command
+        .env("EMBREE_LIB", "/nonexistent")
+        .env("TINYBVH_LIB", "/nonexistent")
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_quick_speed_run_needs_no_rival() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let done =
+        bench(&["speed", "torus-knot:320", "--quick", "--threads", "1,2", "--out", out, "--name", "quick"]);
+    let (printed, said) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
+    assert!(done.status.success(), "{said}");
+    assert!(printed.contains("| k-d tree |") && printed.contains("2 threads"), "{printed}");
+    assert!(said.contains("embree: not measured: EMBREE_LIB names no file"), "{said}");
+
+    let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
+    let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
+    let record = json(find("-quick.json"));
+    let tracers = record["models"][0]["runs"][0]["tracers"].as_array().unwrap();
+    let names: Vec<&str> = tracers.iter().map(|t| t["name"].as_str().unwrap()).collect();
+    for name in ["bth", "bth from", "bth single", "bvh", "bvh single", "obvhs cwbvh", "k-d tree"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    for tracer in tracers.iter().filter(|t| t["ours"] == true) {
+        assert!(tracer["differ"].as_object().unwrap().values().all(|n| n == 0), "{tracer}");
+        assert!(tracer["mrays_per_s"]["ao"].as_f64().unwrap() > 0.0, "{tracer}");
+    }
+    let page = std::fs::read_to_string(find("-quick.md")).unwrap();
+    assert!(page.contains("-quick-torus-knot-2-threads.svg"), "{page}");
+    find("-quick-torus-knot-1-thread.svg");
+}
+
+#[test]
+fn load_measures_our_files_where_embree_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("load.json");
+    let done = bench(&[
+        "load",
+        "torus-knot:320",
+        "--rounds",
+        "1",
+        "--threads",
+        "1",
+        "--rays",
+        "100",
+        "--json",
+        path.to_str().unwrap(),
+    ]);
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{said}");
+    assert!(said.contains("embree: not measured"), "{said}");
+    let record = json(&path);
+    let starts = record["models"][0]["runs"][0]["starts"].as_array().unwrap();
+    let names: Vec<&str> = starts.iter().map(|s| s[0].as_str().unwrap()).collect();
+    assert_eq!(names[..4], ["bth map warm", "bth map cold", "bth read warm", "bth read cold"]);
+    for start in starts {
+        let times = ["ready_s", "first_hit_s", "total_s"].map(|k| start[1][k].as_f64().unwrap());
+        assert!(times[0] > 0.0 && times.is_sorted(), "{start}");
+    }
+}
+
+#[test]
+fn misspelled_names_are_refused_before_anything_is_measured() {
+    for (option, name) in [("--tracer", "embre"), ("--set", "primarily"), ("--isa", "avx1024")] {
+        let done = bench(&["speed", "torus-knot", option, name]);
+        assert!(!done.status.success());
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(said.contains(name), "{said}");
+    }
+    let done = bench(&["speed", "no-such-model"]);
+    assert!(String::from_utf8(done.stderr).unwrap().contains("neither a file nor a model"));
+}

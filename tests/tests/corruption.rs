@@ -6,6 +6,18 @@ use bth_tests::conformance::{Editor, Seal, valid};
 fn passes(bytes: &[u8]) -> bool {
     let Ok(file) = bth::File::from_bytes(bytes) else { return false };
     let good = (0..file.object_count()).all(|i| file.check(i).is_ok());
+    // A scene that opens can be moved to any time and traced, or says why not.
+    if let Ok(mut scene) = bth::from_bytes(bytes)
+        && scene.description().is_some()
+    {
+        let ray =
+            bth::rays::Ray { origin: [0.3, 0.2, 9.0], tmin: 0.0, direction: [0.0, 0.1, -1.0], tmax: 1e9 };
+        for seconds in [-1.0, 0.3, 1.5, 1e300, f64::NAN] {
+            let _ = scene.set_seconds(seconds);
+            scene.nearest(&ray, bth::rays::Surface { instance: 1, triangle: 0 });
+            scene.any(&ray, bth::rays::Surface::NONE);
+        }
+    }
     if good {
         // Verifying must end too; it may find fault.
         let _ = bth::verify::verify(&file);

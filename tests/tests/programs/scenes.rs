@@ -300,3 +300,19 @@ fn manifests_are_written_beside_or_above_their_model_only() {
     let info = run("bthc", folder.path(), &["info", "flat.bth", "--json"]).expect(0).json();
     assert!(info["scene"].is_null());
 }
+
+#[test]
+fn objects_that_no_ray_comes_near_are_not_touched() {
+    let folder = compiled();
+    let touched = |camera: &str| {
+        let args = ["-o", "x.png", "--map", "--stats", "--json", "--mode", "normals", "--camera", camera];
+        let json = play(folder.path(), &args).expect(0).json();
+        let length = std::fs::metadata(folder.path().join("scene.bth")).unwrap().len();
+        assert_eq!(json["stats"]["mapped_bytes"], length);
+        assert!(json["stats"]["resident_bytes"].as_u64() <= Some(length.next_multiple_of(4096)));
+        json["stats"]["objects_touched"].as_u64().unwrap()
+    };
+    assert_eq!(touched("0,9,0,0,99,0"), 0, "the sky");
+    assert_eq!(touched("-2,3,2,-2.5,-1,2.5"), 1, "a corner of the floor");
+    assert_eq!(touched("0,3,6,0,0,0"), 2, "all");
+}

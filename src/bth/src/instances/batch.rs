@@ -133,8 +133,8 @@ impl World {
         visits.sort_unstable_by_key(|v| (v.object, v.ray));
         for group in visits.chunk_by(|a, b| a.object == b.object) {
             self.touch(group[0].object);
-            let object = round.file.object(group[0].object).expect("checked when opened");
-            query.trace(round, &object, group);
+            let object = round.file.view(group[0].object).expect("checked when opened");
+            query.trace(round, object, group);
         }
         visits.clear();
     }
@@ -145,7 +145,7 @@ impl World {
 struct Batch {
     visits: Vec<(Visit, f32)>,
     rays: Vec<Ray>,
-    /// The triangles that they start on, or `NONE`.
+    /// The triangle that each starts on.
     from: Vec<u32>,
     hits: Vec<Hit>,
     found: Vec<bool>,
@@ -161,6 +161,11 @@ impl Batch {
         self.visits.push((visit, ray.t_scale));
         self.rays.push(ray.ray);
         self.from.push(from);
+    }
+    /// The triangles that rays start on, if that is of use: only in tetrahedra it is.
+    fn hints(&self, object: &ObjectView<'_>) -> Option<&[u32]> {
+        let some = !object.tet_leaves.is_empty() && self.from.iter().any(|from| *from != NONE);
+        some.then_some(&self.from)
     }
 }
 
@@ -192,21 +197,36 @@ impl Query for Nearest<'_> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+        if visits.len() < trace::FEW {
+            for &visit in visits {
+                let i = visit.ray as usize;
+                let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
+                let from = round.hint(i, visit.instance);
+                let hit = trace::nearest(object, &ray.ray, from, visit.instance, self.scratch);
+                self.hits[i] =
+                    better(&round.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
+            }
+            return;
+        }
         self.batch.clear();
         for &visit in visits {
             let i = visit.ray as usize;
-            let object_ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
-            self.batch.push(visit, object_ray, round.hint(i, visit.instance));
+            let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
+            self.batch.push(visit, ray, round.hint(i, visit.instance));
         }
-        let Batch { visits, rays, from, hits, .. } = &mut self.batch;
+        let mut hits = std::mem::take(&mut self.batch.hits);
         hits.clear();
-        hits.resize(rays.len(), Hit::MISS);
-        trace::nearest_batch(object, rays, Some(from), 0, self.scratch, hits);
-        for (&(visit, scale), hit) in visits.iter().zip(hits) {
-            hit.surface.instance = visit.instance;
-            let (i, hit) = (visit.ray as usize, *hit);
-            self.hits[i] = better(&round.rays[i], &self.hits[i], &hit, scale).unwrap_or(self.hits[i]);
+        hits.resize(visits.len(), Hit::MISS);
+        let batch = &self.batch;
+        trace::nearest_batch(object, &batch.rays, batch.hints(object), 0, self.scratch, &mut hits);
+        for (&(visit, scale), hit) in batch.visits.iter().zip(&mut hits) {
+            if hit.is_hit() {
+                hit.surface.instance = visit.instance;
+                let i = visit.ray as usize;
+                self.hits[i] = better(&round.rays[i], &self.hits[i], hit, scale).unwrap_or(self.hits[i]);
+            }
         }
+        self.batch.hits = hits;
     }
 }
 
@@ -222,19 +242,29 @@ impl Query for Any<'_> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+        if visits.len() < trace::FEW {
+            for &visit in visits {
+                let i = visit.ray as usize;
+                let (ray, from) = (round.object_ray(visit, self.rays[i].tmax), round.hint(i, visit.instance));
+                self.found[i] |= trace::any(object, &ray.ray, from, self.scratch);
+            }
+            return;
+        }
         self.batch.clear();
         for &visit in visits {
             let i = visit.ray as usize;
-            let object_ray = round.object_ray(visit, self.rays[i].tmax);
-            self.batch.push(visit, object_ray, round.hint(i, visit.instance));
+            let ray = round.object_ray(visit, self.rays[i].tmax);
+            self.batch.push(visit, ray, round.hint(i, visit.instance));
         }
-        let Batch { visits, rays, from, found, .. } = &mut self.batch;
+        let mut found = std::mem::take(&mut self.batch.found);
         found.clear();
-        found.resize(rays.len(), false);
-        trace::any_batch(object, rays, Some(from), self.scratch, found);
-        for ((visit, _), found) in visits.iter().zip(found) {
+        found.resize(visits.len(), false);
+        let batch = &self.batch;
+        trace::any_batch(object, &batch.rays, batch.hints(object), self.scratch, &mut found);
+        for ((visit, _), found) in batch.visits.iter().zip(&found) {
             self.found[visit.ray as usize] |= *found;
         }
+        self.batch.found = found;
     }
 }
 

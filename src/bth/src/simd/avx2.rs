@@ -162,7 +162,7 @@ impl Simd for Avx2 {
             _mm256_xor_si256(_mm256_cmpeq_epi32(_mm256_max_epu32(a, b), a), _mm256_set1_epi32(-1));
         select_u(m: M, a: U, b: U) -> U = _mm256_blendv_epi8(b, a, m);
         bits(a: F) -> U = _mm256_castps_si256(a);
-        from_bits(a: U) -> F = _mm256_castsi256_ps(a);
+        floats(a: U) -> F = _mm256_castsi256_ps(a);
         and(a: M, b: M) -> M = _mm256_and_si256(a, b);
         or(a: M, b: M) -> M = _mm256_or_si256(a, b);
         and_not(a: M, b: M) -> M = _mm256_andnot_si256(b, a);
@@ -225,7 +225,7 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn lookup_u(self, table: U, at: U) -> U {
-        self.bits(self.lookup(self.from_bits(table), at))
+        self.bits(self.lookup(self.floats(table), at))
     }
     #[inline(always)]
     fn least(self, a: F) -> f32 {
@@ -312,7 +312,7 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
-        self.bits(self.expand(self.from_bits(a), m, &from.map(f32::from_bits)))
+        self.bits(self.expand(self.floats(a), m, &from.map(f32::from_bits)))
     }
 
     #[inline(always)]
@@ -342,7 +342,7 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
         let mut floats = [0.0; LANES];
-        let count = self.compress_f(bits, self.from_bits(a), &mut floats);
+        let count = self.compress_f(bits, self.floats(a), &mut floats);
         self.store_u(self.bits(self.load(&floats)), to);
         count
     }

@@ -168,7 +168,7 @@ impl Simd for Avx512 {
         select_u(m: u16, a: __m512i, b: __m512i) -> __m512i = _mm512_mask_mov_epi32(b, m, a);
         lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
         bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
-        from_bits(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
+        floats(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
     }
 
     #[inline(always)]

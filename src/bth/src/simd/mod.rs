@@ -95,7 +95,7 @@ pub(crate) trait Simd: Copy {
     /// The bits of f32 lanes.
     fn bits(self, a: Self::F) -> Self::U;
     /// f32 lanes from their bits.
-    fn from_bits(self, a: Self::U) -> Self::F;
+    fn floats(self, a: Self::U) -> Self::F;
 
     fn mask(self, bits: u32) -> Self::M;
     fn mask_bits(self, m: Self::M) -> u32;

@@ -253,7 +253,7 @@ impl Simd for Scalar {
         a.map(f32::to_bits)
     }
     #[inline(always)]
-    fn from_bits(self, a: U) -> F {
+    fn floats(self, a: U) -> F {
         a.map(f32::from_bits)
     }
 

@@ -54,7 +54,7 @@ impl Kernel for Everything<'_> {
         let mut compressed = [0; LANES];
         let count = s.compress(self.bits, x, &mut compressed);
         let mut compressed_f = [0.0; LANES];
-        assert_eq!(s.compress_f(self.bits, s.from_bits(x), &mut compressed_f), count);
+        assert_eq!(s.compress_f(self.bits, s.floats(x), &mut compressed_f), count);
         assert_eq!(compressed_f.map(f32::to_bits)[..count], compressed[..count]);
         let ordered = self.a.map(|x| if x.is_nan() { 0.5 } else { x.abs() });
         let (mut codes, mut keys) = ([0; LANES], [0.0; LANES]);
@@ -68,7 +68,7 @@ impl Kernel for Everything<'_> {
         let kept = s.keep_up_to(&mut kept_codes[..19], &mut kept_keys[..19], self.b[3]);
         let mut square = [a; LANES];
         for i in 0..LANES {
-            square[i] = s.from_bits(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
+            square[i] = s.floats(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
         }
         let square = s.transpose(square);
         let mut turned = Vec::new();
@@ -109,7 +109,7 @@ impl Kernel for Everything<'_> {
             u(second),
             u(s.expand_u(x, mask, self.v)),
             u(s.bits(a)),
-            f(s.from_bits(s.bits(a))),
+            f(s.floats(s.bits(a))),
             m(mask),
             m(s.and(mask, other)),
             m(s.or(mask, other)),

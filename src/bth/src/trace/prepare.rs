@@ -219,13 +219,13 @@ pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 
     for k in 0..3 {
         let magnitude = s.div(greatest, s.max(size[k], least));
         let sign = s.and_u(s.bits(d[k]), s.splat_u(1 << 31));
-        let reciprocal = s.from_bits(s.or_u(s.bits(magnitude), sign));
+        let reciprocal = s.floats(s.or_u(s.bits(magnitude), sign));
         let (middle, pad) = (s.mul(o[k], reciprocal), s.mul(pad, magnitude));
         let negative = s.lt_u(s.splat_u(i32::MAX as u32), sign);
         aim[k] = reciprocal;
         aim[4 + k] = s.sub(zero, s.add(middle, pad));
         aim[8 + k] = s.sub(pad, middle);
-        aim[12 + k] = s.from_bits(s.select_u(negative, s.splat_u(slabs::FAR), s.splat_u(0)));
+        aim[12 + k] = s.floats(s.select_u(negative, s.splat_u(slabs::FAR), s.splat_u(0)));
     }
 
     // The axes of the plane: in cyclic order for a ray that goes up along the third, else the other way round.
@@ -242,9 +242,9 @@ pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 
     let next = s.select_u(is_x, s.splat_u(1), s.select_u(is_y, s.splat_u(2), s.splat_u(0)));
     let last = s.select_u(is_x, s.splat_u(2), s.select_u(is_y, s.splat_u(0), s.splat_u(1)));
     let forward = s.select(backward, s.splat(-1.0), s.splat(1.0));
-    aim[16] = s.from_bits(s.select_u(backward, last, next));
-    aim[17] = s.from_bits(s.select_u(backward, next, last));
-    aim[18] = s.from_bits(z);
+    aim[16] = s.floats(s.select_u(backward, last, next));
+    aim[17] = s.floats(s.select_u(backward, next, last));
+    aim[18] = s.floats(z);
     aim[19] = s.splat(f32::MIN_POSITIVE);
     aim[20] = origin[0];
     aim[21] = origin[1];

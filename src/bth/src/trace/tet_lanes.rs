@@ -168,7 +168,7 @@ impl<S: Simd> Lanes<S> {
 
     #[inline(always)]
     pub(super) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> ProjectedLanes<S> {
-        let depth = s.from_bits(s.xor_u(s.bits(z), self.words[word::SIGN]));
+        let depth = s.floats(s.xor_u(s.bits(z), self.words[word::SIGN]));
         let x = s.fnma(self.floats[float::SHEAR], depth, x);
         let y = s.fnma(self.floats[float::SHEAR + 1], depth, y);
         ProjectedLanes { x, y, depth }

@@ -67,8 +67,8 @@ impl Kernel for Everything<'_> {
         let (mut kept_codes, mut kept_keys) = (self.u.repeat(2), self.a.repeat(2));
         let kept = s.keep_up_to(&mut kept_codes[..19], &mut kept_keys[..19], self.b[3]);
         let mut square = [a; LANES];
-        for i in 0..LANES {
-            square[i] = s.floats(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
+        for (i, row) in square.iter_mut().enumerate() {
+            *row = s.floats(s.add_u(s.load_u(self.u), s.splat_u(i as u32)));
         }
         let square = s.transpose(square);
         let mut turned = Vec::new();

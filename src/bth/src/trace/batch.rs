@@ -4,7 +4,7 @@
 use super::Scratch;
 use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
-use super::packets::{self, LeastUse};
+use super::packets;
 use super::query::{Any, Nearest, Query};
 use super::records::LaneRecords;
 use super::tet_batch::{self, Walk};
@@ -72,8 +72,7 @@ fn trace<Q: Query>(
         }
         return;
     }
-    let packed =
-        Isa::chosen().run(Together { object, rays, least: packets::LEAST_USE, scratch, sink: &mut sink });
+    let packed = Isa::chosen().run(Together { object, rays, scratch, sink: &mut sink });
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
@@ -99,8 +98,8 @@ fn trace_hinted<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
-    // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
-    let packed = Isa::chosen().run(Together { object, rays, least: packets::ONLY_COHERENT, scratch, sink });
+    // Packets of rays that go together beat all else, where they serve enough of their rays.
+    let packed = Isa::chosen().run(Together { object, rays, scratch, sink });
     let mut faces = vec![NONE; rays.len()];
     let home = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
@@ -111,7 +110,9 @@ fn trace_hinted<Q: Query>(
         _ => scratch.packets.rest.clone(),
     };
     for &ray in &order {
-        faces[ray as usize] = home(ray as usize);
+        if is_worth_a_walk::<Q>(object, &rays[ray as usize]) {
+            faces[ray as usize] = home(ray as usize);
+        }
     }
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
     let mut walks = vec![Walk::Not; rays.len()];
@@ -132,6 +133,23 @@ fn trace_hinted<Q: Query>(
         let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
         Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink });
     }
+}
+
+/// Whether a ray that starts on a known surface is likely to be faster through tetrahedra than through the BVH beside
+/// them, if there is one. By measurement (benchmarks/): short any-hit rays are, long ones not; nearest hits only
+/// where the tetrahedra do not exceed the caches by far. No answer depends on it.
+fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
+    const MOST_TETS: usize = 400_000;
+    const SHORT: f32 = 0.3;
+    if object.tet_leaves.first().is_none_or(|leaf| leaf.subtree == NONE) {
+        return true;
+    }
+    if !Q::ANY {
+        return object.records.len() <= MOST_TETS;
+    }
+    let (header, d) = (object.header, ray.direction);
+    let size = (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]));
+    d[0].abs().max(d[1].abs()).max(d[2].abs()) * ray.tmax <= SHORT * size
 }
 
 fn walk_tets<Q: Query>(
@@ -157,7 +175,6 @@ fn walk_tets<Q: Query>(
 struct Together<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    least: LeastUse,
     scratch: &'a mut Scratch,
     sink: &'a mut Sink<'b, Q>,
 }
@@ -168,7 +185,7 @@ impl<Q: Query> Kernel for Together<'_, '_, Q> {
     fn run<S: Simd>(self, s: S) -> usize {
         let (packets, sink) = (&mut self.scratch.packets, self.sink);
         let done = |ray: usize, query: &Q| sink.put(ray, query);
-        packets::trace(s, self.object, self.rays, packets, self.least, done).rays
+        packets::trace(s, self.object, self.rays, packets, packets::LEAST_USE, done).rays
     }
 }
 

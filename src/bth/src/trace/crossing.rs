@@ -34,8 +34,8 @@ pub(crate) enum Estimate {
     Missed,
     /// It crosses, at t, u and v good to [`RATIO_ERROR`].
     Crossed(Crossing),
-    /// Rounding hides the answer: weights, and the bound of their error.
-    Open([f64; 3], f64),
+    /// Rounding hides the answer: weights, the bound of their error, and between which t the line crosses, if it does.
+    Open([f64; 3], f64, [f64; 2]),
 }
 
 /// The least and the greatest. Compared in the way that vector instructions do; nothing is NaN here.
@@ -55,6 +55,7 @@ pub(crate) struct Weighed {
     /// The greatest difference of the corners' depths.
     pub(crate) range: f64,
     pub(crate) depth: f64,
+    pub(crate) inverse_depth: f64,
     pub(crate) t: f64,
 }
 
@@ -81,7 +82,7 @@ pub(crate) fn weigh(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]
     let sum = weight[0] + weight[1] + weight[2];
     let depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / sum;
     let (shallow, deep) = ends(z);
-    Weighed { weight, bound, range: deep - shallow, depth, t: depth * inverse_depth }
+    Weighed { weight, bound, range: deep - shallow, depth, inverse_depth, t: depth * inverse_depth }
 }
 
 impl Weighed {
@@ -100,7 +101,21 @@ impl Weighed {
         if certain && bound <= tolerance && bound * self.range <= tolerance * self.depth.abs() {
             return Estimate::Crossed(Crossing { t: self.t, weight: [weight[1], weight[2], sum] });
         }
-        Estimate::Open(weight, bound)
+        let t = if certain { self.t_range(sum.abs()) } else { [f64::NEG_INFINITY, f64::INFINITY] };
+        Estimate::Open(weight, bound, t)
+    }
+
+    /// Between which t the line crosses a triangle whose weights have certain signs. Three weights that are off by e move
+    /// the depth by at most 3e·range/(|sum| - 3e); roundings move it by less than 2^-48 of the greatest depth.
+    #[inline(never)]
+    fn t_range(&self, sum: f64) -> [f64; 2] {
+        const ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
+        if sum <= 12.0 * self.bound {
+            return [f64::NEG_INFINITY, f64::INFINITY];
+        }
+        let shift = 4.0 * self.bound * self.range / sum + (self.depth.abs() + self.range) * ROUNDING;
+        let (t, u) = ((self.depth - shift) * self.inverse_depth, (self.depth + shift) * self.inverse_depth);
+        [t.min(u), t.max(u)]
     }
 }
 
@@ -122,7 +137,7 @@ impl Line {
         match estimate(along(self.origin), along(self.direction), corner) {
             Estimate::Missed => None,
             Estimate::Crossed(crossing) => Some(crossing),
-            Estimate::Open(weight, bound) => self.close_crossing(corners, weight, bound),
+            Estimate::Open(weight, bound, _) => self.close_crossing(corners, weight, bound),
         }
     }
 

@@ -141,6 +141,7 @@ impl<Q: Query> Flight<Q> {
             let crossing = match estimate(origin, direction, block.corners_along(axis, i)) {
                 Estimate::Missed => None,
                 Estimate::Crossed(crossing) => Some(crossing),
+                Estimate::Open(_, _, t) if !self.query.cares(t) => None,
                 Estimate::Open(..) => open(ray, block.corners(i)),
             };
             let Some(crossing) = crossing else { continue };

@@ -106,6 +106,7 @@ pub(crate) fn settle<Q: Query>(
         let crossing = match estimate(origin, direction, corners) {
             Estimate::Missed => None,
             Estimate::Crossed(crossing) => Some(crossing),
+            Estimate::Open(_, _, t) if !query.cares(t) => None,
             Estimate::Open(..) => candidate.open(object, ray),
         };
         if crossing.is_some_and(|crossing| query.offer(id, crossing)) {
@@ -163,6 +164,7 @@ impl Last<'_> {
                 bound: all[3][lane],
                 range: all[4][lane],
                 depth: all[5][lane],
+                inverse_depth: 1.0 / direction[2][lane],
                 t: all[6][lane],
             };
             let crossing = match weighed.judge() {

@@ -26,7 +26,7 @@ struct Surface {
 }
 
 /// Packets whatever they are worth.
-const ALWAYS: LeastUse = LeastUse { coherent: 0, short: Some(0) };
+const ALWAYS: LeastUse = LeastUse { coherent: 0, short: 0 };
 
 /// A block that follows the lines.
 fn append(lines: &mut Vec<Line>, block: &[u8]) -> u32 {

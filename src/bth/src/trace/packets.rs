@@ -18,14 +18,11 @@ const FEWEST: usize = 2 * LANES;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LeastUse {
     pub(crate) coherent: u32,
-    /// None: short rays that fill a small box do not go together.
-    pub(crate) short: Option<u32>,
+    pub(crate) short: u32,
 }
 
 /// By measurement.
-pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 40, short: Some(15) };
-/// Where short rays have something better.
-pub(crate) const ONLY_COHERENT: LeastUse = LeastUse { short: None, ..LEAST_USE };
+pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 40, short: 15 };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
@@ -67,13 +64,13 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         return count;
     }
     let frame = Frame::new(object.header);
-    let (mut coherent, mut short) = (Guard::new(), least.short.map(|_| Guard::new()));
+    let (mut coherent, mut short) = (Guard::new(), Guard::new());
     let PacketScratch { stack, rest } = scratch;
     rest.clear();
     let mut packets = None;
     for (i, own) in rays.chunks(PACKET).enumerate() {
         let at = i * PACKET;
-        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, short.as_mut()) else {
+        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
             rest.extend(at as u32..(at + own.len()) as u32);
             continue;
         };
@@ -93,8 +90,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             }
             Run::Short(bounds) => {
                 let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
-                let guard = short.as_mut().unwrap_or(&mut coherent);
-                (outcome, guard, least.short.unwrap_or(0), &mut count.short)
+                (outcome, &mut short, least.short, &mut count.short)
             }
         };
         match outcome {
@@ -117,13 +113,13 @@ fn choose<S: Simd, Q: Query>(
     frame: &Frame,
     rays: &[Ray],
     coherent: &mut Guard,
-    short: Option<&mut Guard>,
+    short: &mut Guard,
 ) -> Option<Run> {
     if rays.len() < FEWEST {
         return None;
     }
     let try_coherent = coherent.is_open() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
-    let try_short = Q::ANY && short.is_some_and(|guard| guard.is_open());
+    let try_short = Q::ANY && short.is_open();
     if !try_coherent && !try_short {
         return None;
     }

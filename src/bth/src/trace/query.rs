@@ -24,6 +24,9 @@ pub(crate) trait Query: Copy {
     }
     /// Nothing whose exact t lies beyond this can be of interest.
     fn limit(&self) -> f64;
+    /// Whether a crossing between two values of t can be of interest. (Those of triangles that a ray starts on mostly are
+    /// not, and exact arithmetic need not be troubled.)
+    fn cares(&self, t: [f64; 2]) -> bool;
     /// t of the nearest hit so far, if the query wants the nearest.
     fn found(&self) -> Option<f64>;
     /// A triangle is certainly hit within the ray's range; of use where any hit will do.
@@ -78,10 +81,18 @@ impl Query for Nearest {
     fn limit(&self) -> f64 {
         widened(self.best.t)
     }
+    fn cares(&self, t: [f64; 2]) -> bool {
+        may_be_in_range(t, self.tmin, self.limit())
+    }
     fn found(&self) -> Option<f64> {
         (self.triangle != NONE).then_some(self.best.t)
     }
     fn accept(&mut self) {}
+}
+
+/// Whether a t between two values may lie in a range, rounding counted in.
+fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
+    t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
 /// Whether a t, rounded as it will be reported, lies in the ray's range.
@@ -120,6 +131,9 @@ impl Query for Any {
     #[inline(always)]
     fn limit(&self) -> f64 {
         widened(f64::from(self.tmax))
+    }
+    fn cares(&self, t: [f64; 2]) -> bool {
+        may_be_in_range(t, self.tmin, self.limit())
     }
     fn found(&self) -> Option<f64> {
         None

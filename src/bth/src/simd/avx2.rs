@@ -246,14 +246,6 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
-    fn shr_u<const K: u32>(self, a: U) -> U {
-        // SAFETY: registers only.
-        unsafe {
-            let count = _mm_cvtsi32_si128(K as i32);
-            [_mm256_srl_epi32(a[0], count), _mm256_srl_epi32(a[1], count)]
-        }
-    }
-    #[inline(always)]
     fn gather(self, m: M, from: &[f32], at: U) -> F {
         assert_within(self, m, at, from.len());
         // SAFETY: only lanes of the mask are read, and those lie within the slice.

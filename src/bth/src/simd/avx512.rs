@@ -202,11 +202,6 @@ impl Simd for Avx512 {
         unsafe { _mm512_slli_epi32::<K>(a) }
     }
     #[inline(always)]
-    fn shr_u<const K: u32>(self, a: __m512i) -> __m512i {
-        // SAFETY: registers only.
-        unsafe { _mm512_srli_epi32::<K>(a) }
-    }
-    #[inline(always)]
     fn gather(self, m: u16, from: &[f32], at: __m512i) -> __m512 {
         assert_within(self, m, at, from.len());
         // SAFETY: only lanes of the mask are read, and those lie within the slice.

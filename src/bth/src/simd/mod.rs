@@ -83,7 +83,6 @@ pub(crate) trait Simd: Copy {
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn shl_u<const K: u32>(self, a: Self::U) -> Self::U;
-    fn shr_u<const K: u32>(self, a: Self::U) -> Self::U;
     fn eq_u(self, a: Self::U, b: Self::U) -> Self::M;
     /// a < b, unsigned.
     fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;

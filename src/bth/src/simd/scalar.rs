@@ -220,10 +220,6 @@ impl Simd for Scalar {
         a.map(|x| x << K)
     }
     #[inline(always)]
-    fn shr_u<const K: u32>(self, a: U) -> U {
-        a.map(|x| x >> K)
-    }
-    #[inline(always)]
     fn eq_u(self, a: U, b: U) -> u32 {
         compare(|i| a[i] == b[i])
     }

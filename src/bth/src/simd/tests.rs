@@ -100,7 +100,6 @@ impl Kernel for Everything<'_> {
             u(s.or_u(x, y)),
             u(s.xor_u(x, y)),
             u(s.shl_u::<3>(x)),
-            u(s.shr_u::<5>(x)),
             m(s.eq_u(s.and_u(x, s.splat_u(3)), s.and_u(y, s.splat_u(3)))),
             m(s.lt_u(x, y)),
             u(s.select_u(mask, x, y)),

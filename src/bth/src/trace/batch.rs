@@ -4,13 +4,13 @@
 use super::Scratch;
 use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
-use super::packets;
+use super::packets::{self, LeastUse};
 use super::query::{Any, Nearest, Query};
-use super::records::LaneRecord;
+use super::records::LaneRecords;
 use super::tet_batch::{self, Walk};
 use super::tets::{enter_tets, leaf_of_face};
 use crate::layout::{Child, NONE};
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 
@@ -64,14 +64,16 @@ fn trace<Q: Query>(
     if object.header.root == NONE {
         return;
     }
-    if let Some(from) = from.filter(|_| !object.tet_leaves.is_empty()) {
-        let parts = rays.chunks(PART).zip(from.chunks(PART)).zip(sink.answers.chunks_mut(PART));
-        for ((rays, from), answers) in parts {
+    let from = from.filter(|from| !object.tet_leaves.is_empty() && from.iter().any(|&face| face != NONE));
+    if from.is_some() || whole(object) != NONE {
+        for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
+            let from = from.map(|from| &from[part * PART..][..rays.len()]);
             trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, instance: sink.instance });
         }
         return;
     }
-    let packed = Isa::chosen().run(Together { object, rays, with_short: true, scratch, sink: &mut sink });
+    let packed =
+        Isa::chosen().run(Together { object, rays, least: packets::LEAST_USE, scratch, sink: &mut sink });
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
@@ -81,18 +83,29 @@ fn trace<Q: Query>(
     }
 }
 
-/// Traces at most [`PART`] rays, some of which start on known surfaces.
+/// The tet leaf that is the whole object, without another structure for rays that come from outside; or `NONE`.
+fn whole(object: &ObjectView<'_>) -> u32 {
+    match Child::from_code(object.header.root) {
+        Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
+        _ => NONE,
+    }
+}
+
+/// Traces at most [`PART`] rays, some of which start on known surfaces, or all of which enter the same tetrahedra.
 fn trace_hinted<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
-    from: &[u32],
+    from: Option<&[u32]>,
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
     // Packets of coherent rays beat all else; short rays in a small box are faster through tetrahedra.
-    let packed = Isa::chosen().run(Together { object, rays, with_short: false, scratch, sink });
+    let packed = Isa::chosen().run(Together { object, rays, least: packets::ONLY_COHERENT, scratch, sink });
     let mut faces = vec![NONE; rays.len()];
-    let home = |ray: usize| object.triangle_homes.get(from[ray] as usize).copied().unwrap_or(NONE);
+    let home = |ray: usize| {
+        let triangle = from.map_or(NONE, |from| from[ray]);
+        object.triangle_homes.get(triangle as usize).copied().unwrap_or(NONE)
+    };
     let mut order: Vec<u32> = match packed {
         0 => (0..rays.len() as u32).collect(),
         _ => scratch.packets.rest.clone(),
@@ -102,13 +115,7 @@ fn trace_hinted<Q: Query>(
     }
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
     let mut walks = vec![Walk::Not; rays.len()];
-    match object.records {
-        Records::None => {}
-        Records::Link32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet32(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet20(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-        Records::Tet16(records) => walk_tets(object, records, rays, &faces, &mut queries, &mut walks),
-    }
+    walk_tets(object, rays, &faces, &mut queries, &mut walks);
     let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
     let mut walked = vec![NONE; rays.len()];
     order.retain(|&ray| {
@@ -127,16 +134,19 @@ fn trace_hinted<Q: Query>(
     }
 }
 
-fn walk_tets<R: LaneRecord, Q: Query>(
+fn walk_tets<Q: Query>(
     object: &ObjectView<'_>,
-    records: &[R],
     rays: &[Ray],
     faces: &[u32],
     queries: &mut [Q],
     walks: &mut [Walk],
 ) {
-    if tet_batch::Batch::<R, Q>::fits(object, records) && faces.iter().any(|&face| face != NONE) {
-        let mut batch = tet_batch::Batch::new(object, records, rays, faces, queries, walks);
+    let whole = whole(object);
+    let any = whole != NONE || faces.iter().any(|&face| face != NONE);
+    let records = LaneRecords::new(object.records).filter(|_| any && tet_batch::Batch::<Q>::fits(object));
+    if let Some(records) = records {
+        let leaves = vec![whole; rays.len()];
+        let mut batch = tet_batch::Batch::new(object, records, rays, faces, &leaves, queries, walks);
         // Without vectors the BVH is faster, and a hint of no use to it.
         let _ = Isa::chosen().run_wide(&mut batch);
     }
@@ -147,8 +157,7 @@ fn walk_tets<R: LaneRecord, Q: Query>(
 struct Together<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
-    /// Also short rays that fill a small box.
-    with_short: bool,
+    least: LeastUse,
     scratch: &'a mut Scratch,
     sink: &'a mut Sink<'b, Q>,
 }
@@ -159,7 +168,7 @@ impl<Q: Query> Kernel for Together<'_, '_, Q> {
     fn run<S: Simd>(self, s: S) -> usize {
         let (packets, sink) = (&mut self.scratch.packets, self.sink);
         let done = |ray: usize, query: &Q| sink.put(ray, query);
-        packets::trace(s, self.object, self.rays, self.with_short, packets, done).rays
+        packets::trace(s, self.object, self.rays, packets, self.least, done).rays
     }
 }
 

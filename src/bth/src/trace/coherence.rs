@@ -29,8 +29,26 @@ pub(crate) struct Span {
 /// Two rays in sixteen lanes.
 #[inline(always)]
 fn pair<S: Simd>(s: S, rays: &[Ray], at: usize) -> S::F {
-    let both = rays[at..].first_chunk::<2>().copied().unwrap_or([rays[at]; 2]);
-    s.load(<[f32; LANES]>::ref_from_bytes(both.as_bytes()).expect("rays are made of f32"))
+    if let Some(both) = rays[at..].first_chunk::<2>() {
+        return s.load(floats(both));
+    }
+    s.load(floats(&[rays[at]; 2]))
+}
+
+/// Their floats.
+#[inline(always)]
+fn floats(rays: &[Ray; 2]) -> &[f32; LANES] {
+    <[f32; LANES]>::ref_from_bytes(rays.as_bytes()).expect("rays are made of f32")
+}
+
+/// Whether two rays go into the same octant: asked first, of the first and the last of a run.
+#[inline(always)]
+pub(crate) fn is_same_octant(a: &Ray, b: &Ray) -> bool {
+    let mut differ = 0;
+    for k in 0..3 {
+        differ |= a.direction[k].to_bits() ^ b.direction[k].to_bits();
+    }
+    differ >> 31 == 0
 }
 
 /// The lesser, or the greater, of what two rays have at a place.

@@ -1,4 +1,6 @@
 //! Tracing rays through one object: BVH walk, tet walk, and what both share.
+// Closures and iterators over lanes are compiled without the instructions that these need.
+#![allow(clippy::needless_range_loop)]
 
 mod batch;
 mod bvh_batch;
@@ -12,6 +14,8 @@ mod packet_group;
 mod packet_hull;
 mod packet_leaf;
 mod packet_settle;
+#[cfg(test)]
+mod packet_tests;
 mod packets;
 mod prepare;
 mod query;
@@ -21,10 +25,12 @@ mod single;
 mod slabs;
 mod stack;
 mod tet_batch;
+mod tet_decide;
 mod tet_flood;
 mod tet_lanes;
 mod tet_locate;
 mod tet_queue;
+mod tet_rounds;
 mod tet_walk;
 mod tets;
 

@@ -195,8 +195,6 @@ fn fields<S: Simd>(s: S, floats: &[f32]) -> [S::F; FLOATS] {
     }
     let columns = s.transpose(rows);
     let mut out = [columns[0]; FLOATS];
-    for k in 0..FLOATS {
-        out[k] = columns[k];
-    }
+    out.copy_from_slice(&columns[..FLOATS]);
     out
 }

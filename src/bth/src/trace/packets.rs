@@ -1,6 +1,6 @@
 //! Which rays of a batch go in packets.
 
-use super::coherence::{Guard, Span};
+use super::coherence::{Guard, Span, is_same_octant};
 use super::packet::{Entry, PACKET, Packets, Use};
 use super::packet_hull::{Beam, SegmentBox};
 use super::prepare::Frame;
@@ -13,9 +13,19 @@ use zerocopy::{FromBytes, IntoBytes};
 
 /// Fewer rays make no packet.
 const FEWEST: usize = 2 * LANES;
-/// Per cent of the rays that a step must serve on average: with less, one ray at a time is faster.
-const COHERENT_USE: u32 = 40;
-const SHORT_USE: u32 = 15;
+
+/// Per cent of its rays that a step of a packet must serve on average: with less, one ray at a time is faster.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LeastUse {
+    pub(crate) coherent: u32,
+    /// None: short rays that fill a small box do not go together.
+    pub(crate) short: Option<u32>,
+}
+
+/// By measurement.
+pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 40, short: Some(15) };
+/// Where short rays have something better.
+pub(crate) const ONLY_COHERENT: LeastUse = LeastUse { short: None, ..LEAST_USE };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
@@ -41,14 +51,14 @@ enum Run {
 }
 
 /// Traces those rays of a batch that are better traced in packets, and leaves the others in `scratch.rest`, unless it does
-/// not try at all. `with_short`: also short rays that fill a small box. Hands on places and queries of rays that hit something.
+/// not try at all. Hands on places and queries of rays that hit something.
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
     object: &ObjectView<'_>,
     rays: &[Ray],
-    with_short: bool,
     scratch: &mut PacketScratch,
+    least: LeastUse,
     mut done: impl FnMut(usize, &Q),
 ) -> PacketCount {
     let mut count = PacketCount::default();
@@ -57,7 +67,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         return count;
     }
     let frame = Frame::new(object.header);
-    let (mut coherent, mut short) = (Guard::new(), with_short.then(Guard::new));
+    let (mut coherent, mut short) = (Guard::new(), least.short.map(|_| Guard::new()));
     let PacketScratch { stack, rest } = scratch;
     rest.clear();
     let mut packets = None;
@@ -72,27 +82,28 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         }
         let packets = packets.as_mut().expect("just made");
         let done = |ray: usize, query: &Q| done(at + ray, query);
-        let (outcome, guard, least, kind) = match run {
+        let (outcome, guard, least_use, kind) = match run {
             _ if !prepare(s, &frame, packets, own) => {
-                (Use::Refused, &mut coherent, COHERENT_USE, &mut count.coherent)
+                (Use::Refused, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Coherent(span) => {
                 let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
                 let outcome = packets.trace(s, object, &beam, own, done);
-                (outcome, &mut coherent, COHERENT_USE, &mut count.coherent)
+                (outcome, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Short(bounds) => {
                 let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
-                (outcome, short.as_mut().unwrap_or(&mut coherent), SHORT_USE, &mut count.short)
+                let guard = short.as_mut().unwrap_or(&mut coherent);
+                (outcome, guard, least.short.unwrap_or(0), &mut count.short)
             }
         };
         match outcome {
             Use::Refused => rest.extend(at as u32..(at + own.len()) as u32),
             Use::Lanes(share) => {
-                guard.learn(share >= least);
+                guard.learn(share >= least_use);
                 count.rays += own.len();
                 *kind += 1;
-                count.poor += usize::from(share < least);
+                count.poor += usize::from(share < least_use);
             }
         }
     }
@@ -111,12 +122,16 @@ fn choose<S: Simd, Q: Query>(
     if rays.len() < FEWEST {
         return None;
     }
-    let try_coherent = coherent.is_open();
+    let try_coherent = coherent.is_open() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
+    let try_short = Q::ANY && short.is_some_and(|guard| guard.is_open());
+    if !try_coherent && !try_short {
+        return None;
+    }
     let span = Span::of(s, rays);
     if try_coherent && span.is_coherent() {
         return Some(Run::Coherent(span));
     }
-    if Q::ANY && short.is_some_and(|guard| guard.is_open()) {
+    if try_short {
         return span.segments(s, frame, rays).map(Run::Short);
     }
     None

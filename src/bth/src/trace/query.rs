@@ -17,8 +17,8 @@ pub(crate) trait Query: Copy {
     const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
     fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
-    /// Tells of a crossing whose t is known to lie between two values, and not rounded out of the ray's
-    /// range if they do not; true if that is all the query wants to know.
+    /// Tells of a crossing whose t certainly lies between two values, roundings included; true if that is all that the
+    /// query wants to know.
     fn settled_by(&mut self, _t: (f64, f64)) -> bool {
         false
     }

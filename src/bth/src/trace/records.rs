@@ -4,6 +4,7 @@
 //! The rest follows: the fourth vertex, and what lies behind the other faces.
 
 use crate::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
+use crate::object::Records;
 use crate::simd::Simd;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -86,6 +87,32 @@ impl Record for Tet16 {
     }
 }
 
+impl Records<'_> {
+    /// [`Record::apex`] of a tetrahedron.
+    #[inline(always)]
+    pub(crate) fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32 {
+        match self {
+            Records::Link32(_) => carried,
+            Records::Tet32(records) => records[tet as usize].apex(face, carried),
+            Records::Tet20(records) => records[tet as usize].apex(face, carried),
+            Records::Tet16(records) => records[tet as usize].apex(face, carried),
+            Records::None => NONE,
+        }
+    }
+
+    /// [`Record::link`] of a tetrahedron.
+    #[inline(always)]
+    pub(crate) fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link {
+        match self {
+            Records::Link32(records) => records[tet as usize].link(at, vertex),
+            Records::Tet32(records) => records[tet as usize].link(at, vertex),
+            Records::Tet20(records) => records[tet as usize].link(at, vertex),
+            Records::Tet16(records) => records[tet as usize].link(at, vertex),
+            Records::None => Link { next: NONE, opposite: NONE },
+        }
+    }
+}
+
 /// Sixteen tetrahedra as entered through faces, one a lane.
 #[derive(Clone, Copy)]
 pub(crate) struct EnteredLanes<S: Simd> {
@@ -109,29 +136,6 @@ impl<S: Simd> EnteredLanes<S> {
     }
 }
 
-/// [`Record`] for sixteen at a time: the same answers by gathers from the records as plain words.
-pub(crate) trait LaneRecord: Record + IntoBytes + zerocopy::Immutable {
-    /// Whether [`EnteredLanes::behind`] is of use.
-    const KNOWS_BEHIND: bool;
-    /// What gathers read, a whole number a record.
-    type Word: FromBytes + zerocopy::Immutable + Copy;
-
-    /// The records as words.
-    fn words(records: &[Self]) -> &[Self::Word] {
-        <[Self::Word]>::ref_from_bytes(records.as_bytes()).expect("records are a whole number of words")
-    }
-    /// See [`Record::apex`].
-    fn apex_lanes<S: Simd>(s: S, words: &[Self::Word], m: S::M, at: &EnteredLanes<S>) -> S::U;
-    /// `next` and `opposite` of [`Record::link`]; those of lanes that are not in the mask are undefined.
-    fn link_lanes<S: Simd>(
-        s: S,
-        words: &[Self::Word],
-        m: S::M,
-        at: &EnteredLanes<S>,
-        vertex: S::U,
-    ) -> (S::U, S::U);
-}
-
 /// The fourth vertices from the words that hold the exclusive or of all.
 #[inline(always)]
 fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor: S::U) -> S::U {
@@ -139,70 +143,79 @@ fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor
     s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
 }
 
-impl LaneRecord for Link32 {
-    const KNOWS_BEHIND: bool = false;
-    type Word = [u32; 2];
-    #[inline(always)]
-    fn apex_lanes<S: Simd>(_s: S, _words: &[[u32; 2]], _m: S::M, at: &EnteredLanes<S>) -> S::U {
-        at.apex
-    }
-    #[inline(always)]
-    fn link_lanes<S: Simd>(
-        s: S,
-        words: &[[u32; 2]],
-        m: S::M,
-        at: &EnteredLanes<S>,
-        vertex: S::U,
-    ) -> (S::U, S::U) {
-        s.gather_pair(m, words, s.add_u(s.shl_u::<2>(at.tet), at.rank(s, vertex)))
-    }
+/// [`Records`] for sixteen at a time: the same answers by gathers from the records as plain words. Which kind they are
+/// is asked at every step: always with the same answer, which costs next to nothing, and there is one walk for all.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LaneRecords<'a> {
+    Link32(&'a [[u32; 2]]),
+    Tet32(&'a [u32]),
+    Tet20(&'a [u32]),
+    Tet16(&'a [u32]),
 }
 
-impl LaneRecord for Tet32 {
-    const KNOWS_BEHIND: bool = false;
-    type Word = u32;
-    #[inline(always)]
-    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
-        fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(3)))
-    }
-    #[inline(always)]
-    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
-        let first = s.add_u(s.shl_u::<3>(at.tet), s.splat_u(4));
-        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
-    }
+fn words<T: FromBytes + zerocopy::Immutable>(
+    records: &(impl IntoBytes + zerocopy::Immutable + ?Sized),
+) -> &[T] {
+    <[T]>::ref_from_bytes(records.as_bytes()).expect("records are a whole number of words")
 }
 
-impl LaneRecord for Tet20 {
-    const KNOWS_BEHIND: bool = false;
-    type Word = u32;
-    #[inline(always)]
-    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
-        fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<2>(at.tet), at.tet))
+impl<'a> LaneRecords<'a> {
+    /// None if there are no records.
+    pub(crate) fn new(records: Records<'a>) -> Option<Self> {
+        Some(match records {
+            Records::None => return None,
+            Records::Link32(records) => LaneRecords::Link32(words(records)),
+            Records::Tet32(records) => LaneRecords::Tet32(words(records)),
+            Records::Tet20(records) => LaneRecords::Tet20(words(records)),
+            Records::Tet16(records) => LaneRecords::Tet16(words(records)),
+        })
     }
-    #[inline(always)]
-    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
-        let first = s.add_u(s.add_u(s.shl_u::<2>(at.tet), at.tet), s.splat_u(1));
-        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
-    }
-}
 
-impl LaneRecord for Tet16 {
-    const KNOWS_BEHIND: bool = true;
-    type Word = u32;
+    /// Whether [`EnteredLanes::behind`] is of use.
     #[inline(always)]
-    fn apex_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>) -> S::U {
-        fourth_lanes(s, words, m, at, s.shl_u::<2>(at.tet))
+    pub(crate) fn knows_behind(&self) -> bool {
+        matches!(self, LaneRecords::Tet16(_))
     }
+
+    /// See [`Record::apex`].
     #[inline(always)]
-    fn link_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
-        let first = s.add_u(s.shl_u::<2>(at.tet), s.splat_u(1));
-        // The link behind us, and with it the fourth; then the one that is wanted.
-        let mut link = at.behind;
-        for v in [at.apex, vertex] {
-            let rank = at.rank(s, v);
-            let stored = s.and(m, s.lt_u(rank, s.splat_u(3)));
-            link = s.xor_u(link, s.gather_u(stored, words, s.add_u(first, rank)));
+    pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, at: &EnteredLanes<S>) -> S::U {
+        match self {
+            LaneRecords::Link32(_) => at.apex,
+            LaneRecords::Tet32(words) => {
+                fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(3)))
+            }
+            LaneRecords::Tet20(words) => fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<2>(at.tet), at.tet)),
+            LaneRecords::Tet16(words) => fourth_lanes(s, words, m, at, s.shl_u::<2>(at.tet)),
         }
-        (link, s.splat_u(NONE))
     }
+
+    /// `next` and `opposite` of [`Record::link`]; those of lanes that are not in the mask are undefined.
+    #[inline(always)]
+    pub(crate) fn link<S: Simd>(&self, s: S, m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
+        let (words, first) = match self {
+            LaneRecords::Link32(pairs) => {
+                return s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(at.tet), at.rank(s, vertex)));
+            }
+            LaneRecords::Tet16(words) => return (link_of_tet16(s, words, m, at, vertex), s.splat_u(NONE)),
+            LaneRecords::Tet32(words) => (words, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(4))),
+            LaneRecords::Tet20(words) => {
+                (words, s.add_u(s.add_u(s.shl_u::<2>(at.tet), at.tet), s.splat_u(1)))
+            }
+        };
+        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
+    }
+}
+
+#[inline(always)]
+fn link_of_tet16<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> S::U {
+    let first = s.add_u(s.shl_u::<2>(at.tet), s.splat_u(1));
+    // The link behind us, and with it the fourth; then the one that is wanted.
+    let mut link = at.behind;
+    for v in [at.apex, vertex] {
+        let rank = at.rank(s, v);
+        let stored = s.and(m, s.lt_u(rank, s.splat_u(3)));
+        link = s.xor_u(link, s.gather_u(stored, words, s.add_u(first, rank)));
+    }
+    link
 }

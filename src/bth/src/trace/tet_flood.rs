@@ -8,12 +8,12 @@
 
 use super::line::{Projected, Sign};
 use super::query::{Count, Query};
-use super::records::{Entered, Record};
+use super::records::Entered;
 use super::tet_walk::{Outcome, TetSpace};
 use crate::layout::{FACE_BIT, NONE};
 use std::collections::HashSet;
 
-impl<R: Record> TetSpace<'_, R> {
+impl TetSpace<'_> {
     /// Offers all constrained faces of the leaf that the line can touch up to the query's limit.
     #[inline(never)]
     pub(crate) fn flood<Q: Query, C: Count>(&self, query: &mut Q, count: &mut C) -> Outcome {
@@ -36,7 +36,7 @@ impl<R: Record> TetSpace<'_, R> {
                 if !self.touches(&projected) {
                     continue;
                 }
-                let link = self.records[tet as usize].link(&at, at.face[out]);
+                let link = self.records.link(tet, &at, at.face[out]);
                 let constrained = link.next & FACE_BIT != 0 && link.next != NONE;
                 if constrained && self.offer(&self.faces[(link.next & !FACE_BIT) as usize], query) {
                     return Outcome::Done;

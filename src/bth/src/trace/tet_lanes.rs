@@ -14,7 +14,7 @@
 //! The two signs that name the exit of the line are all that a step needs: the face left behind was crossed with certain
 //! signs, so those of the face ahead are certain too.
 
-use super::records::{EnteredLanes, LaneRecord};
+use super::records::{EnteredLanes, LaneRecords};
 use crate::layout::{FACE_BIT, NONE};
 use crate::simd::Simd;
 
@@ -208,16 +208,16 @@ impl<S: Simd> Lanes<S> {
 
     /// First part of a step, which takes every active walk one tetrahedron on: fetches the fourth vertex.
     #[inline(always)]
-    pub(super) fn fetch<R: LaneRecord>(
+    pub(super) fn fetch(
         &self,
         s: S,
         one: S::U,
         step: &mut Step<S>,
-        words: &[R::Word],
+        records: &LaneRecords<'_>,
         vertices: &[[f32; 4]],
     ) {
         let active = self.active(s);
-        step.apex = R::apex_lanes(s, words, active, &self.entered(one));
+        step.apex = records.apex(s, active, &self.entered(one));
         step.position = self.gather(s, active, vertices, step.apex);
     }
 
@@ -259,26 +259,110 @@ impl<S: Simd> Lanes<S> {
     /// pass their limit stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
     /// it was.
     #[inline(always)]
-    pub(super) fn follow<R: LaneRecord, const DEPTHS: bool>(
+    pub(super) fn follow<const DEPTHS: bool>(
         &mut self,
         s: S,
         one: S::U,
         step: &Step<S>,
-        words: &[R::Word],
+        records: &LaneRecords<'_>,
     ) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
         let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
-        let (mut next, opposite) = R::link_lanes(s, words, step.go, &at, step.left);
+        let (mut next, opposite) = records.link(s, step.go, &at, step.left);
         if DEPTHS {
             let f = &self.floats;
             let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
             next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
         }
-        if R::KNOWS_BEHIND {
+        if records.knows_behind() {
             self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
         }
         let next = s.select_u(step.go, next, s.or_u(tet, s.splat_u(DOUBT)));
         self.words[word::TET] = s.select_u(self.active(s), next, tet);
         self.words[word::APEX] = s.select_u(step.go, opposite, self.words[word::APEX]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::line::Line;
+    use super::super::tet_queue::Ready;
+    use super::*;
+    use crate::rays::Ray;
+    use crate::simd::{Isa, Kernel, LANES};
+    use crate::testing::Rng;
+    use zerocopy::{FromBytes, IntoBytes};
+
+    /// For each of sixteen rays: cross products of three points in turn, their bound, and which rays lanes can take.
+    struct Crosses<'a>(&'a [Ray], &'a [[f32; 4]]);
+
+    impl Kernel for Crosses<'_> {
+        type Output = ([[f32; LANES]; 3], [f32; LANES], u32);
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let lane = s.load_u(&std::array::from_fn(|i| i as u32));
+            let first = s.add_u(lane, s.shl_u::<1>(lane));
+            let vertex = three!(|k| s.add_u(first, s.splat_u(k)));
+            let rays = <[f32]>::ref_from_bytes(self.0.as_bytes()).expect("whole words");
+            let ready = Ready::new(s, s.mask(0xffff), rays, self.1, lane, vertex);
+            let lanes = &ready.lanes;
+            let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
+            let (mut out, mut bound) = ([[0.0; LANES]; 3], [0.0; LANES]);
+            s.store(cross(s, &lanes.corner(0), &lanes.corner(1)), &mut out[0]);
+            s.store(cross(s, &lanes.corner(1), &lanes.corner(2)), &mut out[1]);
+            s.store(cross(s, &lanes.corner(2), &lanes.corner(0)), &mut out[2]);
+            s.store(extent.bound(s, extent.size), &mut bound);
+            (out, bound, s.mask_bits(ready.able))
+        }
+    }
+
+    #[test]
+    fn cross_products_are_off_by_less_than_their_bound_at_any_scale() {
+        let mut rng = Rng(51);
+        let (mut certain, mut tried) = (0, 0);
+        for round in 0..4_000 {
+            let scale = 2f32.powi(rng.below(180) as i32 - 95);
+            let unit = |rng: &mut Rng| (rng.below(1 << 24) as f32 / (1 << 23) as f32) - 1.0;
+            let near = [1.0, 1e-3, 1e-6][round % 3];
+            let rays: [Ray; LANES] = std::array::from_fn(|_| Ray {
+                origin: [(); 3].map(|()| unit(&mut rng) * scale),
+                tmin: 0.0,
+                direction: [(); 3].map(|()| unit(&mut rng)),
+                tmax: f32::INFINITY,
+            });
+            // Triangles about points of the rays' lines.
+            let vertices: Vec<[f32; 4]> = (0..3 * LANES)
+                .map(|i| {
+                    let (ray, t) = (&rays[i / 3], unit(&mut rng) * scale);
+                    let p = [0, 1, 2]
+                        .map(|k| ray.origin[k] + ray.direction[k] * t + unit(&mut rng) * near * scale);
+                    [p[0], p[1], p[2], 0.0]
+                })
+                .collect();
+            for isa in Isa::ALL {
+                let (crosses, bound, able) = isa.run(Crosses(&rays, &vertices));
+                for lane in (0..LANES).filter(|i| able >> i & 1 != 0) {
+                    let line = Line::new(&rays[lane]).expect("a direction");
+                    let p = [0, 1, 2].map(|k| {
+                        let [x, y, z, _] = vertices[3 * lane + k];
+                        line.project([x, y, z])
+                    });
+                    for k in 0..3 {
+                        let (a, b) = (p[k], p[(k + 1) % 3]);
+                        let exactly = a.x * b.y - a.y * b.x;
+                        let error = (f64::from(crosses[k][lane]) - exactly).abs();
+                        let bound = f64::from(bound[lane]);
+                        assert!(
+                            bound == f64::INFINITY || error <= bound,
+                            "{isa}: {error:e} exceeds {bound:e}: {:?}",
+                            rays[lane]
+                        );
+                        certain += u32::from(f64::from(crosses[k][lane]).abs() > bound);
+                        tried += 1;
+                    }
+                }
+            }
+        }
+        assert!(certain * 2 > tried, "{certain} of {tried} signs are certain");
     }
 }

@@ -2,7 +2,7 @@
 //! own tetrahedron towards the origin, usually of no step or one.
 
 use super::line::{Line, Projected, Sign};
-use super::records::{Entered, Record};
+use super::records::Entered;
 use super::tet_walk::{Place, TetSpace};
 use crate::layout::{FACE_BIT, TetFace};
 
@@ -35,7 +35,7 @@ fn side_of_plane([a, b, c]: [[f32; 3]; 3], point: [f64; 3]) -> Sign {
 /// Faces opposite to each vertex of a positively oriented tetrahedron, oriented to that vertex.
 const FACES: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 
-impl<R: Record> TetSpace<'_, R> {
+impl TetSpace<'_> {
     /// The place from which to walk for a ray that starts near a constrained face: in the tetrahedron that
     /// holds its origin, at the face through which the line came in. `None` if any sign on the way is
     /// uncertain, the origin lies outside the leaf, or it is too far off.
@@ -61,7 +61,7 @@ impl<R: Record> TetSpace<'_, R> {
                     Sign::Uncertain => return None,
                     Sign::Negative => {}
                 }
-                let link = self.records[tet as usize].link(&entered, vertex[out]);
+                let link = self.records.link(tet, &entered, vertex[out]);
                 let (next, apex, behind) = self.beyond(tet, link, face)?;
                 // Seen from the other side the face turns around.
                 vertex = [face[0], face[2], face[1], apex];
@@ -84,7 +84,7 @@ impl<R: Record> TetSpace<'_, R> {
             }
             let behind = match vertex[apex] == entered.apex {
                 true => entered.behind,
-                false => self.records[tet as usize].link(entered, vertex[apex]).next,
+                false => self.records.link(tet, entered, vertex[apex]).next,
             };
             let entered = Entered { face: indices.map(|i| vertex[i]), apex: vertex[apex], behind };
             return Some(Place { tet, entered, corner });

@@ -1,7 +1,7 @@
 //! Rays made ready to walk, in wait for lanes that are free.
 
 use super::tet_lanes::{Extent, Lanes, cross, float, three, word};
-use crate::layout::TetFace;
+use crate::layout::{HullFace, NONE, TetFace};
 use crate::simd::{LANES, Simd};
 
 /// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or
@@ -137,16 +137,9 @@ pub(super) struct Ready<S: Simd> {
 }
 
 impl<S: Simd> Ready<S> {
-    /// Prepares the rays `slot` of the batch, to the projection of their faces.
+    /// Prepares the rays `slot` of the batch, without any place yet.
     #[inline(always)]
-    pub(super) fn new(
-        s: S,
-        m: S::M,
-        rays: &[f32],
-        vertices: &[[f32; 4]],
-        slot: S::U,
-        face: [S::U; 3],
-    ) -> Self {
+    fn of_rays(s: S, m: S::M, rays: &[f32], slot: S::U) -> Self {
         let row = s.shl_u::<RAY_WORDS>(slot);
         let o = three!(|k| column(s, m, rays, row, k));
         let tmin = column(s, m, rays, row, 3);
@@ -182,6 +175,13 @@ impl<S: Simd> Ready<S> {
         lanes.words[word::SLOT] = slot;
         let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
         lanes.floats[float::LIMIT] = s.add(high, spare(s, high));
+        Ready { lanes, tmin_low: s.sub(low, spare(s, low)), able }
+    }
+
+    /// Projects the faces.
+    #[inline(always)]
+    fn set_face(&mut self, s: S, m: S::M, vertices: &[[f32; 4]], face: [S::U; 3]) {
+        let lanes = &mut self.lanes;
         let mut extent = Extent::least(s);
         for (i, vertex) in face.into_iter().enumerate() {
             let corner = lanes.project(s, lanes.gather(s, m, vertices, vertex));
@@ -193,7 +193,62 @@ impl<S: Simd> Ready<S> {
         }
         lanes.floats[float::REACH] = extent.reach;
         lanes.floats[float::SIZE] = extent.size;
-        Ready { lanes, tmin_low: s.sub(low, spare(s, low)), able }
+    }
+
+    /// Prepares the rays `slot` of the batch, to the projection of their faces.
+    #[inline(always)]
+    pub(super) fn new(
+        s: S,
+        m: S::M,
+        rays: &[f32],
+        vertices: &[[f32; 4]],
+        slot: S::U,
+        face: [S::U; 3],
+    ) -> Self {
+        let mut ready = Self::of_rays(s, m, rays, slot);
+        ready.set_face(s, m, vertices, face);
+        ready
+    }
+
+    /// Prepares rays to walk from where their lines enter a hull. Returns also which certainly do, and which
+    /// certainly miss it.
+    #[inline(always)]
+    pub(super) fn from_hull(
+        s: S,
+        m: S::M,
+        rays: &[f32],
+        vertices: &[[f32; 4]],
+        hull: &[HullFace],
+        slot: S::U,
+    ) -> (Self, S::M, S::M) {
+        let mut ready = Self::of_rays(s, m, rays, slot);
+        let (mut entered, mut in_doubt) = (s.mask(0), s.mask(0));
+        let [mut tet, mut apex] = [s.splat_u(0); 2];
+        let mut entry = [s.splat_u(0); 3];
+        for face in hull {
+            let vertex = three!(|i| s.splat_u(face.vertex[i]));
+            ready.set_face(s, m, vertices, vertex);
+            let lanes = &ready.lanes;
+            let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
+            let bound = extent.bound(s, extent.size);
+            let mut inwards = m;
+            for i in 0..3 {
+                let value = cross(s, &lanes.corner(i), &lanes.corner((i + 1) % 3));
+                inwards = s.and(inwards, s.lt(bound, value));
+                in_doubt = s.or(in_doubt, s.and_not(m, s.lt(bound, s.abs(value))));
+            }
+            entered = s.or(entered, inwards);
+            tet = s.select_u(inwards, s.splat_u(face.tet), tet);
+            apex = s.select_u(inwards, s.splat_u(face.opposite), apex);
+            entry = three!(|i| s.select_u(inwards, vertex[i], entry[i]));
+        }
+        let certain = s.and_not(ready.able, in_doubt);
+        let entered = s.and(certain, entered);
+        ready.set_face(s, entered, vertices, entry);
+        ready.lanes.words[word::TET] = tet;
+        ready.lanes.words[word::APEX] = apex;
+        ready.lanes.words[word::BEHIND] = s.splat_u(NONE);
+        (ready, entered, s.and_not(certain, entered))
     }
 
     /// Prepares rays that start about constrained faces to walk from these, and returns which can: those whose lines

@@ -8,14 +8,15 @@
 
 use super::line::{Line, Projected, Sign};
 use super::query::{Count, Query};
-use super::records::{Entered, Record};
+use super::records::Entered;
 use crate::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
+use crate::object::Records;
 
 /// The parts of a tet leaf that a walk reads, and what it knows about the ray.
-pub(crate) struct TetSpace<'a, R> {
+pub(crate) struct TetSpace<'a> {
     pub(crate) leaf: &'a TetLeaf,
     /// All records, vertices and faces of the object: rows are object-wide.
-    pub(crate) records: &'a [R],
+    pub(crate) records: Records<'a>,
     pub(crate) vertices: &'a [TetVertex],
     pub(crate) faces: &'a [TetFace],
     pub(crate) hull: &'a [HullFace],
@@ -44,10 +45,10 @@ pub(crate) struct Place {
     pub(crate) corner: [Projected; 3],
 }
 
-impl<'a, R: Record> TetSpace<'a, R> {
+impl<'a> TetSpace<'a> {
     pub(crate) fn new(
         leaf: &'a TetLeaf,
-        records: &'a [R],
+        records: Records<'a>,
         vertices: &'a [TetVertex],
         faces: &'a [TetFace],
         hull: &'a [HullFace],
@@ -93,7 +94,7 @@ impl<'a, R: Record> TetSpace<'a, R> {
             let side = (row.tet[0] == from) as usize;
             return Some((row.tet[side], row.opposite[side], link.next));
         }
-        let apex = self.records[link.next as usize].apex(face, link.opposite);
+        let apex = self.records.apex(link.next, face, link.opposite);
         Some((link.next, apex, from))
     }
 
@@ -110,7 +111,7 @@ impl<'a, R: Record> TetSpace<'a, R> {
             (_, Positive, Negative) => 0,
             _ => return None,
         };
-        let link = self.records[at.tet as usize].link(&at.entered, at.entered.face[out]);
+        let link = self.records.link(at.tet, &at.entered, at.entered.face[out]);
         at.entered.face[out] = at.entered.apex;
         at.corner[out] = apex;
         Some(link)

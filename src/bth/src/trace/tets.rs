@@ -3,10 +3,9 @@
 use super::bvh_walk::TetOutcome;
 use super::line::Line;
 use super::query::{Count, Query};
-use super::records::Record;
 use super::tet_walk::{Outcome, TetSpace};
 use crate::layout::NONE;
-use crate::object::{ObjectView, Records};
+use crate::object::ObjectView;
 use crate::rays::Ray;
 
 /// What became of a ray where it starts.
@@ -35,13 +34,7 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
         return Start::Walked(NONE);
     }
     let Some(line) = Line::new(ray) else { return Start::Done };
-    let outcome = match object.records {
-        Records::None => None,
-        Records::Link32(records) => start(object, records, leaf, row, &line, query, count),
-        Records::Tet32(records) => start(object, records, leaf, row, &line, query, count),
-        Records::Tet20(records) => start(object, records, leaf, row, &line, query, count),
-        Records::Tet16(records) => start(object, records, leaf, row, &line, query, count),
-    };
+    let outcome = start(object, leaf, row, &line, query, count);
     match outcome {
         Some(Outcome::Done) => Start::Done,
         Some(_) => Start::Walked(leaf),
@@ -49,16 +42,15 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
     }
 }
 
-fn start<R: Record, Q: Query, C: Count>(
+fn start<Q: Query, C: Count>(
     object: &ObjectView<'_>,
-    records: &[R],
     leaf: u32,
     row: u32,
     line: &Line,
     query: &mut Q,
     count: &mut C,
 ) -> Option<Outcome> {
-    let space = space(object, records, leaf, line);
+    let space = space(object, leaf, line);
     let place = space.locate(row)?;
     count.leaf();
     Some(match space.walk(place, query, count) {
@@ -77,24 +69,7 @@ pub(crate) fn enter_tets<Q: Query, C: Count>(
     count: &mut C,
 ) -> TetOutcome {
     let Some(line) = Line::new(ray) else { return TetOutcome::Done };
-    match object.records {
-        Records::None => TetOutcome::GoOn,
-        Records::Link32(records) => enter(object, records, leaf, &line, query, count),
-        Records::Tet32(records) => enter(object, records, leaf, &line, query, count),
-        Records::Tet20(records) => enter(object, records, leaf, &line, query, count),
-        Records::Tet16(records) => enter(object, records, leaf, &line, query, count),
-    }
-}
-
-fn enter<R: Record, Q: Query, C: Count>(
-    object: &ObjectView<'_>,
-    records: &[R],
-    leaf: u32,
-    line: &Line,
-    query: &mut Q,
-    count: &mut C,
-) -> TetOutcome {
-    let space = space(object, records, leaf, line);
+    let space = space(object, leaf, &line);
     let outcome = match space.enter_hull() {
         Ok(place) => space.walk(place, query, count),
         Err(outcome) => outcome,
@@ -111,13 +86,8 @@ pub(crate) fn leaf_of_face(object: &ObjectView<'_>, row: u32) -> u32 {
     object.tet_leaves.partition_point(|leaf| leaf.first_face <= row) as u32 - 1
 }
 
-pub(crate) fn space<'a, R: Record>(
-    object: &ObjectView<'a>,
-    records: &'a [R],
-    leaf: u32,
-    line: &'a Line,
-) -> TetSpace<'a, R> {
+pub(crate) fn space<'a>(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> TetSpace<'a> {
     let leaf = &object.tet_leaves[leaf as usize];
     let hull = &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
-    TetSpace::new(leaf, records, object.tet_vertices, object.tet_faces, hull, line)
+    TetSpace::new(leaf, object.records, object.tet_vertices, object.tet_faces, hull, line)
 }

@@ -34,7 +34,7 @@ KINDS = {
     PROVENANCE: ("PROVENANCE", (1,), None),
     SCENE: ("SCENE", (64,), (1 << 32) - 2),
     NODES: ("NODES", (128,), (1 << 32) - 2),
-    INSTANCES: ("INSTANCES", (16,), (1 << 32) - 2),
+    INSTANCES: ("INSTANCES", (16,), (1 << 31) - 1),
     TRACKS: ("TRACKS", (32,), (1 << 32) - 2),
     TIMES: ("TIMES", (8,), (1 << 32) - 2),
     VALUES: ("VALUES", (8,), (1 << 32) - 2),

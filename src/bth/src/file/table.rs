@@ -68,7 +68,7 @@ fn most(kind: u32) -> u64 {
         }
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Rows are referred to by 31 bits in links and by u32 elsewhere; NONE is no row.
-        kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES => (FACE_BIT - 1) as u64,
+        kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,
         kind::POSITIONS | kind::NORMALS | kind::UVS => (NONE - 1) as u64,
         kind if kind::is_scene(kind) => (NONE - 1) as u64,
         _ => u64::MAX,

@@ -171,6 +171,8 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                 };
                 let below = slot.top.below();
                 slot.top = match found {
+                    // Any-hit queries keep no keys, so nothing can be told of what waits.
+                    Found::Nearer if Q::ANY => below,
                     Found::Nothing => below,
                     Found::Again => slot.top,
                     Found::Nearer => self.stacks.keep_up_to(s, at, below, slot.flight.key_limit()),

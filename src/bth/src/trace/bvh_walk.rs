@@ -66,6 +66,8 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
         top = top.below();
         match found {
             Found::Nothing | Found::Again => {}
+            // Any-hit queries keep no keys, so nothing can be told of what waits.
+            Found::Nearer if Q::ANY => {}
             Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
             Found::Enough => return,
         }

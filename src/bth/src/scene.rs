@@ -164,7 +164,9 @@ impl Scene {
             for instance in 0..self.object_count() {
                 let object = self.view(instance);
                 for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
-                    let ray = Ray { tmax: ray.tmax.min(best.t), ..*ray };
+                    // Not `min`, which would make a range of NaN.
+                    let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
+                    let ray = Ray { tmax, ..*ray };
                     let hit =
                         trace::nearest(object, &ray, hint(surface(from, i), instance), instance, scratch);
                     if hit.t < best.t {

@@ -136,13 +136,16 @@ fn trace_hinted<Q: Query>(
 }
 
 /// Whether a ray that starts on a known surface is likely to be faster through tetrahedra than through the BVH beside
-/// them, if there is one. By measurement (benchmarks/): short any-hit rays are, long ones not; nearest hits only
-/// where the tetrahedra do not exceed the caches by far. No answer depends on it.
+/// them, if there is one. By measurement (benchmarks/): with AVX-512 short any-hit rays are, long ones not;
+/// nearest hits only where the tetrahedra do not exceed the caches by far. No answer depends on it.
 fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     const MOST_TETS: usize = 400_000;
     const SHORT: f32 = 0.3;
     if object.tet_leaves.first().is_none_or(|leaf| leaf.subtree == NONE) {
         return true;
+    }
+    if Isa::chosen() != Isa::Avx512 {
+        return false;
     }
     if !Q::ANY {
         return object.records.len() <= MOST_TETS;

@@ -32,6 +32,10 @@ pub(crate) struct Args {
     /// Render frames again whose pictures are there and whole.
     #[arg(long)]
     pub(crate) force: bool,
+    /// Instruction set: scalar, avx2 or avx512. By default what BTH_ISA says, else the best of this machine. Pictures do
+    /// not depend on it.
+    #[arg(long, value_name = "ISA")]
+    pub(crate) isa: Option<bth::Isa>,
     /// Width and height of the picture.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = parse_size)]
     pub(crate) size: (u32, u32),

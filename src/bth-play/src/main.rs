@@ -42,6 +42,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         clap_complete::generate(shell, &mut args::Args::command(), "bth-play", &mut script);
         return report::print(&String::from_utf8_lossy(&script));
     }
+    let isa = match args.isa {
+        Some(isa) => isa.choose(),
+        None => bth::Isa::from_environment().map(|_| ()),
+    };
+    isa.map_err(|error| Failure::Usage(error.to_string()))?;
     let (file, output) = args.paths()?;
     let compiled;
     let file = if manifests::is_manifest(file) {

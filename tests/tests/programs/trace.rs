@@ -1,4 +1,4 @@
-use crate::support::{bthc, folder, sphere};
+use crate::support::{bthc, command, folder, sphere};
 use bth::rays::{Ray, Surface};
 
 /// Rays of a grid in front of the unit sphere, some past it.
@@ -51,6 +51,33 @@ fn hits_are_those_of_the_library_bit_for_bit() {
     let any: Vec<bool> = rays.iter().map(|ray| scene.any(ray, Surface::NONE)).collect();
     assert_eq!(found, any);
     assert_eq!(json["hits"], any.iter().filter(|b| **b).count());
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_file_and_others_are_refused() {
+    let folder = folder(&[("ball.obj", &sphere(16))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    std::fs::write(folder.path().join("x.rays"), file(b"RAYS", rays().iter().map(ray_bytes))).unwrap();
+    let args = ["trace", "ball.bth", "x.rays", "-o", "x.hits"];
+    let hits = || std::fs::read(folder.path().join("x.hits")).unwrap();
+    bthc(folder.path(), &[&args[..], &["--isa", "scalar"]].concat()).expect(0);
+    let expected = hits();
+    let cpu = bthc(folder.path(), &["info", "--cpu", "--json"]).expect(0).json();
+    let available: Vec<&str> =
+        cpu["cpu"]["available"].as_array().unwrap().iter().flat_map(|v| v.as_str()).collect();
+    assert_eq!(available[0], "scalar");
+    for isa in &available {
+        let chosen = bthc(folder.path(), &["info", "--cpu", "--json", "--isa", isa]).expect(0).json();
+        assert_eq!(chosen["cpu"]["isa"], *isa);
+        bthc(folder.path(), &[&args[..], &["--isa", isa]].concat()).expect(0);
+        assert!(hits() == expected, "--isa {isa}");
+        let status = command("bthc", folder.path(), &args).env("BTH_ISA", isa).status().unwrap();
+        assert!(status.success() && hits() == expected, "BTH_ISA={isa}");
+    }
+    let run = bthc(folder.path(), &[&args[..], &["--isa", "mmx"]].concat()).expect(2);
+    assert!(run.stderr.contains("scalar, avx2 or avx512"), "{run:?}");
+    let status = command("bthc", folder.path(), &args).env("BTH_ISA", "mmx").status().unwrap();
+    assert_eq!(status.code(), Some(2), "BTH_ISA=mmx");
 }
 
 #[test]

@@ -25,10 +25,16 @@ pub(crate) struct Frame {
     farthest: f32,
 }
 
+/// The greater; `b` where either is NaN. One instruction, which `f32::max` is not.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 impl Frame {
     pub(crate) fn new(object: &Object) -> Frame {
         let corners = object.lower.iter().chain(&object.upper);
-        let farthest = corners.fold(0.0, |m: f32, x| m.max(x.abs()));
+        let farthest = corners.fold(0.0, |m: f32, x| greater(x.abs(), m));
         Frame { lower: object.lower, upper: object.upper, farthest }
     }
 
@@ -72,11 +78,12 @@ impl Aim {
         let greatest = size[z];
         let (mut reach, mut farthest) = (0f32, 0f32);
         for k in 0..3 {
-            reach = reach.max((frame.lower[k] - o[k]).abs()).max((frame.upper[k] - o[k]).abs());
-            farthest = farthest.max(o[k].abs());
+            let (low, high) = ((frame.lower[k] - o[k]).abs(), (frame.upper[k] - o[k]).abs());
+            reach = greater(greater(low, high), reach);
+            farthest = greater(o[k].abs(), farthest);
         }
         let extent = (frame.farthest + farthest) * UP;
-        // Sums, because `max` drops NaN.
+        // Sums, because the greater of NaN and a number may be the number.
         let finite = reach + (o[0] + o[1] + o[2]).abs() + (size[0] + size[1] + size[2]);
         if !(greatest > 1.0 / LARGEST && finite < LARGEST && extent < LARGEST && ray.tmin <= ray.tmax) {
             return false;
@@ -85,7 +92,7 @@ impl Aim {
         let least = greatest * slabs::LEAST_COMPONENT as f32;
         let Aim { slabs, sight } = self;
         for k in 0..3 {
-            let magnitude = greatest / size[k].max(least);
+            let magnitude = greatest / greater(size[k], least);
             let reciprocal = magnitude.copysign(d[k]);
             let (middle, pad) = (o[k] * reciprocal, pad * magnitude);
             slabs.reciprocal[k] = reciprocal;

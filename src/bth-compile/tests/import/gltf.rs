@@ -212,7 +212,12 @@ fn refuses_graphs_that_are_not_trees() {
     assert_bad(|d| d["scenes"][0]["nodes"] = json!([0, 0]), "BTH-I012", "node 0", "one parent");
     assert_bad(|d| d["scenes"][0]["nodes"] = json!([7]), "BTH-I012", "node 7", "does not exist");
     assert_bad(|d| d["scene"] = 4.into(), "BTH-I012", "scene 4", "does not exist");
-    assert_bad(|d| d["nodes"][0]["mesh"] = 4.into(), "BTH-I012", "node 0", "expected a mesh below 1, found 4");
+    assert_bad(
+        |d| d["nodes"][0]["mesh"] = 4.into(),
+        "BTH-I012",
+        "node 0",
+        "expected a mesh below 1, found 4",
+    );
 }
 
 #[test]

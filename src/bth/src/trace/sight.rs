@@ -242,13 +242,14 @@ pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, floor: S::F, first: S::F
     let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
 
     let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
-    let moment = s.fma(weight[2], c[2], s.fma(weight[1], b[2], s.mul(weight[0], a[2])));
+    // Shares, and not the sum of products by the sum of weights: those of a small triangle would underflow.
     let inverse = s.div(s.splat(1.0), sum);
+    let share = [s.mul(weight[0], inverse), s.mul(weight[1], inverse), s.mul(weight[2], inverse)];
     let range = s.sub(deep, shallow);
     // Where |sum| <= 6e this exceeds the range, and is cut to it.
     let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
     let shift = s.min(shift, range);
-    let depth = s.mul(moment, inverse);
+    let depth = s.fma(share[2], c[2], s.fma(share[1], b[2], s.mul(share[0], a[2])));
     let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
     let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
     let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);

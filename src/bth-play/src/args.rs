@@ -165,13 +165,16 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((parse(parts.0)?, parse(parts.1)?))
 }
 
-/// Six numbers, or else a name.
+/// Six numbers, or else a name; other numbers of numbers are more likely a slip than a name.
 fn parse_camera(text: &str) -> Result<View, String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|s| s.trim().parse().ok()).collect();
-    let Ok(camera) = <[f64; 6]>::try_from(numbers) else { return Ok(View::Named(text.to_owned())) };
-    if text.split(',').count() != 6 {
+    let parts: Vec<&str> = text.split(',').collect();
+    let numbers: Vec<f64> = parts.iter().map_while(|s| s.trim().parse().ok()).collect();
+    if parts.len() == 1 || numbers.len() < parts.len() {
         return Ok(View::Named(text.to_owned()));
     }
+    let camera = <[f64; 6]>::try_from(numbers).map_err(|numbers| {
+        format!("expected six numbers or the name of a camera, found {} numbers", numbers.len())
+    })?;
     if camera.iter().any(|x| !x.is_finite()) {
         return Err("expected finite numbers".to_owned());
     }

@@ -6,7 +6,6 @@ mod compile;
 mod errors;
 mod inspect;
 mod interrupt;
-mod messy;
 mod play;
 mod scenes;
 mod support;

@@ -64,7 +64,11 @@ fn trace<Q: Query>(
     if object.header.root == NONE {
         return;
     }
-    let from = from.filter(|from| !object.tet_leaves.is_empty() && from.iter().any(|&face| face != NONE));
+    let from = from.filter(|from| {
+        let mut starts = rays.iter().zip(*from);
+        !object.tet_leaves.is_empty()
+            && starts.any(|(ray, &triangle)| triangle != NONE && is_worth_a_walk::<Q>(object, ray))
+    });
     if from.is_some() || whole(object) != NONE {
         for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
             let from = from.map(|from| &from[part * PART..][..rays.len()]);

@@ -13,7 +13,8 @@ use crate::rays::Ray;
 use crate::simd::Simd;
 use zerocopy::FromZeros;
 
-/// What keys of the stack may exceed the true t by, relative: the four lowest bits of f32.
+/// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less
+/// than the least normal one.
 pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
 /// A ray on its way.
@@ -86,7 +87,7 @@ impl<Q: Query> Flight<Q> {
     /// Keys of the stack beyond this are of no interest any more.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
-        self.limit + self.limit.abs() * KEY_SLACK
+        self.limit + (self.limit.abs() * KEY_SLACK + f32::MIN_POSITIVE)
     }
 
     /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.

@@ -18,6 +18,8 @@ mod packet_settle;
 mod packet_tests;
 mod packets;
 mod prepare;
+#[cfg(test)]
+mod prepare_tests;
 mod query;
 mod records;
 mod sight;

@@ -12,6 +12,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Directions of this size or its inverse, and coordinates up to it, are prepared in f32.
 const LARGEST: f32 = (1u64 << 40) as f32;
+/// Where all coordinates are smaller, pads underflow.
+const SMALLEST: f32 = slabs::SMALLEST_EXTENT as f32;
 /// What lower bounds of a few f32 roundings are multiplied by, to bound from above.
 const UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 /// Floats of a [`Ray`].
@@ -82,10 +84,15 @@ impl Aim {
             reach = greater(greater(low, high), reach);
             farthest = greater(o[k].abs(), farthest);
         }
-        let extent = (frame.farthest + farthest) * UP;
+        let extent = frame.extent(farthest);
         // Sums, because the greater of NaN and a number may be the number.
         let finite = reach + (o[0] + o[1] + o[2]).abs() + (size[0] + size[1] + size[2]);
-        if !(greatest > 1.0 / LARGEST && finite < LARGEST && extent < LARGEST && ray.tmin <= ray.tmax) {
+        if !(greatest > 1.0 / LARGEST
+            && finite < LARGEST
+            && SMALLEST < extent
+            && extent < LARGEST
+            && ray.tmin <= ray.tmax)
+        {
             return false;
         }
         let pad = extent * slabs::PAD as f32;
@@ -219,7 +226,7 @@ pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 
         finite = s.and(finite, s.and(s.lt(far, s.splat(LARGEST)), s.lt(size[k], s.splat(LARGEST))));
     }
     let extent = s.mul(s.add(s.splat(frame.farthest), farthest), s.splat(UP));
-    finite = s.and(finite, s.lt(extent, s.splat(LARGEST)));
+    finite = s.and(finite, s.and(s.lt(s.splat(SMALLEST), extent), s.lt(extent, s.splat(LARGEST))));
     let pad = s.mul(extent, s.splat(slabs::PAD as f32));
     let least = s.mul(greatest, s.splat(slabs::LEAST_COMPONENT as f32));
     let mut aim = [zero; 2 * LANES];

@@ -20,6 +20,9 @@ have_cxx() { command -v "${CXX:-c++}" >/dev/null; }
 have_tetgen() {
     [ -n "${TETGEN_DIR:-}" ] || { have_cxx && echo '#include <tetgen.h>' | "${CXX:-c++}" -E -x c++ - >/dev/null 2>&1; }
 }
+have_nightly() { command -v rustup >/dev/null && rustup run nightly rustc --version >/dev/null 2>&1; }
+have_miri() { have_nightly && cargo +nightly miri --version >/dev/null 2>&1; }
+have_fuzzer() { have_nightly && cargo fuzz --version >/dev/null 2>&1; }
 have_venv() { command -v python3 >/dev/null && python3 -c 'import venv, ensurepip' 2>/dev/null; }
 
 # install_missing python|plain: installs the system packages that are missing, where that is possible.

@@ -1,9 +1,12 @@
 //! What the end-to-end, conformance and corruption tests share.
 
 pub mod conformance;
-pub mod oracle;
 pub mod rays;
 pub mod rng;
+pub mod stress;
+pub mod structures;
+
+pub use bth_oracle as oracle;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -2,7 +2,7 @@
 
 use bth::layout::RecordKind;
 use bth::rays::{Hit, Ray, Surface};
-use bth::{Isa, Scene};
+use bth::{Hinted, Isa, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure, compile};
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
@@ -22,7 +22,7 @@ fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtre
     bth_scenes::write::file(model, &path).expect("a model file");
     let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
     options.costs.minimum_triangles = 32;
-    options.costs.c_tet = 1e-3;
+    options.costs.c_tet = Some(1e-3);
     options.tets.worker = bth_tests::worker().map(Into::into);
     options.tets.minimum = 1;
     let (compiled, _) = compile(&path, &options, &Silent).expect("a model that compiles");
@@ -97,14 +97,16 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {
         let scene = compiled(model, structure, record, keep);
         assert!(!scene.object(0).tet_leaves.is_empty());
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
+        for (isa, hinted) in ways.filter(|(isa, _)| isa.is_available()) {
             isa.choose().expect("an instruction set that is available");
+            hinted.choose();
             let mut hits = vec![Hit::MISS; rays.len()];
             scene.nearest_batch(&rays, Some(&from), &mut hits);
             let mut any = vec![false; rays.len()];
             scene.any_batch(&rays, Some(&from), &mut any);
             for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
-                let context = || format!("{isa}, {}: {ray:?} from {from:?}", record.name());
+                let context = || format!("{isa}, {hinted:?}, {}: {ray:?} from {from:?}", record.name());
                 assert_eq!(bits(&hits[i]), bits(&expected[i]), "{}", context());
                 assert_eq!(any[i], expected[i].is_hit(), "any hit, {}", context());
             }

@@ -29,6 +29,8 @@ fn kinds() -> impl Iterator<Item = Options> {
                 structure,
                 record,
                 keep_subtrees,
+                // So cheap that the knot's tetrahedra are taken.
+                costs: bth_compile::costs::Options { c_tet: Some(1e-3), ..Default::default() },
                 ..Options::default()
             })
         })

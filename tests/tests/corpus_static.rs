@@ -7,6 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
+use bth::rays::{Hit, Ray, Surface};
+use bth::{Hinted, Isa};
+use zerocopy::IntoBytes;
+
 use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program, run};
 
 const LIMIT: Duration = Duration::from_secs(600);
@@ -84,6 +88,7 @@ fn static_models_verify_and_answer_alike_with_and_without_tetrahedra() {
             scenes.push(bth::open(&file).unwrap());
         }
         let hits = compare(&scenes[0], &scenes[1], &model);
+        agree_in_batches(&scenes[0], &scenes[1], &model);
         println!("{}: {triangles} triangles{said}, {hits} hits", model.file_name().unwrap().display());
     }
 }
@@ -103,17 +108,79 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
         let mut point =
             || [0, 1, 2].map(|k| lower[k] - 0.1 * size + (upper[k] - lower[k] + 0.2 * size) * unit());
         let (origin, target) = (point(), point());
-        let ray = bth::rays::Ray {
+        let ray = Ray {
             origin,
             tmin: 0.0,
             direction: [0, 1, 2].map(|k| target[k] - origin[k]),
             tmax: f32::INFINITY,
         };
-        let (a, b) =
-            (tets.nearest(&ray, bth::rays::Surface::NONE), bvh.nearest(&ray, bth::rays::Surface::NONE));
+        let (a, b) = (tets.nearest(&ray, Surface::NONE), bvh.nearest(&ray, Surface::NONE));
         assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
         // Where triangles meet either may be named; the distance is what must agree.
         hits += usize::from(a.t.is_finite());
     }
     hits
+}
+
+/// A pinhole camera's rays from one side, in tiles, and random rays from the surfaces they hit.
+fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<Surface>) {
+    const SIDE: u16 = 64;
+    let object = *bvh.object(0).header;
+    let (lower, upper) = (object.lower, object.upper);
+    let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f32::max);
+    let middle = [0, 1, 2].map(|k| 0.5 * (lower[k] + upper[k]));
+    let origin = [middle[0] + 0.9 * size, middle[1] + 0.3 * size, middle[2] + 1.1 * size];
+    let (mut rays, mut from) = (Vec::new(), Vec::new());
+    for i in 0..SIDE * SIDE {
+        // Tiles of eight by eight.
+        let (tile, within) = (i / 64, i % 64);
+        let x = (tile % (SIDE / 8)) * 8 + within % 8;
+        let y = (tile / (SIDE / 8)) * 8 + within / 8;
+        let [x, y] = [x, y].map(|x| (f32::from(x) / f32::from(SIDE) - 0.5) * size);
+        let target = [middle[0] + x, middle[1] + y, middle[2] - x];
+        let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
+        rays.push(Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY });
+        from.push(Surface::NONE);
+    }
+    let mut state = 5u64;
+    let mut unit = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    for i in 0..rays.len() {
+        let hit = bvh.nearest(&rays[i], Surface::NONE);
+        if hit.is_hit() {
+            let (o, d) = (rays[i].origin, rays[i].direction);
+            let origin = [0, 1, 2].map(|k| o[k] + hit.t * d[k]);
+            let direction = [(); 3].map(|()| (unit() - 0.5) * size);
+            let tmax = if i % 3 == 0 { 0.1 } else { f32::INFINITY };
+            rays.push(Ray { origin, tmin: 1e-4, direction, tmax });
+            from.push(hit.surface);
+        }
+    }
+    (rays, from)
+}
+
+/// Batches of both structures, with hints and without, give on every instruction set the bits of single rays.
+fn agree_in_batches(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) {
+    let (rays, from) = coherent_and_bounced(bvh);
+    let single = |(ray, from): (&Ray, &Surface)| bvh.nearest(ray, *from);
+    let expected: Vec<Hit> = rays.iter().zip(&from).map(single).collect();
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        isa.choose().expect("an instruction set that is available");
+        for (scene, hinted) in [(tets, Hinted::Tets), (tets, Hinted::Bvh), (bvh, Hinted::Measured)] {
+            hinted.choose();
+            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            scene.nearest_batch(&rays, Some(&from), &mut hits);
+            scene.any_batch(&rays, Some(&from), &mut found);
+            for (i, ray) in rays.iter().enumerate() {
+                let context =
+                    || format!("{}, {isa}, {hinted:?}: {ray:?} from {:?}", model.display(), from[i]);
+                assert_eq!(hits[i].as_bytes(), expected[i].as_bytes(), "{}", context());
+                assert_eq!(found[i], expected[i].is_hit(), "any hit, {}", context());
+            }
+        }
+    }
+    Isa::best().choose().expect("the best is available");
+    Hinted::Measured.choose();
 }

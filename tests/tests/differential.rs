@@ -1,58 +1,13 @@
 //! Every structure and record against the exact oracle, and against each other bit for bit.
 
-use bth::layout::RecordKind;
+use bth::Steps;
 use bth::rays::{Hit, Ray, Surface};
-use bth::{Scene, Steps};
-use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure, compile};
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
 use bth_tests::rays::{assorted, onward};
+use bth_tests::structures::{Traced, bits, every_structure};
 
 type Corners = Vec<[[f32; 3]; 3]>;
-
-/// A structure compiled from a model.
-struct Traced {
-    name: String,
-    scene: Scene,
-}
-
-fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> Options {
-    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
-    // So cheap that these small models get tet leaves wherever they can.
-    options.costs.minimum_triangles = 32;
-    options.costs.c_tet = 1e-3;
-    options.tets.worker = bth_tests::worker().map(Into::into);
-    options.tets.minimum = 1;
-    options
-}
-
-/// The model in every structure. Those with tetrahedra only when the worker program is there.
-fn structures(model: &Model, whole: bool) -> Vec<Traced> {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = folder.path().join("model.ply");
-    bth_scenes::write::file(model, &path).expect("a model file");
-    let mut wanted = vec![("bvh".to_string(), options(Structure::Bvh, RecordKind::Link32, false))];
-    if bth_tests::worker().is_some() {
-        for record in RecordKind::ALL {
-            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));
-            if whole {
-                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
-            }
-        }
-        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
-    }
-    let compile = |(name, options): (String, Options)| {
-        let (compiled, _) = compile(&path, &options, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
-        let scene = bth::from_bytes(&compiled.bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
-        Traced { name, scene }
-    };
-    wanted.into_iter().map(compile).collect()
-}
-
-fn bits(hit: &Hit) -> [u32; 5] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
-}
 
 fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
     let truth = oracle::nearest(corners, ray);
@@ -67,7 +22,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
     let id = hit.surface.triangle;
     if !truth.triangles.contains(&id) {
         // Another triangle at the same t but for less than the rounding of f64.
-        let other = oracle::crossing(ray, corners[id as usize]).map(|t| oracle::to_f64(&t));
+        let other = oracle::crossing(ray, corners[id as usize]).map(|at| oracle::to_f64(&at.t));
         let gap = other.map(|t| (t - truth.t_f64()).abs());
         assert!(gap.is_some_and(|g| g <= truth.t_f64().abs() * 1e-12), "other triangle: {}", context());
     }
@@ -77,7 +32,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
 fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
     let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let rays = assorted(&corners, ray_count, seed);
-    let traced = structures(model, whole);
+    let traced = every_structure(model, whole);
     let plain = &traced[0].scene;
     let mut expected = vec![Hit::MISS; rays.len()];
     plain.nearest_batch(&rays, None, &mut expected);
@@ -199,7 +154,7 @@ fn rays_without_a_line_hit_nothing() {
         Ray { tmin: f32::INFINITY, ..ray },
         Ray { tmax: f32::NEG_INFINITY, ..ray },
     ];
-    for Traced { name, scene } in &structures(&torus_knot(400), true) {
+    for Traced { name, scene } in &every_structure(&torus_knot(400), true) {
         for ray in &bad {
             assert_eq!(scene.nearest(ray, Surface::NONE), Hit::MISS, "{name}: {ray:?}");
             assert!(!scene.any(ray, Surface { instance: 0, triangle: 0 }), "{name}: {ray:?}");
@@ -213,7 +168,7 @@ fn tets_are_really_walked_and_hints_save_steps() {
         return;
     }
     let model = gyroid(3000);
-    let traced = structures(&model, true);
+    let traced = every_structure(&model, true);
     let tets = &traced.iter().find(|t| t.name == "tets link32").expect("compiled above").scene;
     let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let first = assorted(&corners, 4000, 9);

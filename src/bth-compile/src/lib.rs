@@ -5,6 +5,7 @@
 #![warn(missing_docs)]
 
 pub mod bvh;
+pub mod cached;
 pub mod costs;
 pub mod error;
 pub mod marks;

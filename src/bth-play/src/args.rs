@@ -15,8 +15,8 @@ Exit codes:
 #[derive(Debug, Parser)]
 #[command(name = "bth-play", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
-    /// The compiled file, or a scene manifest (.manifest, .toml), which is compiled first with the bthc beside this
-    /// program and kept in a cache.
+    /// The compiled file; or a scene manifest (.manifest, .toml) or model, which is compiled first with the bthc beside this
+    /// program and mapped from the cache.
     #[arg(required_unless_present = "completions")]
     file: Option<PathBuf>,
     /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or .y4m); or `-` for
@@ -83,6 +83,9 @@ pub(crate) struct Args {
     /// change it meanwhile.
     #[arg(long)]
     pub(crate) map: bool,
+    /// Folder of the cache; by default BTH_CACHE_DIR, else `bth` in the user's folder for caches.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) cache_dir: Option<PathBuf>,
     /// Also print what each frame took, memory, and how many objects were touched.
     #[arg(long)]
     pub(crate) stats: bool,

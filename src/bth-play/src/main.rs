@@ -48,14 +48,14 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
     let (file, output) = args.paths()?;
+    // What is mapped from the cache is not evicted before the end of the program.
     let compiled;
-    let file = if manifests::is_manifest(file) {
-        compiled = manifests::compiled(file)?;
-        &compiled
+    let (file, mut scene) = if manifests::is_source(file) {
+        compiled = manifests::compiled(file, args.cache_dir.as_deref())?;
+        (compiled.path.as_path(), open(&compiled.path, true)?)
     } else {
-        file
+        (file, open(file, args.map)?)
     };
-    let mut scene = open(file, args.map)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads)
         .build()
@@ -70,7 +70,8 @@ fn open(file: &std::path::Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
         // SAFETY: the contract of `map` is that the file is one that bthc wrote, and that nobody
         // changes or shrinks it while it is mapped. The user takes that over with `--map`, whose
-        // help says so.
+        // help says so. Entries of the cache are written once, read-only, by linking a finished file;
+        // no program of ours opens one for writing, and this one had the hash of what bthc wrote.
         unsafe { bth::map(file) }
     } else {
         bth::open(file)

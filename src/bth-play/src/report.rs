@@ -9,6 +9,12 @@ use serde_json::json;
 use std::io::Write;
 use std::path::Path;
 
+/// Prints a warning.
+pub(crate) fn warn(text: &str) {
+    // Nothing can be done when standard error is closed.
+    let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
+}
+
 /// Prints text on standard output.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();

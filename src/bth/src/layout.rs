@@ -147,7 +147,7 @@ pub mod kind {
     }
     /// Whether a reader that does not know the kind must refuse the file.
     pub const fn is_required(kind: u32) -> bool {
-        kind <= TRIANGLE_HOMES || is_scene(kind)
+        (OBJECT <= kind && kind <= TRIANGLE_HOMES) || is_scene(kind)
     }
 }
 
@@ -332,7 +332,7 @@ pub struct TetLeaf {
     pub first_hull: u32,
     /// Number of hull faces.
     pub hulls: u32,
-    /// Child code of a BVH over the same triangles, for rays without a hint; `NONE` when pruned.
+    /// Child code of a BVH over the same triangles, for rays without a hint and where it proves faster; `NONE` when pruned.
     pub subtree: u32,
     /// Zero.
     pub flags: u32,

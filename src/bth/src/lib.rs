@@ -36,4 +36,4 @@ pub use instances::Update;
 pub use motion::InstanceView;
 pub use scene::{Scene, from_bytes, map, open};
 pub use simd::{Isa, IsaError};
-pub use trace::Steps;
+pub use trace::{Hinted, Steps};

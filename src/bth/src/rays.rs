@@ -20,6 +20,13 @@ pub struct Ray {
     pub tmax: f32,
 }
 
+impl Ray {
+    /// Rays as rows of the bits of their floats.
+    pub(crate) fn rows(rays: &[Ray]) -> &[[u32; 8]] {
+        <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")
+    }
+}
+
 /// A triangle of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]

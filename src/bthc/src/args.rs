@@ -1,13 +1,15 @@
 //! The command line: one definition feeds parsing, help, completions and the manual page.
 
+use crate::cache_args::{Cache, Keeping};
+use crate::jobs_args::Jobs;
 use bth_compile::mesh::Keep;
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-const EXIT_CODES: &str = "\
+pub(crate) const EXIT_CODES: &str = "\
 Exit codes:
     0  done
-    1  a check failed (verify)
+    1  a check failed (verify, cache verify), or files differ (diff)
     2  wrong usage
     3  bad input: the model or the compiled file cannot be used
     4  a file could not be read or written
@@ -29,11 +31,14 @@ pub(crate) struct Args {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Compile(Compile),
+    Compile(Box<Compile>),
+    Cache(Cache),
+    Diff(Diff),
     Import(Import),
     Info(Info),
     Verify(Verify),
     Explain(Explain),
+    Calibrate(Calibrate),
     Marks(Marks),
     Trace(Trace),
     Completions(Completions),
@@ -45,11 +50,17 @@ pub(crate) enum Command {
 #[derive(Debug, Group)]
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Compile {
-    /// The model or scene; what ends with .manifest or .toml is a scene manifest.
-    pub(crate) model: PathBuf,
-    /// The compiled file; by default the model's name with the extension .bth, beside it.
+    /// Models or scenes; what ends with .manifest or .toml is a scene manifest. `-` is a model from standard input.
+    #[arg(required = true, value_name = "MODEL")]
+    pub(crate) models: Vec<PathBuf>,
+    /// The compiled file, or the folder for several; by default each model's name with the extension .bth, beside it. `-` is
+    /// standard output.
     #[arg(short, long, value_name = "FILE")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) jobs: Jobs,
+    #[command(flatten)]
+    pub(crate) keeping: Keeping,
     /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
     #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "strict"])]
     pub(crate) flatten: bool,
@@ -155,6 +166,30 @@ pub(crate) struct Selection {
     /// How the steps of a ray through a tetrahedralization are estimated.
     #[arg(long, value_enum, default_value_t = Estimator::FaceCount)]
     pub(crate) estimator: Estimator,
+    /// How nodes are selected.
+    #[arg(long, value_enum, default_value_t = Select::Best)]
+    pub(crate) select: Select,
+    /// Which rays the file is for.
+    #[arg(long, value_enum, default_value_t = OptimizeFor::Balanced)]
+    pub(crate) optimize_for: OptimizeFor,
+    /// What tracing costs: `default`, or a file that `bthc calibrate` wrote. Files of one profile are the same
+    /// on every machine.
+    #[arg(long, value_name = "PROFILE", default_value = "default")]
+    pub(crate) profile: PathBuf,
+    /// Bytes that tracing may read for each triangle, the BVH included; what saves least for its size stays BVH.
+    #[arg(long, value_name = "BYTES", value_parser = positive)]
+    pub(crate) max_bytes_per_triangle: Option<f64>,
+    /// Seconds of one thread for tetrahedralization, as the profile estimates them; what saves least for its time
+    /// stays BVH.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) budget: Option<f64>,
+    /// For scenes: let the rays of their cameras, lights and frames decide, instead of rays from everywhere. What none of
+    /// them meets is not tetrahedralized.
+    #[arg(long)]
+    pub(crate) for_scene: bool,
+    /// What decides, when the tetrahedra are there, whether they stay.
+    #[arg(long, value_enum, default_value_t = Probe::Steps)]
+    pub(crate) probe: Probe,
     /// Least number of triangles that is worth a tetrahedralization.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) min_tet_triangles: Option<u32>,
@@ -196,6 +231,19 @@ pub(crate) struct Verify {
     pub(crate) json: bool,
 }
 
+/// Compare two compiled files by content: objects, sections, options that made them.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Diff {
+    /// A compiled file.
+    pub(crate) first: PathBuf,
+    /// Another one.
+    pub(crate) second: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 /// Show which nodes of a model would be tetrahedralized, which not, and why, with the costs.
 #[derive(Debug, Group)]
 pub(crate) struct Explain {
@@ -203,6 +251,12 @@ pub(crate) struct Explain {
     pub(crate) model: PathBuf,
     #[command(flatten)]
     pub(crate) selection: Selection,
+    /// Tetrahedralize the chosen nodes and measure, too: predicted beside measured costs.
+    #[arg(long)]
+    pub(crate) measure: bool,
+    /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a PNG.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
     /// Nodes to show, largest first; 0 for all.
     #[arg(long, default_value_t = 20, value_name = "N")]
     pub(crate) top: usize,
@@ -210,6 +264,23 @@ pub(crate) struct Explain {
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
     /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Measure what tracing costs on this machine, for `--profile`. Takes below a minute without models.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Calibrate {
+    /// Models to measure on besides our own; they must be free of bad contacts.
+    pub(crate) models: Vec<PathBuf>,
+    /// The profile.
+    #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json")]
+    pub(crate) output: PathBuf,
+    /// Rounds of which the fastest counts.
+    #[arg(long, default_value_t = 15, value_name = "N", value_parser = rounds)]
+    pub(crate) rounds: usize,
+    /// Print the profile as one JSON object on standard output, too.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -245,8 +316,13 @@ pub(crate) struct Trace {
     #[arg(long)]
     pub(crate) any: bool,
     /// A .from file: the triangle that each ray starts on. Changes speed only.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "exact")]
     pub(crate) from: Option<PathBuf>,
+    /// Compare every ray with every triangle in exact arithmetic instead of walking the structure: the truth to
+    /// compare with, some million times slower on large models. Instances count where their transforms put them,
+    /// without the rounding of rays in the object's space.
+    #[arg(long)]
+    pub(crate) exact: bool,
     /// Threads; 0 for one per processor.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
     pub(crate) threads: usize,
@@ -296,6 +372,32 @@ pub(crate) enum Estimator {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Select {
+    /// What saves most time of all rays.
+    Best,
+    /// The paper's rule: from the root down, the first nodes whose tetrahedra are cheaper for rays from outside.
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OptimizeFor {
+    /// Rays from outside only.
+    Camera,
+    /// Rays that start on known surfaces only.
+    Secondary,
+    /// Three rays from surfaces for one from outside.
+    Balanced,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Probe {
+    /// Steps of sampled rays, priced by the profile: the same on every machine.
+    Steps,
+    /// Nothing: all that was built stays.
+    Off,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Record {
     /// 32 bytes, fastest.
     Link32,
@@ -317,8 +419,16 @@ pub(crate) enum Attributes {
     All,
 }
 
+/// A number of rounds that ends.
+fn rounds(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if (1..=10_000).contains(&n) => Ok(n),
+        _ => Err("expected a number from 1 to 10000".to_owned()),
+    }
+}
+
 /// A number of threads that a machine may have.
-fn threads(text: &str) -> Result<usize, String> {
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(n) if n <= 4096 => Ok(n),
         _ => Err("expected a number from 0 to 4096".to_owned()),
@@ -365,6 +475,34 @@ impl From<Estimator> for bth_compile::costs::Estimator {
     }
 }
 
+impl From<Select> for bth_compile::costs::Select {
+    fn from(select: Select) -> Self {
+        match select {
+            Select::Best => Self::Best,
+            Select::Paper => Self::Paper,
+        }
+    }
+}
+
+impl From<OptimizeFor> for bth_compile::costs::OptimizeFor {
+    fn from(rays: OptimizeFor) -> Self {
+        match rays {
+            OptimizeFor::Camera => Self::Camera,
+            OptimizeFor::Secondary => Self::Secondary,
+            OptimizeFor::Balanced => Self::Balanced,
+        }
+    }
+}
+
+impl From<Probe> for bth_compile::costs::Probe {
+    fn from(probe: Probe) -> Self {
+        match probe {
+            Probe::Steps => Self::Steps,
+            Probe::Off => Self::Off,
+        }
+    }
+}
+
 impl From<Structure> for bth_compile::pipeline::Structure {
     fn from(structure: Structure) -> Self {
         match structure {
@@ -377,7 +515,10 @@ impl From<Structure> for bth_compile::pipeline::Structure {
 
 impl Compile {
     /// The options of the compiler that this command line stands for.
-    pub(crate) fn options(&self) -> bth_compile::pipeline::Options {
+    ///
+    /// # Errors
+    /// If the profile cannot be used.
+    pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::Options> {
         let mut options = bth_compile::pipeline::Options {
             structure: self.structure.into(),
             attributes: self.attributes.into(),
@@ -389,7 +530,7 @@ impl Compile {
             geometry: !self.no_geometry,
             ..Default::default()
         };
-        self.selection.apply(&mut options);
+        self.selection.apply(&mut options)?;
         if let Some(seconds) = self.tet_deadline {
             options.tets.deadline = std::time::Duration::from_secs(seconds);
             options.tets.deadline_per_triangle = std::time::Duration::ZERO;
@@ -397,20 +538,32 @@ impl Compile {
         if let Some(mib) = self.tet_memory {
             options.tets.memory = mib << 20;
         }
-        options
+        Ok(options)
     }
 }
 
 impl Selection {
     /// Sets the options that concern the selection.
-    pub(crate) fn apply(&self, options: &mut bth_compile::pipeline::Options) {
+    ///
+    /// # Errors
+    /// If the profile cannot be used.
+    pub(crate) fn apply(&self, options: &mut bth_compile::pipeline::Options) -> bth_compile::Result<()> {
         options.bvh.quality = self.quality.into();
-        options.costs.estimator = self.estimator.into();
+        let costs = &mut options.costs;
+        costs.estimator = self.estimator.into();
+        costs.select = self.select.into();
+        costs.optimize_for = self.optimize_for.into();
+        costs.probe = self.probe.into();
+        costs.for_scene = self.for_scene;
+        costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
+        costs.budget = self.budget;
+        costs.c_tet = self.c_tet;
+        if self.profile.as_os_str() != "default" {
+            costs.profile = bth_compile::costs::Profile::read(&self.profile)?;
+        }
         if let Some(triangles) = self.min_tet_triangles {
-            options.costs.minimum_triangles = triangles;
+            costs.minimum_triangles = triangles;
         }
-        if let Some(nanoseconds) = self.c_tet {
-            options.costs.c_tet = nanoseconds;
-        }
+        Ok(())
     }
 }

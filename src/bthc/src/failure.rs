@@ -16,6 +16,8 @@ pub(crate) enum Failure {
     Manifest(bth_scene::Error),
     /// Arguments that do not fit together (exit code 2).
     Usage { message: String, hint: &'static str },
+    /// Jobs failed, and it has been said why; the exit code of the first.
+    Reported(u8),
     /// A check failed; what there was to say has been said on standard output.
     Check,
     /// Standard output was closed by its reader (`bthc ... | head`).
@@ -74,10 +76,11 @@ impl Failure {
         })
     }
 
-    fn exit_code(&self) -> u8 {
+    pub(crate) fn exit_code(&self) -> u8 {
         use bth_compile::Error;
         match self {
             Self::Check => 1,
+            Self::Reported(code) => *code,
             Self::Usage { .. } => 2,
             Self::Compile(Error::Input { .. }) => 3,
             Self::Compile(Error::File { .. }) => 4,
@@ -93,7 +96,7 @@ impl Failure {
     }
 
     /// The error as JSON: `code`, `message`, and where known `place` and `hint`.
-    fn json(&self) -> serde_json::Value {
+    pub(crate) fn json(&self) -> serde_json::Value {
         use bth_compile::Error;
         match self {
             Self::Compile(Error::Input { code, place, message, hint }) => {
@@ -110,24 +113,31 @@ impl Failure {
             Self::Manifest(error) => json!({"code": error.code, "place": error.path.to_string_lossy(),
                 "line": error.line, "column": error.column, "message": error.message, "hint": error.hint}),
             Self::Usage { message, hint } => json!({"code": "BTH-U001", "message": message, "hint": hint}),
-            Self::Check | Self::ClosedOutput => serde_json::Value::Null,
+            Self::Check | Self::Reported(_) | Self::ClosedOutput => serde_json::Value::Null,
         }
     }
 
     /// Says what went wrong and gives the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
+        if !matches!(self, Self::Check | Self::Reported(_) | Self::ClosedOutput) {
+            self.say();
+            if wants_json {
+                print_json_error(self.json(), self.exit_code());
+            }
+        }
+        ExitCode::from(self.exit_code())
+    }
+
+    /// Says what went wrong.
+    pub(crate) fn say(&self) {
         let text = match self {
-            Self::Check | Self::ClosedOutput => return ExitCode::from(self.exit_code()),
+            Self::Check | Self::Reported(_) | Self::ClosedOutput => return,
             Self::Compile(error) => error.to_string(),
             Self::Runtime(error) => error.to_string(),
             Self::Manifest(error) => error.to_string(),
             Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
         };
         output::error(&text);
-        if wants_json {
-            print_json_error(self.json(), self.exit_code());
-        }
-        ExitCode::from(self.exit_code())
     }
 }
 

@@ -1,8 +1,13 @@
 //! `bthc`, the BTH compiler: compiles models, inspects and verifies compiled files, traces rays.
 
 mod args;
+mod cache_args;
+mod calibrate;
 mod commands;
+mod explain;
 mod failure;
+mod jobs_args;
+mod measure;
 mod output;
 mod progress;
 mod ray_files;

@@ -3,6 +3,7 @@
 use bth_compile::Monitor;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set by Ctrl-C; stages look at it a few times a second.
@@ -36,6 +37,48 @@ impl Progress {
         let visible = !quiet && std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         Self { bar: ProgressBar::with_draw_target(None, target), quiet }
+    }
+}
+
+impl Progress {
+    /// Counts jobs from now on.
+    pub(crate) fn of_jobs(self, total: u64) -> Self {
+        self.stage("models", Some(total));
+        self
+    }
+
+    /// One job is done.
+    pub(crate) fn done(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Prints a line without getting into the way of the bar.
+    pub(crate) fn print(&self, line: &str) {
+        // Nothing is left to say to a closed output; the files are written all the same.
+        self.bar.suspend(|| {
+            let _ = crate::output::text(&format!("{line}\n"));
+        });
+    }
+}
+
+/// Watches one of many jobs: shows no stages, and names the model in warnings.
+pub(crate) struct Quiet<'a> {
+    all: &'a Progress,
+    model: &'a Path,
+}
+
+impl<'a> Quiet<'a> {
+    pub(crate) fn new(all: &'a Progress, model: &'a Path) -> Self {
+        Self { all, model }
+    }
+}
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.all.cancelled()
+    }
+    fn warn(&self, message: &str) {
+        self.all.warn(&format!("{}: {message}", self.model.display()));
     }
 }
 

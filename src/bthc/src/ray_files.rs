@@ -52,10 +52,10 @@ pub(crate) fn hits(hits: &[Hit]) -> Vec<u8> {
     bytes
 }
 
-/// The answers of an any-hit query as hits: triangle 0 or none.
-pub(crate) fn answers(any: &[bool]) -> Vec<Hit> {
+/// The answer of an any-hit query as a hit: triangle 0 or none.
+pub(crate) fn answer(any: bool) -> Hit {
     let hit = Hit { t: 0.0, u: 0.0, v: 0.0, surface: Surface { instance: 0, triangle: 0 } };
-    any.iter().map(|&found| if found { hit } else { Hit::MISS }).collect()
+    if any { hit } else { Hit::MISS }
 }
 
 /// The bytes of a `.tris` file: 9 f32 per triangle.

@@ -2,11 +2,15 @@
 // Tests say what they skip.
 #![allow(clippy::print_stdout)]
 
+mod cache;
 mod compile;
+mod costs;
 mod errors;
 mod inspect;
 mod interrupt;
+mod pipelines;
 mod play;
 mod scenes;
+mod stress;
 mod support;
 mod trace;

@@ -35,13 +35,18 @@ fn programs() -> &'static Path {
 /// The command for a program, in a folder.
 pub(crate) fn command(program: &str, folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(programs().join(program));
-    command.args(args).current_dir(folder).stdin(Stdio::null());
+    // What one test compiled must not spare another one the work.
+    command.args(args).current_dir(folder).stdin(Stdio::null()).env("BTH_NO_CACHE", "1");
     command
 }
 
 pub(crate) fn run(program: &str, folder: &Path, args: &[&str]) -> Run {
-    let output = command(program, folder, args).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    run_with(command(program, folder, args))
+}
+
+pub(crate) fn run_with(mut command: Command) -> Run {
+    let output = command.output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }
 

@@ -53,6 +53,39 @@ fn hits_are_those_of_the_library_bit_for_bit() {
     assert_eq!(json["hits"], any.iter().filter(|b| **b).count());
 }
 
+/// The rows of a .hits file: t, u, v and the triangle.
+fn rows(path: &std::path::Path) -> Vec<([f32; 3], u32)> {
+    let bytes = std::fs::read(path).unwrap();
+    let word = |row: &[u8], i: usize| u32::from_le_bytes(row[4 * i..4 * i + 4].try_into().unwrap());
+    bytes[16..]
+        .chunks(16)
+        .map(|row| ([0, 1, 2].map(|i| f32::from_bits(word(row, i))), word(row, 3)))
+        .collect()
+}
+
+#[test]
+fn exact_hits_are_those_of_every_structure() {
+    let folder = folder(&[("ball.obj", &sphere(8))]);
+    bthc(folder.path(), &["compile", "ball.obj"]).expect(0);
+    std::fs::write(folder.path().join("x.rays"), file(b"RAYS", rays().iter().map(ray_bytes))).unwrap();
+    bthc(folder.path(), &["trace", "ball.bth", "x.rays", "-o", "walked.hits"]).expect(0);
+    let args = ["trace", "ball.bth", "x.rays", "--exact", "-o", "exact.hits", "--json"];
+    let json = bthc(folder.path(), &args).expect(0).json();
+    assert_eq!(json["exact"], true);
+    let (walked, exact) = (rows(&folder.path().join("walked.hits")), rows(&folder.path().join("exact.hits")));
+    assert_eq!(json["hits"], exact.iter().filter(|(_, triangle)| *triangle != u32::MAX).count());
+    for ((a, a_triangle), (b, b_triangle)) in walked.iter().zip(&exact) {
+        assert_eq!((a_triangle, a[0].to_bits()), (b_triangle, b[0].to_bits()));
+        assert!((a[1] - b[1]).abs() < 1e-6 && (a[2] - b[2]).abs() < 1e-6, "{a:?} {b:?}");
+    }
+    // Any hit: whether there is one.
+    bthc(folder.path(), &["trace", "ball.bth", "x.rays", "--exact", "--any", "-o", "any.hits"]).expect(0);
+    let any = rows(&folder.path().join("any.hits"));
+    assert!(any.iter().zip(&exact).all(|(a, b)| (a.1 == 0) == (b.1 != u32::MAX)));
+    bthc(folder.path(), &["trace", "ball.bth", "x.rays", "--exact", "--from", "x.from", "-o", "y.hits"])
+        .expect(2);
+}
+
 #[test]
 fn every_instruction_set_gives_the_same_file_and_others_are_refused() {
     let folder = folder(&[("ball.obj", &sphere(16))]);

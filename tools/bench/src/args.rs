@@ -21,6 +21,12 @@ pub enum Command {
     Speed(Speed),
     /// Opening a compiled file and tracing the first rays, against building at the start.
     Load(Load),
+    /// Hard rays on hard surfaces, every answer checked exactly: misses, leaks, ghosts, errors of t.
+    Stress(Stress),
+    /// Predictions of the cost model against measurements.
+    Costs(Costs),
+    /// The paper's tables on our models.
+    Paper(Paper),
     /// One start in a process of its own; `load` calls this.
     #[command(hide = true)]
     Probe(Probe),
@@ -121,6 +127,81 @@ pub struct Load {
     /// Vector instructions of our kernels; the best that the machine has when absent.
     #[arg(long, value_name = "NAME")]
     pub isa: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `stress`.
+#[derive(Debug, Args)]
+pub struct Stress {
+    /// Rays to trace in all, in millions; each counts once for every structure and query that it goes through.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    pub millions: u64,
+    /// Size of the shapes: the number of their triangles grows with its square.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(i32).range(1..=64))]
+    pub size: i32,
+    /// One of this many rays is compared with every triangle.
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = at_least_one)]
+    pub one_in: usize,
+    /// Start of the random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `costs`.
+#[derive(Debug, Args)]
+pub struct Costs {
+    /// Models that the estimators are judged on: files, or models of `bth-scenes list` by NAME or NAME:FACES.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    /// Models that constants are fitted on.
+    #[arg(long, value_name = "MODEL,…", value_delimiter = ',', required = true)]
+    pub fit: Vec<String>,
+    /// Small models, on which every selection is measured.
+    #[arg(long, value_name = "MODEL,…", value_delimiter = ',')]
+    pub small: Vec<String>,
+    /// Least triangles of a node.
+    #[arg(long, value_name = "N", default_value_t = 1024)]
+    pub least: u32,
+    /// Most triangles of a node.
+    #[arg(long, value_name = "N", default_value_t = 300_000)]
+    pub most: u32,
+    /// Nodes of a model, at most.
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = at_least_one)]
+    pub nodes: usize,
+    /// Rounds of which the fastest counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `paper`.
+#[derive(Debug, Args)]
+pub struct Paper {
+    /// Model files, or models of `bth-scenes list` by NAME or NAME:FACES.
+    #[arg(required = true, value_name = "MODEL")]
+    pub models: Vec<String>,
+    /// Rounds of which the fastest counts; one more comes before.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Triangles of the largest model that gets a k-d tree, which takes long to build.
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    pub most_kd: usize,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    /// Small pictures: whether it works, not how fast it is.
+    #[arg(long)]
+    pub quick: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub output: Output,

@@ -38,7 +38,7 @@ pub struct BarChart {
 }
 
 /// Tells up to nine colours apart, also with common defects of colour vision (after Okabe and Ito 2008).
-const COLOURS: [&str; 9] =
+pub(crate) const COLOURS: [&str; 9] =
     ["#0072b2", "#56b4e9", "#009e73", "#7fcdbb", "#e69f00", "#d55e00", "#cc79a7", "#999999", "#4d4d4d"];
 
 const BAR: f64 = 22.0;
@@ -186,7 +186,7 @@ impl BarChart {
 }
 
 // Writing to a string cannot fail.
-fn text(svg: &mut String, x: f64, y: f64, style: &str, what: &str) {
+pub(crate) fn text(svg: &mut String, x: f64, y: f64, style: &str, what: &str) {
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" {style}>{}</text>", escaped(what));
 }
 

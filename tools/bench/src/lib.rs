@@ -1,12 +1,13 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed` and `load` are
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `load`, `stress`, `costs` and `paper` are
 //! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
 #![warn(missing_docs)]
 
 pub mod args;
 pub mod chart;
 pub mod clock;
+pub mod costs;
 pub mod isa;
 pub mod load;
 pub mod machine;
@@ -15,9 +16,12 @@ pub mod model;
 pub mod names;
 pub mod ours;
 pub mod output;
+pub mod paper;
 pub mod progress;
 pub mod rays;
 pub mod rivals;
 pub mod rounds;
+pub mod scatter;
 pub mod speed;
+pub mod stress;
 pub mod tracer;

@@ -1,7 +1,7 @@
 //! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
 
 use bth_bench::args::{Arguments, Command};
-use bth_bench::{load, output, speed};
+use bth_bench::{costs, load, output, paper, speed, stress};
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -9,6 +9,9 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Speed(arguments) => speed::run(&arguments),
         Command::Load(arguments) => load::run(&arguments),
+        Command::Stress(arguments) => stress::run(&arguments),
+        Command::Costs(arguments) => costs::run(&arguments),
+        Command::Paper(arguments) => paper::run(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
     };
     match done {

@@ -128,6 +128,15 @@ pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
     Ok(kind.uses().map(contender).collect())
 }
 
+/// A tracer of a compiled file.
+///
+/// # Errors
+/// If the runtime refuses the file, which would be a fault of ours.
+pub fn tracer(bytes: &[u8], usage: Use) -> Result<Box<dyn Tracer>> {
+    let scene = Arc::new(bth::from_bytes(bytes).context("a file that was just compiled")?);
+    Ok(Box::new(Ours { scene, usage }))
+}
+
 /// A scene and how it is traced.
 struct Ours {
     scene: Arc<Scene>,

@@ -6,8 +6,26 @@
 pub fn medians<T>(
     items: &[T],
     rounds: usize,
-    mut measure: impl FnMut(usize, &T) -> Option<f64>,
+    measure: impl FnMut(usize, &T) -> Option<f64>,
 ) -> Vec<Option<f64>> {
+    interleaved(items, rounds, measure).into_iter().map(median).collect()
+}
+
+/// As [`medians`], but the least of each: what else the machine does can only add to a time.
+pub fn least<T>(
+    items: &[T],
+    rounds: usize,
+    measure: impl FnMut(usize, &T) -> Option<f64>,
+) -> Vec<Option<f64>> {
+    let least = |values: Vec<f64>| values.into_iter().min_by(f64::total_cmp);
+    interleaved(items, rounds, measure).into_iter().map(least).collect()
+}
+
+fn interleaved<T>(
+    items: &[T],
+    rounds: usize,
+    mut measure: impl FnMut(usize, &T) -> Option<f64>,
+) -> Vec<Vec<f64>> {
     let mut taken = vec![Vec::with_capacity(rounds); items.len()];
     for round in 0..=rounds {
         for (item, taken) in items.iter().zip(&mut taken) {
@@ -16,7 +34,7 @@ pub fn medians<T>(
             }
         }
     }
-    taken.into_iter().map(median).collect()
+    taken
 }
 
 /// The median, between the middle two of an even number.

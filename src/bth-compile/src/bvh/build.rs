@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::mesh::{Mesh, is_zero_area};
 use crate::monitor::Monitor;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Edges on the longest path of a binary BVH that [`build`] makes; below `bth::limits::MAX_DEPTH`,
@@ -58,7 +58,7 @@ pub struct Options {
 }
 
 /// What [`build`] did.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Triangles in the tree.
     pub triangles: u64,

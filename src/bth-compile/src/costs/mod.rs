@@ -1,8 +1,41 @@
-//! Which suitable nodes to tetrahedralize: the paper's Cost_TET < Cost_SAH (§3.2, §3.3).
+//! Which suitable nodes to tetrahedralize.
+//!
+//! `profile` holds what tracing costs on a machine; `rays`, `bvh_walk` and `tet_walk` sample rays and
+//! count their steps, `estimate` and `area` predict these. `choose` selects: by the paper's rule (`top_down`) or
+//! what saves most time (`gains`, `bottom_up`). `probe` looks again when the tetrahedra are built.
 
+mod area;
+mod bottom_up;
+mod bvh_walk;
 mod choose;
 mod estimate;
+mod gains;
+mod least_squares;
+mod options;
+mod prices;
+mod probe;
+mod profile;
+mod random;
+mod rays;
 mod subtree_sums;
+mod tet_walk;
+mod top_down;
+mod weighting;
 
-pub use choose::{Choice, Decision, Options, Report, Verdict, choose};
-pub use estimate::Estimator;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+pub use area::area_steps;
+pub use bvh_walk::{Met, walk};
+pub use choose::{Storage, choose};
+pub use estimate::{Estimator, Start};
+pub use least_squares::fit;
+pub use options::{Choice, Decision, OptimizeFor, Options, Probe, Report, Select, Verdict};
+pub use probe::{ProbeReport, ProbedLeaf, probe};
+pub use profile::{BvhCosts, Profile, TetCosts, Walk};
+pub(crate) use random::Random;
+pub use rays::{SampleRay, from_surface, outside};
+pub use tet_walk::{TetWalker, Walked, mean_steps};
+pub use weighting::Weighting;

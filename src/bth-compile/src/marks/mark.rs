@@ -7,14 +7,14 @@ use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// Triangles of a subtree that one thread marks alone.
 const GRAIN: u32 = 4096;
 
 /// What marking found.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Triangles in the BVH; those of zero area are not.
     pub triangles: u64,
@@ -35,7 +35,7 @@ pub struct Report {
 }
 
 /// How much of a model its large suitable nodes cover.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Least size of a node that counts, triangles.
     pub at_least: u32,

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::io::Read;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use super::gltf_json::{Buffer, Root};
 use super::source::{MALFORMED, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
@@ -147,17 +147,11 @@ impl<'a> Buffers<'a> {
 
     /// Reads a file beside the document, at most as many bytes of it as the document uses.
     fn read_external(&self, part: &str, uri: &str, length: u64) -> Result<Vec<u8>> {
-        let name = decode_percent(uri);
-        let relative = name.as_deref().map(Path::new).filter(|path| {
-            !uri.contains(':')
-                && !path.components().any(|c| matches!(c, Component::RootDir | Component::Prefix(_)))
-        });
-        let Some(relative) = relative else {
+        let Some(path) = beside(self.source.path, uri) else {
             let message = format!("expected a relative file name or a data: URI, found \"{uri}\"");
             let hint = "put the buffer beside the model and refer to it by its name";
             return Err(self.source.error_in_part(BUFFER, part, message, hint));
         };
-        let path = self.source.path.parent().unwrap_or(Path::new("")).join(relative);
         let file_error = |e: std::io::Error| Error::File {
             code: "BTH-O001",
             path: path.clone(),
@@ -171,6 +165,24 @@ impl<'a> Buffers<'a> {
         file.take(length).read_to_end(&mut bytes).map_err(file_error)?;
         Ok(bytes)
     }
+}
+
+/// The file that a relative URI names; `None` for others.
+fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
+    let name = decode_percent(uri)?;
+    let relative = Path::new(&name);
+    let is_relative = !uri.contains(':')
+        && !relative.components().any(|c| matches!(c, Component::RootDir | Component::Prefix(_)));
+    is_relative.then(|| document.parent().unwrap_or(Path::new("")).join(relative))
+}
+
+/// The files beside a glTF document that hold its buffers, in order. None for what is no document: reading it tells why.
+pub(crate) fn external_files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
+    let source = Source::new(path, data, &crate::Silent);
+    let root = split(&source).ok().and_then(|(json, _)| serde_json::from_slice::<Root>(json).ok());
+    let buffers = root.into_iter().flat_map(|root| root.buffers);
+    let uris = buffers.filter_map(|buffer| buffer.uri).filter(|uri| !uri.starts_with("data:"));
+    uris.filter_map(|uri| beside(path, &uri)).collect()
 }
 
 /// Decodes %XX; `None` if that is malformed or the result is not UTF-8.

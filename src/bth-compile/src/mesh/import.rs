@@ -26,9 +26,17 @@ enum Format {
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
 /// [`Error::Cancelled`].
 pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
-    let data = read_file(path)?;
+    import_bytes(path, &read_file(path)?, keep, monitor)
+}
+
+/// As [`import`], from the bytes of a file; `name` tells the format by its extension, stands in messages, and says
+/// beside what a glTF file's external buffers lie.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     monitor.stage("import", Some(data.len() as u64));
-    let source = Source::new(path, &data, monitor);
+    let source = Source::new(name, data, monitor);
     let raw = match format(&source)? {
         Format::Obj => obj::read(&source, keep)?,
         Format::Gltf => gltf::read(&source, keep)?,

@@ -26,10 +26,10 @@ mod weld;
 mod zero_area;
 
 pub(crate) use import::read_file;
-pub use import::{import, import_gltf_meshes};
+pub use import::{import, import_bytes, import_gltf_meshes};
 pub use zero_area::is_zero_area;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,7 +68,7 @@ pub enum Keep {
 }
 
 /// What was found in a source; counts of triangles unless said otherwise.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the format that was read.
     pub format: String,

@@ -1,12 +1,16 @@
 //! The compiler: calls the stages in order.
 
+mod kept;
 mod options;
 pub(crate) mod parts;
 pub(crate) mod provenance;
 mod structure;
 
+pub use kept::{Foreseen, Outcome, compile_cached, foresee};
+pub(crate) use kept::{tetgen, through};
 pub use options::{Options, Structure};
 
+use crate::cached::{self, Cache, Topology};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, costs, marks, mesh, tets};
@@ -38,6 +42,8 @@ pub struct Report {
     pub costs: Option<costs::Report>,
     /// Tetrahedralization.
     pub tets: Option<tets::Report>,
+    /// What the probe made of the tetrahedra, if there were any.
+    pub probe: Option<costs::ProbeReport>,
     /// Wide BVH.
     pub collapse: bvh::CollapseReport,
     /// The compiled file.
@@ -74,9 +80,35 @@ pub struct FileReport {
 /// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
 pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
     let mut clock = Clock::default();
-    let (mesh, mesh_report) = clock.time("mesh", || mesh::import(source, options.attributes, monitor))?;
-    let source_blake3 = clock.time("hash", || provenance::hash(source))?;
-    let (object, reports) = build(source, mesh, options, monitor, &mut clock)?;
+    let digest = clock.time("hash", || cached::SourceDigest::of(source))?;
+    compile_model(source, &digest, options, &Cache::none(), monitor, clock)
+}
+
+/// Compiles a model whose files have been hashed.
+fn compile_model(
+    source: &Path,
+    digest: &cached::SourceDigest,
+    options: &Options,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+    mut clock: Clock,
+) -> Result<(Compiled, Report)> {
+    let (mesh, facts) = clock.time("mesh", || {
+        cache.stage(
+            || cached::mesh(digest, source, "flat", options.attributes),
+            "",
+            monitor,
+            cached::decode,
+            cached::encode,
+            || {
+                let read = mesh::import(source, options.attributes, monitor)?;
+                digest.unchanged(source, cached::MeshFacts::of(read))
+            },
+        )
+    })?;
+    let (object, reports) = build(source, "", (mesh, &facts.geometry), options, cache, monitor, &mut clock)?;
+    let mesh_report = facts.report;
+    let source_blake3 = digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
     let provenance = provenance::json(&source_blake3, &mesh_report.format, tetgen, options)?;
     let (bytes, resident_bytes) = clock.time("file", || parts::file(&object, provenance, options))?;
@@ -89,10 +121,10 @@ pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Resul
         resident_bytes,
         resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
     };
-    let Reports { bvh, marks, costs, tets, collapse } = reports;
+    let Reports { bvh, marks, costs, tets, probe, collapse } = reports;
     let seconds = clock.0;
     let report =
-        Report { source_blake3, seconds, mesh: mesh_report, bvh, marks, costs, tets, collapse, file };
+        Report { source_blake3, seconds, mesh: mesh_report, bvh, marks, costs, tets, probe, collapse, file };
     Ok((Compiled { bytes }, report))
 }
 
@@ -113,40 +145,89 @@ pub(crate) struct Reports {
     marks: Option<marks::Report>,
     costs: Option<costs::Report>,
     pub(crate) tets: Option<tets::Report>,
+    probe: Option<costs::ProbeReport>,
     collapse: bvh::CollapseReport,
 }
 
-/// Builds an object from its mesh; `source` is for messages.
+/// Builds an object from its mesh and the hash of its geometry; `source` is for messages, `part` tells the objects of a source apart when misses of
+/// the cache are explained.
 pub(crate) fn build(
     source: &Path,
-    mesh: mesh::Mesh,
+    part: &str,
+    (mesh, geometry): (mesh::Mesh, &bth_cache::Digest),
     options: &Options,
+    cache: &Cache<'_>,
     monitor: &dyn Monitor,
     clock: &mut Clock,
 ) -> Result<(Object, Reports)> {
-    let (tree, bvh_report) = clock.time("bvh", || bvh::build(&mesh, &options.bvh, monitor))?;
-    let (mut meshes, mut reports) = (Vec::new(), (None, None, None));
+    let (tree, bvh_report) = clock.time("bvh", || {
+        cache.stage(
+            || cached::bvh(geometry, &options.bvh),
+            part,
+            monitor,
+            |bytes| cached::decode::<Topology>(bytes)?.over(&mesh),
+            |tree| cached::encode(&Topology::of(tree)),
+            || bvh::build(&mesh, &options.bvh, monitor),
+        )
+    })?;
+    let (mut meshes, mut reports, mut probe) = (Vec::new(), (None, None, None), None);
     if options.structure != Structure::Bvh {
-        let (marks, marks_report) = clock.time("marks", || marks::mark(&mesh, &tree, monitor))?;
+        let (marks, marks_report) = clock.time("marks", || {
+            cache.stage(
+                || cached::marks(geometry, &options.bvh),
+                part,
+                monitor,
+                |bytes| cached::decode(bytes).filter(|m: &marks::Marks| m.suitable.len() == tree.nodes.len()),
+                cached::encode,
+                || marks::mark(&mesh, &tree, monitor),
+            )
+        })?;
         let (chosen, costs_report) =
             clock.time("costs", || structure::choose(source, &mesh, &tree, &marks, options, monitor))?;
-        let (built, tets_report) =
-            clock.time("tets", || tets::build(&mesh, &tree, &chosen, &options.tets, monitor))?;
+        let (built, tets_report) = clock
+            .time("tets", || tets::build_cached(&mesh, &tree, &chosen, &options.tets, cache, monitor))?;
         structure::check_built(source, &tree, &built, options)?;
-        meshes = built;
+        (meshes, probe) = clock.time("probe", || structure::probe(&mesh, &tree, built, options, monitor))?;
         reports = (Some(marks_report), costs_report, Some(tets_report));
     }
-    let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = meshes.into_iter().unzip();
+    let (object, collapse) = clock.time("collapse", || object(mesh, tree, meshes, options, monitor))?;
+    let (marks, costs, tets) = reports;
+    Ok((object, Reports { bvh: bvh_report, marks, costs, tets, probe, collapse }))
+}
+
+/// Joins what the stages made of a mesh.
+fn object(
+    mesh: mesh::Mesh,
+    tree: bvh::BinaryBvh,
+    built: Vec<(u32, tets::TetMesh)>,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Object, bvh::CollapseReport)> {
+    let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
-    let (wide, collapse) =
-        clock.time("collapse", || bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor))?;
+    let (wide, collapse) = bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor)?;
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
     let (tet_leaves, tet_triangles) =
         (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
-    let (marks, costs, tets) = reports;
-    let object = Object { mesh, tree, wide, encoded, tet_leaves, tet_triangles };
-    Ok((object, Reports { bvh: bvh_report, marks, costs, tets, collapse }))
+    Ok((Object { mesh, tree, wide, encoded, tet_leaves, tet_triangles }, collapse))
+}
+
+/// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes: for
+/// measurements, which make one of these and look at it in several forms.
+///
+/// # Errors
+/// A limit of the format, cancellation.
+pub fn assemble(
+    mesh: &mesh::Mesh,
+    tree: &bvh::BinaryBvh,
+    built: &[(u32, tets::TetMesh)],
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<Compiled> {
+    let (object, _) = object(mesh.clone(), tree.clone(), built.to_vec(), options, monitor)?;
+    let (bytes, _) = parts::file(&object, "{}".to_owned(), options)?;
+    Ok(Compiled { bytes })
 }
 
 /// Times the stages on the wall clock; a stage that comes again adds to its time.

@@ -55,3 +55,10 @@ impl Default for Options {
         }
     }
 }
+
+impl Options {
+    /// How tetrahedra will be stored.
+    pub fn storage(&self) -> costs::Storage {
+        costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees }
+    }
+}

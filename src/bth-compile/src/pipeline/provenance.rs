@@ -1,20 +1,10 @@
 //! How a file came about: tool version, options and source content. No paths and no times, so that
 //! equal input gives equal bytes.
 
-use super::Options;
+use super::{Options, Structure};
 use crate::error::{Error, Result};
 use crate::tets;
 use serde_json::json;
-use std::path::Path;
-
-/// BLAKE3 of a file's bytes, hexadecimal.
-pub(crate) fn hash(source: &Path) -> Result<String> {
-    let failed =
-        |e: std::io::Error| Error::File { code: "BTH-O080", path: source.into(), message: e.to_string() };
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(std::fs::File::open(source).map_err(failed)?).map_err(failed)?;
-    Ok(hasher.finalize().to_hex().to_string())
-}
 
 /// Version of TetGen that a compilation used.
 pub(super) fn tetgen(report: Option<&tets::Report>) -> Option<&str> {
@@ -62,7 +52,7 @@ fn chosen(options: &Options) -> serde_json::Value {
         "quality": options.bvh.quality,
         "attributes": options.attributes,
         "tets": options.record.name(),
-        "selection": options.costs,
+        "selection": (options.structure == Structure::Bth).then_some(&options.costs),
         "keep_subtrees": options.keep_subtrees,
         "geometry": options.geometry,
     })

@@ -33,9 +33,27 @@ pub(super) fn choose(
             ))
         }
         (Structure::Bth, _) => {
-            let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, monitor)?;
+            let (choice, report) =
+                costs::choose(mesh, tree, marks, &options.costs, options.storage(), monitor)?;
             Ok((choice.chosen, Some(report)))
         }
+    }
+}
+
+/// Tetrahedralizations by their node.
+type Built = Vec<(u32, tets::TetMesh)>;
+
+/// What stays of the tetrahedralizations; a whole one that was asked for always does.
+pub(super) fn probe(
+    mesh: &mesh::Mesh,
+    tree: &bvh::BinaryBvh,
+    built: Built,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Built, Option<costs::ProbeReport>)> {
+    match options.structure {
+        Structure::Bth => costs::probe(mesh, tree, built, &options.costs, options.storage(), monitor),
+        Structure::Bvh | Structure::Tets => Ok((built, None)),
     }
 }
 

@@ -1,15 +1,19 @@
 //! A manifest into a file: objects that may be seen, then the scene.
 
 use super::objects::{self, ObjectReport};
-use super::{encode, visible};
-use crate::error::{Error, Place, Result};
+use super::{encode, meshes, visible, weights};
+use crate::cached::{self, Cache};
+use crate::costs;
+use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
-use crate::pipeline::{Clock, Compiled, Options, StageTime, provenance};
+use crate::pipeline::{self, Clock, Compiled, Foreseen, Options, Outcome, StageTime, Structure, provenance};
 use crate::tets::WorkerStatus;
 use crate::write::{self, FileBuilder};
+use bth_cache::{Key, Record};
 use bth_scene::Manifest;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a scene file holds and how it was made.
 #[derive(Clone, Debug, Serialize)]
@@ -48,6 +52,17 @@ pub struct SceneReport {
     pub worker: Option<WorkerStatus>,
 }
 
+/// What the parts of a compilation need.
+pub(super) struct Context<'a> {
+    pub(super) options: &'a Options,
+    pub(super) cache: &'a Cache<'a>,
+    /// The tetrahedralizer as it stands in keys; nothing when objects may not be kept.
+    pub(super) tetgen: Option<String>,
+    pub(super) monitor: &'a dyn Monitor,
+    /// The scene's rays for each object of the file, if they count.
+    pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
+}
+
 /// Compiles a scene; paths of the manifest count from `folder`, `name` stands for the scene in messages.
 ///
 /// # Errors
@@ -59,15 +74,165 @@ pub fn compile(
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
+    let context = Context { options, cache: &Cache::none(), tetgen: None, monitor, weights: None };
     let mut clock = Clock::default();
-    let order = encode::order(manifest);
-    let visible = visible::visible(manifest, &order);
-    let mut used = vec![false; manifest.objects.len()];
-    for (node, _) in manifest.nodes.iter().zip(&visible).filter(|(_, visible)| **visible) {
-        node.object.into_iter().for_each(|object| used[object] = true);
+    let plan = Plan::of(manifest, folder, &mut clock)?;
+    build(manifest, &plan, name, &context, clock)
+}
+
+/// Where a scene is.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    /// The folder that its paths count from.
+    pub folder: &'a Path,
+    /// What stands for it in messages.
+    pub name: &'a Path,
+}
+
+/// What is kept of a scene besides its objects.
+#[derive(Clone, Copy)]
+pub struct Keep<'a> {
+    /// Whether the whole file is, for mapping it. Else it is put together from its objects when it is needed.
+    pub whole: bool,
+    /// Whether the bytes of a file that is kept are needed.
+    pub needed: &'a dyn Fn(&Record) -> bool,
+}
+
+/// Compiles a scene, or takes what was made of the same content before.
+///
+/// # Errors
+/// As [`compile`]; `BTH-O002` when a source changes meanwhile.
+pub fn compile_cached(
+    manifest: &Manifest,
+    place: Place<'_>,
+    options: &Options,
+    cache: &Cache<'_>,
+    keep: Keep<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Outcome<SceneReport>> {
+    let context = Context::new(options, cache, monitor)?;
+    let mut clock = Clock::default();
+    let plan = Plan::of(manifest, place.folder, &mut clock)?;
+    let key = key(manifest, &plan, &context)?;
+    pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
+        let (compiled, report) = build(manifest, &plan, place.name, &context, clock)?;
+        Ok((compiled.bytes, report, keep.whole))
+    })
+}
+
+/// Compiles part `shard.0` of `shard.1` (from 1) of a scene's objects into the cache; how many there are in this part.
+///
+/// # Errors
+/// As [`compile_cached`].
+pub fn compile_objects(
+    manifest: &Manifest,
+    place: Place<'_>,
+    options: &Options,
+    cache: &Cache<'_>,
+    shard: (u32, u32),
+    monitor: &dyn Monitor,
+) -> Result<u64> {
+    let context = Context::new(options, cache, monitor)?;
+    let mut clock = Clock::default();
+    let mut plan = Plan::of(manifest, place.folder, &mut clock)?;
+    let mut place = 0;
+    for file in &mut plan.sources {
+        file.parts.retain(|_| {
+            place += 1;
+            !file.compiled && (place - 1) % shard.1 == shard.0 - 1
+        });
     }
-    let objects = objects::build(manifest, folder, &used, options, monitor, &mut clock)?;
-    let parts = encode::encode(manifest, &order, &visible, &objects.number)?;
+    plan.sources.retain(|file| !file.parts.is_empty());
+    let objects = objects::build(manifest, &plan.sources, &context, &mut clock)?;
+    Ok(objects.reports.len() as u64)
+}
+
+/// What [`compile_cached`] would find. Reads and hashes all sources, and does nothing else.
+///
+/// # Errors
+/// When a source cannot be read.
+pub fn foresee(
+    manifest: &Manifest,
+    place: Place<'_>,
+    options: &Options,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Foreseen> {
+    let context = Context::new(options, cache, monitor)?;
+    let plan = Plan::of(manifest, place.folder, &mut Clock::default())?;
+    let mut foreseen = Foreseen::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
+    if foreseen.record.is_none() {
+        for file in plan.sources.iter().filter(|file| !file.compiled) {
+            let missing = meshes::missing(file, &context);
+            foreseen.kept += (file.parts.len() - missing.len()) as u64;
+            foreseen.parts.extend(missing);
+        }
+    }
+    Ok(foreseen)
+}
+
+/// The key of a scene, if it may be kept.
+fn key(manifest: &Manifest, plan: &Plan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
+    let Some(tetgen) = &context.tetgen else { return Ok(None) };
+    let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
+    let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
+    Ok(Some(cached::scene(&parts, &objects::contents(manifest, &plan.sources), context.options, tetgen)))
+}
+
+impl<'a> Context<'a> {
+    fn new(options: &'a Options, cache: &'a Cache<'a>, monitor: &'a dyn Monitor) -> Result<Self> {
+        Ok(Self {
+            options,
+            cache,
+            tetgen: pipeline::tetgen(options, cache, monitor)?,
+            monitor,
+            weights: None,
+        })
+    }
+}
+
+/// What is to be done.
+struct Plan<'a> {
+    /// Nodes with parents before children.
+    order: Vec<usize>,
+    visible: Vec<bool>,
+    used: Vec<bool>,
+    sources: Vec<objects::File<'a>>,
+}
+
+impl<'a> Plan<'a> {
+    fn of(manifest: &'a Manifest, folder: &Path, clock: &mut Clock) -> Result<Self> {
+        let order = encode::order(manifest);
+        let visible = visible::visible(manifest, &order);
+        let mut used = vec![false; manifest.objects.len()];
+        for (node, _) in manifest.nodes.iter().zip(&visible).filter(|(_, visible)| **visible) {
+            node.object.into_iter().for_each(|object| used[object] = true);
+        }
+        let sources = clock.time("hash", || objects::files(manifest, folder, &used))?;
+        Ok(Self { order, visible, used, sources })
+    }
+}
+
+fn build(
+    manifest: &Manifest,
+    plan: &Plan<'_>,
+    name: &Path,
+    context: &Context<'_>,
+    mut clock: Clock,
+) -> Result<(Compiled, SceneReport)> {
+    let options = context.options;
+    let weighed;
+    let context = match options.costs.for_scene && options.structure == Structure::Bth {
+        true => {
+            let weights = Some(clock.time("rays", || rays(manifest, plan, name, context))?);
+            let Context { cache, monitor, .. } = *context;
+            weighed = Context { options, cache, tetgen: context.tetgen.clone(), monitor, weights };
+            &weighed
+        }
+        false => context,
+    };
+    let objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
+    let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
 
     let tetgen = match &objects.worker {
         Some(WorkerStatus::Ready { tetgen }) => Some(tetgen.as_str()),
@@ -85,7 +250,7 @@ pub fn compile(
     })?;
 
     let triangles = |object: u32| objects.reports[object as usize].triangles;
-    let unused = manifest.objects.iter().zip(&used).filter(|(_, used)| !**used);
+    let unused = manifest.objects.iter().zip(&plan.used).filter(|(_, used)| !**used);
     let report = SceneReport {
         seconds: clock.0,
         unused: unused.map(|(object, _)| object.name.clone()).collect(),
@@ -107,13 +272,30 @@ pub fn compile(
     Ok((Compiled { bytes }, report))
 }
 
+/// The rays of the scene that concern each object of the file, by way of a file with BVHs only.
+fn rays(
+    manifest: &Manifest,
+    plan: &Plan<'_>,
+    name: &Path,
+    context: &Context<'_>,
+) -> Result<Vec<Arc<costs::Weighting>>> {
+    let Context { cache, monitor, .. } = *context;
+    let costs = costs::Options { for_scene: false, ..context.options.costs.clone() };
+    let options = Options { structure: Structure::Bvh, geometry: true, costs, ..context.options.clone() };
+    let tetgen = context.tetgen.as_ref().map(|_| String::new());
+    let plain = Context { options: &options, cache, tetgen, monitor, weights: None };
+    let (compiled, _) = build(manifest, plan, name, &plain, Clock::default())?;
+    let mut scene = bth::from_bytes(&compiled.bytes).map_err(|e| refused(name, &e))?;
+    Ok(weights::weights(&mut scene, name)?.into_iter().map(Arc::new).collect())
+}
+
 /// The error for a file that the library does not take: the scene's fault when its first frame cannot be shown,
 /// else ours.
 fn refused(name: &Path, error: &bth::Error) -> Error {
     match error.code() {
         bth::Code::Singular | bth::Code::NotFinite => Error::Input {
             code: "BTH-I050",
-            place: Place::File(name.to_owned()),
+            place: error::Place::File(name.to_owned()),
             message: format!("the first frame cannot be shown: {error}"),
             hint: error.hint().to_owned(),
         },

@@ -4,10 +4,12 @@ mod compile;
 mod encode;
 mod import;
 mod import_tracks;
+mod meshes;
 mod objects;
 mod visible;
+mod weights;
 
-pub use compile::{SceneReport, compile};
+pub use compile::{Keep, Place, SceneReport, compile, compile_cached, compile_objects, foresee};
 pub use import::{ImportOptions, ImportReport, import};
 pub use import_tracks::Chosen;
 pub use objects::ObjectReport;

@@ -1,20 +1,22 @@
 //! The objects of a scene: each source read once, equal geometry stored once.
 
+use super::compile::Context;
+use super::meshes;
+use crate::cached::{self, MeshFacts, SourceDigest};
+use crate::costs;
 use crate::error::{Error, Place, Result};
-use crate::mesh::{self, Mesh};
-use crate::monitor::Monitor;
-use crate::pipeline::{self, Clock, Options, parts, provenance};
+use crate::pipeline::{self, Clock, Options, parts};
 use crate::tets;
-use crate::write::{FileBuilder, object};
+use crate::write::{self, FileBuilder, object};
 use bth::layout::kind;
+use bth_cache::Digest;
 use bth_scene::{Manifest, Source};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::path::Path;
-use zerocopy::IntoBytes;
+use std::path::{Path, PathBuf};
 
 /// What is stored of an object.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectReport {
     /// Its names in the manifest; several for equal geometry.
     pub names: Vec<String>,
@@ -45,46 +47,46 @@ pub(super) struct Objects {
 
 enum Stored {
     Built(Box<pipeline::Object>),
+    /// From a file of the user.
     Copied(std::rc::Rc<bth::File>, u32),
+    /// From the cache.
+    Kept(bth::File),
 }
 
-/// Reads and builds the objects that are used.
+/// What the cache says of an object.
+#[derive(Serialize, Deserialize)]
+struct Facts {
+    object: ObjectReport,
+    worker: Option<tets::WorkerStatus>,
+}
+
+/// Reads and builds the objects that are used, or takes them from the cache.
 pub(super) fn build(
     manifest: &Manifest,
-    folder: &Path,
-    used: &[bool],
-    options: &Options,
-    monitor: &dyn Monitor,
+    sources: &[File<'_>],
+    context: &Context<'_>,
     clock: &mut Clock,
 ) -> Result<Objects> {
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
-    let mut of_geometry: HashMap<blake3::Hash, u32> = HashMap::new();
-    for file in files(manifest, used) {
-        let path = folder.join(file.path);
-        let digest = clock.time("hash", || provenance::hash(&path))?;
+    let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
+    for file in sources {
         if file.compiled {
-            objects.sources.push(("bth".to_owned(), digest));
-            copy(&mut objects, manifest, &file, &path, &mut of_geometry)?;
+            objects.sources.push(("bth".to_owned(), file.digest.file.hex()));
+            copy(&mut objects, manifest, file, &mut of_content)?;
             continue;
         }
-        let meshes = clock.time("mesh", || import(&file, &path, options, monitor))?;
-        let format = meshes.first().map_or(String::new(), |(_, report)| report.format.clone());
-        objects.sources.push((format, digest));
-        for ((_, rows), (mesh, report)) in file.parts.iter().zip(meshes) {
-            let number = match of_geometry.entry(geometry(&mesh)) {
+        let meshes = clock.time("mesh", || meshes::read(file, context))?;
+        let format = meshes.first().map_or(String::new(), |m| m.facts.report.format.clone());
+        objects.sources.push((format, file.digest.file.hex()));
+        for ((_, rows), mesh) in file.parts.iter().zip(meshes) {
+            let number = match of_content.entry(content(&mesh.facts)) {
                 std::collections::hash_map::Entry::Occupied(there) => *there.get(),
                 std::collections::hash_map::Entry::Vacant(free) => {
-                    let (built, reports) = pipeline::build(&path, mesh, options, monitor, clock)?;
-                    objects.note_worker(reports.tets);
+                    let (stored, facts) = object_of(file, mesh, context, objects.stored.len(), clock)?;
+                    objects.note_worker(facts.worker);
                     let number = objects.stored.len() as u32;
-                    objects.reports.push(ObjectReport {
-                        triangles: report.triangles,
-                        degenerate: report.degenerate,
-                        tet_leaves: built.tet_leaves,
-                        tet_triangles: built.tet_triangles,
-                        ..ObjectReport::default()
-                    });
-                    objects.stored.push(Stored::Built(Box::new(built)));
+                    objects.reports.push(facts.object);
+                    objects.stored.push(stored);
                     *free.insert(number)
                 }
             };
@@ -99,17 +101,101 @@ pub(super) fn build(
     Ok(objects)
 }
 
-/// A source file and what of it is used.
-struct File<'a> {
-    path: &'a str,
-    compiled: bool,
-    /// Mesh or object (`None` for the whole file), and the manifest's objects that are that.
-    parts: Vec<(Option<u32>, Vec<usize>)>,
+/// An object, from the cache or built.
+fn object_of(
+    file: &File<'_>,
+    mut mesh: meshes::Found,
+    context: &Context<'_>,
+    number: usize,
+    clock: &mut Clock,
+) -> Result<(Stored, Facts)> {
+    let Context { cache, monitor, .. } = context;
+    let weighed;
+    let options = match context.weights.as_ref().and_then(|weights| weights.get(number)) {
+        Some(rays) => {
+            let costs = costs::Options { scene: Some(rays.clone()), ..context.options.costs.clone() };
+            weighed = Options { costs, ..context.options.clone() };
+            &weighed
+        }
+        None => context.options,
+    };
+    let key = context.tetgen.as_ref().map(|tetgen| cached::object(&mesh.facts, options, tetgen));
+    let part = file.name_of(mesh.number);
+    if let Some(key) = &key
+        && let Some((record, bytes)) = cache.fetch(key, &part, *monitor)
+        && let Ok(facts) = serde_json::from_value::<Facts>(record.report)
+        && let Ok(kept) = bth::File::from_bytes(&bytes)
+        && kept.object_count() == 1
+    {
+        return Ok((Stored::Kept(kept), facts));
+    }
+    let triangles = clock.time("mesh", || mesh.take(file, context))?;
+    let geometry = (triangles, &mesh.facts.geometry);
+    let (built, reports) = pipeline::build(&file.full, &part, geometry, options, cache, *monitor, clock)?;
+    let object = ObjectReport {
+        triangles: mesh.facts.report.triangles,
+        degenerate: mesh.facts.report.degenerate,
+        tet_leaves: built.tet_leaves,
+        tet_triangles: built.tet_triangles,
+        ..ObjectReport::default()
+    };
+    let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
+    let facts = Facts { object, worker };
+    if let Some(key) = key {
+        let mut builder = FileBuilder::new();
+        write::object(&mut builder, 0, &parts::parts(&built, options))?;
+        let bytes = builder.finish();
+        write::self_check(&bytes, false)?;
+        cache.put(&key, &part, &bytes, &facts, *monitor);
+    }
+    Ok((Stored::Built(Box::new(built)), facts))
 }
 
-/// The files of the used objects, in order of first use.
-fn files<'a>(manifest: &'a Manifest, used: &[bool]) -> Vec<File<'a>> {
+/// A source file and what of it is used.
+pub(super) struct File<'a> {
+    /// As the manifest has it.
+    pub(super) path: &'a str,
+    /// Where it is.
+    pub(super) full: PathBuf,
+    pub(super) compiled: bool,
+    /// Mesh or object (`None` for the whole file), and the manifest's objects that are that.
+    pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
+    pub(super) digest: SourceDigest,
+}
+
+impl File<'_> {
+    /// How a part of it stands in keys.
+    pub(super) fn part(&self, part: Option<u32>) -> String {
+        let kind = if self.compiled { "object" } else { "mesh" };
+        part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
+    }
+
+    /// What stands for a part of it when misses of the cache are explained.
+    pub(super) fn name_of(&self, part: Option<u32>) -> String {
+        format!("{} {}", self.path, self.part(part))
+    }
+}
+
+/// What each used object of the manifest is made from, as it stands in keys; `unused` for the others.
+pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String> {
+    let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
+    for file in sources {
+        for (part, rows) in &file.parts {
+            let name =
+                format!("{} {} {}", file.digest.text(), file.part(*part), cached::extension(&file.full));
+            rows.iter().for_each(|row| contents[*row].clone_from(&name));
+        }
+    }
+    contents
+}
+
+/// The files of the used objects, in order of first use, hashed.
+///
+/// # Errors
+/// When one cannot be read.
+pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
+    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new() };
     let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
     let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
@@ -120,7 +206,8 @@ fn files<'a>(manifest: &'a Manifest, used: &[bool]) -> Vec<File<'a>> {
         let path = object.source.path();
         // The whole of a glTF file and single meshes are read in different ways.
         let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
-            files.push(File { path, compiled, parts: Vec::new() });
+            let full = folder.join(path);
+            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing() });
             files.len() - 1
         });
         let parts = &mut files[file].parts;
@@ -130,37 +217,16 @@ fn files<'a>(manifest: &'a Manifest, used: &[bool]) -> Vec<File<'a>> {
         });
         parts[place].1.push(row);
     }
-    files
-}
-
-fn import(
-    file: &File<'_>,
-    path: &Path,
-    options: &Options,
-    monitor: &dyn Monitor,
-) -> Result<Vec<(Mesh, mesh::Report)>> {
-    let meshes: Vec<u32> = file.parts.iter().filter_map(|(mesh, _)| *mesh).collect();
-    if meshes.is_empty() {
-        return Ok(vec![mesh::import(path, options.attributes, monitor)?]);
+    for file in &mut files {
+        file.digest = SourceDigest::of(&file.full)?;
     }
-    mesh::import_gltf_meshes(path, &meshes, options.attributes, monitor)
+    Ok(files)
 }
 
 /// A hash of what makes objects equal.
-fn geometry(mesh: &Mesh) -> blake3::Hash {
-    let mut hasher = blake3::Hasher::new();
-    let mut add = |bytes: &[u8]| {
-        hasher.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
-    };
-    add(b"mesh");
-    add(mesh.positions.as_bytes());
-    add(mesh.triangles.as_bytes());
-    if let Some(attributes) = &mesh.attributes {
-        add(attributes.corners.as_bytes());
-        add(attributes.normals.as_bytes());
-        add(attributes.uvs.as_bytes());
-    }
-    hasher.finalize()
+fn content(mesh: &MeshFacts) -> blake3::Hash {
+    let shading = mesh.shading.as_ref().map(Digest::hex);
+    blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
 }
 
 /// Takes objects from a compiled file.
@@ -168,9 +234,9 @@ fn copy(
     objects: &mut Objects,
     manifest: &Manifest,
     file: &File<'_>,
-    path: &Path,
-    of_geometry: &mut HashMap<blake3::Hash, u32>,
+    of_content: &mut HashMap<blake3::Hash, u32>,
 ) -> Result<()> {
+    let path = file.full.as_path();
     let unusable = |e: &dyn std::fmt::Display| Error::Input {
         code: "BTH-I051",
         place: Place::File(path.to_owned()),
@@ -191,7 +257,7 @@ fn copy(
             // Not the hash that the file gives: whoever made the file made that too.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
-        let number = *of_geometry.entry(hasher.finalize()).or_insert_with(|| {
+        let number = *of_content.entry(hasher.finalize()).or_insert_with(|| {
             objects.stored.push(Stored::Copied(read.clone(), object));
             objects.reports.push(ObjectReport {
                 triangles: view.header.triangles.into(),
@@ -210,8 +276,7 @@ fn copy(
 
 impl Objects {
     /// Keeps what says most of the worker.
-    fn note_worker(&mut self, report: Option<tets::Report>) {
-        let needed = report.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
+    fn note_worker(&mut self, needed: Option<tets::WorkerStatus>) {
         if self.worker.is_none() {
             self.worker = needed;
         }
@@ -227,6 +292,14 @@ impl Objects {
                     let parts = parts::parts(built, options);
                     object(builder, number, &parts)?;
                     resident += parts::resident_bytes(&parts);
+                }
+                Stored::Kept(file) => {
+                    for section in file.sections() {
+                        // The content was checked against its name, so the hashes in it are right.
+                        let e = section.entry;
+                        builder.hashed_section(e.kind, number, e.stride, section.bytes.into(), e.hash)?;
+                    }
+                    resident += file.resident_bytes();
                 }
                 Stored::Copied(file, from) => {
                     for section in file.sections().filter(|s| s.entry.object == *from) {

@@ -5,13 +5,15 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::bvh::BinaryBvh;
+use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
 
-use super::node::tetrahedralize;
+use super::kept::tetrahedralize;
+use super::node::Done;
 use super::pool::{Slot, find};
-use super::report::{NodeReport, Outcome, Report, Trouble, WorkerStatus};
+use super::report::{NodeReport, Outcome, Report, WorkerStatus};
 use super::worker::Setup;
 use super::{Options, TetMesh};
 
@@ -29,6 +31,21 @@ pub fn build(
     bvh: &BinaryBvh,
     chosen: &[u32],
     options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Vec<(u32, TetMesh)>, Report)> {
+    build_cached(mesh, bvh, chosen, options, &Cache::none(), monitor)
+}
+
+/// As [`build`], with nodes that the cache has taken from there.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_cached(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    chosen: &[u32],
+    options: &Options,
+    cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<(u32, TetMesh)>, Report)> {
     let start = Instant::now();
@@ -57,21 +74,22 @@ pub fn build(
     let setup = Setup { program, memory: options.memory };
     // The first worker tells whether workers work at all, before there are many.
     let mut first = Slot::new(&setup);
-    match first.tetgen(monitor)? {
-        Ok(tetgen) => report.worker = WorkerStatus::Ready { tetgen: tetgen.into() },
+    let version = match first.tetgen(monitor)? {
+        Ok(tetgen) => tetgen.to_owned(),
         Err(trouble) => {
             monitor.warn(&trouble.to_string());
             report.worker = WorkerStatus::Unusable { reason: trouble.to_string() };
             return Ok((Vec::new(), none_built(report)));
         }
-    }
+    };
+    report.worker = WorkerStatus::Ready { tetgen: version.clone() };
 
     let workers = if options.workers > 0 { options.workers } else { rayon::current_num_threads() };
     let queue = Queue::new(chosen.iter().map(|&node| (size(node), node)));
     let results = Mutex::new(Results::default());
     let work = |mut slot: Slot<'_>| {
         while let Some(node) = queue.next() {
-            let done = tetrahedralize(&mut slot, mesh, bvh, node, options, monitor);
+            let done = tetrahedralize(&mut slot, mesh, bvh, node, options, (cache, &version), monitor);
             let cells = match done {
                 Ok(done) => lock(&results).take(done, bvh, options, monitor),
                 Err(error) => {
@@ -139,7 +157,7 @@ fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<(
 struct Results {
     built: BTreeMap<u32, TetMesh>,
     nodes: BTreeMap<u32, NodeReport>,
-    failures: BTreeMap<&'static str, u64>,
+    failures: BTreeMap<String, u64>,
     left_triangles: u64,
     workers_started: u64,
     error: Option<Error>,
@@ -149,21 +167,20 @@ impl Results {
     /// Files the result of a node; the cells that replace it if it failed.
     fn take(
         &mut self,
-        (built, mut report, troubles): (Option<TetMesh>, NodeReport, Vec<Trouble>),
+        Done { built, mut report, hopeless, .. }: Done,
         bvh: &BinaryBvh,
         options: &Options,
         monitor: &dyn Monitor,
     ) -> Vec<u32> {
         let mut cells = Vec::new();
         let mut settled = report.triangles;
-        for trouble in &troubles {
-            *self.failures.entry(trouble.name()).or_default() += 1;
+        for failure in &report.failures {
+            let name = failure.split(':').next().unwrap_or_default();
+            *self.failures.entry(name.to_owned()).or_default() += 1;
         }
         if let Some(mesh) = built {
             self.built.insert(report.node, mesh);
         } else {
-            // Without a worker smaller nodes would fail as well.
-            let hopeless = troubles.iter().any(|t| matches!(t, Trouble::Start(_)));
             if !hopeless {
                 (cells, settled) = replace(bvh, report.node, options);
             }

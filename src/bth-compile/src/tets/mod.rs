@@ -10,6 +10,7 @@ mod encode;
 mod faces;
 mod free_space;
 mod gather;
+mod kept;
 mod node;
 mod nudge;
 mod options;
@@ -18,9 +19,10 @@ mod pool;
 mod report;
 mod worker;
 
-pub use build::build;
+pub use build::{build, build_cached};
 pub use encode::{Encoded, encode};
 pub use options::Options;
+pub(crate) use pool::version;
 pub use report::{NodeReport, Outcome, Report, WorkerStatus};
 
 /// A checked tetrahedralization of one node's triangles inside a box slightly larger than the node's.

@@ -14,6 +14,17 @@ use super::pool::Slot;
 use super::report::{NodeReport, Outcome, Trouble};
 use super::{Options, TetMesh, check, free_space, order};
 
+/// What became of a node.
+pub(super) struct Done {
+    /// Absent when every attempt failed.
+    pub(super) built: Option<TetMesh>,
+    pub(super) report: NodeReport,
+    /// Whether there is no worker that works: smaller nodes would fail as well.
+    pub(super) hopeless: bool,
+    /// Whether the same would come out again, on any machine at any time.
+    pub(super) certain: bool,
+}
+
 /// The points of one attempt.
 struct Attempt {
     /// Vertices that an octree cell may hold; 0 for no free-space points.
@@ -45,7 +56,7 @@ fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
     attempts
 }
 
-/// Tetrahedralizes a node; `None` with the reasons in the report when every attempt failed.
+/// Tetrahedralizes a node; the reasons are in the report when every attempt failed.
 ///
 /// # Errors
 /// Cancelled.
@@ -56,7 +67,7 @@ pub(super) fn tetrahedralize(
     node: u32,
     options: &Options,
     monitor: &dyn Monitor,
-) -> Result<(Option<TetMesh>, NodeReport, Vec<Trouble>)> {
+) -> Result<Done> {
     let start = Instant::now();
     let triangles = bvh.nodes[node as usize].count;
     let mut report = NodeReport {
@@ -103,7 +114,9 @@ pub(super) fn tetrahedralize(
     }
     report.failures = troubles.iter().map(Trouble::to_string).collect();
     report.seconds = start.elapsed().as_secs_f64();
-    Ok((built, report, troubles))
+    let hopeless = troubles.iter().any(|t| matches!(t, Trouble::Start(_)));
+    let certain = troubles.iter().all(Trouble::is_certain);
+    Ok(Done { built, report, hopeless, certain })
 }
 
 /// Whether the node lies many times its size away from the origin, where coordinates have few

@@ -42,6 +42,18 @@ pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
     })
 }
 
+/// The tetrahedralizer that a compilation will use: TetGen and its version, or `none`; nothing when there is a worker
+/// that does not work.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn version(options: &Options, monitor: &dyn Monitor) -> Result<Option<String>> {
+    let Ok(program) = find(options) else { return Ok(Some("none".to_owned())) };
+    let setup = Setup { program, memory: options.memory };
+    let version = Slot::new(&setup).tetgen(monitor)?.map(str::to_owned);
+    Ok(version.ok())
+}
+
 /// A place for one worker.
 pub(super) struct Slot<'a> {
     setup: &'a Setup,

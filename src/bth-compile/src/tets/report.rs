@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use bth_tetgen_protocol::Failure;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What became of the chosen nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -27,7 +27,7 @@ pub struct Report {
     /// Jobs that were sent to workers.
     pub attempts: u64,
     /// Attempts that failed, by reason.
-    pub failures: BTreeMap<&'static str, u64>,
+    pub failures: BTreeMap<String, u64>,
     /// Tetrahedra.
     pub tets: u64,
     /// Their vertices.
@@ -47,7 +47,7 @@ pub struct Report {
 }
 
 /// The worker program.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkerStatus {
     /// No node was chosen, so none was looked for.
@@ -71,7 +71,7 @@ pub enum WorkerStatus {
 }
 
 /// What became of one node.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     /// Index in the binary BVH.
     pub node: u32,
@@ -96,7 +96,7 @@ pub struct NodeReport {
 }
 
 /// How a node ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// It is a tet leaf.
@@ -144,6 +144,11 @@ impl Trouble {
         }
     }
 
+    /// Whether the same attempt would fail in the same way again, on any machine at any time.
+    pub(super) fn is_certain(&self) -> bool {
+        matches!(self, Trouble::Failed(..) | Trouble::Unfit(_) | Trouble::Defect(_))
+    }
+
     /// Whether another attempt with other points may succeed. TetGen hangs on some points and not
     /// on others, but time spent on a large node is better spent on its parts.
     pub(super) fn retry(&self, triangles: u32) -> bool {
@@ -151,7 +156,7 @@ impl Trouble {
             Trouble::Died(_) | Trouble::Answer(_) => true,
             Trouble::Defect(defect) => *defect != super::check::Defect::Duplicate,
             Trouble::Failed(failure, _) => *failure != Failure::Memory,
-            Trouble::TimedOut => triangles <= 16384,
+            Trouble::TimedOut => triangles <= 4096,
             Trouble::Start(_) | Trouble::Unfit(_) => false,
         }
     }

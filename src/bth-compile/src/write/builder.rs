@@ -49,8 +49,23 @@ impl<'a> FileBuilder<'a> {
                 bytes.len()
             )));
         }
-        let flags = if kind::is_required(kind) { SECTION_REQUIRED } else { 0 };
         let hash = hash128(&bytes);
+        self.hashed_section(kind, object, stride, bytes, hash)
+    }
+
+    /// As [`Self::section`], for bytes whose hash is known already.
+    ///
+    /// # Errors
+    /// As [`Self::section`].
+    pub(crate) fn hashed_section(
+        &mut self,
+        kind: u32,
+        object: u32,
+        stride: u32,
+        bytes: Cow<'a, [u8]>,
+        hash: [u8; 16],
+    ) -> Result<&mut Self> {
+        let flags = if kind::is_required(kind) { SECTION_REQUIRED } else { 0 };
         let before = self.sections.insert((object, kind), Section { flags, stride, hash, bytes });
         match before {
             None => Ok(self),
@@ -179,6 +194,13 @@ mod tests {
         a.provenance("{}".into()).unwrap();
         assert_eq!(id, a.content_id());
         assert_ne!(a.finish(), b.finish());
+    }
+
+    #[test]
+    fn a_section_of_unassigned_kind_0_stays_optional() {
+        let mut builder = FileBuilder::new();
+        builder.section(0, NONE, 1, b"a".as_slice()).unwrap();
+        assert_eq!(bth::File::from_bytes(&builder.finish()).unwrap().table()[0].flags, 0);
     }
 
     #[test]

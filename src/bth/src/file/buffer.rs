@@ -2,7 +2,7 @@
 
 use crate::error::{Code, Error, Result};
 use crate::layout::Line;
-use memmap2::Mmap;
+use memmap2::{Mmap, MmapMut};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use zerocopy::IntoBytes;
@@ -10,33 +10,90 @@ use zerocopy::IntoBytes;
 /// Bytes of a file at a multiple of 64.
 #[derive(Debug)]
 pub(super) enum Buffer {
-    /// Memory of our own; the length is in bytes.
-    Owned(Vec<Line>, usize),
+    /// Memory of our own.
+    Owned(Owned),
     /// A mapping, which starts at a page.
     Mapped(Mmap),
+}
+
+/// Memory of our own, all of it writable until the file is in it.
+#[derive(Debug)]
+pub(super) struct Owned {
+    memory: Memory,
+    /// In bytes.
+    length: usize,
+}
+
+#[derive(Debug)]
+enum Memory {
+    Lines(Vec<Line>),
+    /// Anonymous pages, large ones where the system has them; and the first byte in use.
+    Pages(MmapMut, usize),
+}
+
+/// Smaller files gain nothing by large pages.
+const LARGE_PAGE: usize = 2 << 20;
+
+impl Owned {
+    /// As many zero bytes; fails instead of aborting when there is not so much memory.
+    fn zeroed(length: usize) -> Option<Self> {
+        if length >= 2 * LARGE_PAGE
+            && let Some(memory) = large_pages(length)
+        {
+            return Some(Owned { memory, length });
+        }
+        let count = length.div_ceil(size_of::<Line>());
+        let mut lines = Vec::new();
+        lines.try_reserve_exact(count).ok()?;
+        lines.resize(count, Line([0; 16]));
+        Some(Owned { memory: Memory::Lines(lines), length })
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match &self.memory {
+            Memory::Lines(lines) => &lines.as_bytes()[..self.length],
+            Memory::Pages(pages, first) => &pages[*first..][..self.length],
+        }
+    }
+
+    fn bytes_mut(&mut self) -> &mut [u8] {
+        match &mut self.memory {
+            Memory::Lines(lines) => &mut lines.as_mut_bytes()[..self.length],
+            Memory::Pages(pages, first) => &mut pages[*first..][..self.length],
+        }
+    }
+}
+
+/// Zero bytes from the start of a large page on. Rays go all over a model: with small pages most of their cache misses are
+/// misses of the page tables' cache, too.
+fn large_pages(length: usize) -> Option<Memory> {
+    #[cfg(target_os = "linux")]
+    {
+        let pages = MmapMut::map_anon(length.checked_add(LARGE_PAGE)?).ok()?;
+        // A wish: not every system has them.
+        let _ = pages.advise(memmap2::Advice::HugePage);
+        let first = pages.as_ptr().addr().next_multiple_of(LARGE_PAGE) - pages.as_ptr().addr();
+        Some(Memory::Pages(pages, first))
+    }
+    #[cfg(not(target_os = "linux"))]
+    {
+        let _ = length;
+        None
+    }
 }
 
 impl Buffer {
     pub(super) fn bytes(&self) -> &[u8] {
         match self {
-            Buffer::Owned(lines, length) => &lines.as_bytes()[..*length],
+            Buffer::Owned(owned) => owned.bytes(),
             Buffer::Mapped(map) => map,
         }
     }
 
-    /// As many zero bytes; fails instead of aborting when there is not so much memory.
-    fn zeroed(length: usize) -> Option<Vec<Line>> {
-        let count = length.div_ceil(size_of::<Line>());
-        let mut lines = Vec::new();
-        lines.try_reserve_exact(count).ok()?;
-        lines.resize(count, Line([0; 16]));
-        Some(lines)
-    }
-
     pub(super) fn copy(bytes: &[u8]) -> Result<Self> {
-        let mut lines = Self::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
-        lines.as_mut_bytes()[..bytes.len()].copy_from_slice(bytes);
-        Ok(Buffer::Owned(lines, bytes.len()))
+        let mut owned = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
+        owned.bytes_mut().copy_from_slice(bytes);
+        Ok(Buffer::Owned(owned))
     }
 
     /// Reads a whole file. Its header is checked first, so that what is no BTH file is not read.
@@ -50,9 +107,9 @@ impl Buffer {
         file.seek(SeekFrom::Start(0)).map_err(io)?;
 
         let size = usize::try_from(length).map_err(|_| no_memory(length))?;
-        let mut lines = Self::zeroed(size).ok_or_else(|| no_memory(length))?;
-        file.read_exact(&mut lines.as_mut_bytes()[..size]).map_err(io)?;
-        Ok(Buffer::Owned(lines, size))
+        let mut owned = Owned::zeroed(size).ok_or_else(|| no_memory(length))?;
+        file.read_exact(owned.bytes_mut()).map_err(io)?;
+        Ok(Buffer::Owned(owned))
     }
 
     /// Maps a whole file.

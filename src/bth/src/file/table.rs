@@ -13,6 +13,9 @@ const ENTRY: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
 const KNOWN_FEATURES: u64 = 0;
 
+/// Whether hashes are compared. Not under fuzzing: no fuzzer guesses one, and none of the checks behind would be reached.
+const CHECKSUMS: bool = !cfg!(fuzzing);
+
 /// The first 128 bits of the BLAKE3 hash.
 pub fn hash128(bytes: &[u8]) -> [u8; 16] {
     blake3::hash(bytes).as_bytes()[..16].try_into().expect("32 bytes hold 16")
@@ -94,7 +97,7 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     }
     let at = offset_of!(Header, header_hash);
     let hash = hash128(&bytes[..at]);
-    if header.header_hash != hash {
+    if CHECKSUMS && header.header_hash != hash {
         return fail(Code::HeaderHash, at, hex(&hash), hex(&header.header_hash));
     }
     if header.file_length != length {
@@ -134,7 +137,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     let header = check_header(bytes, bytes.len() as u64)?;
     let entries = entries(bytes, header);
     let hash = hash128(entries.as_bytes());
-    if header.table_hash != hash {
+    if CHECKSUMS && header.table_hash != hash {
         let at = offset_of!(Header, table_hash) as u64;
         return Err(Error::at(Code::TableHash, at, hex(&hash), hex(&header.table_hash)));
     }
@@ -149,7 +152,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     }
     let objects = check_objects(entries)?;
     let id = content_id(entries);
-    if header.content_id != id {
+    if CHECKSUMS && header.content_id != id {
         let at = offset_of!(Header, content_id) as u64;
         return Err(Error::at(Code::ContentId, at, hex(&id), hex(&header.content_id)));
     }

@@ -4,7 +4,7 @@
 //! the intrinsics need, so each may be executed. Blocks that go through pointers say more.
 #![allow(unsafe_code)]
 
-use super::{Kernel, LANES, Simd, scalar};
+use super::{Kernel, LANES, Simd, assert_within, scalar, within};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -95,13 +95,43 @@ fn split_mut<T>(to: &mut [T; LANES]) -> [*mut T; 2] {
     [low.as_mut_ptr(), high.as_mut_ptr()]
 }
 
-/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
-/// gathers.
+/// Transposes four by four lanes within each half.
+///
+/// # Safety
+/// The machine must have the features of [`Avx2`].
 #[inline(always)]
-fn assert_within(simd: Avx2, m: M, at: U, len: usize) {
-    let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
-    let outside = simd.and_not(m, simd.lt_u(at, simd.splat_u(len)));
-    assert!(simd.mask_bits(outside) == 0, "an index of a gather lies outside");
+unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    // SAFETY: see above; registers only.
+    unsafe {
+        let (a, b) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (c, d) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0b01_00_01_00>(a, c),
+            _mm256_shuffle_ps::<0b11_10_11_10>(a, c),
+            _mm256_shuffle_ps::<0b01_00_01_00>(b, d),
+            _mm256_shuffle_ps::<0b11_10_11_10>(b, d),
+        ]
+    }
+}
+
+/// Transposes eight by eight lanes.
+///
+/// # Safety
+/// As [`transpose4`].
+#[inline(always)]
+unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
+    let mut out = rows;
+    // SAFETY: see `transpose4`.
+    unsafe {
+        // Columns 0 to 3 and 4 to 7 of the first four rows, and of the last.
+        let low = transpose4([rows[0], rows[1], rows[2], rows[3]]);
+        let high = transpose4([rows[4], rows[5], rows[6], rows[7]]);
+        for k in 0..4 {
+            out[k] = _mm256_permute2f128_ps::<0x20>(low[k], high[k]);
+            out[4 + k] = _mm256_permute2f128_ps::<0x31>(low[k], high[k]);
+        }
+    }
+    out
 }
 
 /// For each lane of eight whose bit is set, how many set bits lie below it: where its element is in a packed row.
@@ -246,34 +276,41 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
-    fn gather(self, m: M, from: &[f32], at: U) -> F {
-        assert_within(self, m, at, from.len());
-        // SAFETY: only lanes of the mask are read, and those lie within the slice.
-        let half = |i: usize| unsafe {
-            _mm256_mask_i32gather_ps::<4>(
-                _mm256_setzero_ps(),
-                from.as_ptr(),
-                at[i],
-                _mm256_castsi256_ps(m[i]),
-            )
-        };
-        [half(0), half(1)]
+    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
+        let row = within(self, m, row, from.len());
+        // SAFETY: `within` gives rows of the slice; unaligned loads.
+        unsafe {
+            macro_rules! halves {
+                ($a:literal $b:literal) => {
+                    _mm256_insertf128_ps::<1>(
+                        _mm256_castps128_ps256(_mm_loadu_ps(from.as_ptr().add(row[$a] as usize).cast())),
+                        _mm_loadu_ps(from.as_ptr().add(row[$b] as usize).cast()),
+                    )
+                };
+            }
+            let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
+            let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
+            [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]], [low[3], high[3]]]
+        }
     }
     #[inline(always)]
-    fn gather_rows(self, m: M, from: &[[f32; 4]], row: U, column: U) -> F {
-        assert_within(self, m, row, from.len().min(1 << 29));
-        let column = self.and_u(column, self.splat_u(3));
-        let at = self.or_u(self.shl_u::<2>(row), column);
-        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
-        let half = |i: usize| unsafe {
-            _mm256_mask_i32gather_ps::<4>(
-                _mm256_setzero_ps(),
-                from.as_ptr().cast(),
-                at[i],
-                _mm256_castsi256_ps(m[i]),
-            )
-        };
-        [half(0), half(1)]
+    fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
+        let row = within(self, m, row, from.len());
+        let mut out = [self.splat_u(0); 8];
+        // SAFETY: as `rows4`.
+        unsafe {
+            for half in 0..2 {
+                let mut rows = [self.splat(0.0)[0]; 8];
+                for i in 0..8 {
+                    rows[i] = _mm256_loadu_ps(from.as_ptr().add(row[8 * half + i] as usize).cast());
+                }
+                let columns = transpose8(rows);
+                for k in 0..8 {
+                    out[k][half] = _mm256_castps_si256(columns[k]);
+                }
+            }
+        }
+        out
     }
     #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
@@ -378,13 +415,19 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
-        let (mut a, mut out) = ([[0.0; LANES]; LANES], rows);
-        for i in 0..LANES {
-            self.store(rows[i], &mut a[i]);
-        }
-        let a = scalar::transpose(a);
-        for i in 0..LANES {
-            out[i] = self.load(&a[i]);
+        let mut out = rows;
+        for half in 0..2 {
+            for side in 0..2 {
+                let mut block = [rows[0][0]; 8];
+                for i in 0..8 {
+                    block[i] = rows[8 * half + i][side];
+                }
+                // SAFETY: registers only.
+                let block = unsafe { transpose8(block) };
+                for i in 0..8 {
+                    out[8 * side + i][half] = block[i];
+                }
+            }
         }
         out
     }

@@ -4,7 +4,7 @@
 //! that the intrinsics need, so each may be executed. Blocks that go through pointers say more.
 #![allow(unsafe_code)]
 
-use super::{Kernel, LANES, Simd};
+use super::{Kernel, LANES, Simd, assert_within, within};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -127,13 +127,33 @@ unsafe fn sort16(v: __m512i) -> __m512i {
     }
 }
 
-/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
-/// gathers.
+/// Four times four lanes.
 #[inline(always)]
-fn assert_within(simd: Avx512, m: u16, at: __m512i, len: usize) {
-    let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
-    let outside = m & !simd.lt_u(at, simd.splat_u(len));
-    assert!(outside == 0, "an index of a gather lies outside");
+fn quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
+    // SAFETY: the features are there (the token), and only registers are touched.
+    unsafe {
+        let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
+        _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
+    }
+}
+
+/// Transposes four by four lanes within each quarter.
+///
+/// # Safety
+/// As [`sort4`].
+#[inline(always)]
+unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: see `sort4`.
+    unsafe {
+        let (a, b) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (c, d) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0b01_00_01_00>(a, c),
+            _mm512_shuffle_ps::<0b11_10_11_10>(a, c),
+            _mm512_shuffle_ps::<0b01_00_01_00>(b, d),
+            _mm512_shuffle_ps::<0b11_10_11_10>(b, d),
+        ]
+    }
 }
 
 impl Simd for Avx512 {
@@ -202,18 +222,49 @@ impl Simd for Avx512 {
         unsafe { _mm512_slli_epi32::<K>(a) }
     }
     #[inline(always)]
-    fn gather(self, m: u16, from: &[f32], at: __m512i) -> __m512 {
-        assert_within(self, m, at, from.len());
-        // SAFETY: only lanes of the mask are read, and those lie within the slice.
-        unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr()) }
+    fn rows4(self, m: u16, from: &[[f32; 4]], row: __m512i) -> [__m512; 4] {
+        let row = within(self, m, row, from.len());
+        // SAFETY: `within` gives rows of the slice; unaligned loads.
+        unsafe {
+            macro_rules! load {
+                ($i:literal) => {
+                    _mm_loadu_ps(from.as_ptr().add(row[$i] as usize).cast())
+                };
+            }
+            // Four rows, a quarter of the lanes each.
+            macro_rules! quarters {
+                ($($i:literal)*) => { quarters(self, [$(load!($i)),*]) };
+            }
+            let (a, b) = (quarters!(0 4 8 12), quarters!(1 5 9 13));
+            let (c, d) = (quarters!(2 6 10 14), quarters!(3 7 11 15));
+            transpose4([a, b, c, d])
+        }
     }
     #[inline(always)]
-    fn gather_rows(self, m: u16, from: &[[f32; 4]], row: __m512i, column: __m512i) -> __m512 {
-        assert_within(self, m, row, from.len().min(1 << 29));
-        let column = self.and_u(column, self.splat_u(3));
-        let at = self.or_u(self.shl_u::<2>(row), column);
-        // SAFETY: only lanes of the mask are read; their rows lie within the slice, and 4 row + column below 2^31.
-        unsafe { _mm512_mask_i32gather_ps::<4>(_mm512_setzero_ps(), m, at, from.as_ptr().cast()) }
+    fn rows8(self, m: u16, from: &[[u32; 8]], row: __m512i) -> [__m512i; 8] {
+        let row = within(self, m, row, from.len());
+        // SAFETY: as `rows4`.
+        unsafe {
+            macro_rules! load {
+                ($i:literal) => {
+                    _mm256_loadu_ps(from.as_ptr().add(row[$i] as usize).cast())
+                };
+            }
+            macro_rules! halves {
+                ($a:literal $b:literal) => {
+                    _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
+                };
+            }
+            // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
+            let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
+            let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
+            let mut out = [self.bits(low[0]); 8];
+            for k in 0..4 {
+                out[k] = self.bits(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[k], high[k]));
+                out[4 + k] = self.bits(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[k], high[k]));
+            }
+            out
+        }
     }
     #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
@@ -223,28 +274,38 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn gather_pair(self, m: u16, from: &[[u32; 2]], at: __m512i) -> (__m512i, __m512i) {
-        assert_within(self, m, at, from.len());
-        // SAFETY: as `gather`, eight lanes at a time.
+        let at = within(self, m, at, from.len());
+        // SAFETY: `within` gives elements of the slice; unaligned loads of eight bytes.
         unsafe {
-            let zero = _mm512_setzero_si512();
-            let low = _mm512_castsi512_si256(at);
-            let high = _mm512_extracti64x4_epi64::<1>(at);
-            let low = _mm512_mask_i32gather_epi64::<8>(zero, m as u8, low, from.as_ptr().cast());
-            let high = _mm512_mask_i32gather_epi64::<8>(zero, (m >> 8) as u8, high, from.as_ptr().cast());
-            let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-            let odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-            (_mm512_permutex2var_epi32(low, even, high), _mm512_permutex2var_epi32(low, odd, high))
+            macro_rules! load {
+                ($i:literal) => {
+                    from.as_ptr().add(at[$i] as usize).cast()
+                };
+            }
+            // Two elements; and two in each quarter of the lanes.
+            macro_rules! two {
+                ($a:literal $b:literal) => {
+                    _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(load!($a)), load!($b)))
+                };
+            }
+            macro_rules! quarters {
+                ($($a:literal $b:literal)*) => { quarters(self, [$(two!($a $b)),*]) };
+            }
+            let (low, high) = (quarters!(0 1 4 5 8 9 12 13), quarters!(2 3 6 7 10 11 14 15));
+            let first = _mm512_shuffle_ps::<0b10_00_10_00>(low, high);
+            let second = _mm512_shuffle_ps::<0b11_01_11_01>(low, high);
+            (self.bits(first), self.bits(second))
         }
     }
     #[inline(always)]
     fn expand(self, a: __m512, m: u16, from: &[f32; LANES]) -> __m512 {
-        // SAFETY: at most sixteen floats are read.
-        unsafe { _mm512_mask_expandloadu_ps(a, m, from.as_ptr()) }
+        // SAFETY: registers only. (An expanding load is slow on some machines.)
+        unsafe { _mm512_mask_expand_ps(a, m, self.load(from)) }
     }
     #[inline(always)]
     fn expand_u(self, a: __m512i, m: u16, from: &[u32; LANES]) -> __m512i {
-        // SAFETY: at most sixteen words are read.
-        unsafe { _mm512_mask_expandloadu_epi32(a, m, from.as_ptr().cast()) }
+        // SAFETY: as `expand`.
+        unsafe { _mm512_mask_expand_epi32(a, m, self.load_u(from)) }
     }
 
     #[inline(always)]
@@ -355,12 +416,8 @@ impl Simd for Avx512 {
         unsafe {
             // Within each quarter of the lanes: four by four,
             for i in (0..LANES).step_by(4) {
-                let (a, b) = (_mm512_unpacklo_ps(r[i], r[i + 1]), _mm512_unpackhi_ps(r[i], r[i + 1]));
-                let (c, d) = (_mm512_unpacklo_ps(r[i + 2], r[i + 3]), _mm512_unpackhi_ps(r[i + 2], r[i + 3]));
-                r[i] = _mm512_shuffle_ps::<0b01_00_01_00>(a, c);
-                r[i + 1] = _mm512_shuffle_ps::<0b11_10_11_10>(a, c);
-                r[i + 2] = _mm512_shuffle_ps::<0b01_00_01_00>(b, d);
-                r[i + 3] = _mm512_shuffle_ps::<0b11_10_11_10>(b, d);
+                let four = transpose4([r[i], r[i + 1], r[i + 2], r[i + 3]]);
+                r[i..i + 4].copy_from_slice(&four);
             }
             // then the quarters: row 4p + i holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
             let mut out = r;

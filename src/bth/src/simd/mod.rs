@@ -65,10 +65,11 @@ pub(crate) trait Simd: Copy {
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
     /// The least of all lanes; none may be NaN.
     fn least(self, a: Self::F) -> f32;
-    /// Elements of a slice, 0.0 where the mask is clear. Panics if a lane that is set lies outside.
-    fn gather(self, m: Self::M, from: &[f32], at: Self::U) -> Self::F;
-    /// Elements of rows of four: `column[i] % 4` of row `row[i]`. Panics if a row of a lane that is set lies outside.
-    fn gather_rows(self, m: Self::M, from: &[[f32; 4]], row: Self::U, column: Self::U) -> Self::F;
+    /// Rows of four by their columns: lane i of the k-th is element k of row `row[i]`; undefined where the mask is clear.
+    /// Panics if a row of a lane that is set lies outside. Much faster than four gathers, on any machine.
+    fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
+    /// As [`Self::rows4`], rows of eight words.
+    fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
     /// Where the mask is set, the next elements of `from` in order; else `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 
@@ -88,8 +89,9 @@ pub(crate) trait Simd: Copy {
     fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
     fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
+    /// Elements of a slice, 0 where the mask is clear. Panics if a lane that is set lies outside.
     fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
-    /// Both halves of elements of a slice: one access each where the machine has it.
+    /// Both halves of elements of a slice: one access each where the machine has it. Undefined where the mask is clear.
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
     /// The bits of f32 lanes.
@@ -127,4 +129,26 @@ pub(crate) trait Simd: Copy {
 
     /// Asks for a cache line.
     fn prefetch<T>(self, place: *const T);
+}
+
+/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
+/// gathers.
+#[inline(always)]
+#[cfg(target_arch = "x86_64")]
+fn assert_within<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
+    let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
+    let outside = s.and_not(m, s.lt_u(at, s.splat_u(len)));
+    assert!(s.mask_bits(outside) == 0, "an index of a gather lies outside");
+}
+
+/// The indices of lanes of the mask, which must lie below `len`, and 0 for the others; a slice of that length that
+/// is not empty has them all.
+#[inline(always)]
+#[cfg(target_arch = "x86_64")]
+fn within<S: Simd>(s: S, m: S::M, at: S::U, len: usize) -> [u32; LANES] {
+    assert!(len > 0, "rows of nothing");
+    assert_within(s, m, at, len);
+    let mut out = [0; LANES];
+    s.store_u(s.select_u(m, at, s.splat_u(0)), &mut out);
+    out
 }

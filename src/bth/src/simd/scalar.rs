@@ -93,6 +93,21 @@ pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usi
     kept
 }
 
+/// Rows by their columns.
+#[inline(always)]
+fn columns<T: Copy + Default, const N: usize>(m: u32, from: &[[T; N]], row: U) -> [[T; LANES]; N] {
+    let mut out = [[T::default(); LANES]; N];
+    for i in 0..LANES {
+        if set(m, i) {
+            let row = &from[row[i] as usize];
+            for k in 0..N {
+                out[k][i] = row[k];
+            }
+        }
+    }
+    out
+}
+
 impl Simd for Scalar {
     type F = F;
     type U = U;
@@ -167,12 +182,12 @@ impl Simd for Scalar {
         a.into_iter().fold(f32::INFINITY, |m, x| if x < m { x } else { m })
     }
     #[inline(always)]
-    fn gather(self, m: u32, from: &[f32], at: U) -> F {
-        from_fn(|i| if set(m, i) { from[at[i] as usize] } else { 0.0 })
+    fn rows4(self, m: u32, from: &[[f32; 4]], row: U) -> [F; 4] {
+        columns(m, from, row)
     }
     #[inline(always)]
-    fn gather_rows(self, m: u32, from: &[[f32; 4]], row: U, column: U) -> F {
-        from_fn(|i| if set(m, i) { from[row[i] as usize][column[i] as usize % 4] } else { 0.0 })
+    fn rows8(self, m: u32, from: &[[u32; 8]], row: U) -> [U; 8] {
+        columns(m, from, row)
     }
     #[inline(always)]
     fn expand(self, a: F, m: u32, from: &F) -> F {

@@ -4,14 +4,16 @@
 use super::Scratch;
 use super::bvh_batch::{BatchWalk, Waiting};
 use super::bvh_walk::TetOutcome;
+use super::choice::{self, LEAST_RAYS, Way};
+use super::hinted::Hinted;
 use super::packets;
-use super::query::{Any, Nearest, Query};
+use super::query::{Any, Deliver, Nearest, Query};
 use super::records::LaneRecords;
 use super::tet_batch::{self, Walk};
 use super::tets::{enter_tets, leaf_of_face};
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
-use crate::rays::{Hit, Ray};
+use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
 
 /// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
@@ -27,7 +29,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    trace::<Nearest>(object, rays, from, scratch, Sink { answers: hits, instance });
+    trace::<Nearest>(object, rays, from, scratch, Sink { ids: object.triangle_ids, answers: hits, instance });
 }
 
 /// Whether rays in object space hit anything; `from` as for [`nearest_batch`].
@@ -38,19 +40,26 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    trace::<Any>(object, rays, from, scratch, Sink { answers: found, instance: 0 });
+    trace::<Any>(object, rays, from, scratch, Sink { ids: object.triangle_ids, answers: found, instance: 0 });
 }
 
 /// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.
-struct Sink<'a, Q: Query> {
-    answers: &'a mut [Q::Answer],
-    instance: u32,
+pub(super) struct Sink<'a, Q: Query> {
+    /// Of the object's triangles, in leaf order.
+    pub(super) ids: &'a [u32],
+    pub(super) answers: &'a mut [Q::Answer],
+    pub(super) instance: u32,
 }
 
-impl<Q: Query> Sink<'_, Q> {
+impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
     #[inline(always)]
-    fn put(&mut self, ray: usize, query: &Q) {
-        self.answers[ray] = query.answer(self.instance);
+    fn query(&mut self, ray: usize, query: &Q) {
+        self.answers[ray] = query.answer(self.ids, self.instance);
+    }
+    #[inline(always)]
+    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
+        let triangle = self.ids[place as usize];
+        self.answers[ray] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
     }
 }
 
@@ -59,7 +68,7 @@ fn trace<Q: Query>(
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    mut sink: Sink<'_, Q>,
+    sink: Sink<'_, Q>,
 ) {
     if object.header.root == NONE {
         return;
@@ -69,10 +78,40 @@ fn trace<Q: Query>(
         !object.tet_leaves.is_empty()
             && starts.any(|(ray, &triangle)| triangle != NONE && is_worth_a_walk::<Q>(object, ray))
     });
+    // Where there is no BVH beside the tetrahedra there is no choice.
+    if from.is_none() || !has_subtrees(object) {
+        return trace_one_way(object, rays, from, scratch, sink);
+    }
+    let hinted = Hinted::chosen();
+    let at = std::ptr::from_ref(object.header).addr();
+    let choice = scratch.choices.of(at, usize::from(Q::ANY));
+    let measured = rays.len() >= LEAST_RAYS && hinted == Hinted::Measured;
+    let way = match hinted {
+        Hinted::Bvh => Way::Bvh,
+        Hinted::Tets => Way::Tets,
+        Hinted::Measured if measured => choice.next(),
+        Hinted::Measured => choice.best(),
+    };
+    let start = if measured { choice::now() } else { None };
+    trace_one_way(object, rays, from.filter(|_| way == Way::Tets), scratch, sink);
+    if let Some(start) = start {
+        let seconds_a_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
+        scratch.choices.of(at, usize::from(Q::ANY)).learn(way, seconds_a_ray);
+    }
+}
+
+/// Traces rays that start on surfaces of which tetrahedra are known through those; others through packets and the BVH.
+fn trace_one_way<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    scratch: &mut Scratch,
+    mut sink: Sink<'_, Q>,
+) {
     if from.is_some() || whole(object) != NONE {
         for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
             let from = from.map(|from| &from[part * PART..][..rays.len()]);
-            trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, instance: sink.instance });
+            trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, ..sink });
         }
         return;
     }
@@ -84,6 +123,11 @@ fn trace<Q: Query>(
         Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
         scratch.packets.rest = rest;
     }
+}
+
+/// Whether there is a BVH beside the tetrahedra.
+fn has_subtrees(object: &ObjectView<'_>) -> bool {
+    object.tet_leaves.first().is_some_and(|leaf| leaf.subtree != NONE)
 }
 
 /// The tet leaf that is the whole object, without another structure for rays that come from outside; or `NONE`.
@@ -127,7 +171,7 @@ fn trace_hinted<Q: Query>(
         let ray = ray as usize;
         let done = walks[ray] == Walk::Done || walks[ray] == Walk::Left && is_all;
         if done {
-            sink.put(ray, &queries[ray]);
+            sink.query(ray, &queries[ray]);
         } else if walks[ray] == Walk::Left {
             walked[ray] = leaf_of_face(object, faces[ray]);
         }
@@ -139,20 +183,19 @@ fn trace_hinted<Q: Query>(
     }
 }
 
-/// Whether a ray that starts on a known surface is likely to be faster through tetrahedra than through the BVH beside
-/// them, if there is one. By measurement (benchmarks/): with AVX-512 short any-hit rays are, long ones not;
-/// nearest hits only where the tetrahedra do not exceed the caches by far. No answer depends on it.
+/// Whether a ray that starts on a known surface may be faster through tetrahedra than through the BVH beside
+/// them, if there is one. By measurement (benchmarks/): long any-hit rays never are, and none are without vectors. Of
+/// the others [`choice`] decides. No answer depends on it.
 fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
-    const MOST_TETS: usize = 400_000;
     const SHORT: f32 = 0.3;
-    if object.tet_leaves.first().is_none_or(|leaf| leaf.subtree == NONE) {
+    if !has_subtrees(object) {
         return true;
     }
-    if Isa::chosen() != Isa::Avx512 {
+    if Isa::chosen() == Isa::Scalar {
         return false;
     }
     if !Q::ANY {
-        return object.records.len() <= MOST_TETS;
+        return true;
     }
     let (header, d) = (object.header, ray.direction);
     let size = (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]));
@@ -191,8 +234,7 @@ impl<Q: Query> Kernel for Together<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
         let (packets, sink) = (&mut self.scratch.packets, self.sink);
-        let done = |ray: usize, query: &Q| sink.put(ray, query);
-        packets::trace(s, self.object, self.rays, packets, packets::LEAST_USE, done).rays
+        packets::trace(s, self.object, self.rays, packets, packets::LEAST_USE, sink).rays
     }
 }
 
@@ -211,7 +253,7 @@ impl<Q: Query> Kernel for ThroughBvh<'_, '_, Q> {
     fn run<S: Simd>(self, s: S) {
         let (object, rays, waiting, sink) = (self.object, self.rays, self.waiting, self.sink);
         let stacks = &mut self.scratch.stacks;
-        let done = |ray: usize, query: &Q| sink.put(ray, query);
+        let done = |ray: usize, query: &Q| sink.query(ray, query);
         let walk = BatchWalk { object, rays, waiting, stacks, done };
         walk.run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }

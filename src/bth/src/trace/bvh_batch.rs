@@ -285,7 +285,7 @@ fn enter_tets<Q: Query>(
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
     let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
-    for i in (0..NODE_LINES).step_by(2) {
+    for i in 0..NODE_LINES {
         s.prefetch(first.wrapping_add(i));
     }
 }

@@ -5,6 +5,7 @@
 //! decide ([`crate::expansion`]).
 
 use super::line::{Line, PROJECTION_ERROR};
+use super::query::reported;
 use crate::expansion::Expansion;
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32.
@@ -20,10 +21,10 @@ pub(crate) struct Crossing {
 }
 
 impl Crossing {
-    /// Barycentric weights of the triangle's second and third vertex.
+    /// Barycentric weights of the triangle's second and third vertex, as they are reported.
     pub(crate) fn uv(&self) -> [f32; 2] {
         let [u, v, whole] = self.weight;
-        [(u / whole) as f32, (v / whole) as f32]
+        [reported(u / whole), reported(v / whole)]
     }
 }
 
@@ -85,24 +86,45 @@ pub(crate) fn weigh(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]
     Weighed { weight, bound, range: deep - shallow, depth, inverse_depth, t: depth * inverse_depth }
 }
 
+/// What is certain of a line and a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verdict {
+    /// Of the weights.
+    pub(crate) sum: f64,
+    /// The line passes within.
+    inside: bool,
+    /// It does, and t, u and v are good to [`RATIO_ERROR`].
+    pub(crate) crossed: bool,
+    pub(crate) missed: bool,
+}
+
 impl Weighed {
-    /// Decides, or leaves it open.
+    /// What is certain. Without branches.
     #[inline(always)]
-    pub(crate) fn judge(&self) -> Estimate {
+    pub(crate) fn verdict(&self) -> Verdict {
         let (weight, bound) = (self.weight, self.bound);
         let (least, greatest) = ends(weight);
-        if least < -bound && greatest > bound {
-            return Estimate::Missed;
-        }
         let sum = weight[0] + weight[1] + weight[2];
         // Errors of the weights shift the depth within the triangle's range of depths.
         let tolerance = RATIO_ERROR * sum.abs();
-        let certain = least > bound || greatest < -bound;
-        if certain && bound <= tolerance && bound * self.range <= tolerance * self.depth.abs() {
+        let inside = (least > bound) | (greatest < -bound);
+        let good = (bound <= tolerance) & (bound * self.range <= tolerance * self.depth.abs());
+        Verdict { sum, inside, crossed: inside & good, missed: (least < -bound) & (greatest > bound) }
+    }
+
+    /// Decides, or leaves it open.
+    #[inline(always)]
+    pub(crate) fn judge(&self) -> Estimate {
+        let Verdict { sum, inside, crossed, missed } = self.verdict();
+        let weight = self.weight;
+        if missed {
+            return Estimate::Missed;
+        }
+        if crossed {
             return Estimate::Crossed(Crossing { t: self.t, weight: [weight[1], weight[2], sum] });
         }
-        let t = if certain { self.t_range(sum.abs()) } else { [f64::NEG_INFINITY, f64::INFINITY] };
-        Estimate::Open(weight, bound, t)
+        let t = if inside { self.t_range(sum.abs()) } else { [f64::NEG_INFINITY, f64::INFINITY] };
+        Estimate::Open(weight, self.bound, t)
     }
 
     /// Between which t the line crosses a triangle whose weights have certain signs. Three weights that are off by e move

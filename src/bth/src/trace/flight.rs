@@ -4,7 +4,7 @@
 use super::crossing::{Crossing, Estimate, estimate};
 use super::line::Line;
 use super::prepare::{Aim, Frame};
-use super::query::Query;
+use super::query::{Named, Query};
 use super::sight::{Block, Sight};
 use super::slabs::Slabs;
 use crate::layout::{WIDTH, WideNode};
@@ -124,12 +124,19 @@ impl<Q: Query> Flight<Q> {
             self.query.accept();
             return Found::Enough;
         }
-        self.decide(object, ray, block, found.maybe)
+        self.decide(s, object, ray, block, found.maybe)
     }
 
     /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.
     #[inline(always)]
-    fn decide<B: Block>(&mut self, object: &ObjectView<'_>, ray: &Ray, block: &B, mut bits: u32) -> Found {
+    fn decide<S: Simd, B: Block>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        ray: &Ray,
+        block: &B,
+        mut bits: u32,
+    ) -> Found {
         let axis = self.aim.sight.axis;
         let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
@@ -146,7 +153,9 @@ impl<Q: Query> Flight<Q> {
                 Estimate::Open(..) => open(ray, block.corners(i)),
             };
             let Some(crossing) = crossing else { continue };
-            if self.query.offer(object.triangle_ids[block.first() as usize + i], crossing) {
+            let place = block.first() + i as u32;
+            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
+            if self.query.offer(Named::place(place, object.triangle_ids), crossing) {
                 return Found::Enough;
             }
         }

@@ -5,9 +5,11 @@
 mod batch;
 mod bvh_batch;
 mod bvh_walk;
+mod choice;
 mod coherence;
 mod crossing;
 mod flight;
+mod hinted;
 mod line;
 mod packet;
 mod packet_group;
@@ -37,10 +39,12 @@ mod tet_walk;
 mod tets;
 
 pub(crate) use batch::{any_batch, nearest_batch};
+pub use hinted::Hinted;
 pub use query::Steps;
 
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
+use choice::Choices;
 use packets::PacketScratch;
 use query::{Any, Nearest, Query};
 use single::trace;
@@ -55,6 +59,7 @@ pub(crate) const FEW: usize = 4;
 pub(crate) struct Scratch {
     stacks: Stacks,
     packets: PacketScratch,
+    choices: Choices,
 }
 
 /// Lends the thread's scratch memory.
@@ -78,17 +83,17 @@ pub(crate) fn nearest(
     scratch: &mut Scratch,
 ) -> Hit {
     let query = Nearest::new(ray);
-    trace(object, ray, from, scratch, query, &mut ()).answer(instance)
+    trace(object, ray, from, scratch, query, &mut ()).answer(object.triangle_ids, instance)
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let mut steps = Steps::default();
     let query = with_scratch(|scratch| trace(object, ray, from, scratch, Nearest::new(ray), &mut steps));
-    (query.answer(instance), steps)
+    (query.answer(object.triangle_ids, instance), steps)
 }
 
 /// Whether a ray in object space hits anything.
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
-    trace(object, ray, from, scratch, Any::new(ray), &mut ()).answer(0)
+    trace(object, ray, from, scratch, Any::new(ray), &mut ()).answer(object.triangle_ids, 0)
 }

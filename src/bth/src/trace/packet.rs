@@ -6,11 +6,10 @@
 //! be computed at the end; what is not certain is decided at once ([`super::packet_settle`]).
 
 use super::flight::KEY_SLACK;
-use super::packet_group::Group;
+use super::packet_group::{Crossings, Group};
 use super::packet_hull::Hull;
 use super::packet_leaf::{Leaf, Points, Rays, no_points};
-use super::packet_settle::Last;
-use super::query::Query;
+use super::query::{Deliver, Query};
 use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
@@ -76,7 +75,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         object: &ObjectView<'_>,
         hull: &H,
         rays: &[Ray],
-        mut done: impl FnMut(usize, &Q),
+        to: &mut impl Deliver<Q>,
     ) -> Use {
         let Packets { groups, points, stack, queries } = self;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
@@ -165,7 +164,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
             }
         }
-        finish(s, groups, &mut rays, all, &mut done);
+        finish(s, groups, &mut rays, all, to);
         // Deciding one candidate alone costs about as much as a step.
         let steps = u64::from(steps + rays.settled);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
@@ -179,43 +178,43 @@ fn finish<S: Simd, Q: Query>(
     groups: &[Group<S>],
     rays: &mut Rays<'_, Q>,
     all: u64,
-    done: &mut impl FnMut(usize, &Q),
+    to: &mut impl Deliver<Q>,
 ) {
     if Q::ANY {
         let mut hit = all & !rays.alive;
         let mut query = Q::new(&rays.rays[0]);
         query.accept();
         while hit != 0 {
-            done(hit.trailing_zeros() as usize, &query);
+            to.query(hit.trailing_zeros() as usize, &query);
             hit &= hit - 1;
         }
         return;
     }
-    for (i, group) in groups.iter().enumerate() {
-        let own = &rays.rays[i * LANES..];
-        let own = &own[..own.len().min(LANES)];
-        let (axis, none) = ([[0; LANES]; 3], [0; LANES]);
-        let mut last = Last { object: rays.object, rays: own, axis, leaf: none, triangle: none };
-        for k in 0..3 {
-            s.store_u(group.axis[k], &mut last.axis[k]);
-        }
-        s.store_u(group.leaf, &mut last.leaf);
-        s.store_u(group.triangle, &mut last.triangle);
-        let (asked, queries) = (&mut rays.asked, &mut *rays.queries);
-        last.compute(|lane, id, crossing| {
-            let ray = i * LANES + lane;
-            let mut query = if *asked >> ray & 1 != 0 { queries[ray] } else { Q::new(&own[lane]) };
-            query.offer(id, crossing);
-            *asked &= !(1 << ray);
-            done(ray, &query);
-        });
+    // First all, then what comes of them: so the divisions of one group overlap with the next.
+    let mut crossings = [Crossings::NONE; GROUPS];
+    for (group, crossings) in groups.iter().zip(&mut crossings) {
+        group.cross(s, crossings);
     }
-    // Those whose last word was said before.
+    for (i, (group, crossings)) in groups.iter().zip(&crossings).enumerate() {
+        let asked = (rays.asked >> (i * LANES)) as u32 & 0xffff;
+        let mut clear = crossings.certain & !asked;
+        while clear != 0 {
+            let lane = clear.trailing_zeros() as usize % LANES;
+            clear &= clear - 1;
+            let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
+            to.hit(i * LANES + lane, crossings.place[lane], t, u, v);
+        }
+        let rest = crossings.open | crossings.certain & asked;
+        if rest != 0 {
+            rays.settle_last(s, group, i, rest);
+        }
+    }
+    // Those of which something had to be decided alone.
     let mut asked = rays.asked;
     while asked != 0 {
         let ray = asked.trailing_zeros() as usize;
         asked &= asked - 1;
-        done(ray, &rays.queries[ray]);
+        to.query(ray, &rays.queries[ray]);
     }
 }
 

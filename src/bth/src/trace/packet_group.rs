@@ -4,13 +4,14 @@
 //! one box or triangle: the same operations on the same prepared floats ([`super::prepare`]), so the same bounds hold.
 //! The axes of the plane need not be swapped for rays that go backward: the tests do not see handedness.
 
+use super::crossing::weigh;
 use super::prepare::{self, Aim, Frame};
+use super::query::reported;
+use super::sight::Block;
 use crate::layout::NONE;
+use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use std::mem::offset_of;
-
-/// Floats of a ray.
-const FLOATS: usize = 8;
 
 /// Sixteen rays, and what they have found.
 #[derive(Clone, Copy)]
@@ -44,8 +45,40 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) nearest: S::F,
     /// The leaf of the nearest hit so far if it is still to be computed, else `NONE`;
     pub(crate) leaf: S::U,
-    /// and the triangle within.
+    /// and the triangle within,
     pub(crate) triangle: S::U,
+    /// its place in leaf order and corners (`[corner][axis]`).
+    place: S::U,
+    corner: [[S::F; 3]; 3],
+}
+
+/// Sixteen of a number.
+type Many = [f32; LANES];
+
+/// What f64 makes of the triangles that wait to be computed.
+#[derive(Clone, Copy)]
+pub(crate) struct Crossings {
+    /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
+    /// else the triangles would have been decided upon at once.)
+    pub(crate) certain: u32,
+    /// Lanes that must be looked at one by one.
+    pub(crate) open: u32,
+    /// In leaf order.
+    pub(crate) place: [u32; LANES],
+    pub(crate) t: Many,
+    pub(crate) u: Many,
+    pub(crate) v: Many,
+}
+
+impl Crossings {
+    pub(crate) const NONE: Crossings = Crossings {
+        certain: 0,
+        open: 0,
+        place: [0; LANES],
+        t: [0.0; LANES],
+        u: [0.0; LANES],
+        v: [0.0; LANES],
+    };
 }
 
 /// Place of a field of [`Aim`] among its floats.
@@ -86,14 +119,40 @@ impl<S: Simd> Group<S> {
             nearest: zero,
             leaf: none,
             triangle: none,
+            place: none,
+            corner: [[zero; 3]; 3],
         }
     }
 
-    /// Prepares the first sixteen of rays that are given as floats; the last fills up lanes that are too many. False
-    /// if one of them can't be prepared.
+    /// A triangle is certainly the nearest hit so far of these lanes, between these depths.
     #[inline(always)]
-    pub(crate) fn prepare(&mut self, s: S, frame: &Frame, floats: &[f32]) -> bool {
-        let field = fields(s, floats);
+    pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], leaf: u32, triangle: u32) {
+        self.nearest = s.select(m, depth[0], self.nearest);
+        self.limit = s.select(m, depth[1], self.limit);
+        self.leaf = s.select_u(m, s.splat_u(leaf), self.leaf);
+        self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
+    }
+
+    /// What is to be known of it to compute the hit.
+    #[inline(always)]
+    pub(crate) fn keep<B: Block>(&mut self, s: S, m: S::M, block: &B, triangle: u32) {
+        self.place = s.select_u(m, s.splat_u(block.first() + triangle), self.place);
+        for c in 0..3 {
+            for k in 0..3 {
+                // Each straight from the leaf: through an array, what was written in words would be read as more.
+                let x = s.splat(block.coordinate(triangle as usize, c, k));
+                self.corner[c][k] = s.select(m, x, self.corner[c][k]);
+            }
+        }
+    }
+
+    /// Prepares the first sixteen of rays; the last fills up lanes that are too many. False if one of them can't be
+    /// prepared.
+    #[inline(always)]
+    pub(crate) fn prepare(&mut self, s: S, frame: &Frame, rays: &[Ray]) -> bool {
+        let lane = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+        let last = s.splat_u(rays.len() as u32 - 1);
+        let field = prepare::fields(s, s.mask(0xffff), rays, s.select_u(s.lt_u(lane, last), lane, last));
         let (rows, usable) = prepare::rows(s, frame, field);
         let zero = s.splat(0.0);
         self.origin = [field[0], field[1], field[2]];
@@ -150,14 +209,50 @@ impl<S: Simd> Group<S> {
         s.mask_bits(s.le(enter, leave))
     }
 
+    /// Computes where rays cross the triangles that wait to be computed.
+    #[inline(always)]
+    pub(crate) fn cross(&self, s: S, crossings: &mut Crossings) {
+        let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        let mut corner = [[[0.0; LANES]; 3]; 3];
+        let (o, d) = (self.turn(s, self.origin), self.turn(s, self.direction));
+        for k in 0..3 {
+            s.store(o[k], &mut origin[k]);
+            s.store(d[k], &mut direction[k]);
+        }
+        for c in 0..3 {
+            let along = self.turn(s, self.corner[c]);
+            for k in 0..3 {
+                s.store(along[k], &mut corner[c][k]);
+            }
+        }
+        let (mut certain, mut missed) = ([0; LANES], [0; LANES]);
+        s.store_u(self.place, &mut crossings.place);
+        // Without branches, so that it is compiled to vectors.
+        for i in 0..LANES {
+            let at = |rows: &[Many; 3]| [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()];
+            let corners = [at(&corner[0]), at(&corner[1]), at(&corner[2])];
+            let weighed = weigh(at(&origin), at(&direction), corners);
+            let verdict = weighed.verdict();
+            let [_, b, c] = weighed.weight;
+            certain[i] = u32::from(verdict.crossed);
+            missed[i] = u32::from(verdict.missed);
+            crossings.t[i] = reported(weighed.t);
+            crossings.u[i] = reported(b / verdict.sum);
+            crossings.v[i] = reported(c / verdict.sum);
+        }
+        let some = s.mask_bits(s.lt_u(self.leaf, s.splat_u(NONE)));
+        let bits = |flags: &[u32; LANES]| s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(flags)));
+        crossings.certain = bits(&certain) & some;
+        crossings.open = some & !crossings.certain & !bits(&missed);
+    }
+
     /// A point as the rays see it: its place in the plane of projection, and its depth.
     #[inline(always)]
     pub(crate) fn project(&self, s: S, point: [f32; 3]) -> [S::F; 3] {
-        let (x, y, z) = if let Some([x, y, z]) = self.common {
-            (s.splat(point[x]), s.splat(point[y]), s.splat(point[z]))
+        let [x, y, z] = if let Some([x, y, z]) = self.common {
+            [s.splat(point[x]), s.splat(point[y]), s.splat(point[z])]
         } else {
-            let [x, y, z] = [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])];
-            (self.choose(s, y, z, x), self.choose(s, z, x, y), self.choose(s, x, y, z))
+            self.turn(s, [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])])
         };
         let depth = s.fma(z, self.forward, self.start);
         let x = s.sub(x, self.plane_origin[0]);
@@ -165,36 +260,15 @@ impl<S: Simd> Group<S> {
         [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
     }
 
+    /// Coordinates along the axes of the projection.
+    #[inline(always)]
+    pub(crate) fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+        [self.choose(s, y, z, x), self.choose(s, z, x, y), self.choose(s, x, y, z)]
+    }
+
     /// By the axis along the ray.
     #[inline(always)]
     fn choose(&self, s: S, x: S::F, y: S::F, z: S::F) -> S::F {
         s.select(self.is_x, x, s.select(self.is_y, y, z))
     }
-}
-
-/// The fields of the first sixteen rays.
-#[inline(always)]
-fn fields<S: Simd>(s: S, floats: &[f32]) -> [S::F; FLOATS] {
-    // A row is a ray, and whatever follows it.
-    const NEEDED: usize = (LANES + 1) * FLOATS;
-    let mut filled = [0.0; NEEDED];
-    let floats: &[f32; NEEDED] = match floats.first_chunk() {
-        Some(enough) => enough,
-        None => {
-            let last = floats.len() - FLOATS;
-            for ray in 0..LANES {
-                let from = (ray * FLOATS).min(last);
-                filled[ray * FLOATS..][..FLOATS].copy_from_slice(&floats[from..from + FLOATS]);
-            }
-            &filled
-        }
-    };
-    let mut rows = [s.splat(0.0); LANES];
-    for ray in 0..LANES {
-        rows[ray] = s.load(floats[ray * FLOATS..].first_chunk().expect("sixteen floats"));
-    }
-    let columns = s.transpose(rows);
-    let mut out = [columns[0]; FLOATS];
-    out.copy_from_slice(&columns[..FLOATS]);
-    out
 }

@@ -190,10 +190,12 @@ impl<Q: Query> Rays<'_, Q> {
             } else {
                 let clear = sure & s.mask_bits(s.lt(weighed.farthest, group.nearest));
                 let m = s.mask(clear);
-                group.nearest = s.select(m, weighed.nearest, group.nearest);
-                group.limit = s.select(m, weighed.farthest, group.limit);
-                group.leaf = s.select_u(m, s.splat_u(leaf.code), group.leaf);
-                group.triangle = s.select_u(m, s.splat_u(triangle), group.triangle);
+                group.accept(s, m, [weighed.nearest, weighed.farthest], leaf.code, triangle);
+                if clear != 0 {
+                    let place = (leaf.block.first() + triangle) as usize;
+                    s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
+                    group.keep(s, m, leaf.block, triangle);
+                }
                 nearer |= clear != 0;
                 clear
             };
@@ -233,14 +235,9 @@ impl<Q: Query> Rays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
-            if self.asked >> ray & 1 == 0 {
-                self.queries[ray] = Q::new(&self.rays[ray]);
-                self.asked |= 1 << ray;
-            }
-            self.settled += 1;
             let waiting = Candidate { leaf: leaf[lane], triangle: triangle[lane] };
             let axis = [axis[0][lane], axis[1][lane], axis[2][lane]];
-            match settle(self.object, &self.rays[ray], axis, [waiting, candidate], &mut self.queries[ray]) {
+            match self.settle_one(ray, axis, [waiting, candidate]) {
                 Settled::Enough => self.alive &= !(1 << ray),
                 Settled::Found(t) => {
                     let [near, far] = t.map(|t| t * f64::from(scale[lane]));
@@ -254,5 +251,31 @@ impl<Q: Query> Rays<'_, Q> {
         group.leaf = s.load_u(&leaf);
         group.limit = s.load(&limit);
         group.nearest = s.load(&nearest);
+    }
+
+    /// Decides for a few rays of a group the candidate that waits.
+    #[inline(always)]
+    pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &Group<S>, at: usize, mut lanes: u32) {
+        let mut rows = [[0; LANES]; 5];
+        for (row, &values) in rows.iter_mut().zip(group.axis.iter().chain([&group.leaf, &group.triangle])) {
+            s.store_u(values, row);
+        }
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let [x, y, z, leaf, triangle] = [0, 1, 2, 3, 4].map(|i: usize| rows[i][lane]);
+            self.settle_one(at * LANES + lane, [x, y, z], [Candidate { leaf, triangle }, Candidate::NONE]);
+        }
+    }
+
+    /// Offers candidates of a ray to its query.
+    #[inline(always)]
+    fn settle_one(&mut self, ray: usize, axis: [u32; 3], candidates: [Candidate; 2]) -> Settled {
+        if self.asked >> ray & 1 == 0 {
+            self.queries[ray] = Q::new(&self.rays[ray]);
+            self.asked |= 1 << ray;
+        }
+        self.settled += 1;
+        settle(self.object, &self.rays[ray], axis, candidates, &mut self.queries[ray])
     }
 }

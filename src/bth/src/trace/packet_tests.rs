@@ -1,5 +1,6 @@
 //! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
 
+use super::batch::Sink;
 use super::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
 use super::query::{Any, Nearest, Query};
 use super::{single, with_scratch};
@@ -9,7 +10,6 @@ use crate::object::{ObjectView, Records};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::testing::Rng;
-use std::marker::PhantomData;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Quads of the surface along x and y, and of a leaf.
@@ -148,20 +148,19 @@ impl Surface {
 }
 
 /// Packets of a batch as a kernel.
-struct Packed<'a, Q, D> {
+struct Packed<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut PacketScratch,
     least: LeastUse,
-    done: D,
-    query: PhantomData<Q>,
+    sink: Sink<'b, Q>,
 }
 
-impl<Q: Query, D: FnMut(usize, &Q)> Kernel for Packed<'_, Q, D> {
+impl<Q: Query> Kernel for Packed<'_, '_, Q> {
     type Output = PacketCount;
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> PacketCount {
-        packets::trace(s, self.object, self.rays, self.scratch, self.least, self.done)
+    fn run<S: Simd>(mut self, s: S) -> PacketCount {
+        packets::trace(s, self.object, self.rays, self.scratch, self.least, &mut self.sink)
     }
 }
 
@@ -170,10 +169,11 @@ fn packed<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     least: LeastUse,
-    done: impl FnMut(usize, &Q),
+    answers: &mut [Q::Answer],
 ) -> (PacketCount, Vec<u32>) {
     let mut scratch = PacketScratch::default();
-    let count = isa.run(Packed { object, rays, scratch: &mut scratch, least, done, query: PhantomData });
+    let sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
+    let count = isa.run(Packed { object, rays, scratch: &mut scratch, least, sink });
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     (count, scratch.rest)
 }
@@ -188,16 +188,21 @@ fn check(surface: &Surface, rays: &[Ray], least: LeastUse) -> [(PacketCount, usi
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = with_scratch(|scratch| {
         let mut trace = |ray: &Ray| {
-            let hit = single::trace(&object, ray, NONE, scratch, Nearest::new(ray), &mut ()).answer(0);
-            (hit, single::trace(&object, ray, NONE, scratch, Any::new(ray), &mut ()).answer(0))
+            let hit = single::trace(&object, ray, NONE, scratch, Nearest::new(ray), &mut ())
+                .answer(object.triangle_ids, 0);
+            (
+                hit,
+                single::trace(&object, ray, NONE, scratch, Any::new(ray), &mut ())
+                    .answer(object.triangle_ids, 0),
+            )
         };
         rays.iter().map(&mut trace).collect()
     });
     for isa in Isa::ALL {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let (count, rest) = packed(isa, &object, rays, least, |i, q: &Nearest| hits[i] = q.answer(0));
+        let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
         let mut found = vec![false; rays.len()];
-        let (count_any, rest_any) = packed(isa, &object, rays, least, |i, q: &Any| found[i] = q.answer(0));
+        let (count_any, rest_any) = packed::<Any>(isa, &object, rays, least, &mut found);
         for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
             if !rest.contains(&(i as u32)) {
                 assert_eq!(bits(&hits[i]), bits(hit), "{isa}, ray {i}, {ray:?}: {:?}, {hit:?}", hits[i]);

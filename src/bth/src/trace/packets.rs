@@ -4,12 +4,11 @@ use super::coherence::{Guard, Span, is_same_octant};
 use super::packet::{Entry, PACKET, Packets, Use};
 use super::packet_hull::{Beam, SegmentBox};
 use super::prepare::Frame;
-use super::query::Query;
+use super::query::{Deliver, Offset, Query};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use zerocopy::{FromBytes, IntoBytes};
 
 /// Fewer rays make no packet.
 const FEWEST: usize = 2 * LANES;
@@ -22,7 +21,7 @@ pub(crate) struct LeastUse {
 }
 
 /// By measurement.
-pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 40, short: 15 };
+pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 10, short: 15 };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
@@ -56,7 +55,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     scratch: &mut PacketScratch,
     least: LeastUse,
-    mut done: impl FnMut(usize, &Q),
+    to: &mut impl Deliver<Q>,
 ) -> PacketCount {
     let mut count = PacketCount::default();
     // Where tetrahedra have no subtree beside them, rays go alone.
@@ -78,18 +77,18 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             packets = Some(Packets::<S, Q>::new(s, object, &mut *stack, &own[0]));
         }
         let packets = packets.as_mut().expect("just made");
-        let done = |ray: usize, query: &Q| done(at + ray, query);
+        let mut to = Offset { first: at, to: &mut *to };
         let (outcome, guard, least_use, kind) = match run {
             _ if !prepare(s, &frame, packets, own) => {
                 (Use::Refused, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Coherent(span) => {
                 let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
-                let outcome = packets.trace(s, object, &beam, own, done);
+                let outcome = packets.trace(s, object, &beam, own, &mut to);
                 (outcome, &mut coherent, least.coherent, &mut count.coherent)
             }
             Run::Short(bounds) => {
-                let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, done);
+                let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to);
                 (outcome, &mut short, least.short, &mut count.short)
             }
         };
@@ -136,11 +135,9 @@ fn choose<S: Simd, Q: Query>(
 /// Prepares all groups; false if a ray can't be.
 #[inline(always)]
 fn prepare<S: Simd, Q: Query>(s: S, frame: &Frame, packets: &mut Packets<'_, S, Q>, rays: &[Ray]) -> bool {
-    let floats = <[f32]>::ref_from_bytes(rays.as_bytes()).expect("rays are made of f32");
-    let each = LANES * size_of::<Ray>() / size_of::<f32>();
     let mut ready = true;
-    for i in 0..rays.len().div_ceil(LANES) {
-        ready &= packets.groups[i].prepare(s, frame, &floats[i * each..]);
+    for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
+        ready &= group.prepare(s, frame, rays);
     }
     ready
 }

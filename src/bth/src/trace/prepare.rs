@@ -16,9 +16,6 @@ const LARGEST: f32 = (1u64 << 40) as f32;
 const SMALLEST: f32 = slabs::SMALLEST_EXTENT as f32;
 /// What lower bounds of a few f32 roundings are multiplied by, to bound from above.
 const UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
-/// Floats of a [`Ray`].
-const STRIDE: u32 = (size_of::<Ray>() / size_of::<f32>()) as u32;
-
 /// What is the same for all rays through an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
@@ -170,23 +167,7 @@ impl Prepared {
         count: usize,
     ) {
         let wanted = s.mask(((1u64 << count) - 1) as u32);
-        let floats: &[f32] = <[f32]>::ref_from_bytes(rays.as_bytes()).expect("rays are made of f32");
-        let index = s.load_u(at);
-        let index = s.shl_u::<{ STRIDE.trailing_zeros() }>(index);
-        let at = [
-            index,
-            s.add_u(index, s.splat_u(1)),
-            s.add_u(index, s.splat_u(2)),
-            s.add_u(index, s.splat_u(3)),
-            s.add_u(index, s.splat_u(4)),
-            s.add_u(index, s.splat_u(5)),
-            s.add_u(index, s.splat_u(6)),
-            s.add_u(index, s.splat_u(7)),
-        ];
-        let mut field = [s.splat(0.0); 8];
-        for k in 0..8 {
-            field[k] = s.gather(wanted, floats, at[k]);
-        }
+        let field = fields(s, wanted, rays, s.load_u(at));
         let (aim, usable) = rows(s, frame, field);
         for half in 0..2 {
             let mut rows = [s.splat(0.0); LANES];
@@ -200,6 +181,17 @@ impl Prepared {
         }
         self.ready = s.mask_bits(s.and(wanted, usable));
     }
+}
+
+/// The floats of rays, a row of lanes for each.
+#[inline(always)]
+pub(crate) fn fields<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8] {
+    let words = s.rows8(m, Ray::rows(rays), at);
+    let mut out = [s.splat(0.0); 8];
+    for k in 0..8 {
+        out[k] = s.floats(words[k]);
+    }
+    out
 }
 
 /// The floats of the [`Aim`]s of sixteen rays, a row of lanes for each, and the lanes that they are good for; from the rays'

@@ -4,19 +4,70 @@ use super::crossing::Crossing;
 use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
 
+/// Where answers go. Rays that are not spoken of hit nothing.
+pub(crate) trait Deliver<Q> {
+    /// A query over a ray of the batch has ended.
+    fn query(&mut self, ray: usize, query: &Q);
+    /// The nearest hit of a ray is the triangle at this place in leaf order; all else as reported. (In single words: what goes through memory as a pair stalls.)
+    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32);
+}
+
+/// Answers to rays from a place in the batch on.
+pub(crate) struct Offset<'a, D> {
+    pub(crate) first: usize,
+    pub(crate) to: &'a mut D,
+}
+
+impl<Q, D: Deliver<Q>> Deliver<Q> for Offset<'_, D> {
+    #[inline(always)]
+    fn query(&mut self, ray: usize, query: &Q) {
+        self.to.query(self.first + ray, query);
+    }
+    #[inline(always)]
+    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
+        self.to.hit(self.first + ray, place, t, u, v);
+    }
+}
+
+/// A triangle, by its id or by its place in leaf order among the ids of an object. An id is most often a cache miss, and of no
+/// use until the query ends: it is asked for when the triangle is offered, and read then.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Named<'a> {
+    pub(crate) word: u32,
+    pub(crate) is_place: bool,
+    pub(crate) ids: &'a [u32],
+}
+
+impl<'a> Named<'a> {
+    #[inline(always)]
+    pub(crate) fn id(id: u32, ids: &'a [u32]) -> Self {
+        Named { word: id, is_place: false, ids }
+    }
+    #[inline(always)]
+    pub(crate) fn place(place: u32, ids: &'a [u32]) -> Self {
+        Named { word: place, is_place: true, ids }
+    }
+    fn read(&self) -> u32 {
+        if self.is_place { self.ids[self.word as usize] } else { self.word }
+    }
+}
+
 /// A query in progress over one ray.
 pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
     /// What the caller gets.
     type Answer;
-    fn answer(&self, instance: u32) -> Self::Answer;
+    /// `ids` are those of the object, in leaf order.
+    fn answer(&self, ids: &[u32], instance: u32) -> Self::Answer;
+    /// The same, given t, u and v as they are to be reported.
+    fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
     fn new(ray: &Ray) -> Self;
     /// Whether walks should keep an eye on how far they are: where rays are often short, and where
     /// [`Self::settled_by`] has a use for it.
     const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
-    fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool;
+    fn offer(&mut self, triangle: Named<'_>, crossing: Crossing) -> bool;
     /// Tells of a crossing whose t certainly lies between two values, roundings included; true if that is all that the
     /// query wants to know.
     fn settled_by(&mut self, _t: (f64, f64)) -> bool {
@@ -46,33 +97,45 @@ fn widened(t: f64) -> f64 {
 pub(crate) struct Nearest {
     tmin: f32,
     tmax: f32,
+    /// An id, or a place among the ids ([`Named`]); `NONE` where nothing is hit.
     triangle: u32,
+    is_place: bool,
     best: Crossing,
+}
+
+impl Nearest {
+    /// The nearest triangle so far.
+    fn named<'a>(&self, ids: &'a [u32]) -> Named<'a> {
+        Named { word: self.triangle, is_place: self.is_place, ids }
+    }
 }
 
 impl Query for Nearest {
     const ANY: bool = false;
     type Answer = Hit;
-    fn answer(&self, instance: u32) -> Hit {
+    fn answer(&self, ids: &[u32], instance: u32) -> Hit {
         if self.triangle == NONE {
             return Hit::MISS;
         }
-        let surface = Surface { instance, triangle: self.triangle };
+        let surface = Surface { instance, triangle: self.named(ids).read() };
         let [u, v] = self.best.uv();
-        // + 0.0 turns -0.0 into 0.0.
-        Hit { t: self.best.t as f32 + 0.0, u: u + 0.0, v: v + 0.0, surface }
+        Self::answer_of(surface, reported(self.best.t), u, v)
+    }
+    #[inline(always)]
+    fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Hit {
+        Hit { t, u, v, surface }
     }
     fn new(ray: &Ray) -> Self {
         let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
-        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, best }
+        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_place: false, best }
     }
     #[inline(always)]
-    fn offer(&mut self, triangle: u32, crossing: Crossing) -> bool {
+    fn offer(&mut self, triangle: Named<'_>, crossing: Crossing) -> bool {
         let nearer = self.triangle == NONE
             || crossing.t < self.best.t
-            || (crossing.t == self.best.t && triangle < self.triangle);
-        if nearer && in_range(crossing.t, self.tmin, self.tmax) {
-            self.triangle = triangle;
+            || (crossing.t == self.best.t && triangle.read() < self.named(triangle.ids).read());
+        if nearer && in_range(crossing.t as f32, self.tmin, self.tmax) {
+            (self.triangle, self.is_place) = (triangle.word, triangle.is_place);
             self.best = crossing;
         }
         false
@@ -95,9 +158,15 @@ fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
+/// A number as it is reported: rounded, and never -0.0.
+#[inline(always)]
+pub(crate) fn reported(x: f64) -> f32 {
+    x as f32 + 0.0
+}
+
 /// Whether a t, rounded as it will be reported, lies in the ray's range.
-fn in_range(t: f64, tmin: f32, tmax: f32) -> bool {
-    let t = t as f32;
+#[inline(always)]
+fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t < f32::INFINITY
 }
 
@@ -112,16 +181,19 @@ pub(crate) struct Any {
 impl Query for Any {
     const ANY: bool = true;
     type Answer = bool;
-    fn answer(&self, _instance: u32) -> bool {
+    fn answer(&self, _ids: &[u32], _instance: u32) -> bool {
         self.found
+    }
+    fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
+        true
     }
     fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
     const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
-    fn offer(&mut self, _triangle: u32, crossing: Crossing) -> bool {
-        self.found |= in_range(crossing.t, self.tmin, self.tmax);
+    fn offer(&mut self, _triangle: Named<'_>, crossing: Crossing) -> bool {
+        self.found |= in_range(crossing.t as f32, self.tmin, self.tmax);
         self.found
     }
     fn settled_by(&mut self, t: (f64, f64)) -> bool {

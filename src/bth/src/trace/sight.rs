@@ -69,6 +69,8 @@ pub(crate) trait Block {
     fn first(&self) -> u32;
     fn triangles(&self) -> u32;
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3];
+    /// One coordinate of a corner; the number of the triangle is taken modulo [`WIDTH`].
+    fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
     /// The corners along these axes.
     fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3];
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
@@ -107,6 +109,10 @@ impl Block for IndexedLeaf {
         self.corner.map(|row| self.vertex.map(|axis| axis[usize::from(row[triangle]) % WIDTH]))
     }
     #[inline(always)]
+    fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {
+        self.vertex[axis][usize::from(self.corner[corner][triangle % WIDTH]) % WIDTH]
+    }
+    #[inline(always)]
     fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {
         let mut out = [[0.0; 3]; 3];
         for k in 0..3 {
@@ -136,6 +142,10 @@ impl Block for RawLeaf {
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
         self.corner.map(|axes| axes.map(|row| row[triangle]))
+    }
+    #[inline(always)]
+    fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {
+        self.corner[corner][axis][triangle % WIDTH]
     }
     #[inline(always)]
     fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {

@@ -61,7 +61,9 @@ impl Slabs {
             near: [0; 3],
             reserved: 0,
         };
-        slabs.first = ((f64::from(ray.tmin) * depth) as f32).next_down();
+        // A number even where every box is entered at this depth: lanes are written into the low bits of keys, which would
+        // make NaN of an infinity.
+        slabs.first = ((f64::from(ray.tmin) * depth) as f32).next_down().max(-f32::MAX);
         slabs.last = slabs.limit(f64::from(ray.tmax));
         for k in 0..3 {
             let d = line.direction[k] / depth;

@@ -134,7 +134,7 @@ impl<'a, Q: Query + Copy> Batch<'a, Q> {
         }
         let slot = s.load_u(&columns[0]);
         let face = three!(|k| s.load_u(&columns[4 + k]));
-        let mut ready = Ready::new(s, s.mask(valid), rays(self.rays), vertices(self.object), slot, face);
+        let mut ready = Ready::new(s, s.mask(valid), self.rays, vertices(self.object), slot, face);
         ready.lanes.words[word::TET] = s.load_u(&columns[1]);
         ready.lanes.words[word::APEX] = s.load_u(&columns[2]);
         ready.lanes.words[word::BEHIND] = s.load_u(&columns[3]);
@@ -173,9 +173,8 @@ impl<'a, Q: Query + Copy> Batch<'a, Q> {
             }
             return self.locate_all(first as u32, rest);
         }
-        let faces = <[u32]>::ref_from_bytes(self.object.tet_faces.as_bytes()).expect("whole words");
-        let (ready, able) =
-            Ready::from_faces(s, valid, rays(self.rays), vertices(self.object), faces, slot, row);
+        let faces = self.object.tet_faces;
+        let (ready, able) = Ready::from_faces(s, valid, self.rays, vertices(self.object), faces, slot, row);
         let able = s.mask_bits(able);
         queue.push(s, able, &ready.lanes);
         rest &= !able;
@@ -187,8 +186,7 @@ impl<'a, Q: Query + Copy> Batch<'a, Q> {
     fn fill_from_outside<S: Simd>(&mut self, s: S, queue: &mut Queue, m: S::M, slot: S::U, leaf: u32) -> u32 {
         let leaf = &self.object.tet_leaves[leaf as usize];
         let hull = &self.object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
-        let (ready, entered, missed) =
-            Ready::from_hull(s, m, rays(self.rays), vertices(self.object), hull, slot);
+        let (ready, entered, missed) = Ready::from_hull(s, m, self.rays, vertices(self.object), hull, slot);
         let (entered, mut missed) = (s.mask_bits(entered), s.mask_bits(missed));
         queue.push(s, entered, &ready.lanes);
         let rest = s.mask_bits(m) & !entered & !missed;
@@ -231,11 +229,6 @@ impl<'a, Q: Query + Copy> Batch<'a, Q> {
             Err(outcome) => self.finish(slot, outcome),
         }
     }
-}
-
-/// Rays as words.
-fn rays(rays: &[Ray]) -> &[f32] {
-    <[f32]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")
 }
 
 /// Vertices as words: x, y, z and one that is unused.

@@ -60,13 +60,13 @@ pub(super) mod word {
     pub(crate) const BEHIND: usize = 2;
     /// The first of three vertices of the face entered.
     pub(crate) const FACE: usize = 3;
-    /// The first of three axes: two of the plane of projection, and the depth.
+    /// The axis of the depth.
     pub(crate) const AXIS: usize = 6;
     /// Sign bit of the direction along the depth.
-    pub(crate) const SIGN: usize = 9;
+    pub(crate) const SIGN: usize = 7;
     /// Which of the batch's rays it is.
-    pub(crate) const SLOT: usize = 10;
-    pub(crate) const COUNT: usize = 11;
+    pub(crate) const SLOT: usize = 8;
+    pub(crate) const COUNT: usize = 9;
 }
 
 /// Names of the f32 of a lane. What has three elements is named by the first.
@@ -160,10 +160,22 @@ impl<S: Simd> Lanes<S> {
     /// Vertices seen from the rays' origins, given as rows of x, y, z and one more.
     #[inline(always)]
     pub(super) fn gather(&self, s: S, m: S::M, vertices: &[[f32; 4]], vertex: S::U) -> [S::F; 3] {
-        three!(|k| {
-            let at = s.gather_rows(m, vertices, vertex, self.words[word::AXIS + k]);
-            s.sub(at, self.floats[float::ORIGIN + k])
-        })
+        let [x, y, z, _] = s.rows4(m, vertices, vertex);
+        let along = self.turn(s, [x, y, z]);
+        three!(|k| s.sub(along[k], self.floats[float::ORIGIN + k]))
+    }
+
+    /// Coordinates along the axes of the lanes: the two of the plane, which follow the one of the depth in turn, swapped for
+    /// rays that go down; and the depth.
+    #[inline(always)]
+    pub(super) fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+        let axis = self.words[word::AXIS];
+        let (is_x, is_y) = (s.eq_u(axis, s.splat_u(0)), s.eq_u(axis, s.splat_u(1)));
+        let down = s.lt_u(s.splat_u(0), self.words[word::SIGN]);
+        let next = s.select(is_x, y, s.select(is_y, z, x));
+        let last = s.select(is_x, z, s.select(is_y, x, y));
+        let depth = s.select(is_x, x, s.select(is_y, y, z));
+        [s.select(down, last, next), s.select(down, next, last), depth]
     }
 
     #[inline(always)]
@@ -291,7 +303,6 @@ mod tests {
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel, LANES};
     use crate::testing::Rng;
-    use zerocopy::{FromBytes, IntoBytes};
 
     /// For each of sixteen rays: cross products of three points in turn, their bound, and which rays lanes can take.
     struct Crosses<'a>(&'a [Ray], &'a [[f32; 4]]);
@@ -303,8 +314,7 @@ mod tests {
             let lane = s.load_u(&std::array::from_fn(|i| i as u32));
             let first = s.add_u(lane, s.shl_u::<1>(lane));
             let vertex = three!(|k| s.add_u(first, s.splat_u(k)));
-            let rays = <[f32]>::ref_from_bytes(self.0.as_bytes()).expect("whole words");
-            let ready = Ready::new(s, s.mask(0xffff), rays, self.1, lane, vertex);
+            let ready = Ready::new(s, s.mask(0xffff), self.0, self.1, lane, vertex);
             let lanes = &ready.lanes;
             let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
             let (mut out, mut bound) = ([[0.0; LANES]; 3], [0.0; LANES]);

@@ -1,8 +1,11 @@
 //! Rays made ready to walk, in wait for lanes that are free.
 
+use super::prepare;
 use super::tet_lanes::{Extent, Lanes, cross, float, three, word};
 use crate::layout::{HullFace, NONE, TetFace};
+use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use zerocopy::{FromBytes, IntoBytes};
 
 /// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or
 /// underflow. Depths are then t times between 2^-40 and 2^40.
@@ -73,7 +76,7 @@ impl Queue {
                 s.$compress(bits, lanes.$values[$i], sixteen_mut(&mut self.$values[$i], self.end));
             )* };
         }
-        push!(words compress 0 1 2 3 4 5 6 7 8 9 10);
+        push!(words compress 0 1 2 3 4 5 6 7 8);
         push!(floats compress_f 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
         self.end += bits.count_ones() as usize;
     }
@@ -92,34 +95,11 @@ impl Queue {
                 lanes.$values[$i] = s.$expand(lanes.$values[$i], m, sixteen(&self.$values[$i], self.first));
             )* };
         }
-        pop!(words expand_u 0 1 2 3 4 5 6 7 8 9 10);
+        pop!(words expand_u 0 1 2 3 4 5 6 7 8);
         pop!(floats expand 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
         self.first += taken.count_ones() as usize;
         taken
     }
-}
-
-/// Rays as words of f32: origin, tmin, direction, tmax.
-const RAY_WORDS: u32 = 3;
-/// log2 of the words of a [`TetFace`].
-const FACE_WORDS: u32 = 3;
-
-/// An element of rows.
-#[inline(always)]
-fn column<S: Simd>(s: S, m: S::M, rows: &[f32], row: S::U, k: u32) -> S::F {
-    s.gather(m, rows, s.add_u(row, s.splat_u(k)))
-}
-
-#[inline(always)]
-fn column_u<S: Simd>(s: S, m: S::M, rows: &[u32], row: S::U, k: u32) -> S::U {
-    s.gather_u(m, rows, s.add_u(row, s.splat_u(k)))
-}
-
-/// The component of a vector along an axis.
-#[inline(always)]
-fn pick<S: Simd>(s: S, axis: S::U, v: [S::F; 3]) -> S::F {
-    let rest = s.select(s.eq_u(axis, s.splat_u(1)), v[1], v[2]);
-    s.select(s.eq_u(axis, s.splat_u(0)), v[0], rest)
 }
 
 #[inline(always)]
@@ -139,12 +119,9 @@ pub(super) struct Ready<S: Simd> {
 impl<S: Simd> Ready<S> {
     /// Prepares the rays `slot` of the batch, without any place yet.
     #[inline(always)]
-    fn of_rays(s: S, m: S::M, rays: &[f32], slot: S::U) -> Self {
-        let row = s.shl_u::<RAY_WORDS>(slot);
-        let o = three!(|k| column(s, m, rays, row, k));
-        let tmin = column(s, m, rays, row, 3);
-        let d = three!(|k| column(s, m, rays, row, 4 + k));
-        let tmax = column(s, m, rays, row, 7);
+    fn of_rays(s: S, m: S::M, rays: &[Ray], slot: S::U) -> Self {
+        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::fields(s, m, rays, slot);
+        let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let size = three!(|k| s.abs(d[k]));
         let greatest = s.max(size[0], s.max(size[1], size[2]));
         // Comparisons with NaN are false.
@@ -158,20 +135,16 @@ impl<S: Simd> Ready<S> {
         let along0 = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
         let along1 = s.and_not(s.lt(size[2], size[1]), along0);
         let axis = s.select_u(along0, s.splat_u(0), s.select_u(along1, s.splat_u(1), s.splat_u(2)));
-        let next = s.select_u(along0, s.splat_u(1), s.select_u(along1, s.splat_u(2), s.splat_u(0)));
-        let last = s.xor_u(s.xor_u(axis, next), s.splat_u(3));
-        let depth = pick(s, axis, d);
+        let mut lanes = Lanes::idle(s);
+        lanes.words[word::AXIS] = axis;
+        let depth = lanes.turn(s, d)[2];
         let down = s.lt(depth, s.splat(0.0));
         let per_t = s.abs(depth);
-        let axes = [s.select_u(down, last, next), s.select_u(down, next, last), axis];
-        let mut lanes = Lanes::idle(s);
-        for (k, axis) in axes.into_iter().enumerate() {
-            lanes.words[word::AXIS + k] = axis;
-            lanes.floats[float::ORIGIN + k] = pick(s, axis, o);
-        }
-        lanes.floats[float::SHEAR] = s.div(pick(s, axes[0], d), per_t);
-        lanes.floats[float::SHEAR + 1] = s.div(pick(s, axes[1], d), per_t);
         lanes.words[word::SIGN] = s.select_u(down, s.splat_u(1 << 31), s.splat_u(0));
+        let (origin, direction) = (lanes.turn(s, o), lanes.turn(s, d));
+        lanes.floats[float::ORIGIN..float::ORIGIN + 3].copy_from_slice(&origin);
+        lanes.floats[float::SHEAR] = s.div(direction[0], per_t);
+        lanes.floats[float::SHEAR + 1] = s.div(direction[1], per_t);
         lanes.words[word::SLOT] = slot;
         let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
         lanes.floats[float::LIMIT] = s.add(high, spare(s, high));
@@ -200,7 +173,7 @@ impl<S: Simd> Ready<S> {
     pub(super) fn new(
         s: S,
         m: S::M,
-        rays: &[f32],
+        rays: &[Ray],
         vertices: &[[f32; 4]],
         slot: S::U,
         face: [S::U; 3],
@@ -216,7 +189,7 @@ impl<S: Simd> Ready<S> {
     pub(super) fn from_hull(
         s: S,
         m: S::M,
-        rays: &[f32],
+        rays: &[Ray],
         vertices: &[[f32; 4]],
         hull: &[HullFace],
         slot: S::U,
@@ -258,17 +231,16 @@ impl<S: Simd> Ready<S> {
     pub(super) fn from_faces(
         s: S,
         m: S::M,
-        rays: &[f32],
+        rays: &[Ray],
         vertices: &[[f32; 4]],
-        faces: &[u32],
+        faces: &[TetFace],
         slot: S::U,
         face: S::U,
     ) -> (Self, S::M) {
-        let row = s.shl_u::<FACE_WORDS>(face);
-        const VERTEX: u32 = std::mem::offset_of!(TetFace, vertex) as u32 / 4;
-        const TET: u32 = std::mem::offset_of!(TetFace, tet) as u32 / 4;
-        const OPPOSITE: u32 = std::mem::offset_of!(TetFace, opposite) as u32 / 4;
-        let vertex = three!(|k| column_u(s, m, faces, row, VERTEX + k));
+        let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).expect("a face is eight words");
+        // The fields of a `TetFace`, in their order.
+        let [v0, v1, v2, _, above, below, apex_above, apex_below] = s.rows8(m, faces, face);
+        let vertex = [v0, v1, v2];
         let mut ready = Ready::new(s, m, rays, vertices, slot, vertex);
         let lanes = &mut ready.lanes;
         let corner = three!(|i| lanes.corner(i));
@@ -295,11 +267,9 @@ impl<S: Simd> Ready<S> {
         let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
         let able = s.and(s.or(up, down), s.and(behind, near));
         // The face turns around for those that go against its normal.
-        let side = s.select_u(up, row, s.add_u(row, s.splat_u(1)));
-        lanes.words[word::TET] = column_u(s, m, faces, side, TET);
-        lanes.words[word::APEX] = column_u(s, m, faces, side, OPPOSITE);
+        lanes.words[word::TET] = s.select_u(up, above, below);
+        lanes.words[word::APEX] = s.select_u(up, apex_above, apex_below);
         lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(crate::layout::FACE_BIT));
-        let [_, v1, v2] = vertex;
         lanes.words[word::FACE + 1] = s.select_u(up, v1, v2);
         lanes.words[word::FACE + 2] = s.select_u(up, v2, v1);
         for k in [float::X, float::Y, float::DEPTH] {

@@ -7,10 +7,10 @@
 //! `tet_flood` visits everything that the line can touch instead.
 
 use super::line::{Line, Projected, Sign};
-use super::query::{Count, Query};
+use super::query::{Count, Named, Query};
 use super::records::Entered;
 use crate::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
-use crate::object::Records;
+use crate::object::{ObjectView, Records};
 
 /// The parts of a tet leaf that a walk reads, and what it knows about the ray.
 pub(crate) struct TetSpace<'a> {
@@ -23,6 +23,8 @@ pub(crate) struct TetSpace<'a> {
     pub(crate) line: &'a Line,
     /// Bound on the error of projected coordinates within the leaf's box.
     pub(crate) error: f64,
+    /// Of the object's triangles, in leaf order.
+    ids: &'a [u32],
 }
 
 /// How a walk ended.
@@ -46,16 +48,19 @@ pub(crate) struct Place {
 }
 
 impl<'a> TetSpace<'a> {
-    pub(crate) fn new(
-        leaf: &'a TetLeaf,
-        records: Records<'a>,
-        vertices: &'a [TetVertex],
-        faces: &'a [TetFace],
-        hull: &'a [HullFace],
-        line: &'a Line,
-    ) -> Self {
-        let error = Line::projection_error(line.reach_of_box(leaf.lower, leaf.upper));
-        TetSpace { leaf, records, vertices, faces, hull, line, error }
+    /// A tet leaf of an object.
+    pub(crate) fn new(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> Self {
+        let leaf = &object.tet_leaves[leaf as usize];
+        TetSpace {
+            leaf,
+            records: object.records,
+            vertices: object.tet_vertices,
+            faces: object.tet_faces,
+            hull: &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize],
+            ids: object.triangle_ids,
+            line,
+            error: Line::projection_error(line.reach_of_box(leaf.lower, leaf.upper)),
+        }
     }
 
     #[inline(always)]
@@ -77,7 +82,7 @@ impl<'a> TetSpace<'a> {
     pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         match self.line.crossing(corners) {
-            Some(crossing) => query.offer(face.triangle, crossing),
+            Some(crossing) => query.offer(Named::id(face.triangle, self.ids), crossing),
             None => false,
         }
     }

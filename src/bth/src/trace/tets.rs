@@ -87,7 +87,5 @@ pub(crate) fn leaf_of_face(object: &ObjectView<'_>, row: u32) -> u32 {
 }
 
 pub(crate) fn space<'a>(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> TetSpace<'a> {
-    let leaf = &object.tet_leaves[leaf as usize];
-    let hull = &object.hull_faces[leaf.first_hull as usize..][..leaf.hulls as usize];
-    TetSpace::new(leaf, object.records, object.tet_vertices, object.tet_faces, hull, line)
+    TetSpace::new(object, leaf, line)
 }

@@ -2,6 +2,7 @@
 
 use super::Report;
 use super::exact::{is_zero_area, side};
+use super::seen::Seen;
 use crate::check::Derived;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
@@ -10,7 +11,7 @@ use std::cmp::Ordering;
 use std::mem::offset_of;
 
 pub(super) fn check(view: &ObjectView, report: &mut Report) -> Result<()> {
-    let mut seen = vec![0u8; view.header.triangles as usize];
+    let mut seen = Seen::default();
     tree(view, &mut seen)?;
     for (row, leaf) in view.tet_leaves.iter().enumerate() {
         tet_leaf(view, row, leaf)?;
@@ -23,11 +24,6 @@ pub(super) fn check(view: &ObjectView, report: &mut Report) -> Result<()> {
     report.compared_with_source += u32::from(!view.triangles.is_empty());
     Ok(())
 }
-
-/// In `seen`: the triangle lies in a leaf or is a constrained face.
-const HOME: u8 = 1;
-/// In `seen`: the triangle lies in the subtree beside a tet leaf.
-const SUBTREE: u8 = 2;
 
 #[derive(Clone, Copy)]
 struct Bounds([f32; 3], [f32; 3]);
@@ -57,7 +53,7 @@ struct Visit {
 }
 
 /// Checks that boxes contain what is below and that each triangle occurs once, as in the source.
-fn tree(view: &ObjectView, seen: &mut [u8]) -> Result<()> {
+fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
     let visit = |code, parent, beside| {
         Child::from_code(code).map(|child| Visit { child, parent, beside, content: Bounds::EMPTY })
     };
@@ -169,7 +165,7 @@ fn leaf_triangle(
     row: usize,
     corners: [[f32; 3]; 3],
     visit: &mut Visit,
-    seen: &mut [u8],
+    seen: &mut Seen,
     in_subtree: &mut [u32],
 ) -> Result<()> {
     corners.into_iter().for_each(|p| visit.content.add(p));
@@ -178,7 +174,7 @@ fn leaf_triangle(
     if let Some(tet_leaf) = visit.beside {
         let leaf = &view.tet_leaves[tet_leaf as usize];
         let here = leaf.first_face..leaf.first_face + leaf.faces;
-        if !here.contains(&view.triangle_homes[id as usize]) || seen[id as usize] & SUBTREE != 0 {
+        if !here.contains(&view.triangle_homes[id as usize]) || !seen.mark(id, Seen::SUBTREE) {
             let expected = format!("a triangle of tet leaf {tet_leaf}, once");
             return Err(Error::within(
                 Code::Coverage,
@@ -188,7 +184,6 @@ fn leaf_triangle(
                 format!("triangle {id}"),
             ));
         }
-        seen[id as usize] |= SUBTREE;
         in_subtree[tet_leaf as usize] += 1;
     } else {
         once(id, seen, kind::TRIANGLE_IDS, at)?;
@@ -197,7 +192,7 @@ fn leaf_triangle(
 }
 
 /// A constrained face, by its row.
-fn tet_face(view: &ObjectView, row: u32, seen: &mut [u8], content: &mut Bounds) -> Result<()> {
+fn tet_face(view: &ObjectView, row: u32, seen: &mut Seen, content: &mut Bounds) -> Result<()> {
     let face = &view.tet_faces[row as usize];
     let corners = face.vertex.map(|v| view.tet_vertices[v as usize].position);
     corners.into_iter().for_each(|p| content.add(p));
@@ -206,13 +201,12 @@ fn tet_face(view: &ObjectView, row: u32, seen: &mut [u8], content: &mut Bounds) 
     same_as_source(view, face.triangle, corners, Code::FaceSource, kind::TET_FACES, at)
 }
 
-fn once(id: u32, seen: &mut [u8], section: u32, at: u64) -> Result<()> {
-    if seen[id as usize] & HOME != 0 {
-        let found = format!("triangle {id} again");
-        return Err(Error::within(Code::Coverage, section, at, "each triangle once", found));
+fn once(id: u32, seen: &mut Seen, section: u32, at: u64) -> Result<()> {
+    if seen.mark(id, Seen::HOME) {
+        return Ok(());
     }
-    seen[id as usize] |= HOME;
-    Ok(())
+    let found = format!("triangle {id} again");
+    Err(Error::within(Code::Coverage, section, at, "each triangle once", found))
 }
 
 fn same_as_source(
@@ -246,14 +240,15 @@ fn source(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
 }
 
 /// Checks that as many triangles are left out as the object says, and the right ones.
-fn dropped(view: &ObjectView, seen: &[u8]) -> Result<()> {
-    let left_out = seen.iter().filter(|s| **s & HOME == 0).count();
+fn dropped(view: &ObjectView, seen: &Seen) -> Result<()> {
+    let left_out = view.header.triangles as usize - seen.count(Seen::HOME);
     if left_out != view.header.dropped as usize {
         let at = offset_of!(Object, dropped) as u64;
         let expected = format!("{} triangles in no leaf", view.header.dropped);
         return Err(Error::within(Code::Coverage, kind::OBJECT, at, expected, left_out.to_string()));
     }
-    for id in (0..seen.len()).filter(|id| seen[*id] & HOME == 0) {
+    // Without kept triangles there is nothing to compare with, and nothing to count to.
+    for id in (0..view.triangles.len()).filter(|id| !seen.is(*id as u32, Seen::HOME)) {
         if source(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
             let found = format!("triangle {id}, which has an area, in no leaf");
             let expected = "triangles of zero area to be left out";

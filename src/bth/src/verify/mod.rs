@@ -3,6 +3,7 @@
 
 mod exact;
 mod geometry;
+mod seen;
 
 use crate::error::{Code, Error};
 use crate::file::{File, hash128};

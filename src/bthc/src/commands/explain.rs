@@ -2,27 +2,57 @@
 
 use super::with_threads;
 use crate::args::Explain;
+use crate::explain::{Explained, MeasuredNode, measure, picture};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::costs::{self, Verdict};
 use bth_compile::mesh::Keep;
-use bth_compile::{bvh, marks, mesh, pipeline};
-use serde_json::json;
+use bth_compile::{Error, Monitor, bvh, marks, mesh, pipeline, tets, write};
+use serde_json::{Value, json};
 use std::cmp::Reverse;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
-    let mut options = pipeline::Options::default();
-    args.selection.apply(&mut options);
+    let mut options = pipeline::Options { geometry: false, ..pipeline::Options::default() };
+    args.selection.apply(&mut options)?;
     let progress = Progress::new(args.json);
-    let (triangles, choice, report) = with_threads(args.threads, || -> bth_compile::Result<_> {
+    let ((mesh, tree), (choice, report)) = with_threads(args.threads, || -> bth_compile::Result<_> {
         let (mesh, _) = mesh::import(&args.model, Keep::None, &progress)?;
         let (tree, _) = bvh::build(&mesh, &options.bvh, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
-        let (choice, report) = costs::choose(&mesh, &tree, &marks, &options.costs, &progress)?;
-        Ok((mesh.triangles.len(), choice, report))
+        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, options.storage(), &progress)?;
+        Ok(((mesh, tree), chosen))
     })??;
+    let (mut measured, mut brightest) = (None, None);
+    if args.measure || args.picture.is_some() {
+        let (built, _) = with_threads(args.threads, || {
+            tets::build(&mesh, &tree, &choice.chosen, &options.tets, &progress)
+        })??;
+        let scene = |built: &[(u32, tets::TetMesh)]| -> Result<bth::Scene, Failure> {
+            Ok(bth::from_bytes(&pipeline::assemble(&mesh, &tree, built, &options, &progress)?.bytes)?)
+        };
+        let explained = Explained {
+            mesh: &mesh,
+            tree: &tree,
+            choice: &choice,
+            costs: &options.costs,
+            built: &built,
+            compiled: &scene(&built)?,
+            plain: &scene(&[])?,
+        };
+        if args.measure {
+            progress.stage("measure", None);
+            let most = if args.top == 0 { usize::MAX } else { args.top };
+            measured = Some(measure(&explained, most, || progress.cancelled()).ok_or(Error::Cancelled)?);
+        }
+        if let Some(path) = &args.picture {
+            progress.stage("picture", None);
+            let (png, most) = picture(&explained)?;
+            write::write_atomically(path, &png)?;
+            brightest = Some(most);
+        }
+    }
     drop(progress);
 
     let mut verdicts: Vec<&Verdict> = choice.verdicts.iter().collect();
@@ -32,33 +62,71 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         verdicts.truncate(args.top);
     }
     if args.json {
-        let report = json!({"triangles": triangles, "examined": examined, "chosen": choice.chosen.len(),
-            "report": report, "nodes": verdicts});
+        let mut report = json!({"triangles": mesh.triangles.len(), "examined": examined,
+            "chosen": choice.chosen.len(), "report": report, "nodes": verdicts});
+        if let (Some(nodes), Value::Object(report)) = (&measured, &mut report) {
+            report.insert("measured".to_owned(), json!(nodes));
+        }
         output::json(&report)?;
-    } else {
-        let note = format!(
-            "{} triangles; {} of {} examined nodes chosen, the {} largest shown; costs in nanoseconds a ray\n",
-            count(triangles as u64),
-            count(choice.chosen.len() as u64),
-            count(examined as u64),
-            count(verdicts.len() as u64),
-        );
-        output::text(&format!("{}{note}", table(&verdicts)))?;
+        return Ok(());
     }
-    Ok(())
+    let mut text = table(&verdicts);
+    text.push_str(&format!(
+        "{} triangles; {} of {} examined nodes chosen, the {} largest shown; costs in nanoseconds a ray\n",
+        count(mesh.triangles.len() as u64),
+        count(choice.chosen.len() as u64),
+        count(examined as u64),
+        count(verdicts.len() as u64),
+    ));
+    if let Some(nodes) = &measured {
+        text.push_str(&measured_table(nodes));
+    }
+    if let (Some(path), Some(most)) = (&args.picture, brightest) {
+        text.push_str(&format!(
+            "wrote {}: left what triangles are in (green: tetrahedra; blue-grey: a BVH that is cheaper; grey: too few \
+             triangles; orange: bad contacts), right what a bounce costs, to {most:.0} ns\n",
+            path.display()
+        ));
+    }
+    Ok(output::text(&text)?)
 }
 
 fn table(verdicts: &[&Verdict]) -> String {
     let mut table = Table::default();
-    table.row(["node", "triangles", "steps", "cost tets", "cost BVH", "decision"]);
+    table.row(["node", "triangles", "steps", "cost tets", "cost BVH", "gain", "decision"]);
     for v in verdicts {
         table.row([
             &v.node.to_string(),
             &count(v.count.into()),
             &format!("{:.1}", v.n_avg),
             &format!("{:.1}", v.cost_tet),
-            &format!("{:.1}", v.cost_sah),
+            &format!("{:.1}", v.cost_bvh),
+            &format!("{:.2}", v.gain),
             &v.decision.to_string(),
+        ]);
+    }
+    table.render()
+}
+
+/// Predicted beside measured.
+fn measured_table(nodes: &[MeasuredNode]) -> String {
+    if nodes.is_empty() {
+        return "no node became a tet leaf, so there is nothing to measure\n".to_owned();
+    }
+    let mut table = Table::default();
+    table.row(["node", "triangles", "steps", "counted", "with tets", "measured", "BVH alone", "measured"]);
+    // Where there was no prediction there is none to show.
+    let number = |x: f64| if x.is_nan() { "-".to_owned() } else { format!("{x:.1}") };
+    for n in nodes {
+        table.row([
+            &n.node.to_string(),
+            &count(n.triangles.into()),
+            &number(n.steps[0]),
+            &number(n.steps[1]),
+            &number(n.cost_tet[0]),
+            &number(n.cost_tet[1]),
+            &number(n.cost_bvh[0]),
+            &number(n.cost_bvh[1]),
         ]);
     }
     table.render()

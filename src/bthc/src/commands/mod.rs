@@ -1,13 +1,21 @@
 //! The subcommands.
 
+mod cache;
+mod calibrate;
 mod compile;
+mod deliver;
+mod depfile;
+mod diff;
+mod dry_run;
 mod explain;
 mod import;
 mod info;
+mod jobs;
 mod marks;
 mod scene;
 mod trace;
 mod verify;
+mod watch;
 
 use crate::args::{Args, Command};
 use crate::failure::Failure;
@@ -19,10 +27,13 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
     crate::progress::listen_for_interrupts();
     match command {
         Command::Compile(args) => compile::run(&args),
+        Command::Cache(args) => cache::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Import(args) => import::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Explain(args) => explain::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
         Command::Marks(args) => marks::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Completions(args) => {

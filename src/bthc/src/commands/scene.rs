@@ -1,21 +1,21 @@
 //! `bthc compile` of scenes: glTF files and manifests.
 
-use super::compile::{nonzero, note};
-use super::with_threads;
-use crate::args::Compile;
+use super::compile::{Job, Setting, nonzero, note};
+use super::deliver::{Done, Target, deliver};
+use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
-use crate::output;
-use crate::progress::Progress;
 use crate::table::{Table, bytes, count, seconds};
-use bth_compile::scene::{self, SceneReport};
-use bth_compile::write;
+use bth_compile::Monitor;
+use bth_compile::cached::{self, Cache};
+use bth_compile::pipeline::Foreseen;
+use bth_compile::scene::{self, ImportReport, Keep, Place, SceneReport};
 use bth_scene::Manifest;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Whether a compilation is one of a scene.
-pub(super) fn is_scene(args: &Compile) -> bool {
-    is_manifest(&args.model) || is_gltf(&args.model) && !args.flatten
+/// Whether a model is compiled as a scene.
+pub(super) fn is_scene(model: &Path, args: &Compile) -> bool {
+    is_manifest(model) || is_gltf(model) && !args.flatten
 }
 
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {
@@ -36,32 +36,96 @@ pub(super) fn folder(scene: &Path) -> &Path {
     scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Compiles a scene.
-pub(super) fn compile(args: &Compile, path: &Path) -> Result<(), Failure> {
-    let progress = Progress::new(args.quiet || args.json);
-    let (manifest, import) = if is_manifest(&args.model) {
-        (bth_scene::read(&args.model)?, None)
-    } else {
-        let name = args.model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let (manifest, report) = scene::import(&args.model, &name, &args.gltf.options(), &progress)?;
-        (manifest, Some(report))
-    };
-    let (compiled, report) = with_threads(args.threads, || {
-        scene::compile(&manifest, folder(&args.model), &args.model, &args.options(), &progress)
-    })??;
-    write::write_atomically(path, &compiled.bytes)?;
-    drop(progress);
-    if args.json {
-        let output = path.to_string_lossy();
-        output::json(&json!({"output": output, "scene": report, "import": import}))?;
-    } else if !args.quiet {
-        output::text(&summary(path, &manifest, &report))?;
+/// Reads a manifest, or makes one from a glTF file.
+fn read(
+    model: &Path,
+    gltf: &Gltf,
+    monitor: &dyn Monitor,
+) -> Result<(Manifest, Option<ImportReport>), Failure> {
+    if is_manifest(model) {
+        return Ok((bth_scene::read(model)?, None));
     }
-    Ok(())
+    let name = model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let (manifest, report) = scene::import(model, &name, &gltf.options(), monitor)?;
+    Ok((manifest, Some(report)))
+}
+
+/// Compiles a scene.
+pub(super) fn compile(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -> Result<Done, Failure> {
+    let (manifest, import) = read(&job.model, &setting.args.gltf, monitor)?;
+    let cache = super::compile::cache(setting, &job.model);
+    let place = Place { folder: folder(&job.model), name: &job.model };
+    if let Some(shard) = setting.args.jobs.shard {
+        let built = scene::compile_objects(&manifest, place, &setting.options, &cache, shard, monitor)?;
+        return Ok(shard_done(job, &cache, built));
+    }
+    let keep = Keep {
+        whole: job.target == Target::Cache,
+        needed: &|record| job.target.needs(record, setting.store.as_ref()),
+    };
+    let outcome = scene::compile_cached(&manifest, place, &setting.options, &cache, keep, monitor)?;
+    let mut done = deliver(setting, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
+    done.json["scene"] = outcome.report;
+    done.json["import"] = json!(import);
+    if let Some(report) = &outcome.built {
+        done.text = format!("{}{}", summary(&manifest, report), done.text);
+    }
+    Ok(done)
+}
+
+/// What is said of part of a scene's objects.
+fn shard_done(job: &Job, cache: &Cache<'_>, built: u64) -> Done {
+    let line = format!("{}  {} objects  compiled into the cache", job.model.display(), count(built));
+    let log = cache.log();
+    Done {
+        json: json!({
+            "model": job.model.to_string_lossy(),
+            "objects": built,
+            "cache": {"hits": log.hits, "misses": log.misses},
+        }),
+        text: format!("{line}\n"),
+        line,
+    }
+}
+
+/// What a compilation of a scene would do.
+pub(super) fn foresee(
+    setting: &Setting<'_>,
+    job: &Job,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Foreseen, Failure> {
+    let (manifest, _) = read(&job.model, &setting.args.gltf, monitor)?;
+    let place = Place { folder: folder(&job.model), name: &job.model };
+    Ok(scene::foresee(&manifest, place, &setting.options, cache, monitor)?)
+}
+
+/// All files that a scene is made from.
+pub(super) fn inputs(model: &Path) -> Result<Vec<PathBuf>, Failure> {
+    if is_gltf(model) {
+        return Ok(cached::files(model)?);
+    }
+    Ok(files(&bth_scene::read(model)?, model)?)
+}
+
+fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>> {
+    let mut files = vec![model.to_owned()];
+    let mut paths: Vec<&str> = manifest.objects.iter().map(|o| o.source.path()).collect();
+    paths.sort_unstable();
+    paths.dedup();
+    for path in paths {
+        // Without a `./` before it: build systems compare names.
+        let path = model.parent().unwrap_or(Path::new("")).join(path);
+        // An object that nobody sees may lack its file.
+        if path != *model && path.exists() {
+            files.extend(cached::files(&path)?);
+        }
+    }
+    Ok(files)
 }
 
 /// The report for people.
-fn summary(path: &Path, manifest: &Manifest, report: &SceneReport) -> String {
+fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     let mut stages = Table::default();
     for stage in &report.seconds {
         stages.row([stage.name, &seconds(stage.seconds)]);
@@ -87,5 +151,5 @@ fn summary(path: &Path, manifest: &Manifest, report: &SceneReport) -> String {
     facts.row(["file", &bytes(report.bytes)]);
     facts.row(["traversal reads", &bytes(report.resident_bytes)]);
     let note = note(report.worker.as_ref());
-    format!("{}\n{}{note}\nwrote {}\n", stages.render(), facts.render(), path.display())
+    format!("{}\n{}{note}\n", stages.render(), facts.render())
 }

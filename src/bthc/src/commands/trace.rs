@@ -1,11 +1,15 @@
-//! `bthc trace`: the rays of a file, traced.
+//! `bthc trace`: the rays of a file, traced, or with `--exact` compared with every triangle.
 
 use super::with_threads;
 use crate::args::Trace;
 use crate::failure::Failure;
+use crate::progress::{self, Progress};
 use crate::table::count;
 use crate::{output, ray_files};
-use bth::rays::Hit;
+use bth::Scene;
+use bth::rays::{Hit, Ray};
+use bth_compile::{Error, Monitor};
+use bth_oracle::World;
 use rayon::prelude::*;
 use serde_json::json;
 use std::time::Instant;
@@ -21,24 +25,26 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
 
     let (hits, seconds) = with_threads(args.threads, || {
         let start = Instant::now();
-        let hits = if args.any {
+        let hits = if args.exact {
+            exact(&scene, &rays, args)?
+        } else if args.any {
             let mut found = vec![false; rays.len()];
             let tasks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).enumerate();
             tasks.for_each(|(i, (rays, found))| scene.any_batch(rays, hint(i, rays.len()), found));
-            ray_files::answers(&found)
+            found.into_iter().map(ray_files::answer).collect()
         } else {
             let mut hits = vec![Hit::MISS; rays.len()];
             let tasks = rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).enumerate();
             tasks.for_each(|(i, (rays, hits))| scene.nearest_batch(rays, hint(i, rays.len()), hits));
             hits
         };
-        (hits, start.elapsed().as_secs_f64())
-    })?;
+        Ok::<_, Failure>((hits, start.elapsed().as_secs_f64()))
+    })??;
 
     bth_compile::write::write_atomically(&args.output, &ray_files::hits(&hits))?;
     let found = hits.iter().filter(|h| h.is_hit()).count();
     if args.json {
-        let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "hints": from.is_some()});
+        let report = json!({"rays": rays.len(), "hits": found, "seconds": seconds, "any": args.any, "hints": from.is_some(), "exact": args.exact});
         output::json(&report)?;
     } else {
         let rate = rays.len() as f64 / seconds.max(1e-9) / 1e6;
@@ -49,4 +55,21 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+/// Every ray against every triangle.
+fn exact(scene: &Scene, rays: &[Ray], args: &Trace) -> Result<Vec<Hit>, Failure> {
+    progress::listen_for_interrupts();
+    let progress = Progress::new(args.json);
+    let world = World::new(scene);
+    progress.stage("trace exactly", Some(rays.len() as u64));
+    let one = |ray: &Ray| {
+        if progress.cancelled() {
+            return Err(Error::Cancelled.into());
+        }
+        let hit = if args.any { ray_files::answer(world.any(ray)) } else { world.hit(ray) };
+        progress.advance(1);
+        Ok(hit)
+    };
+    rays.par_iter().map(one).collect()
 }

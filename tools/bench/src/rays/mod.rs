@@ -92,11 +92,7 @@ pub struct Options {
 pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     let bounds = finder.model.bounds();
     let diagonal = bounds.diagonal();
-    let view = options.view.unwrap_or_else(|| view::automatic(finder, diagonal));
-    let shot = match view {
-        View::Outside => view::outside(finder, &bounds, options.size),
-        View::Inside => view::inside(finder, &bounds, options.size),
-    };
+    let (view, shot) = shoot(finder, options);
     let light = match view {
         View::Outside => bounds.center() + DVec3::new(0.4, 1.1, 0.9) * diagonal,
         View::Inside => shot.camera.eye,
@@ -118,6 +114,25 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
         set("miss", false, false, miss, None),
     ];
     (view, sets.into_iter().map(|s| s.thinned(options.most)).collect())
+}
+
+/// The rays of the cameras that see the whole model (or stand in it) and the surface close by, in tiles of 4×4 pixels, and
+/// from where the model is seen.
+pub fn cameras(finder: &Finder<'_>, options: &Options) -> (View, [Vec<Ray>; 2]) {
+    let (view, shot) = shoot(finder, options);
+    let close = view::close_up(finder, finder.model.bounds().diagonal(), &shot).rays();
+    (view, [shot.rays, close])
+}
+
+/// What the camera sees.
+fn shoot(finder: &Finder<'_>, options: &Options) -> (View, Shot) {
+    let bounds = finder.model.bounds();
+    let view = options.view.unwrap_or_else(|| view::automatic(finder, bounds.diagonal()));
+    let shot = match view {
+        View::Outside => view::outside(finder, &bounds, options.size),
+        View::Inside => view::inside(finder, &bounds, options.size),
+    };
+    (view, shot)
 }
 
 /// A ray in single precision; the direction is a unit vector.

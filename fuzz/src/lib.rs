@@ -1,0 +1,107 @@
+//! What the fuzz targets share.
+
+use bth::rays::{Hit, Ray, Surface};
+use bth::{Isa, Scene};
+use bth_compile::Silent;
+use bth_compile::mesh::{Keep, import_bytes};
+use std::path::Path;
+
+/// Small generator of pseudo-random numbers (SplitMix64), so that an input always does the same.
+struct Rng(u64);
+
+impl Rng {
+    /// Seeded by the input (FNV-1a).
+    fn of(bytes: &[u8]) -> Self {
+        Rng(bytes
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3)))
+    }
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+    fn below(&mut self, n: u64) -> u64 {
+        self.bits() % n
+    }
+    fn unit(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
+    }
+}
+
+/// Opens a file; what passes the checks is traced with 64 rays, at some times, with the instruction set that the
+/// input's bytes choose. Whatever the answers: no panic, no end beyond the time limit, nothing read out of bounds.
+pub fn open_and_trace(bytes: &[u8]) {
+    let Ok(mut scene) = bth::from_bytes(bytes) else { return };
+    let mut rng = Rng::of(bytes);
+    let available: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
+    available[rng.below(available.len() as u64) as usize].choose().expect("it is available");
+    trace(&scene, &mut rng);
+    if scene.description().is_some() {
+        for seconds in [0.3, -1.0, 1.5, 1e300, f64::NAN] {
+            if scene.set_seconds(seconds).is_ok() {
+                trace(&scene, &mut rng);
+            }
+        }
+    }
+}
+
+/// 64 rays: one by one, as a batch, with and without hints, nearest and any hit.
+fn trace(scene: &Scene, rng: &mut Rng) {
+    let rays: Vec<Ray> = (0..64).map(|_| ray(scene, rng)).collect();
+    let from: Vec<Surface> = rays
+        .iter()
+        .map(|_| Surface { instance: rng.below(3) as u32, triangle: rng.below(40) as u32 })
+        .collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let mut found = vec![false; rays.len()];
+    scene.nearest_batch(&rays, None, &mut hits);
+    scene.nearest_batch(&rays, Some(&from), &mut hits);
+    scene.any_batch(&rays, Some(&from), &mut found);
+    scene.any_batch(&rays, None, &mut found);
+    for (ray, from) in rays.iter().zip(&from).take(8) {
+        scene.nearest(ray, *from);
+        scene.any(ray, Surface::NONE);
+        scene.nearest_counted(ray, *from);
+    }
+}
+
+/// A ray about an instance: often between points of its box, along axes, from corners; also without sense.
+fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
+    let instance = rng.below(u64::from(scene.instance_count().max(1))) as u32;
+    let bounds = (instance < scene.instance_count()).then(|| scene.instance_bounds(instance)).flatten();
+    let (lower, upper) = bounds.unwrap_or(([-1.0; 3], [1.0; 3]));
+    let mut point = |spread: f32| {
+        let s = [(); 3].map(|()| match rng.below(4) {
+            0 => rng.below(2) as f32,
+            1 => 0.5,
+            _ => 0.5 + (rng.unit() - 0.5) * spread,
+        });
+        [0, 1, 2].map(|k| lower[k] * (1.0 - s[k]) + upper[k] * s[k])
+    };
+    let (origin, target) = (point(4.0), point(1.0));
+    let mut direction = [0, 1, 2].map(|k| target[k] - origin[k]);
+    if rng.below(4) == 0 {
+        let axis = rng.below(3) as usize;
+        direction = [0.0, -0.0, 0.0];
+        direction[axis] = if rng.below(2) == 0 { -1.0 } else { 1e-30 };
+    }
+    let tmin = [0.0, 0.0, 0.5, -1.0, f32::NEG_INFINITY, f32::NAN][rng.below(6) as usize];
+    let tmax = [f32::INFINITY, 1.0, f32::INFINITY, f32::MAX, 1e-30, f32::NAN][rng.below(6) as usize];
+    Ray { origin, tmin, direction, tmax }
+}
+
+/// Imports a model of this format; a mesh that comes out keeps the promises of its type.
+pub fn import(format: &str, bytes: &[u8]) {
+    let name = Path::new("/nonexistent/fuzz/model").with_extension(format);
+    let Ok((mesh, report)) = import_bytes(&name, bytes, Keep::All, &Silent) else { return };
+    assert_eq!(report.triangles, mesh.triangles.len() as u64);
+    assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
+    assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
+    if let Some(attributes) = &mesh.attributes {
+        let rows = attributes.normals.len().max(attributes.uvs.len());
+        assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));
+        assert_eq!(attributes.corners.len(), mesh.triangles.len());
+    }
+}

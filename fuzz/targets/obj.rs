@@ -1,0 +1,3 @@
+//! Reading OBJ files.
+#![no_main]
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| bth_fuzz::import("obj", bytes));

@@ -1,0 +1,91 @@
+//! Where things lie in the folder of a store.
+
+use crate::Digest;
+use std::path::{Path, PathBuf};
+
+/// The folders of a store.
+#[derive(Clone, Debug)]
+pub(crate) struct Files {
+    root: PathBuf,
+}
+
+/// What says to backup programs that a folder can be made again (<https://bford.info/cachedir/>).
+const TAG: &str = "Signature: 8a477f597d28d172789f06886806bc55\n\
+    # This folder is a cache of compiled models (bthc); it may be deleted at any time.\n";
+
+impl Files {
+    /// The files of a store; its folders are made.
+    ///
+    /// # Errors
+    /// When they cannot be.
+    pub(crate) fn open(folder: &Path) -> std::io::Result<Self> {
+        let files = Self { root: folder.join("v1") };
+        for name in ["keys", "blobs", "locks", "last"] {
+            std::fs::create_dir_all(files.root.join(name))?;
+        }
+        let tag = folder.join("CACHEDIR.TAG");
+        if !tag.exists() {
+            // A store without the tag is only backed up for nothing.
+            let _ = std::fs::write(tag, TAG);
+        }
+        Ok(files)
+    }
+
+    /// The record of a key.
+    pub(crate) fn key(&self, id: &Digest) -> PathBuf {
+        self.sharded("keys", id)
+    }
+
+    /// A content.
+    pub(crate) fn blob(&self, digest: &Digest) -> PathBuf {
+        self.sharded("blobs", digest)
+    }
+
+    /// The lock of who works on a key.
+    pub(crate) fn lock(&self, id: &Digest) -> PathBuf {
+        self.root.join("locks").join(id.hex())
+    }
+
+    /// The last key of a source.
+    pub(crate) fn last(&self, subject: &Digest) -> PathBuf {
+        self.root.join("last").join(subject.hex())
+    }
+
+    /// Counters.
+    pub(crate) fn tally(&self) -> PathBuf {
+        self.root.join("tally")
+    }
+
+    /// All files below `keys`, `blobs`, `locks` or `last`.
+    pub(crate) fn below(&self, name: &str) -> Vec<std::fs::DirEntry> {
+        let mut found = Vec::new();
+        let mut folders = vec![self.root.join(name)];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                match entry.file_type() {
+                    Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                    Ok(_) => found.push(entry),
+                    // It went away meanwhile.
+                    Err(_) => {}
+                }
+            }
+        }
+        found
+    }
+
+    /// Spread over folders by the first two digits, since some file systems are slow with many files in one.
+    fn sharded(&self, name: &str, digest: &Digest) -> PathBuf {
+        let hex = digest.hex();
+        self.root.join(name).join(&hex[..2]).join(hex)
+    }
+}
+
+/// The digest that a file is named by.
+pub(crate) fn named(path: &Path) -> Option<Digest> {
+    Digest::parse(path.file_name()?.to_str()?)
+}
+
+/// Removes a file; whether it is gone by our doing. Read-only files need no more rights than others, but on Windows.
+pub(crate) fn remove(path: &Path) -> bool {
+    std::fs::remove_file(path).is_ok()
+}

@@ -1,0 +1,54 @@
+//! A second store behind the first, shared by machines: looked into on a miss, filled on a build.
+
+use std::io::{Error, ErrorKind, Result};
+use std::path::PathBuf;
+
+/// A place that keeps named bytes. Names are such as `keys/ab/abcd…`; what has a name never changes, and who
+/// reads checks what was read.
+pub trait Remote: Send + Sync {
+    /// The bytes of a name, if it is there.
+    ///
+    /// # Errors
+    /// When the place cannot be reached.
+    fn get(&self, name: &str) -> Result<Option<Vec<u8>>>;
+    /// Keeps bytes under a name; `over` replaces what is there.
+    ///
+    /// # Errors
+    /// When the place cannot be reached or is full.
+    fn put(&self, name: &str, bytes: &[u8], over: bool) -> Result<()>;
+    /// What to call it in messages.
+    fn name(&self) -> String;
+}
+
+/// A folder that machines share. It needs no locks: files are written under another name and then linked.
+#[derive(Clone, Debug)]
+pub struct Folder(pub PathBuf);
+
+impl Remote for Folder {
+    fn get(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        match std::fs::read(self.0.join(name)) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(e) if e.kind() == ErrorKind::NotFound && self.0.is_dir() => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    fn put(&self, name: &str, bytes: &[u8], over: bool) -> Result<()> {
+        let path = self.0.join(name);
+        if !self.0.is_dir() {
+            return Err(Error::new(ErrorKind::NotFound, "the folder is not there"));
+        }
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        if over {
+            // Gone already or not ours to remove: the next line tells.
+            let _ = std::fs::remove_file(&path);
+        }
+        crate::atomic::write_once(&path, bytes).map(|_| ())
+    }
+
+    fn name(&self) -> String {
+        self.0.display().to_string()
+    }
+}

@@ -1,0 +1,77 @@
+//! A shared store in an S3-compatible object store.
+
+use crate::Remote;
+use object_store::aws::{AmazonS3, AmazonS3Builder};
+use object_store::path::Path;
+use object_store::{ClientOptions, ObjectStoreExt, RetryConfig};
+use std::io::{Error, Result};
+use std::time::Duration;
+use tokio::runtime::Runtime;
+
+/// Time for one try, and for all tries together: who is offline goes on without soon.
+const CONNECT: Duration = Duration::from_secs(5);
+const TRIES: usize = 2;
+const ALL_TRIES: Duration = Duration::from_secs(30);
+
+/// A bucket, or part of one.
+#[derive(Debug)]
+pub struct S3 {
+    url: String,
+    prefix: Path,
+    bucket: AmazonS3,
+    runtime: Runtime,
+}
+
+impl S3 {
+    /// A place such as `s3://bucket/prefix`; how to reach it stands in the variables `AWS_ACCESS_KEY_ID`,
+    /// `AWS_SECRET_ACCESS_KEY`, `AWS_REGION`, `AWS_ENDPOINT_URL` and `AWS_ALLOW_HTTP`. Nothing is sent yet.
+    ///
+    /// # Errors
+    /// When it is no such place, or a variable is none.
+    pub fn open(url: &str) -> Result<Self> {
+        let prefix = url.strip_prefix("s3://").and_then(|rest| rest.split_once('/')).map_or("", |(_, p)| p);
+        let options = ClientOptions::new().with_connect_timeout(CONNECT).with_allow_http(allow_http());
+        let retry = RetryConfig { max_retries: TRIES, retry_timeout: ALL_TRIES, ..RetryConfig::default() };
+        let bucket = AmazonS3Builder::from_env().with_url(url).with_retry(retry).with_client_options(options);
+        Ok(Self {
+            url: url.to_owned(),
+            prefix: Path::parse(prefix).map_err(Error::other)?,
+            bucket: bucket.build().map_err(Error::other)?,
+            runtime: tokio::runtime::Builder::new_current_thread().enable_all().build()?,
+        })
+    }
+
+    fn place(&self, name: &str) -> Path {
+        name.split('/').fold(self.prefix.clone(), |path, part| path.join(part))
+    }
+}
+
+impl Remote for S3 {
+    fn get(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        let got = self.runtime.block_on(async {
+            let found = self.bucket.get(&self.place(name)).await?;
+            found.bytes().await
+        });
+        match got {
+            Ok(bytes) => Ok(Some(bytes.into())),
+            Err(object_store::Error::NotFound { .. }) => Ok(None),
+            Err(e) => Err(Error::other(e)),
+        }
+    }
+
+    fn put(&self, name: &str, bytes: &[u8], _over: bool) -> Result<()> {
+        // What is there under the name of a content is that content: writing it again changes nothing.
+        let place = self.place(name);
+        let put = self.bucket.put(&place, bytes.to_vec().into());
+        self.runtime.block_on(put).map(|_| ()).map_err(Error::other)
+    }
+
+    fn name(&self) -> String {
+        self.url.clone()
+    }
+}
+
+/// Options of the client replace what the environment says of it, so this is asked here.
+fn allow_http() -> bool {
+    std::env::var("AWS_ALLOW_HTTP").is_ok_and(|value| value.eq_ignore_ascii_case("true") || value == "1")
+}

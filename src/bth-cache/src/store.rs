@@ -1,0 +1,370 @@
+//! The store: find, read, pin and put.
+
+use crate::atomic::write_once;
+use crate::evict::{Evicted, evict};
+use crate::files::{Files, named, remove};
+use crate::lock::{WorkLock, same_file};
+use crate::{Digest, Key, Record, Remote, Tally, last};
+use serde_json::Value;
+use std::fs::File;
+use std::io::{ErrorKind, Result};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, SystemTime};
+
+/// Least age of a time of use that is renewed.
+const FRESH: Duration = Duration::from_secs(1);
+/// Share of the cap that a process writes before it looks whether something must go.
+const SHARE: u64 = 64;
+/// Longest time for which no process looks.
+const LONG_UNCHECKED: Duration = Duration::from_secs(600);
+
+/// A store; see the crate's page.
+pub struct Store {
+    folder: PathBuf,
+    pub(crate) files: Files,
+    pub(crate) cap: u64,
+    remote: Mutex<Option<Box<dyn Remote>>>,
+    notes: Mutex<Vec<String>>,
+    tally: Mutex<Tally>,
+    written: AtomicU64,
+}
+
+/// A verified content that is not evicted while this value lives.
+#[derive(Debug)]
+pub struct Pin {
+    /// The file; nobody writes to it, ever.
+    pub path: PathBuf,
+    _file: File,
+}
+
+impl Store {
+    /// A store in a folder, which is made; `cap` bytes are kept.
+    ///
+    /// # Errors
+    /// When the folder cannot be made.
+    pub fn open(folder: &Path, cap: u64) -> Result<Self> {
+        Ok(Self {
+            folder: folder.to_owned(),
+            files: Files::open(folder)?,
+            cap,
+            remote: Mutex::new(None),
+            notes: Mutex::default(),
+            tally: Mutex::default(),
+            written: AtomicU64::new(0),
+        })
+    }
+
+    /// With a shared store behind it: what this one lacks is looked for there, what is put here goes there too. When
+    /// that fails, a note says so and this process goes on without it.
+    #[must_use]
+    pub fn with_remote(self, remote: Box<dyn Remote>) -> Self {
+        *lock(&self.remote) = Some(remote);
+        self
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The record of a key, checked.
+    pub fn find(&self, key: &Key) -> Option<Record> {
+        self.find_id(&key.id())
+    }
+
+    /// The record of a key by the key's hash, checked.
+    pub fn find_id(&self, id: &Digest) -> Option<Record> {
+        self.local_record(id).or_else(|| {
+            let text = self.fetch(&name("keys", id))?;
+            match Record::from_text(&text, id) {
+                Ok(record) => {
+                    let _ = self.write(&self.files.key(id), &text);
+                    Some(record)
+                }
+                Err(why) => {
+                    self.damaged(&format!("record {} of the shared store", id.hex()), why);
+                    None
+                }
+            }
+        })
+    }
+
+    fn local_record(&self, id: &Digest) -> Option<Record> {
+        let path = self.files.key(id);
+        let text = std::fs::read(&path).ok()?;
+        Record::from_text(&text, id).map_err(|why| self.drop_damaged(&path, why)).ok()
+    }
+
+    /// The content of a record, checked. `None` when it was evicted, or damaged: then it is removed and a note says so.
+    pub fn read(&self, record: &Record) -> Option<Vec<u8>> {
+        let path = self.files.blob(&record.blob);
+        if let Ok(bytes) = std::fs::read(&path) {
+            if Digest::of(&bytes) == record.blob {
+                touch(&path);
+                return Some(bytes);
+            }
+            self.drop_damaged(&path, "its bytes do not have the hash that names it");
+        }
+        let bytes = self.fetch(&name("blobs", &record.blob))?;
+        if Digest::of(&bytes) != record.blob {
+            self.damaged(
+                &format!("content {} of the shared store", record.blob.hex()),
+                "it has another hash",
+            );
+            return None;
+        }
+        lock(&self.tally).shared_hits += 1;
+        // What cannot be kept can be used all the same.
+        let _ = self.write(&path, &bytes);
+        Some(bytes)
+    }
+
+    /// The file of a record's content, checked, and kept from eviction; else as [`Store::read`].
+    pub fn pin(&self, record: &Record) -> Option<Pin> {
+        let path = self.files.blob(&record.blob);
+        // Once from here, once from the shared store.
+        for attempt in 0..2 {
+            if let Ok(file) = File::open(&path) {
+                // Without locks what is mapped may lose its name, which local file systems take well.
+                let _ = file.lock_shared();
+                if same_file(&file, &path) {
+                    match Digest::of_reader(&file) {
+                        Ok((digest, _)) if digest == record.blob => {
+                            touch(&path);
+                            return Some(Pin { path, _file: file });
+                        }
+                        _ => self.drop_damaged(&path, "its bytes do not have the hash that names it"),
+                    }
+                }
+            }
+            if attempt == 0 {
+                self.read(record)?;
+            }
+        }
+        None
+    }
+
+    /// Bytes that are kept.
+    pub fn cap(&self) -> u64 {
+        self.cap
+    }
+
+    /// The file of a record's content, whether it is there or not.
+    pub fn path(&self, record: &Record) -> PathBuf {
+        self.files.blob(&record.blob)
+    }
+
+    /// Whether the content of a record is there; not whether it is whole.
+    pub fn holds(&self, record: &Record) -> bool {
+        self.files.blob(&record.blob).is_file()
+    }
+
+    /// Keeps a content under a key.
+    ///
+    /// # Errors
+    /// When it cannot be written; the store is then as it was.
+    pub fn put(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
+        let record = record(key, bytes, true, report);
+        self.put_content(&record, bytes)?;
+        self.put_record(record)
+    }
+
+    /// Keeps only what the content of a key is called, for contents that are quickly made from others.
+    ///
+    /// # Errors
+    /// As [`Store::put`].
+    pub fn put_name(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
+        self.put_record(record(key, bytes, false, report))
+    }
+
+    fn put_content(&self, record: &Record, bytes: &[u8]) -> Result<()> {
+        let blob = self.files.blob(&record.blob);
+        let mut new = self.write(&blob, bytes)?;
+        if !new && std::fs::metadata(&blob).is_ok_and(|m| m.len() != record.bytes) {
+            remove(&blob);
+            new = self.write(&blob, bytes)?;
+        }
+        touch(&blob);
+        if new {
+            let mut tally = lock(&self.tally);
+            tally.stored += 1;
+            tally.stored_bytes += record.bytes;
+        }
+        self.share(&name("blobs", &record.blob), bytes, false);
+        self.written(record.bytes);
+        Ok(())
+    }
+
+    fn put_record(&self, record: Record) -> Result<Record> {
+        let (id, text) = (record.key.id(), record.to_text()?);
+        let path = self.files.key(&id);
+        if !self.write(&path, text.as_bytes())? {
+            // The content that it led to is gone, or was made a second time.
+            remove(&path);
+            self.write(&path, text.as_bytes())?;
+        }
+        self.share(&name("keys", &id), text.as_bytes(), true);
+        self.written(text.len() as u64);
+        Ok(record)
+    }
+
+    /// Evicts when this process has written much.
+    fn written(&self, bytes: u64) {
+        if self.written.fetch_add(bytes, Ordering::Relaxed) + bytes > self.cap / SHARE {
+            self.evict(self.cap);
+        }
+    }
+
+    /// The right to work on a key alone; see [`WorkLock`].
+    pub fn work_lock(&self, key: &Key, cancelled: &dyn Fn() -> bool) -> Option<WorkLock> {
+        WorkLock::take(&self.files.lock(&key.id()), cancelled)
+    }
+
+    /// Renews the time of use of a record whose content is not kept; others have that of their contents.
+    pub fn touch(&self, record: &Record) {
+        if !record.whole {
+            touch(&self.files.key(&record.key.id()));
+        }
+    }
+
+    /// Counts a hit.
+    pub fn count_hit(&self, key: &Key) {
+        lock(&self.tally).hit(key.stage());
+    }
+
+    /// Why a key is not there: what differs from the last key of the same source. `source` may be a path: only a
+    /// hash of it is kept.
+    pub fn reasons(&self, key: &Key, source: &str) -> Vec<String> {
+        last::reasons(&self.files, key, source)
+    }
+
+    /// Counts a miss and says why.
+    pub fn count_miss(&self, key: &Key, source: &str) -> Vec<String> {
+        let reasons = self.reasons(key, source);
+        lock(&self.tally).miss(key.stage(), &reasons);
+        reasons
+    }
+
+    /// Notes the key that a source has now.
+    pub fn note_last(&self, key: &Key, source: &str) {
+        last::note(&self.files, key, source);
+    }
+
+    /// What a person should know: damaged entries, a shared store that cannot be reached.
+    pub fn take_notes(&self) -> Vec<String> {
+        std::mem::take(&mut lock(&self.notes))
+    }
+
+    /// Removes what was used longest ago until `cap` bytes are left, and what killed processes left.
+    pub fn evict(&self, cap: u64) -> Evicted {
+        self.written.store(0, Ordering::Relaxed);
+        let evicted = evict(&self.files, cap);
+        let mut tally = lock(&self.tally);
+        tally.evictions += evicted.entries;
+        tally.evicted_bytes += evicted.bytes;
+        let _ = File::create(self.files.tally().with_extension("checked"));
+        evicted
+    }
+
+    /// The counters, those of this process included.
+    pub fn tally(&self) -> Tally {
+        self.flush();
+        Tally::read(&self.files)
+    }
+
+    pub(crate) fn flush(&self) {
+        let tally = std::mem::take(&mut *lock(&self.tally));
+        // Counters are the least of what a full disk costs.
+        let _ = tally.append(&self.files);
+    }
+
+    fn write(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
+        match write_once(path, bytes) {
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+                write_once(path, bytes)
+            }
+            done => done,
+        }
+    }
+
+    fn drop_damaged(&self, path: &Path, why: &str) {
+        remove(path);
+        let what = if named(path).is_some() { path.display().to_string() } else { "an entry".to_owned() };
+        self.damaged(&what, why);
+    }
+
+    pub(crate) fn damaged(&self, what: &str, why: &str) {
+        lock(&self.tally).damaged += 1;
+        lock(&self.notes).push(format!("cache: {what} is damaged ({why}); it is not used"));
+    }
+
+    fn fetch(&self, name: &str) -> Option<Vec<u8>> {
+        let mut remote = lock(&self.remote);
+        let got = remote.as_ref()?.get(name);
+        got.unwrap_or_else(|e| {
+            self.give_up(&mut remote, &e);
+            None
+        })
+    }
+
+    fn share(&self, name: &str, bytes: &[u8], over: bool) {
+        let mut remote = lock(&self.remote);
+        let put = remote.as_ref().map_or(Ok(()), |place| place.put(name, bytes, over));
+        if let Err(e) = put {
+            self.give_up(&mut remote, &e);
+        }
+    }
+
+    fn give_up(&self, remote: &mut Option<Box<dyn Remote>>, error: &std::io::Error) {
+        if let Some(gone) = remote.take() {
+            let name = gone.name();
+            lock(&self.notes).push(format!("cache: going on without the shared store {name}: {error}"));
+        }
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        let unchecked = || {
+            let checked = std::fs::metadata(self.files.tally().with_extension("checked"));
+            let age = checked.and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
+            age.is_none_or(|age| age > LONG_UNCHECKED)
+        };
+        if self.written.load(Ordering::Relaxed) > 0 && unchecked() {
+            self.evict(self.cap);
+        }
+        self.flush();
+    }
+}
+
+impl std::fmt::Debug for Store {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Store").field("folder", &self.folder).field("cap", &self.cap).finish_non_exhaustive()
+    }
+}
+
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn record(key: &Key, bytes: &[u8], whole: bool, report: Value) -> Record {
+    Record { key: key.clone(), blob: Digest::of(bytes), bytes: bytes.len() as u64, whole, report }
+}
+
+/// As [`Files`] have it, with slashes on all systems.
+fn name(kind: &str, digest: &Digest) -> String {
+    let hex = digest.hex();
+    format!("{kind}/{}/{hex}", &hex[..2])
+}
+
+/// Renews the time of use; a store of others, which cannot be written, is read all the same.
+fn touch(path: &Path) {
+    let Ok(file) = File::open(path) else { return };
+    let used = file.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
+    if used.is_none_or(|age| age > FRESH) {
+        let _ = file.set_modified(SystemTime::now());
+    }
+}

@@ -1,0 +1,159 @@
+//! What is in a store: listed, summed, verified, cleared.
+
+use crate::evict::{is_locked, sweep};
+use crate::files::{named, remove};
+use crate::{Digest, Record, Store, Tally};
+use serde::Serialize;
+use std::collections::{BTreeMap, HashSet};
+use std::time::SystemTime;
+
+/// A record, and its content's state.
+#[derive(Clone, Debug, Serialize)]
+pub struct Entry {
+    /// Hash of the key.
+    pub id: Digest,
+    /// The record, without the report.
+    pub stage: String,
+    /// Names and values of the key.
+    pub components: Vec<(String, String)>,
+    /// Hash of the content.
+    pub blob: Digest,
+    /// Bytes of the content.
+    pub bytes: u64,
+    /// Seconds since the content was last used; `None` when it is gone.
+    pub idle_seconds: Option<u64>,
+}
+
+/// Sums over a store.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Survey {
+    /// Folder of the store.
+    pub folder: String,
+    /// Records by stage.
+    pub records: BTreeMap<String, u64>,
+    /// Contents.
+    pub contents: u64,
+    /// Bytes of records and contents.
+    pub bytes: u64,
+    /// Bytes that are kept.
+    pub cap: u64,
+    /// What happened so far.
+    pub tally: Tally,
+}
+
+/// What a verification found.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// Records that were checked.
+    pub records: u64,
+    /// Contents that were checked.
+    pub contents: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+    /// Damaged records and contents, which were removed.
+    pub damaged: Vec<String>,
+    /// What killed processes left, which was removed.
+    pub leftovers: u64,
+}
+
+impl Store {
+    /// All records, by stage and then by time of use, the latest first.
+    pub fn list(&self) -> Vec<Entry> {
+        let now = SystemTime::now();
+        let one = |entry: std::fs::DirEntry| {
+            let id = named(&entry.path())?;
+            let record = Record::from_text(&std::fs::read(entry.path()).ok()?, &id).ok()?;
+            let used = std::fs::metadata(self.files.blob(&record.blob)).and_then(|m| m.modified());
+            let idle = used.ok().map(|t| now.duration_since(t).unwrap_or_default().as_secs());
+            Some(Entry {
+                id,
+                stage: record.key.stage().to_owned(),
+                components: record.key.components().to_vec(),
+                blob: record.blob,
+                bytes: record.bytes,
+                idle_seconds: idle,
+            })
+        };
+        let mut entries: Vec<_> = self.files.below("keys").into_iter().filter_map(one).collect();
+        entries.sort_by(|a, b| (&a.stage, a.idle_seconds, a.id).cmp(&(&b.stage, b.idle_seconds, b.id)));
+        entries
+    }
+
+    /// Sums.
+    pub fn survey(&self) -> Survey {
+        let mut survey = Survey {
+            folder: self.folder().display().to_string(),
+            cap: self.cap,
+            tally: self.tally(),
+            ..Survey::default()
+        };
+        self.list().into_iter().for_each(|e| *survey.records.entry(e.stage).or_default() += 1);
+        let blobs = self.files.below("blobs");
+        survey.contents = blobs.len() as u64;
+        let all =
+            blobs.iter().chain(&self.files.below("keys")).map(|e| e.metadata().map_or(0, |m| m.len())).sum();
+        survey.bytes = all;
+        survey
+    }
+
+    /// Reads everything; what is damaged or was left by killed processes is removed. Stops early when `go_on` says so.
+    pub fn verify(&self, go_on: &dyn Fn(u64) -> bool) -> Verdict {
+        let mut verdict = Verdict { leftovers: sweep(&self.files), ..Verdict::default() };
+        for entry in self.files.below("keys") {
+            let (path, id) = (entry.path(), named(&entry.path()));
+            // It may have been evicted meanwhile.
+            let Ok(text) = std::fs::read(&path) else { continue };
+            verdict.records += 1;
+            verdict.bytes += text.len() as u64;
+            if id.is_none_or(|id| Record::from_text(&text, &id).is_err()) && remove(&path) {
+                verdict.damaged.push(path.display().to_string());
+            }
+        }
+        for entry in self.files.below("blobs") {
+            let path = entry.path();
+            let Ok((digest, bytes)) = std::fs::File::open(&path).and_then(Digest::of_reader) else {
+                continue;
+            };
+            verdict.contents += 1;
+            verdict.bytes += bytes;
+            if named(&path) != Some(digest) && remove(&path) {
+                verdict.damaged.push(path.display().to_string());
+            }
+            if !go_on(bytes) {
+                break;
+            }
+        }
+        for path in &verdict.damaged {
+            self.damaged(path, "found by verification");
+        }
+        self.flush();
+        verdict
+    }
+
+    /// Removes everything but what is in use; how many contents were removed, and how many not.
+    pub fn clear(&self) -> (u64, u64) {
+        let (mut removed, mut in_use) = (0, 0);
+        let mut kept = HashSet::new();
+        for entry in self.files.below("blobs") {
+            if is_locked(&entry.path()) {
+                in_use += 1;
+                kept.extend(named(&entry.path()));
+            } else if remove(&entry.path()) {
+                removed += 1;
+            }
+        }
+        for entry in self.files.below("keys") {
+            let record = named(&entry.path())
+                .and_then(|id| Record::from_text(&std::fs::read(entry.path()).ok()?, &id).ok());
+            if !record.is_some_and(|r| kept.contains(&r.blob)) {
+                remove(&entry.path());
+            }
+        }
+        self.files.below("last").iter().for_each(|entry| {
+            remove(&entry.path());
+        });
+        sweep(&self.files);
+        remove(&self.files.tally());
+        (removed, in_use)
+    }
+}

@@ -1,0 +1,67 @@
+//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and says where; without it there is nothing to
+//! test.
+#![allow(clippy::print_stdout)]
+
+use bth_cache::{Digest, Key, Remote, S3, Store};
+use std::time::Instant;
+
+const LARGE: u64 = 1 << 30;
+
+/// A store of its own with the server behind it; nothing, with a line that says so, when there is no server.
+fn store(folder: &tempfile::TempDir) -> Option<(Store, String)> {
+    let Ok(url) = std::env::var("BTH_TEST_S3") else {
+        println!("skipped: BTH_TEST_S3 names no bucket (tools/s3/run does)");
+        return None;
+    };
+    let store = Store::open(folder.path(), LARGE).unwrap().with_remote(Box::new(S3::open(&url).unwrap()));
+    Some((store, url))
+}
+
+fn key(name: &str) -> Key {
+    Key::new("test").with("name", name)
+}
+
+#[test]
+fn what_one_machine_makes_another_finds() {
+    let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let Some((one, url)) = store(&here) else { return };
+    let content: Vec<u8> = (0..3_000_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    assert_eq!(one.find(&key("a")), None);
+    let record = one.put(&key("a"), &content, serde_json::json!({"nodes": 3})).unwrap();
+    assert_eq!(one.take_notes(), [""; 0]);
+
+    let (two, _) = store(&there).unwrap();
+    assert_eq!(two.find(&key("a")), Some(record.clone()));
+    assert!(two.read(&record).as_deref() == Some(&content[..]));
+    assert_eq!(two.tally().shared_hits, 1);
+    // The copy serves without the server.
+    let alone = Store::open(there.path(), LARGE).unwrap();
+    assert!(alone.find(&key("a")).and_then(|r| alone.read(&r)).as_deref() == Some(&content[..]));
+
+    // What was damaged there is not taken over.
+    let s3 = S3::open(&url).unwrap();
+    let hex = record.blob.hex();
+    s3.put(&format!("blobs/{}/{hex}", &hex[..2]), b"something else", true).unwrap();
+    let third = tempfile::tempdir().unwrap();
+    let (three, _) = store(&third).unwrap();
+    assert_eq!(three.find(&key("a")).and_then(|r| three.read(&r)), None);
+    assert!(three.take_notes()[0].contains("shared store"));
+}
+
+#[test]
+fn a_server_that_cannot_be_reached_is_gone_on_without() {
+    let folder = tempfile::tempdir().unwrap();
+    if store(&folder).is_none() {
+        return;
+    }
+    // A bucket that is not there answers like a server without rights; a name that leads nowhere like no server.
+    let gone = S3::open("s3://no-such-bucket/x").unwrap();
+    let local = tempfile::tempdir().unwrap();
+    let store = Store::open(local.path(), LARGE).unwrap().with_remote(Box::new(gone));
+    let start = Instant::now();
+    let record = store.put(&key("b"), b"content", serde_json::Value::Null).unwrap();
+    let notes = store.take_notes();
+    assert!(notes.len() == 1 && notes[0].contains("going on without"), "{notes:?}");
+    assert!(start.elapsed().as_secs() < 40);
+    assert_eq!(store.read(&record).map(|bytes| Digest::of(&bytes)), Some(record.blob));
+}

@@ -1,0 +1,213 @@
+//! What each stage depends on. Never paths, times, numbers of threads or the order of arguments.
+//!
+//! Whoever changes what a stage makes raises its version here; `tests/versions.rs` notices when that
+//! was forgotten.
+
+use super::{MeshFacts, SourceDigest};
+use crate::bvh;
+use crate::mesh::{Keep, Mesh};
+use crate::pipeline::{Options, Structure};
+use crate::write::SceneParts;
+use bth_cache::{Digest, Key};
+use serde::Serialize;
+use std::path::Path;
+use zerocopy::{Immutable, IntoBytes};
+
+/// Versions of what the stages make.
+const MESH: &str = "1";
+const BVH: &str = "1";
+const MARKS: &str = "1";
+const COSTS: &str = "2";
+const TETS: &str = "1";
+const COLLAPSE: &str = "1";
+const FILE: &str = "2";
+
+/// A mesh read from a model. The extension decides in which format the file is read, if it is a known one.
+pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, keep: Keep) -> Key {
+    Key::new("mesh")
+        .with("source", source.text())
+        .with("format", extension(path))
+        .with("part", part)
+        .with("attributes", text(&keep))
+        .with("mesh version", MESH)
+}
+
+pub(crate) fn extension(path: &Path) -> String {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    extension
+        .filter(|e| ["obj", "gltf", "glb", "ply", "stl", "off"].contains(&e.as_str()))
+        .unwrap_or_default()
+}
+
+/// Hash of a mesh's positions and triangles, which is what all stages but the last read.
+pub(super) fn geometry(mesh: &Mesh) -> Digest {
+    let mut hasher = Rows::new("geometry");
+    hasher.add(&mesh.positions);
+    hasher.add(&mesh.triangles);
+    hasher.finish()
+}
+
+/// Hash of a mesh's shading attributes, if it has any.
+pub(super) fn shading(mesh: &Mesh) -> Option<Digest> {
+    let attributes = mesh.attributes.as_ref()?;
+    let mut hasher = Rows::new("shading");
+    hasher.add(&attributes.corners);
+    hasher.add(&attributes.normals);
+    hasher.add(&attributes.uvs);
+    Some(hasher.finish())
+}
+
+/// The binary BVH of a mesh.
+pub(crate) fn bvh(geometry: &Digest, options: &bvh::Options) -> Key {
+    Key::new("bvh")
+        .with("geometry", geometry.hex())
+        .with("quality", text(&options.quality))
+        .with("bvh version", BVH)
+}
+
+/// The marks of its nodes.
+pub(crate) fn marks(geometry: &Digest, options: &bvh::Options) -> Key {
+    Key::new("marks")
+        .with_all(bvh(geometry, options).components().iter().cloned())
+        .with("marks version", MARKS)
+}
+
+/// The tetrahedralization of a node: its corners and triangles, in the order of their rows in the mesh.
+pub(crate) fn tets_of_node(
+    vertices: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    options: &crate::tets::Options,
+    tetgen: &str,
+) -> Key {
+    let mut hasher = Rows::new("node");
+    hasher.add(vertices);
+    hasher.add(triangles);
+    // A node that can be replaced by smaller ones is given up earlier.
+    let smaller = options.cells.iter().any(|&size| (size as usize) < triangles.len());
+    Key::new("tets")
+        .with("geometry", hasher.finish().hex())
+        .with("tetrahedralization", attempts(options))
+        .with("cells below", smaller.to_string())
+        .with("tetgen", tetgen)
+        .with("tets version", TETS)
+}
+
+/// The sections of an object of a scene.
+pub(crate) fn object(mesh: &MeshFacts, options: &Options, tetgen: &str) -> Key {
+    Key::new("object")
+        .with("geometry", mesh.geometry.hex())
+        .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
+        .with_all(components(options, tetgen))
+}
+
+/// A compiled file of one model.
+pub(crate) fn file(source: &SourceDigest, path: &Path, options: &Options, tetgen: &str) -> Key {
+    Key::new("file")
+        .with("source", source.text())
+        .with("format", extension(path))
+        .with_all(components(options, tetgen))
+        .with("mesh version", MESH)
+        .with("bthc", env!("CARGO_PKG_VERSION"))
+}
+
+/// A compiled scene. `parts` has the objects by their place in the manifest, `sources` what each used one is made from.
+pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, tetgen: &str) -> Key {
+    let mut hasher = Rows::new("scene");
+    hasher.add(std::slice::from_ref(&parts.scene));
+    hasher.add(&parts.nodes);
+    hasher.add(&parts.instances);
+    hasher.add(&parts.tracks);
+    hasher.add(&parts.times);
+    hasher.add(&parts.values);
+    hasher.add(&parts.cameras);
+    hasher.add(&parts.lights);
+    hasher.add(&parts.names);
+    let mut objects = Rows::new("objects");
+    sources.iter().for_each(|source| objects.add(source.as_bytes()));
+    Key::new("scene")
+        .with("scene", hasher.finish().hex())
+        .with("objects", objects.finish().hex())
+        .with_all(components(options, tetgen))
+        .with("mesh version", MESH)
+        .with("bthc", env!("CARGO_PKG_VERSION"))
+}
+
+/// All options that a compiled object depends on, in canonical form, each under the name that a person is told when
+/// it differs. A calibrated cost profile belongs in here, by the hash of its content.
+fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
+    let mut all = vec![
+        ("structure", text(&options.structure)),
+        ("quality", text(&options.bvh.quality)),
+        ("attributes", text(&options.attributes)),
+        ("source geometry", options.geometry.to_string()),
+        ("collapse", format!("{:?}", options.collapse.costs)),
+        ("bvh version", BVH.to_owned()),
+        ("collapse version", COLLAPSE.to_owned()),
+        ("file version", format!("{FILE}.{}", bth::layout::WRITER_VERSION)),
+    ];
+    if options.structure != Structure::Bvh {
+        all.extend([
+            ("tets", options.record.name().to_owned()),
+            ("subtrees", options.keep_subtrees.to_string()),
+            ("tetrahedralization", attempts(&options.tets)),
+            ("cells", format!("{:?} from {}", options.tets.cells, options.tets.minimum)),
+            ("tetgen", tetgen.to_owned()),
+            ("marks version", MARKS.to_owned()),
+            ("costs version", COSTS.to_owned()),
+            ("tets version", TETS.to_owned()),
+        ]);
+    }
+    let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+    if options.structure != Structure::Bvh {
+        // One by one, so that a person is told which differs.
+        let fields = json(&options.costs);
+        let fields = fields.as_object().into_iter().flatten();
+        all.extend(fields.map(|(name, value)| (format!("selection {name}"), text(value))));
+    }
+    all
+}
+
+/// What the attempts at a node depend on. Not where the worker is, nor how many there are.
+fn attempts(options: &crate::tets::Options) -> String {
+    format!(
+        "free space {}, inflation {:?}, deadline {:?} + {:?}, memory {}",
+        options.free_space,
+        options.inflation,
+        options.deadline,
+        options.deadline_per_triangle,
+        options.memory
+    )
+}
+
+/// The canonical text of an option: numbers are written with the fewest digits that give them back.
+fn text(value: &impl Serialize) -> String {
+    match json(value) {
+        serde_json::Value::String(text) => text,
+        value => value.to_string(),
+    }
+}
+
+fn json(value: &impl Serialize) -> serde_json::Value {
+    // Options are numbers, names and structures of them.
+    serde_json::to_value(value).unwrap_or_else(|e| unreachable!("an option that is no JSON: {e}"))
+}
+
+/// Hash of slices, each with its length before it.
+struct Rows(blake3::Hasher);
+
+impl Rows {
+    fn new(what: &str) -> Self {
+        let mut rows = Self(blake3::Hasher::new());
+        rows.add(what.as_bytes());
+        rows
+    }
+
+    fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+        let bytes = rows.as_bytes();
+        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
+    }
+
+    fn finish(self) -> Digest {
+        self.0.finalize().into()
+    }
+}

@@ -1,0 +1,167 @@
+//! Results of the stages as rows, and what must hold of them when they come back.
+
+use super::rows::{Parts, Rows};
+use super::{Stored, keys};
+use crate::marks::Marks;
+use crate::mesh::{self, Attributes, Mesh};
+use crate::tets::{Behind, Face, TetMesh};
+use bth_cache::Digest;
+use serde::{Deserialize, Serialize};
+
+/// What is known of a mesh without having it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct MeshFacts {
+    /// The import's report.
+    pub(crate) report: mesh::Report,
+    /// Hash of positions and triangles.
+    pub(crate) geometry: Digest,
+    /// Hash of the shading attributes.
+    pub(crate) shading: Option<Digest>,
+}
+
+impl MeshFacts {
+    /// A mesh with its facts.
+    pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
+        let facts = Self { report, geometry: keys::geometry(&mesh), shading: keys::shading(&mesh) };
+        (mesh, facts)
+    }
+}
+
+impl Stored for Mesh {
+    fn rows(&self, to: &mut Rows) {
+        to.add(&self.positions);
+        to.add(&self.triangles);
+        to.add(&[u8::from(self.attributes.is_some())]);
+        if let Some(attributes) = &self.attributes {
+            to.add(&attributes.corners);
+            to.add(&attributes.normals);
+            to.add(&attributes.uvs);
+        }
+    }
+
+    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+        let (positions, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>) = (from.take()?, from.take()?);
+        let attributes = match from.one::<u8>()? {
+            0 => None,
+            _ => Some(Attributes { corners: from.take()?, normals: from.take()?, uvs: from.take()? }),
+        };
+        let within =
+            |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
+        let attributes_fit = attributes.as_ref().is_none_or(|a| {
+            a.corners.len() == triangles.len()
+                && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
+        });
+        let fits = attributes_fit && within(&triangles, positions.len());
+        fits.then_some(Mesh { positions, triangles, attributes })
+    }
+}
+
+impl Stored for Marks {
+    fn rows(&self, to: &mut Rows) {
+        to.add(&self.suitable.iter().map(|s| u8::from(*s)).collect::<Vec<_>>());
+    }
+
+    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+        let suitable: Vec<u8> = from.take()?;
+        Some(Marks { suitable: suitable.iter().map(|s| *s != 0).collect() })
+    }
+}
+
+/// What lies behind a face: a tetrahedron, 2³¹ + a constrained face, or all bits for the hull.
+const FACE: u32 = 1 << 31;
+const HULL: u32 = u32::MAX;
+
+/// A tetrahedralization whose faces name triangles by their place among the node's, so that it does not
+/// depend on where in a model the node is.
+impl Stored for TetMesh {
+    fn rows(&self, to: &mut Rows) {
+        let code = |behind: &Behind| match *behind {
+            Behind::Tet(tet) => tet,
+            Behind::Face(face) => FACE | face,
+            Behind::Hull => HULL,
+        };
+        to.add(&[self.lower, self.upper]);
+        to.add(&self.vertices);
+        to.add(&self.tets);
+        to.add(&self.behind.iter().map(|b| b.each_ref().map(code)).collect::<Vec<_>>());
+        let face = |f: &Face| [f.triangle, f.vertex[0], f.vertex[1], f.vertex[2], f.tet[0], f.tet[1]];
+        to.add(&self.faces.iter().map(face).collect::<Vec<_>>());
+        to.add(&[self.steiner_points]);
+    }
+
+    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+        let bounds: Vec<[f32; 3]> = from.take()?;
+        let [lower, upper] = *bounds.as_slice() else { return None };
+        let (vertices, tets): (Vec<[f32; 3]>, Vec<[u32; 4]>) = (from.take()?, from.take()?);
+        let behind: Vec<[u32; 4]> = from.take()?;
+        let faces: Vec<[u32; 6]> = from.take()?;
+        let steiner_points = from.one()?;
+        let vertex = |v: u32| (v as usize) < vertices.len();
+        let tet = |t: u32| (t as usize) < tets.len();
+        let link = |code: u32| match code {
+            HULL => Some(Behind::Hull),
+            code if code & FACE == 0 => tet(code).then_some(Behind::Tet(code)),
+            code => ((code ^ FACE) < faces.len() as u32).then_some(Behind::Face(code ^ FACE)),
+        };
+        let links = |[a, b, c, d]: [u32; 4]| Some([link(a)?, link(b)?, link(c)?, link(d)?]);
+        let behind: Vec<[Behind; 4]> = behind.into_iter().map(links).collect::<Option<_>>()?;
+        let face = |[triangle, a, b, c, front, back]: [u32; 6]| {
+            let fits = [a, b, c].into_iter().all(vertex) && tet(front) && tet(back);
+            fits.then_some(Face { triangle, vertex: [a, b, c], tet: [front, back] })
+        };
+        let faces: Vec<Face> = faces.iter().copied().map(face).collect::<Option<_>>()?;
+        let fits = behind.len() == tets.len() && tets.as_flattened().iter().all(|v| vertex(*v));
+        fits.then_some(TetMesh { lower, upper, vertices, tets, behind, faces, steiner_points })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{decode, encode};
+    use super::*;
+
+    #[test]
+    fn meshes_with_rows_out_of_range_do_not_come_back() {
+        let attributes =
+            Attributes { corners: vec![[0, 1, 0]], normals: vec![[0.0; 3]; 2], uvs: vec![[0.5; 2]; 2] };
+        let mesh = Mesh {
+            positions: vec![[0.0; 3], [1.0; 3], [2.0; 3]],
+            triangles: vec![[0, 1, 2]],
+            attributes: Some(attributes),
+        };
+        assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
+        let plain = Mesh { attributes: None, ..mesh.clone() };
+        assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
+        let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
+        assert_eq!(decode::<Mesh>(&encode(&short)), None);
+        let mut other = mesh;
+        other.attributes.as_mut().unwrap().corners[0] = [0, 2, 0];
+        assert_eq!(decode::<Mesh>(&encode(&other)), None);
+    }
+
+    #[test]
+    fn tetrahedralizations_come_back_and_links_to_nowhere_do_not() {
+        let mesh = TetMesh {
+            lower: [0.0; 3],
+            upper: [1.0; 3],
+            vertices: vec![[0.0; 3]; 5],
+            tets: vec![[0, 1, 2, 3], [1, 2, 3, 4]],
+            behind: vec![
+                [Behind::Face(0), Behind::Hull, Behind::Hull, Behind::Hull],
+                [Behind::Hull, Behind::Hull, Behind::Hull, Behind::Tet(0)],
+            ],
+            faces: vec![Face { triangle: 0, vertex: [1, 2, 3], tet: [0, 1] }],
+            steiner_points: 2,
+        };
+        assert_eq!(decode::<TetMesh>(&encode(&mesh)), Some(mesh.clone()));
+        let mut other = mesh.clone();
+        other.behind[0][0] = Behind::Face(1);
+        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
+        let mut other = mesh.clone();
+        other.faces[0].tet[1] = 2;
+        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
+        let mut other = mesh;
+        other.tets[1][3] = 5;
+        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
+    }
+}

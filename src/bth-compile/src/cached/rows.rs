@@ -1,0 +1,79 @@
+//! Rows of numbers as bytes: for each slice its length in bytes, then the bytes, padded to eight.
+
+use zerocopy::{FromBytes, Immutable, IntoBytes};
+
+const PAD: usize = 8;
+
+/// Rows that become bytes.
+#[derive(Default)]
+pub(crate) struct Rows(Vec<u8>);
+
+impl Rows {
+    /// Adds a slice.
+    pub(crate) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+        let bytes = rows.as_bytes();
+        self.0.extend_from_slice(&(bytes.len() as u64).to_le_bytes());
+        self.0.extend_from_slice(bytes);
+        self.0.resize(self.0.len().next_multiple_of(PAD), 0);
+    }
+
+    pub(crate) fn finish(self) -> Vec<u8> {
+        self.0
+    }
+}
+
+/// Bytes that become rows again.
+pub(crate) struct Parts<'a>(&'a [u8]);
+
+impl<'a> Parts<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// The next slice; `None` when there is none of whole rows.
+    pub(crate) fn take<T: FromBytes>(&mut self) -> Option<Vec<T>> {
+        let (length, rest) = self.0.split_first_chunk::<8>()?;
+        let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+        let bytes = rest.get(..length)?;
+        self.0 = rest.get(length.checked_next_multiple_of(PAD)?..)?;
+        let rows = bytes.chunks_exact(size_of::<T>());
+        if !rows.remainder().is_empty() {
+            return None;
+        }
+        rows.map(|row| T::read_from_bytes(row).ok()).collect()
+    }
+
+    /// The next slice, of one row.
+    pub(crate) fn one<T: FromBytes>(&mut self) -> Option<T> {
+        let mut rows = self.take::<T>()?;
+        rows.pop().filter(|_| rows.is_empty())
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_and_other_lengths_are_refused() {
+        let mut rows = Rows::default();
+        rows.add(&[[1.5f32, 2.0, -0.0]]);
+        rows.add::<u8>(&[7; 3]);
+        rows.add::<u64>(&[]);
+        rows.add(&[9u32]);
+        let bytes = rows.finish();
+        let mut parts = Parts::new(&bytes);
+        assert_eq!(parts.take::<[f32; 3]>().unwrap(), [[1.5, 2.0, -0.0]]);
+        assert_eq!(parts.take::<u8>().unwrap(), [7; 3]);
+        assert!(parts.take::<u64>().unwrap().is_empty());
+        assert_eq!(parts.one::<u32>(), Some(9));
+        assert!(parts.is_empty() && parts.take::<u8>().is_none());
+        assert!(Parts::new(&bytes).take::<u64>().is_none(), "twelve bytes are no whole u64");
+        assert!(Parts::new(&bytes[..12]).take::<u32>().is_none());
+        assert!(Parts::new(&[255; 16]).take::<u8>().is_none());
+    }
+}

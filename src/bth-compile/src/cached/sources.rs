@@ -1,0 +1,70 @@
+//! The files that a model consists of, and what they contain.
+
+use crate::error::{Error, Result};
+use crate::mesh::gltf_buffer::external_files;
+use bth_cache::Digest;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// What a model's files contain.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceDigest {
+    /// BLAKE3 of the model's file.
+    pub file: Digest,
+    /// BLAKE3 of those that it refers to, in order.
+    pub others: Vec<Digest>,
+}
+
+impl SourceDigest {
+    /// Reads and hashes the files of a model.
+    ///
+    /// # Errors
+    /// `BTH-O001` when one cannot be read.
+    pub fn of(path: &Path) -> Result<Self> {
+        let others = files(path)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
+        Ok(Self { file: digest(path)?, others })
+    }
+
+    /// Passes on what was read, if the files still contain what they did when they were hashed.
+    ///
+    /// # Errors
+    /// `BTH-O002` when they do not.
+    pub(crate) fn unchanged<T>(&self, path: &Path, read: T) -> Result<T> {
+        if Self::of(path)? == *self {
+            return Ok(read);
+        }
+        Err(Error::File {
+            code: "BTH-O002",
+            path: path.to_owned(),
+            message: "the file changed while it was read; compile again when it is complete".to_owned(),
+        })
+    }
+
+    /// As it stands in keys.
+    pub(crate) fn text(&self) -> String {
+        let all: Vec<String> = std::iter::once(&self.file).chain(&self.others).map(Digest::hex).collect();
+        all.join("+")
+    }
+}
+
+/// The files of a model: itself, then those that a glTF document refers to. What is no glTF document refers to none.
+///
+/// # Errors
+/// `BTH-O001` when the model cannot be read.
+pub fn files(path: &Path) -> Result<Vec<PathBuf>> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let mut files = vec![path.to_owned()];
+    if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
+        files.extend(external_files(path, &crate::mesh::read_file(path)?));
+    }
+    Ok(files)
+}
+
+fn digest(path: &Path) -> Result<Digest> {
+    let read = File::open(path).and_then(Digest::of_reader);
+    read.map(|(digest, _)| digest).map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    })
+}

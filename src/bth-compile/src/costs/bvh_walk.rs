@@ -1,0 +1,66 @@
+//! Rays through the binary BVH in double precision: what they hit, and which nodes they enter on the way.
+//! These counts are the same on every machine, whatever its vector instructions.
+
+use super::rays::{SampleRay, corners, cross, dot, enters, sub};
+use crate::bvh::BinaryBvh;
+use crate::mesh::Mesh;
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Row of the BVH's order that was hit, and where.
+    pub hit: Option<(u32, f64)>,
+    /// Nodes whose boxes the ray entered, leaves included.
+    pub visits: u32,
+}
+
+/// Walks from the root, the nearer child first, to the nearest hit; `entered` hears of every node.
+pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnMut(u32)) -> Met {
+    let mut met = Met { hit: None, visits: 0 };
+    let mut best = ray.tmax;
+    let meets = |node: u32, best: f64| {
+        let node = &bvh.nodes[node as usize];
+        enters(ray, node.lower, node.upper, best)
+    };
+    let mut stack: Vec<(u32, f64)> = Vec::with_capacity(64);
+    if !bvh.nodes.is_empty()
+        && let Some(near) = meets(0, best)
+    {
+        stack.push((0, near));
+    }
+    while let Some((at, near)) = stack.pop() {
+        if near > best {
+            continue;
+        }
+        entered(at);
+        met.visits += 1;
+        let node = &bvh.nodes[at as usize];
+        if node.is_leaf() {
+            if let Some(t) = crosses(ray, corners(mesh, bvh.order[node.first as usize]), best) {
+                best = t;
+                met.hit = Some((node.first, t));
+            }
+            continue;
+        }
+        let [left, right] = [at + 1, node.right].map(|child| meets(child, best).map(|t| (child, t)));
+        match (left, right) {
+            (Some(a), Some(b)) if a.1 <= b.1 => stack.extend([b, a]),
+            (Some(a), Some(b)) => stack.extend([a, b]),
+            (one, other) => stack.extend(one.or(other)),
+        }
+    }
+    met
+}
+
+/// Möller and Trumbore 1997, within (0, best].
+pub(super) fn crosses(ray: &SampleRay, [a, b, c]: [[f64; 3]; 3], best: f64) -> Option<f64> {
+    let (e1, e2) = (sub(b, a), sub(c, a));
+    let p = cross(ray.direction, e2);
+    let determinant = dot(e1, p);
+    let from = sub(ray.origin, a);
+    let q = cross(from, e1);
+    let (u, v) = (dot(from, p) / determinant, dot(ray.direction, q) / determinant);
+    let t = dot(e2, q) / determinant;
+    // Comparisons with the NaN of a zero determinant are false.
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= best).then_some(t)
+}

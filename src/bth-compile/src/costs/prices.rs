@@ -1,0 +1,76 @@
+//! What tetrahedralizations of a size cost: time of rays, bytes, and time to make them.
+
+use super::{Options, Start, Walk, profile::TetCosts};
+use bth::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
+
+/// Tetrahedra and their vertices for each triangle, with free-space points: measured on scans.
+const TETS: f64 = 3.35;
+const VERTICES: f64 = 0.85;
+/// Share of the lines through a node's box that meet a triangle, where it is not known: that of a ball.
+pub(super) const LINES_THAT_HIT: f64 = 0.52;
+
+/// Prices under the options.
+pub(super) struct Prices<'a> {
+    options: &'a Options,
+    costs: &'a TetCosts,
+    record: RecordKind,
+    /// By what the costs of tetrahedra are multiplied.
+    scale: f64,
+    /// Whether a BVH stays beside the tetrahedra for rays from outside.
+    pub(super) keep_subtrees: bool,
+}
+
+impl<'a> Prices<'a> {
+    pub(super) fn new(options: &'a Options, record: RecordKind, keep_subtrees: bool) -> Self {
+        let costs = options.profile.record(record);
+        let scale = options.c_tet.map_or(1.0, |c| c / costs.surface.step[0].max(f64::MIN_POSITIVE));
+        Prices { options, costs, record, scale, keep_subtrees }
+    }
+
+    /// Bytes of the tetrahedra, vertices and faces of so many triangles.
+    pub(super) fn bytes(&self, triangles: u32) -> f64 {
+        let record = self.record.stride() as f64;
+        let a_triangle =
+            TETS * record + VERTICES * size_of::<TetVertex>() as f64 + size_of::<TetFace>() as f64;
+        f64::from(triangles) * a_triangle + (size_of::<TetLeaf>() + 12 * size_of::<HullFace>()) as f64
+    }
+
+    /// Seconds to make them.
+    pub(super) fn seconds(&self, triangles: u32) -> f64 {
+        f64::from(triangles) * self.options.profile.tetrahedralize * 1e-6
+    }
+
+    /// What a step touches: the record and a vertex.
+    fn walked(&self, triangles: u32) -> f64 {
+        f64::from(triangles) * (TETS * self.record.stride() as f64 + VERTICES * size_of::<TetVertex>() as f64)
+    }
+
+    fn cost(&self, walk: &Walk, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
+    }
+
+    /// Nanoseconds of a ray that starts on a triangle of the node; `hits` is the share of such rays that end at one.
+    pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.costs.surface, triangles, steps, hits)
+    }
+
+    /// Nanoseconds of a ray that enters the node's box, sixteen rays at a time.
+    pub(super) fn outside(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.costs.outside, triangles, steps, hits)
+    }
+
+    /// The same for a leaf below a BVH node, where rays enter one by one.
+    pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
+        self.cost(&self.costs.alone, triangles, steps, hits)
+    }
+
+    /// Whether rays that start on known triangles walk at all.
+    pub(super) fn hints(&self) -> bool {
+        self.options.profile.hints || !self.keep_subtrees
+    }
+
+    /// Steps of the node's tetrahedralization, estimated.
+    pub(super) fn steps(&self, start: Start, triangles: u32, average_depth: f64) -> f64 {
+        self.options.estimator.steps(start, triangles, average_depth)
+    }
+}

@@ -1,0 +1,212 @@
+//! The probe: with the tetrahedra at hand, rays are traced through them and through the BVH, and what does not win
+//! is dropped.
+//!
+//! Steps are counted in double precision and priced by the profile, so that the outcome, and with it the file, is
+//! the same on every machine.
+
+use super::bvh_walk::walk;
+use super::choose::Storage;
+use super::gains::leaves;
+use super::options::{Options, Probe, Select};
+use super::prices::Prices;
+use super::rays::{SampleRay, from_surface, outside};
+use super::tet_walk::TetWalker;
+use super::{Weighting, subtree_sums::half_area};
+use crate::bvh::BinaryBvh;
+use crate::error::Result;
+use crate::mesh::Mesh;
+use crate::monitor::Monitor;
+use crate::tets::TetMesh;
+use serde::Serialize;
+
+/// Rays of all leaves together, and of one leaf at least and at most.
+const RAYS: usize = 1 << 16;
+const RAYS_OF_LEAF: [usize; 2] = [64, 1024];
+
+/// What the probe found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ProbeReport {
+    /// Each tet leaf that was built.
+    pub leaves: Vec<ProbedLeaf>,
+    /// Expected cost of a ray through the BVH alone, nanoseconds.
+    pub cost_bvh: f64,
+    /// The same with the leaves that stay.
+    pub cost_with_tets: f64,
+}
+
+/// A tet leaf.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ProbedLeaf {
+    /// Index in the binary BVH.
+    pub node: u32,
+    /// Its triangles.
+    pub triangles: u32,
+    /// Mean steps of rays that start on it.
+    pub steps: f64,
+    /// Nanoseconds of a ray that starts on it: with the tetrahedra, and through the BVH alone.
+    pub cost_tet: f64,
+    /// See `cost_tet`.
+    pub cost_bvh: f64,
+    /// Nanoseconds saved for each ray of the model.
+    pub gain: f64,
+    /// Whether it stays.
+    pub kept: bool,
+}
+
+/// Tetrahedralizations by their node.
+type Built = Vec<(u32, TetMesh)>;
+
+/// Drops the tetrahedralizations that do not win, and all of them if together they save less than the least gain.
+///
+/// # Errors
+/// [`crate::Error::Cancelled`].
+pub fn probe(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    built: Built,
+    options: &Options,
+    storage: Storage,
+    monitor: &dyn Monitor,
+) -> Result<(Built, Option<ProbeReport>)> {
+    if options.probe == Probe::Off || options.select != Select::Best || built.is_empty() {
+        return Ok((built, None));
+    }
+    monitor.stage("probe", Some(built.len() as u64));
+    let prices = Prices::new(options, storage.record, storage.keep_subtrees);
+    let scene = options.scene.as_deref();
+    let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
+    let all = super::gains::sample(mesh, bvh, options, scene);
+    let count = (RAYS / built.len()).clamp(RAYS_OF_LEAF[0], RAYS_OF_LEAF[1]);
+    let areas = surface_areas(mesh, bvh);
+    let mut report =
+        ProbeReport { cost_bvh: all.cost_bvh, cost_with_tets: all.cost_bvh, ..Default::default() };
+    for (node, tets) in &built {
+        monitor.check()?;
+        let mut leaf = surface(mesh, bvh, *node, tets, count, options, &prices, scene);
+        let rows = rows(bvh, *node);
+        // How many of the rays from surfaces start here.
+        let share = match scene {
+            Some(scene) => share_of(scene, bvh, &rows),
+            None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
+        };
+        if prices.hints() {
+            leaf.gain = weights[1] * share * (leaf.cost_bvh - leaf.cost_tet);
+        }
+        if !storage.keep_subtrees {
+            leaf.gain += weights[0] * entering(mesh, bvh, *node, tets, count, options, &prices);
+        }
+        leaf.kept = leaf.gain > 0.0;
+        report.leaves.push(leaf);
+        monitor.advance(1);
+    }
+    let gain: f64 = report.leaves.iter().filter(|l| l.kept).map(|l| l.gain).sum();
+    if gain < options.minimum_gain * report.cost_bvh {
+        report.leaves.iter_mut().for_each(|leaf| leaf.kept = false);
+    } else {
+        report.cost_with_tets -= gain;
+    }
+    let kept = built.into_iter().zip(&report.leaves).filter(|(_, leaf)| leaf.kept).map(|(b, _)| b).collect();
+    Ok((kept, Some(report)))
+}
+
+fn rows(bvh: &BinaryBvh, node: u32) -> std::ops::Range<usize> {
+    let node = &bvh.nodes[node as usize];
+    node.first as usize..(node.first + node.count) as usize
+}
+
+/// Sums of the triangles' areas up to each row of the order.
+fn surface_areas(mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
+    use super::rays::{corners, cross, dot, sub};
+    let mut sums = Vec::with_capacity(bvh.order.len() + 1);
+    sums.push(0.0);
+    for &triangle in &bvh.order {
+        let [a, b, c] = corners(mesh, triangle);
+        let n = cross(sub(b, a), sub(c, a));
+        sums.push(sums[sums.len() - 1] + dot(n, n).sqrt());
+    }
+    sums
+}
+
+fn share_of(scene: &Weighting, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -> f64 {
+    let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
+    ids.sort_unstable();
+    let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
+    here.count() as f64 / scene.surface.len().max(1) as f64
+}
+
+/// Rays that start on the leaf's triangles.
+#[expect(clippy::too_many_arguments)]
+fn surface(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    node: u32,
+    tets: &TetMesh,
+    count: usize,
+    options: &Options,
+    prices: &Prices<'_>,
+    scene: Option<&Weighting>,
+) -> ProbedLeaf {
+    let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
+    let rows = rows(bvh, node);
+    let of_scene: Option<Vec<SampleRay>> = scene.map(|scene| {
+        let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
+        ids.sort_unstable();
+        let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
+        here.copied().take(count).collect()
+    });
+    let rays = of_scene.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
+    let walker = TetWalker::new(tets);
+    let (mut steps, mut through_tets, mut through_bvh, mut traced) = (0.0, 0.0, 0.0, 0.0f64);
+    for ray in &rays {
+        let Some(walked) = walker.walk(ray) else { continue };
+        let met = walk(mesh, bvh, ray, |_| {});
+        let plain = costs.ray + costs.surface * f64::from(met.visits);
+        let mut time = prices.surface(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+        if node != 0 && walked.left && leaves(ray, &met, at) {
+            time += plain;
+        }
+        steps += f64::from(walked.steps);
+        through_tets += time;
+        through_bvh += plain;
+        traced += 1.0;
+    }
+    let mean = |sum: f64| sum / traced.max(1.0);
+    ProbedLeaf {
+        node,
+        triangles: at.count,
+        steps: mean(steps),
+        cost_tet: mean(through_tets),
+        cost_bvh: mean(through_bvh),
+        gain: 0.0,
+        kept: false,
+    }
+}
+
+/// What is saved of rays from outside where no BVH stays beside the tetrahedra, for each that meets the root.
+fn entering(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    node: u32,
+    tets: &TetMesh,
+    count: usize,
+    options: &Options,
+    prices: &Prices<'_>,
+) -> f64 {
+    let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
+    let below = node..node + 2 * at.count - 1;
+    let walker = TetWalker::new(tets);
+    let (mut saved, mut traced) = (0.0, 0.0f64);
+    for ray in outside(at.lower, at.upper, count, 4 + u64::from(node)) {
+        let Some(walked) = walker.walk(&ray) else { continue };
+        let mut visits = 0u32;
+        walk(mesh, bvh, &ray, |i| visits += u32::from(below.contains(&i)));
+        let (steps, hits) = (f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+        saved += costs.outside * f64::from(visits);
+        saved -= match node {
+            0 => prices.outside(at.count, steps, hits) - costs.ray,
+            _ => prices.alone(at.count, steps, hits),
+        };
+        traced += 1.0;
+    }
+    half_area(at) / half_area(&bvh.nodes[0]) * saved / traced.max(1.0)
+}

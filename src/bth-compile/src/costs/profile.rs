@@ -1,0 +1,210 @@
+//! What tracing costs on a machine, as `bthc calibrate` measures it.
+
+use crate::error::{Error, Place, Result};
+use bth::layout::RecordKind;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Times on one thread, nanoseconds a ray in batches unless said otherwise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// Kind of file, and its version.
+    pub profile: u32,
+    /// Vector instructions that were measured; for people.
+    pub isa: String,
+    /// The BVH.
+    pub bvh: BvhCosts,
+    /// Tetrahedra, by name of the record.
+    pub tets: BTreeMap<String, TetCosts>,
+    /// Sizes in bytes of the tetrahedra that the two costs of a step were measured on.
+    pub bytes: [f64; 2],
+    /// Whether the runtime lets rays with hints walk tetrahedra when there is a BVH beside them.
+    pub hints: bool,
+    /// Tetrahedralization, microseconds a triangle.
+    pub tetrahedralize: f64,
+}
+
+/// Costs of the BVH.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BvhCosts {
+    /// A ray from the call to its answer, by itself.
+    pub ray: f64,
+    /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper; several make one visit
+    /// of a wide node or leaf.
+    pub outside: f64,
+    /// The same for rays from surfaces.
+    pub surface: f64,
+    /// A wide node, by itself.
+    pub node: f64,
+    /// A leaf of up to 16 triangles, by itself.
+    pub block: f64,
+}
+
+/// Costs of walks through tetrahedra in one record.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TetCosts {
+    /// Entered through the box, sixteen rays at a time: where the tetrahedra are the whole object.
+    pub outside: Walk,
+    /// From a known triangle, sixteen rays at a time.
+    pub surface: Walk,
+    /// Entered through the box, ray by ray: where they are a leaf of a BVH.
+    pub alone: Walk,
+}
+
+/// A walk.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Walk {
+    /// Setting the ray up, and finding the first tetrahedron.
+    pub entry: f64,
+    /// A triangle where the walk ends: telling that it is hit, and where.
+    pub hit: f64,
+    /// C_tet, a step: in tetrahedra that fit the caches, and in many times as many.
+    pub step: [f64; 2],
+}
+
+impl Walk {
+    /// Cost of so many steps in tetrahedra of so many bytes, between the two sizes that were measured, if such a share
+    /// of walks ends at a triangle.
+    pub fn cost(&self, steps: f64, hits: f64, bytes: f64, sizes: [f64; 2]) -> f64 {
+        let share = (bytes / sizes[0]).max(1.0).log2() / (sizes[1] / sizes[0]).log2();
+        let [small, large] = self.step;
+        self.entry + hits * self.hit + steps * (small + share.clamp(0.0, 1.0) * (large - small))
+    }
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        serde_json::from_str(include_str!("default-profile.json")).expect("a test reads it")
+    }
+}
+
+impl Profile {
+    /// Reads a profile.
+    ///
+    /// # Errors
+    /// `BTH-O060` when it cannot be read, `BTH-I060` when it is not a profile.
+    pub fn read(path: &Path) -> Result<Profile> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::File {
+            code: "BTH-O060",
+            path: path.to_owned(),
+            message: e.to_string(),
+        })?;
+        let wrong = |message: String| Error::Input {
+            code: "BTH-I060",
+            place: Place::File(path.to_owned()),
+            message,
+            hint: "write one with bthc calibrate".to_owned(),
+        };
+        let profile: Profile = serde_json::from_str(&text)
+            .map_err(|e| wrong(format!("expected a profile of this machine's costs: {e}")))?;
+        profile.check().map_err(wrong)?;
+        Ok(profile)
+    }
+
+    /// Whether all costs can be used.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.profile != 1 {
+            return Err(format!("expected profile version 1, found {}", self.profile));
+        }
+        let bvh = self.bvh;
+        let mut numbers = vec![bvh.ray, bvh.outside, bvh.surface, bvh.node, bvh.block];
+        numbers.extend(self.bytes);
+        numbers.push(self.tetrahedralize);
+        for costs in self.tets.values() {
+            for walk in [costs.outside, costs.surface, costs.alone] {
+                numbers.extend([walk.entry, walk.hit]);
+                numbers.extend(walk.step);
+            }
+        }
+        for kind in RecordKind::ALL {
+            if !self.tets.contains_key(kind.name()) {
+                return Err(format!("expected the costs of {}, found none", kind.name()));
+            }
+        }
+        if let Some(x) = numbers.iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
+            return Err(format!("expected costs of 0 or more, found {x}"));
+        }
+        if self.bytes[0] < 1.0 || self.bytes[1] < 2.0 * self.bytes[0] {
+            return Err(format!(
+                "expected two sizes, the second at least twice the first, found {:?}",
+                self.bytes
+            ));
+        }
+        Ok(())
+    }
+
+    /// Costs of a record.
+    pub fn record(&self, kind: RecordKind) -> &TetCosts {
+        self.tets.get(kind.name()).or_else(|| self.tets.values().next()).expect("checked when it was read")
+    }
+
+    /// The same with three decimals: what is beyond them is noise.
+    pub fn rounded(mut self) -> Profile {
+        let round = |x: &mut f64| *x = (*x * 1e3).round() / 1e3;
+        let bvh = &mut self.bvh;
+        [&mut bvh.ray, &mut bvh.outside, &mut bvh.surface, &mut bvh.node, &mut bvh.block]
+            .into_iter()
+            .for_each(round);
+        for costs in self.tets.values_mut() {
+            for walk in [&mut costs.outside, &mut costs.surface, &mut costs.alone] {
+                round(&mut walk.entry);
+                round(&mut walk.hit);
+                walk.step.iter_mut().for_each(round);
+            }
+        }
+        self.bytes.iter_mut().for_each(round);
+        round(&mut self.tetrahedralize);
+        self
+    }
+
+    /// BLAKE3 of the numbers, hexadecimal: what of a profile enters a compiled file.
+    pub fn hash(&self) -> String {
+        let text = serde_json::to_string(self).expect("numbers and names");
+        blake3::hash(text.as_bytes()).to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_profile_can_be_used() {
+        assert_eq!(Profile::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn a_step_costs_more_where_tetrahedra_exceed_the_caches() {
+        let walk = Walk { entry: 8.0, hit: 4.0, step: [2.0, 4.0] };
+        let cost = |bytes: f64| walk.cost(1.0, 0.5, bytes, [1e6, 4e6]);
+        assert_eq!([1e3, 1e6, 2e6, 4e6, 1e9].map(cost), [12.0, 12.0, 13.0, 14.0, 14.0]);
+    }
+
+    #[test]
+    fn profiles_with_costs_that_cannot_be_are_refused() {
+        let refused = |change: fn(&mut Profile)| {
+            let mut profile = Profile::default();
+            change(&mut profile);
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), serde_json::to_string(&profile).unwrap()).unwrap();
+            Profile::read(file.path()).unwrap_err().to_string()
+        };
+        assert!(refused(|p| p.bvh.ray = -1.0).contains("-1"));
+        assert!(refused(|p| p.bytes = [0.0, 0.0]).contains("two sizes"));
+        assert!(refused(|p| p.tets.clear()).contains("link32"));
+        assert!(refused(|p| p.profile = 2).contains("version 1"));
+    }
+
+    #[test]
+    fn a_profile_that_is_no_profile_is_bad_input() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "{\"profile\": 1, \"isa\": 3}").unwrap();
+        assert!(matches!(Profile::read(file.path()), Err(Error::Input { code: "BTH-I060", .. })));
+        assert!(matches!(Profile::read(Path::new("/nowhere/x")), Err(Error::File { code: "BTH-O060", .. })));
+    }
+}

@@ -1,0 +1,151 @@
+//! Rays that stand for those of a renderer: uniform lines from outside, and rays from surfaces.
+
+use super::random::Random;
+use crate::bvh::{BinaryBvh, Node};
+use crate::mesh::Mesh;
+
+/// A sampled ray, object space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleRay {
+    /// Where it starts.
+    pub origin: [f64; 3],
+    /// A unit vector.
+    pub direction: [f64; 3],
+    /// Where it ends, in units of length.
+    pub tmax: f64,
+    /// Triangle that it starts on.
+    pub from: Option<u32>,
+}
+
+/// Length of rays that ask for ambient occlusion, relative to the diagonal of the bounds.
+const SHORT: f64 = 0.05;
+/// By how much rays are lifted off the surface that they start on, relative to the diagonal.
+const LIFT: f64 = 2e-5;
+
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The point at `t` on a ray.
+pub(super) fn along(ray: &SampleRay, t: f64) -> [f64; 3] {
+    [0, 1, 2].map(|k| ray.origin[k] + t * ray.direction[k])
+}
+
+pub(super) fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    v.map(|x| x / length)
+}
+
+/// Corners of a triangle in double precision.
+pub(super) fn corners(mesh: &Mesh, triangle: u32) -> [[f64; 3]; 3] {
+    mesh.corners(triangle).map(|p| p.map(f64::from))
+}
+
+/// Length of a box's diagonal.
+pub(super) fn diagonal(node: &Node) -> f64 {
+    let d = [0, 1, 2].map(|k| f64::from(node.upper[k]) - f64::from(node.lower[k]));
+    dot(d, d).sqrt()
+}
+
+/// Lines that are uniform in space (chords of the ball around the box), which start outside of it and
+/// meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
+pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
+    let mut random = Random(seed);
+    let middle: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(lower[k]) + f64::from(upper[k])));
+    let half: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(upper[k]) - f64::from(lower[k])));
+    let radius = dot(half, half).sqrt();
+    let mut rays = Vec::with_capacity(count);
+    // A box of zero size is met by no chord at all; one of zero width by few.
+    for _ in 0..64 * count {
+        if rays.len() == count || radius == 0.0 {
+            break;
+        }
+        let [p, q] = [0; 2].map(|_| random.sphere());
+        let [p, q] = [p, q].map(|p| [0, 1, 2].map(|k| middle[k] + 1.01 * radius * p[k]));
+        let ray = SampleRay { origin: p, direction: unit(sub(q, p)), tmax: f64::INFINITY, from: None };
+        if ray.direction[0].is_finite() && enters(&ray, lower, upper, f64::INFINITY).is_some() {
+            rays.push(ray);
+        }
+    }
+    rays
+}
+
+/// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area, cosine-weighted
+/// about the normal; every second one as short as rays for ambient occlusion. Fronts are where closed
+/// models and rooms are seen from. They are stratified along the order, so that rays that follow each other start
+/// close together, as a renderer's do.
+pub fn from_surface(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    rows: std::ops::Range<usize>,
+    count: usize,
+    seed: u64,
+) -> Vec<SampleRay> {
+    let Some(root) = bvh.nodes.first() else { return Vec::new() };
+    let (mut random, diagonal) = (Random(seed), diagonal(root));
+    let triangles = &bvh.order[rows];
+    let normal = |triangle: u32| {
+        let [a, b, c] = corners(mesh, triangle);
+        cross(sub(b, a), sub(c, a))
+    };
+    let mut total = 0.0;
+    let sums: Vec<f64> = triangles
+        .iter()
+        .map(|&t| {
+            let n = normal(t);
+            total += dot(n, n).sqrt();
+            total
+        })
+        .collect();
+    if !(total > 0.0 && total.is_finite()) {
+        return Vec::new();
+    }
+    let mut rays = Vec::with_capacity(count);
+    for i in 0..count {
+        let at = (i as f64 + random.unit()) / count as f64 * total;
+        let triangle = triangles[sums.partition_point(|sum| *sum <= at).min(triangles.len() - 1)];
+        let [a, b, c] = corners(mesh, triangle);
+        let n = unit(normal(triangle));
+        // Uniform in the triangle by folding the parallelogram.
+        let (mut u, mut v) = (random.unit(), random.unit());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        let lift = LIFT * diagonal;
+        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + lift * n[k]);
+        let s = random.sphere();
+        let direction = unit([0, 1, 2].map(|k| n[k] + s[k]));
+        let tmax = if i % 2 == 0 { f64::INFINITY } else { SHORT * diagonal };
+        if direction.iter().chain(&origin).all(|x| x.is_finite()) {
+            rays.push(SampleRay { origin, direction, tmax, from: Some(triangle) });
+        }
+    }
+    rays
+}
+
+/// Where a ray enters a box, if before `limit`.
+pub(super) fn enters(ray: &SampleRay, lower: [f32; 3], upper: [f32; 3], limit: f64) -> Option<f64> {
+    let (mut near, mut far) = (0.0f64, limit.min(ray.tmax));
+    for k in 0..3 {
+        let (lower, upper) = (f64::from(lower[k]) - ray.origin[k], f64::from(upper[k]) - ray.origin[k]);
+        if ray.direction[k] == 0.0 {
+            if lower > 0.0 || upper < 0.0 {
+                return None;
+            }
+            continue;
+        }
+        let inverse = 1.0 / ray.direction[k];
+        let (a, b) = (lower * inverse, upper * inverse);
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    (near <= far).then_some(near)
+}

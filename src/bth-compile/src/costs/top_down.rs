@@ -1,0 +1,85 @@
+//! The paper's selection (§3.2, §3.3): top-down, the first suitable nodes for which tetrahedra are the cheaper
+//! structure for rays from outside.
+
+use super::options::{Choice, Decision, Options, Verdict};
+use super::prices::{LINES_THAT_HIT, Prices};
+use super::subtree_sums::{half_area, subtree_sums};
+use super::{Estimator, Start};
+use crate::bvh::BinaryBvh;
+use crate::error::Result;
+use crate::marks::Marks;
+use crate::monitor::Monitor;
+
+/// Nodes between two looks at whether the user asked to stop.
+const NODES_BETWEEN_CHECKS: usize = 1 << 14;
+
+/// Costs of the paper's rule, nanoseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PaperCosts {
+    pub(super) estimator: Estimator,
+    /// C_t and C_i: the visit of a node or leaf.
+    pub(super) visit: f64,
+}
+
+/// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if
+/// `C_tet N_avg` (the paper's equation 2), and here the cost of getting in, is below the cost of
+/// its BVH, and else its children are examined.
+pub(super) fn choose(
+    bvh: &BinaryBvh,
+    marks: &Marks,
+    options: &Options,
+    prices: &Prices<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(Choice, f64, f64)> {
+    let paper = PaperCosts { estimator: options.estimator, visit: options.profile.bvh.outside };
+    let sums = subtree_sums(bvh);
+    let mut choice = Choice::default();
+    let mut saved = 0.0;
+    let Some(root) = bvh.nodes.first() else { return Ok((choice, 0.0, 0.0)) };
+    let mut i = 0;
+    // In preorder, what lies below a node follows it: leaving a subtree out is a jump.
+    while i < bvh.nodes.len() {
+        if choice.verdicts.len().is_multiple_of(NODES_BETWEEN_CHECKS) {
+            monitor.check()?;
+        }
+        let (node, sum) = (&bvh.nodes[i], &sums[i]);
+        let suitable = marks.suitable[i];
+        let depth = sum.depth as f64 / f64::from(node.count);
+        let n_avg = paper.estimator.steps(Start::Outside, node.count, depth);
+        let cost_tet = prices.outside(node.count, n_avg, LINES_THAT_HIT);
+        let cost_bvh = paper.visit * (sum.inner_area + sum.leaf_area) / half_area(node);
+        let decision = if node.count < options.minimum_triangles {
+            Decision::RefusedSmall
+        } else if !suitable {
+            Decision::Unsuitable
+        } else if node.count > options.maximum_triangles {
+            Decision::RefusedLarge
+        } else if cost_tet < cost_bvh {
+            Decision::Chosen
+        } else {
+            Decision::RefusedCost
+        };
+        let gain = half_area(node) / half_area(root) * (cost_bvh - cost_tet);
+        let verdict = Verdict {
+            node: i as u32,
+            count: node.count,
+            suitable,
+            cost_tet,
+            cost_bvh,
+            n_avg,
+            gain,
+            decision,
+        };
+        choice.verdicts.push(verdict);
+        if decision == Decision::Chosen {
+            choice.chosen.push(i as u32);
+            saved += gain;
+        }
+        i += match decision {
+            Decision::Chosen | Decision::RefusedSmall => 2 * node.count as usize - 1,
+            _ => 1,
+        };
+    }
+    let cost = choice.verdicts[0].cost_bvh;
+    Ok((choice, cost, cost - saved))
+}

@@ -1,0 +1,63 @@
+//! A stage that makes something else than it did has a new version in `cached/keys.rs`: else caches would serve what
+//! the old one made.
+
+use bth_cache::Store;
+use bth_compile::cached::Cache;
+use bth_compile::pipeline::{Options, Structure, compile_cached};
+use std::fmt::Write;
+use std::path::Path;
+
+/// What the stages made of the model below, as `stage version BLAKE3`. If this test fails because a stage was changed on
+/// purpose, raise the stage's version and note what the test prints.
+const NOTED: &str = "\
+bvh 1 043679c3f848da987a52b08afe248852a63686e9ba7fe1f9f3f44a3c4b3a8de3
+file 2.65536 ccea7f866f50e6b5cd7857429046bbecee5a0207fa5f6f8bf67b0e31bc729371
+marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
+mesh 1 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
+";
+
+/// A bumpy field of 32 by 32 squares and a triangle through it, in small whole numbers.
+fn model() -> String {
+    let mut text = String::new();
+    for (y, x) in (0..33u32).flat_map(|y| (0..33u32).map(move |x| (y, x))) {
+        writeln!(text, "v {x} {y} {}", (x * x * 7 + y * y * 13 + x * y * 5) % 11).unwrap();
+    }
+    text += "v 3 3 -9\nv 4 5 30\nv 9 4 30\n";
+    for (y, x) in (0..32u32).flat_map(|y| (1..33u32).map(move |x| (y, x))) {
+        let (a, b) = (33 * y + x, 33 * (y + 1) + x);
+        writeln!(text, "f {a} {} {} {b}", a + 1, b + 1).unwrap();
+    }
+    text + "f 1090 1091 1092\n"
+}
+
+/// The stages' versions and what they made.
+fn made(folder: &Path) -> String {
+    let source = folder.join("model.obj");
+    std::fs::write(&source, model()).unwrap();
+    let store = Store::open(&folder.join("cache"), 1 << 30).unwrap();
+    for structure in [Structure::Bvh, Structure::Bth] {
+        let mut options = Options { structure, ..Options::default() };
+        // No node is large enough: whether there is a worker makes no difference.
+        options.costs.minimum_triangles = 1 << 20;
+        let cache = Cache::new(&store, "model");
+        compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+    }
+    let mut text = String::new();
+    for entry in store.list() {
+        let of =
+            |name: &str| entry.components.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str());
+        if entry.stage == "file" && of("structure") != Some("bvh") {
+            continue;
+        }
+        let version = of(&format!("{} version", entry.stage)).unwrap();
+        writeln!(text, "{} {version} {}", entry.stage, entry.blob.hex()).unwrap();
+    }
+    text
+}
+
+#[test]
+fn stages_that_make_something_else_have_another_version() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = made(folder.path());
+    assert_eq!(made, NOTED, "raise the version of the stage that changed, then note\n{made}");
+}

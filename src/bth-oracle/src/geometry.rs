@@ -1,0 +1,54 @@
+//! The triangles of a compiled object, collected from its leaves.
+
+use bth::layout::Child;
+use bth::object::ObjectView;
+
+/// A triangle of an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// Id in the source.
+    pub id: u32,
+    /// Corners, object space.
+    pub corners: [[f32; 3]; 3],
+}
+
+/// All triangles that can be hit, by ascending id: those of the triangle leaves, and the constrained faces of the tet
+/// leaves. The object must have passed its check.
+pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
+    let mut found = Vec::with_capacity(object.header.triangles as usize);
+    let mut stack = vec![object.header.root];
+    while let Some(code) = stack.pop() {
+        match Child::from_code(code) {
+            Some(Child::Node(line)) => stack.extend(object.node(line).child),
+            Some(Child::Indexed(line)) => {
+                let leaf = object.indexed_leaf(line);
+                for row in 0..leaf.triangles as usize {
+                    let corners = [0, 1, 2].map(|c| {
+                        let vertex = usize::from(leaf.corner[c][row]);
+                        [0, 1, 2].map(|axis| leaf.vertex[axis][vertex])
+                    });
+                    found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
+                }
+            }
+            Some(Child::Raw(line)) => {
+                let leaf = object.raw_leaf(line);
+                for row in 0..leaf.triangles as usize {
+                    let corners = leaf.corner.map(|axes| axes.map(|values| values[row]));
+                    found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
+                }
+            }
+            // A subtree beside it holds the same triangles.
+            Some(Child::Tets(row)) => {
+                let leaf = &object.tet_leaves[row as usize];
+                let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];
+                found.extend(faces.iter().map(|face| Triangle {
+                    id: face.triangle,
+                    corners: face.vertex.map(|v| object.tet_vertices[v as usize].position),
+                }));
+            }
+            None => {}
+        }
+    }
+    found.sort_by_key(|triangle| triangle.id);
+    found
+}

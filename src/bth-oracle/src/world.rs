@@ -1,0 +1,123 @@
+//! A whole scene: every triangle of every instance, transformed exactly.
+
+use crate::crossing::{Crossing, Point, clearly_missed, cross, crossing, has_line, integer};
+use crate::geometry::{Triangle, triangles};
+use crate::nearest::{Truth, nearest_of};
+use bth::Scene;
+use bth::rays::{Hit, Ray, Surface};
+use num_bigint::BigInt;
+
+/// The units of f64, 2^-1074, and of f32, 2^-149.
+const UNITS: [u32; 2] = [1074, 149];
+
+/// The instances of a scene at its time. Instances are where their transforms, as f64 numbers, put them: no rounding
+/// comes after, while tracing rounds the ray once in each object's space. So answers for transformed instances differ
+/// from the runtime's by that rounding; those for objects as they are do not.
+#[derive(Debug)]
+pub struct World {
+    instances: Vec<Instance>,
+}
+
+#[derive(Debug)]
+struct Instance {
+    number: u32,
+    /// Rows of four; `None` for the identity.
+    to_world: Option<[[f64; 4]; 3]>,
+    triangles: Vec<Triangle>,
+}
+
+/// A finite f64 as an integer, in units of 2^-1074.
+fn integer_f64(x: f64) -> BigInt {
+    assert!(x.is_finite());
+    let (exponent, fraction) = ((x.to_bits() >> 52) & 0x7ff, x.to_bits() & ((1 << 52) - 1));
+    let magnitude = match exponent {
+        0 => BigInt::from(fraction),
+        e => BigInt::from(fraction | (1 << 52)) << (e - 1),
+    };
+    if x.is_sign_negative() { -magnitude } else { magnitude }
+}
+
+impl World {
+    /// Collects what can be seen.
+    pub fn new(scene: &Scene) -> Self {
+        let identity: [[f64; 4]; 3] =
+            std::array::from_fn(|row| std::array::from_fn(|k| f64::from(u8::from(row == k))));
+        let instance = |number: u32| {
+            let view = scene.instance(number);
+            view.visible.then(|| Instance {
+                number,
+                to_world: Some(view.to_world).filter(|rows| *rows != identity),
+                triangles: triangles(&scene.object(view.object)),
+            })
+        };
+        World { instances: (0..scene.instance_count()).filter_map(instance).collect() }
+    }
+
+    /// Triangles of all instances.
+    pub fn triangle_count(&self) -> usize {
+        self.instances.iter().map(|instance| instance.triangles.len()).sum()
+    }
+
+    /// The nearest exact hit.
+    pub fn nearest(&self, ray: &Ray) -> Option<Truth<Surface>> {
+        nearest_of(ray, self.crossings(ray))
+    }
+
+    /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
+    /// instance and triangle.
+    pub fn hit(&self, ray: &Ray) -> Hit {
+        let rounded = |x: &_| crate::to_f64(x) as f32;
+        self.nearest(ray).map_or(Hit::MISS, |truth| Hit {
+            t: rounded(&truth.at.t),
+            u: rounded(&truth.at.u),
+            v: rounded(&truth.at.v),
+            surface: truth.triangles[0],
+        })
+    }
+
+    /// Whether anything is hit.
+    pub fn any(&self, ray: &Ray) -> bool {
+        self.crossings(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
+    }
+
+    fn crossings<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Crossing)> + 'a {
+        self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
+            instance.triangles.iter().filter_map(move |triangle| {
+                let surface = Surface { instance: instance.number, triangle: triangle.id };
+                let at = match &instance.to_world {
+                    None => crossing(ray, triangle.corners)?,
+                    Some(rows) => crossing_in_world(ray, rows, triangle.corners)?,
+                };
+                Some((surface, at))
+            })
+        })
+    }
+}
+
+/// As [`crossing`], of a triangle that a transform moves.
+fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Crossing> {
+    let wide = |v: [f32; 3]| v.map(f64::from);
+    let (origin, direction) = (wide(ray.origin), wide(ray.direction));
+    let mut magnitude: f64 = 0.0;
+    let from = corners.map(wide).map(|p| {
+        std::array::from_fn(|k| {
+            let [a, b, c, moved] = rows[k];
+            let terms = [a * p[0], b * p[1], c * p[2], moved, -origin[k]];
+            // Five terms, each with one rounding, and four sums: below 8 units of rounding of their sizes.
+            magnitude = magnitude.max(8.0 * terms.iter().map(|x| x.abs()).sum::<f64>());
+            terms.iter().sum()
+        })
+    });
+    if clearly_missed(direction, from, magnitude) {
+        return None;
+    }
+    let widen = |v: [f32; 3]| v.map(|x| integer(x) << UNITS[0]);
+    let exact = |p: [f32; 3]| -> Point {
+        let p = p.map(integer);
+        std::array::from_fn(|k| {
+            let [a, b, c, moved] = rows[k].map(integer_f64);
+            a * &p[0] + b * &p[1] + c * &p[2] + (moved << UNITS[1])
+        })
+    };
+    cross(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
+}

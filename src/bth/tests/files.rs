@@ -1,0 +1,120 @@
+//! The conformance files, embedded: opened, checked, damaged and traced without a file system, as it runs under Miri
+//! (`tools/check/miri`), in WebAssembly and on 32-bit machines (`tools/check/targets`).
+
+use bth::rays::{Hit, Ray, Surface};
+
+macro_rules! files {
+    ($($name:literal),* $(,)?) => {
+        [$(($name, include_bytes!(concat!("../../../format-spec/conformance/valid/", $name, ".bth")).as_slice())),*]
+    };
+}
+
+const VALID: [(&str, &[u8]); 14] = files![
+    "no-objects",
+    "nothing-to-hit",
+    "scene-empty",
+    "scene-moving",
+    "scene-still",
+    "tets-link32",
+    "tets-tet16",
+    "tets-tet20",
+    "tets-tet32",
+    "triangle",
+    "triangle-bare",
+    "two-levels",
+    "two-objects",
+    "unknown-optional-section",
+];
+
+#[test]
+#[cfg(all(not(miri), not(target_family = "wasm")))]
+fn every_valid_file_is_among_them() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../format-spec/conformance/valid");
+    assert_eq!(std::fs::read_dir(folder).unwrap().count(), VALID.len());
+}
+
+/// Rays along and across the boxes of the scene's instances.
+fn rays(scene: &bth::Scene) -> Vec<Ray> {
+    let boxes: Vec<_> = (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)).collect();
+    let count = if cfg!(miri) { 5 } else { 2000 };
+    let ray = |i: usize| {
+        let (lower, upper) = boxes.get(i % boxes.len().max(1)).copied().unwrap_or(([-1.0; 3], [1.0; 3]));
+        let ends = [0.5f32, -1.0, 0.25, 1.0, 2.0, 0.0, 0.625];
+        let point = |i: usize| {
+            [1, 3, 17]
+                .map(|step| ends[i / step % 7])
+                .into_iter()
+                .zip(0..3)
+                .map(|(s, k)| lower[k] * (1.0 - s) + upper[k] * s)
+        };
+        let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
+        for (k, (from, to)) in point(5 * i + 4).zip(point(i)).enumerate() {
+            (origin[k], direction[k]) = (from, to - from);
+        }
+        Ray { origin, tmin: 0.0, direction, tmax: if i % 3 == 2 { 1.0 } else { f32::INFINITY } }
+    };
+    (0..count).map(ray).collect()
+}
+
+fn trace(scene: &bth::Scene) -> usize {
+    let rays = rays(scene);
+    let from: Vec<Surface> =
+        (0..rays.len() as u32).map(|i| Surface { instance: i % 2, triangle: i % 5 }).collect();
+    let (mut hits, mut with_hints) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+    scene.nearest_batch(&rays, None, &mut hits);
+    scene.nearest_batch(&rays, Some(&from), &mut with_hints);
+    assert_eq!(hits, with_hints);
+    let mut found = vec![false; rays.len()];
+    scene.any_batch(&rays, Some(&from), &mut found);
+    for ((ray, hit), found) in rays.iter().zip(&hits).zip(found) {
+        assert_eq!(hit.is_hit(), found);
+        assert_eq!(scene.nearest(ray, Surface::NONE), *hit);
+    }
+    hits.iter().filter(|hit| hit.is_hit()).count()
+}
+
+#[test]
+#[cfg(target_endian = "little")]
+fn every_valid_file_opens_verifies_and_is_traced() {
+    let mut hits = 0;
+    for (name, bytes) in VALID {
+        let file = bth::File::from_bytes(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        bth::verify::verify(&file).unwrap_or_else(|e| panic!("{name}: {}", e[0]));
+        let mut scene = bth::from_bytes(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        hits += trace(&scene);
+        if scene.description().is_some() {
+            scene.set_seconds(0.75).unwrap_or_else(|e| panic!("{name}: {e}"));
+            hits += trace(&scene);
+        }
+    }
+    assert!(hits > 5, "{hits} hits");
+}
+
+/// The text of `BTH-O002`, which is all that a big-endian machine gets.
+#[test]
+#[cfg(target_endian = "big")]
+fn big_endian_machines_get_the_documented_error() {
+    for (name, bytes) in VALID {
+        let error = bth::File::from_bytes(bytes).unwrap_err();
+        assert_eq!(error.code.as_str(), "BTH-O002", "{name}");
+        assert!(error.to_string().contains("big-endian"), "{error}");
+        assert!(bth::from_bytes(bytes).is_err());
+    }
+}
+
+/// Cuts and flipped bytes of the smallest files: an error, whatever they hit.
+#[test]
+#[cfg(target_endian = "little")]
+fn damaged_files_are_refused() {
+    let step = if cfg!(miri) { 311 } else { 1 };
+    for (name, bytes) in VALID.into_iter().filter(|(_, bytes)| bytes.len() <= 1280) {
+        for at in (0..bytes.len()).step_by(step) {
+            assert!(bth::from_bytes(&bytes[..at]).is_err(), "{name} cut to {at} bytes");
+            let mut damaged = bytes.to_vec();
+            damaged[at] ^= 0x55;
+            let refused =
+                bth::File::from_bytes(&damaged).map_or(true, |file| bth::verify::verify(&file).is_err());
+            assert!(refused, "{name} with byte {at} flipped");
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! A model to measure on: its structures, rays, and the steps that these take.
+
+use crate::failure::Failure;
+use crate::measure::{Rays, Run, Way, nanoseconds};
+use bth::Scene;
+use bth::layout::RecordKind;
+use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
+use bth_compile::mesh::Mesh;
+use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::tets::WorkerStatus;
+use bth_compile::{Error, Monitor, bvh, tets};
+
+/// Rays of each kind.
+const RAYS: usize = 16384;
+/// Rays whose steps are counted.
+const COUNTED: usize = 4096;
+
+/// Rays of one kind and their mean steps.
+struct Kind {
+    rays: Rays,
+    /// Entered nodes of the binary BVH, and tetrahedra.
+    visits: f64,
+    steps: f64,
+    /// Share that ends at a triangle.
+    hits: f64,
+}
+
+/// Times of one kind of rays, with their steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Timed {
+    /// Nanoseconds through the BVH.
+    pub(crate) bvh: f64,
+    /// Entered nodes of the binary BVH.
+    pub(crate) visits: f64,
+    /// Nanoseconds through the tetrahedra, by record.
+    pub(crate) tets: [f64; 4],
+    /// Nanoseconds through the tetrahedra one ray a call, by record.
+    pub(crate) single: [f64; 4],
+    /// Tetrahedra on the way.
+    pub(crate) steps: f64,
+    /// Share of the rays that end at a triangle.
+    pub(crate) hits: f64,
+}
+
+/// What was measured on a model.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Times {
+    /// Rays that miss the box.
+    pub(crate) nothing: f64,
+    /// Lines from outside.
+    pub(crate) outside: Timed,
+    /// Bounces that end at a triangle and that don't, each in two halves of few steps and of many.
+    pub(crate) bounces: [Timed; 4],
+    /// Short rays from surfaces.
+    pub(crate) short: Timed,
+    /// Wide nodes and leaves that lines from outside enter.
+    pub(crate) wide: [f64; 2],
+    /// Bytes of the tetrahedra and vertices, by record.
+    pub(crate) bytes: [f64; 4],
+    /// Tetrahedralization, microseconds a triangle.
+    pub(crate) tetrahedralize: f64,
+}
+
+/// A model in all structures.
+pub(crate) struct Subject {
+    bvh: Scene,
+    tets: Vec<Scene>,
+    nothing: Rays,
+    outside: Kind,
+    bounces: [Kind; 4],
+    short: Kind,
+    wide: [f64; 2],
+    bytes: [f64; 4],
+    tetrahedralize: f64,
+}
+
+impl Subject {
+    /// Compiles a model in every structure.
+    ///
+    /// # Errors
+    /// If it cannot be tetrahedralized whole, or the worker is missing.
+    pub(crate) fn new(name: &str, mesh: &Mesh, monitor: &dyn Monitor) -> Result<Subject, Failure> {
+        let options = Options { structure: Structure::Tets, keep_subtrees: false, ..Options::default() };
+        let (tree, _) = bvh::build(mesh, &options.bvh, monitor)?;
+        let (built, report) = tets::build(mesh, &tree, &[0], &options.tets, monitor)?;
+        let [(0, tets)] = &built[..] else {
+            let message = match report.worker {
+                WorkerStatus::Missing { hint } => hint,
+                WorkerStatus::Unusable { reason } => reason,
+                _ => format!("{name} could not be tetrahedralized whole"),
+            };
+            return Err(Error::Input {
+                code: "BTH-I061",
+                place: bth_compile::error::Place::File(name.into()),
+                message,
+                hint: "costs of tetrahedra need the worker bth-tetgen and models without bad contacts".into(),
+            }
+            .into());
+        };
+        let scene = |built: &[(u32, tets::TetMesh)], record: RecordKind| -> Result<Scene, Failure> {
+            let options = Options { record, geometry: false, ..options.clone() };
+            Ok(bth::from_bytes(&pipeline::assemble(mesh, &tree, built, &options, monitor)?.bytes)?)
+        };
+        let plain = scene(&[], RecordKind::Link32)?;
+        let root = &tree.nodes[0];
+        let lines = costs::outside(root.lower, root.upper, RAYS, 11);
+        // Away from the model: the other half of each line.
+        let away = |ray: &SampleRay| SampleRay { direction: ray.direction.map(|x| -x), ..*ray };
+        let nothing: Vec<SampleRay> = lines.iter().map(away).collect();
+        let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 4 * RAYS, 12);
+        let (bounce, mut short): (Vec<SampleRay>, Vec<SampleRay>) =
+            surface.into_iter().partition(|ray| ray.tmax.is_infinite());
+        short.truncate(RAYS);
+        let walker = TetWalker::new(tets);
+        let bounces = parts(&walker, &bounce);
+        let kind = |samples: &[SampleRay]| {
+            let counted = &samples[..samples.len().min(COUNTED)];
+            let visits: f64 =
+                counted.iter().map(|r| f64::from(costs::walk(mesh, &tree, r, |_| {}).visits)).sum();
+            let walked: Vec<Walked> = counted.iter().filter_map(|r| walker.walk(r)).collect();
+            let mean = |of: fn(&Walked) -> u32| {
+                walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / counted.len().max(1) as f64
+            };
+            Kind {
+                rays: Rays::new(samples),
+                visits: visits / counted.len().max(1) as f64,
+                steps: mean(|w| w.steps),
+                hits: mean(|w| u32::from(w.hit)),
+            }
+        };
+        let outside = kind(&lines);
+        Ok(Subject {
+            wide: wide(&plain, &lines[..lines.len().min(COUNTED)]),
+            bytes: RecordKind::ALL
+                .map(|record| (tets.tets.len() * record.stride() + tets.vertices.len() * 16) as f64),
+            tetrahedralize: 1e6 * report.nodes.iter().map(|n| n.seconds).sum::<f64>()
+                / mesh.triangles.len().max(1) as f64,
+            bvh: plain,
+            tets: RecordKind::ALL.iter().map(|r| scene(&built, *r)).collect::<Result<_, _>>()?,
+            nothing: Rays::new(&nothing),
+            bounces: bounces.each_ref().map(|rays| kind(rays)),
+            short: kind(&short),
+            outside,
+        })
+    }
+
+    /// Times all kinds of rays through all structures; `None` when it was stopped.
+    pub(crate) fn measure(&self, rounds: usize, stop: impl Fn() -> bool) -> Option<Times> {
+        let bounces = self.bounces.iter().map(|kind| (kind, Way::Nearest));
+        let others = [(&self.outside, Way::Nearest), (&self.short, Way::Any)];
+        let kinds: Vec<(&Kind, Way)> = others.into_iter().chain(bounces).collect();
+        let mut runs: Vec<Run<'_>> = vec![(&self.bvh, &self.nothing, Way::Nearest)];
+        for (kind, way) in &kinds {
+            runs.push((&self.bvh, &kind.rays, *way));
+            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, *way)));
+            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, Way::Single)));
+        }
+        let times = nanoseconds(&runs, rounds, stop)?;
+        let timed = |row: usize| {
+            let (first, kind) = (1 + 9 * row, kinds[row].0);
+            Timed {
+                bvh: times[first],
+                visits: kind.visits,
+                tets: std::array::from_fn(|r| times[first + 1 + r]),
+                single: std::array::from_fn(|r| times[first + 5 + r]),
+                steps: kind.steps,
+                hits: kind.hits,
+            }
+        };
+        Some(Times {
+            nothing: times[0],
+            outside: timed(0),
+            short: timed(1),
+            bounces: [2, 3, 4, 5].map(timed),
+            wide: self.wide,
+            bytes: self.bytes,
+            tetrahedralize: self.tetrahedralize,
+        })
+    }
+}
+
+/// Rays that end at a triangle and rays that don't, each in halves of few steps and of many, in their order.
+fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
+    let mut parts = [const { Vec::new() }; 4];
+    for hit in [true, false] {
+        let walked: Vec<(u32, SampleRay)> = rays
+            .iter()
+            .filter_map(|ray| Some((walker.walk(ray)?, *ray)))
+            .filter_map(|(walk, ray)| (walk.hit == hit).then_some((walk.steps, ray)))
+            .collect();
+        let mut steps: Vec<u32> = walked.iter().map(|w| w.0).collect();
+        steps.sort_unstable();
+        let median = steps.get(steps.len() / 2).copied().unwrap_or(0);
+        for (steps, ray) in walked {
+            parts[2 * usize::from(hit) + usize::from(steps > median)].push(ray);
+        }
+    }
+    parts
+}
+
+/// Wide nodes and leaves that these rays enter, on average.
+fn wide(scene: &Scene, samples: &[SampleRay]) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for ray in Rays::new(samples).each() {
+        let (_, steps) = scene.nearest_counted(ray, bth::rays::Surface::NONE);
+        sums[0] += f64::from(steps.nodes);
+        sums[1] += f64::from(steps.leaves);
+    }
+    sums.map(|sum| sum / samples.len().max(1) as f64)
+}

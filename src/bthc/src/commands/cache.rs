@@ -1,0 +1,127 @@
+//! `bthc cache`: looks after the cache.
+
+use crate::cache_args::{Cache, Command};
+use crate::failure::Failure;
+use crate::output;
+use crate::progress::Progress;
+use crate::table::{Table, bytes, count};
+use bth_cache::{Digest, Store, Survey};
+use bth_compile::Monitor;
+use serde_json::{Value, json};
+
+pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
+    let Some(store) = args.place.store()? else {
+        let message = "there is no folder for the cache".to_owned();
+        return Err(Failure::Usage { message, hint: "name one with --cache-dir or BTH_CACHE_DIR" });
+    };
+    let (value, text) = match &args.command {
+        Command::Stats => {
+            let survey = store.survey();
+            (json!(survey), stats(&survey))
+        }
+        Command::List { stage } => list(&store, stage.as_deref()),
+        Command::Gc => {
+            let evicted = store.evict(store.cap());
+            let text = format!(
+                "removed {} contents ({}), {} left by killed programs; {} left, {} in use\n",
+                count(evicted.entries),
+                bytes(evicted.bytes),
+                count(evicted.leftovers),
+                bytes(evicted.left_bytes),
+                count(evicted.in_use)
+            );
+            (json!(evicted), text)
+        }
+        Command::Verify => return verify(&store, args.json),
+        Command::Path { key } => path(&store, key.as_deref())?,
+        Command::Clear => {
+            let (removed, in_use) = store.clear();
+            let text = format!("removed {} contents; {} in use\n", count(removed), count(in_use));
+            (json!({"removed": removed, "in_use": in_use}), text)
+        }
+    };
+    if args.json {
+        output::json(&value)?;
+    } else {
+        output::text(&text)?;
+    }
+    Ok(())
+}
+
+fn stats(survey: &Survey) -> String {
+    let mut table = Table::default();
+    let tally = &survey.tally;
+    table.row(["folder", &survey.folder]);
+    table.row(["size", &format!("{} of {}", bytes(survey.bytes), bytes(survey.cap))]);
+    table.row(["contents", &count(survey.contents)]);
+    for (stage, records) in &survey.records {
+        table.row([&format!("entries of {stage}"), &count(*records)]);
+    }
+    for (stage, hits) in &tally.hits {
+        table.row([&format!("hits of {stage}"), &count(*hits)]);
+    }
+    for (stage, reasons) in &tally.misses {
+        for (reason, misses) in reasons {
+            table.row([&format!("misses of {stage}, {reason}"), &count(*misses)]);
+        }
+    }
+    table.row(["hits of the shared cache", &count(tally.shared_hits)]);
+    table.row(["written", &format!("{} ({})", count(tally.stored), bytes(tally.stored_bytes))]);
+    table.row(["evicted", &format!("{} ({})", count(tally.evictions), bytes(tally.evicted_bytes))]);
+    table.row(["damaged", &count(tally.damaged)]);
+    table.render()
+}
+
+fn list(store: &Store, stage: Option<&str>) -> (Value, String) {
+    let entries: Vec<_> =
+        store.list().into_iter().filter(|e| stage.is_none_or(|stage| e.stage == stage)).collect();
+    let mut table = Table::default();
+    for entry in &entries {
+        let used = entry.idle_seconds.map_or("not kept".to_owned(), |s| format!("{} s ago", count(s)));
+        table.row([&format!("{:<6} {}", entry.stage, entry.id.hex()), &bytes(entry.bytes), &used]);
+    }
+    (json!({ "entries": entries }), table.render())
+}
+
+fn verify(store: &Store, as_json: bool) -> Result<(), Failure> {
+    let progress = Progress::new(as_json);
+    progress.stage("verify", Some(store.survey().bytes));
+    let verdict = store.verify(&|bytes| {
+        progress.advance(bytes);
+        !progress.cancelled()
+    });
+    let cancelled = progress.cancelled();
+    drop(progress);
+    if cancelled {
+        return Err(bth_compile::Error::Cancelled.into());
+    }
+    if as_json {
+        output::json(&verdict)?;
+    } else {
+        let mut text: String =
+            verdict.damaged.iter().map(|path| format!("damaged, removed: {path}\n")).collect();
+        text.push_str(&format!(
+            "{} records, {} contents, {}: {} damaged\n",
+            count(verdict.records),
+            count(verdict.contents),
+            bytes(verdict.bytes),
+            count(verdict.damaged.len() as u64)
+        ));
+        output::text(&text)?;
+    }
+    if verdict.damaged.is_empty() { Ok(()) } else { Err(Failure::Check) }
+}
+
+fn path(store: &Store, key: Option<&str>) -> Result<(Value, String), Failure> {
+    let Some(key) = key else {
+        let folder = store.folder().display().to_string();
+        return Ok((json!({ "folder": folder }), folder + "\n"));
+    };
+    let record = Digest::parse(key).and_then(|id| store.find_id(&id)).filter(|record| store.holds(record));
+    let Some(record) = record else {
+        let message = format!("the cache has no entry {key}");
+        return Err(Failure::Usage { message, hint: "`bthc cache list` shows what it has" });
+    };
+    let path = store.path(&record).display().to_string();
+    Ok((json!({ "path": path, "stage": record.key.stage() }), path + "\n"))
+}

@@ -1,0 +1,109 @@
+//! `bthc calibrate`: what tracing costs on this machine.
+
+use crate::args::Calibrate;
+use crate::calibrate::{Measured, Subject, fit};
+use crate::failure::Failure;
+use crate::measure::{Rays, Way, nanoseconds};
+use crate::output;
+use crate::progress::Progress;
+use crate::table::{Table, bytes};
+use bth_compile::costs::Profile;
+use bth_compile::mesh::{self, Keep, Mesh};
+use bth_compile::pipeline::{self, Options};
+use bth_compile::{Error, Monitor, bvh, costs, write};
+use bth_scenes::{Model, blob, gyroid};
+use serde_json::json;
+
+/// Faces of the synthetic models: tetrahedra of a few hundred kilobytes, and of many times the caches.
+const SMALL: u32 = 6_000;
+const LARGE: u32 = 220_000;
+/// Bytes between those of small and large tetrahedra: where models of the user are put.
+const BETWEEN: f64 = 6e6;
+
+pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
+    let progress = Progress::new(args.json);
+    let mut measured = Measured { small: Vec::new(), large: Vec::new(), leaf: 0.0 };
+    let own =
+        [("blob", blob::blob(SMALL)), ("gyroid", gyroid::gyroid(SMALL)), ("large blob", blob::blob(LARGE))];
+    let mut models: Vec<(String, Mesh)> =
+        own.into_iter().map(|(name, model)| (name.to_owned(), of(model))).collect();
+    for path in &args.models {
+        let (mesh, _) = mesh::import(path, Keep::None, &progress)?;
+        models.push((path.display().to_string(), mesh));
+    }
+    for (name, mesh) in &models {
+        let subject = Subject::new(name, mesh, &progress)?;
+        progress.stage("measure", None);
+        let times = subject.measure(args.rounds, || progress.cancelled()).ok_or(Error::Cancelled)?;
+        let kind = if times.bytes[0] < BETWEEN { &mut measured.small } else { &mut measured.large };
+        kind.push(times);
+    }
+    measured.leaf = leaf(args.rounds, &progress)?;
+    drop(progress);
+
+    let isa = bth::Isa::chosen();
+    // The library takes rays with hints into tetrahedra beside a BVH with AVX-512 only.
+    let profile = fit(&measured, &isa.to_string(), isa == bth::Isa::Avx512);
+    let mut text = serde_json::to_string_pretty(&profile).map_err(std::io::Error::from)?;
+    text.push('\n');
+    write::write_atomically(&args.output, text.as_bytes())?;
+    if args.json {
+        output::json(
+            &json!({"output": args.output.to_string_lossy(), "hash": profile.hash(), "profile": profile}),
+        )?;
+    } else {
+        output::text(&format!("{}wrote {}\n", table(&profile), args.output.display()))?;
+    }
+    Ok(())
+}
+
+fn of(model: Model) -> Mesh {
+    Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() }
+}
+
+/// Nanoseconds of a ray into a BVH that is a single leaf: a fan of eight triangles.
+fn leaf(rounds: usize, progress: &Progress) -> Result<f64, Failure> {
+    let rim = |i: u32| {
+        [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0], [0.0, -1.0], [1.0, -1.0]]
+            [i as usize]
+    };
+    let mut model = Model { positions: vec![[0.0, 0.0, 0.2]], triangles: Vec::new() };
+    for i in 0..8 {
+        let [x, y]: [f32; 2] = rim(i);
+        model.positions.push([x, y, 0.0]);
+        model.triangles.push([0, 1 + i, 1 + (i + 1) % 8]);
+    }
+    let mesh = of(model);
+    let (tree, _) = bvh::build(&mesh, &bvh::Options::default(), progress)?;
+    let file = pipeline::assemble(&mesh, &tree, &[], &Options::default(), progress)?;
+    let scene = bth::from_bytes(&file.bytes)?;
+    let root = &tree.nodes[0];
+    let rays = Rays::new(&costs::outside(root.lower, root.upper, 16384, 13));
+    let runs = [(&scene, &rays, Way::Nearest)];
+    let times = nanoseconds(&runs, rounds, || progress.cancelled()).ok_or(Error::Cancelled)?;
+    Ok(times[0])
+}
+
+fn table(profile: &Profile) -> String {
+    let ns = |x: f64| format!("{x:.2}");
+    let mut table = Table::default();
+    table.row(["nanoseconds", &profile.isa]);
+    let bvh = profile.bvh;
+    table.row(["a ray, by itself", &ns(bvh.ray)]);
+    table.row(["a node of the binary BVH, rays from outside", &ns(bvh.outside)]);
+    table.row(["a node of the binary BVH, rays from surfaces", &ns(bvh.surface)]);
+    table.row(["a wide node", &ns(bvh.node)]);
+    table.row(["a leaf of triangles", &ns(bvh.block)]);
+    let [small, large] = profile.bytes.map(|b| bytes(b as u64));
+    for (name, costs) in &profile.tets {
+        for (how, walk) in
+            [("from outside", costs.outside), ("from a surface", costs.surface), ("ray by ray", costs.alone)]
+        {
+            table.row([&format!("{name}, {how}: entry"), &ns(walk.entry)]);
+            table.row([&format!("{name}, {how}: a hit"), &ns(walk.hit)]);
+            table.row([&format!("{name}, {how}: a step in {small}"), &ns(walk.step[0])]);
+            table.row([&format!("{name}, {how}: a step in {large}"), &ns(walk.step[1])]);
+        }
+    }
+    table.render()
+}

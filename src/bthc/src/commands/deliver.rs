@@ -1,0 +1,164 @@
+//! Where a compiled file goes: to its path unless it is there, to standard output, or nowhere but into the cache.
+
+use super::compile::{Job, Setting};
+use crate::failure::Failure;
+use crate::table::{bytes, seconds};
+use bth_cache::{Digest, Record, Store};
+use bth_compile::cached::Cache;
+use bth_compile::pipeline::Outcome;
+use bth_compile::write;
+use serde_json::{Value, json};
+use std::fs::File;
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
+
+/// Where a compiled file goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    File(PathBuf),
+    Stdout,
+    Cache,
+}
+
+/// What is said about a job.
+pub(super) struct Done {
+    pub(super) json: Value,
+    /// Several lines, for one job.
+    pub(super) text: String,
+    /// One line, for one of many.
+    pub(super) line: String,
+}
+
+impl Target {
+    /// Whether the bytes of a kept file are needed.
+    pub(super) fn needs(&self, record: &Record, store: Option<&Store>) -> bool {
+        match self {
+            Self::File(path) => !contains(path, record, store),
+            Self::Stdout => true,
+            // What is not there is made again.
+            Self::Cache => !store.is_some_and(|store| store.holds(record)),
+        }
+    }
+
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::File(path) => path.display().to_string(),
+            Self::Stdout => "standard output".to_owned(),
+            Self::Cache => "the cache".to_owned(),
+        }
+    }
+}
+
+/// Whether a file has the content of a record: by its stamp, else by reading it.
+fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
+    if store.and_then(|store| store.stamped(path)) == Some(record.blob) {
+        return true;
+    }
+    let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
+    let same = || File::open(path).and_then(Digest::of_reader).is_ok_and(|(digest, _)| digest == record.blob);
+    let same = same_size && same();
+    if let (true, Some(store)) = (same, store) {
+        store.stamp(path, record.blob);
+    }
+    same
+}
+
+/// Brings the outcome of a job to its target. `inputs` are the files that it was made from.
+///
+/// # Errors
+/// When it cannot be written.
+pub(super) fn deliver<R>(
+    setting: &Setting<'_>,
+    job: &Job,
+    outcome: &Outcome<R>,
+    cache: &Cache<'_>,
+    inputs: &dyn Fn() -> bth_compile::Result<Vec<PathBuf>>,
+) -> Result<Done, Failure> {
+    let start = Instant::now();
+    match (&job.target, &outcome.bytes) {
+        (Target::File(path), Some(bytes)) => {
+            write::write_atomically(path, bytes)?;
+            if let (Some(store), Some(record)) = (&setting.store, &outcome.record) {
+                store.stamp(path, record.blob);
+            }
+        }
+        (Target::File(path), None) => {
+            if inputs()?.iter().any(|input| modified(input) > modified(path)) {
+                // Build systems compare times: what is up to date must look so.
+                touch(path, outcome.record.as_ref(), setting.store.as_ref())?;
+            }
+        }
+        (Target::Stdout, Some(bytes)) => {
+            let mut out = std::io::stdout().lock();
+            out.write_all(bytes)?;
+            out.flush()?;
+        }
+        (Target::Stdout | Target::Cache, _) => {}
+    }
+    if job.target == Target::Cache && outcome.record.is_none() {
+        return Err(Failure::file(
+            "BTH-O061",
+            Path::new("the cache"),
+            &"the compiled file could not be kept",
+        ));
+    }
+    let (from, wrote) = match (&outcome.built, &outcome.bytes) {
+        (Some(_), _) => ("compiled", "wrote"),
+        (None, Some(_)) => ("from the cache", "wrote"),
+        (None, None) => ("unchanged", "up to date:"),
+    };
+    let size = outcome.record.as_ref().map(|r| r.bytes).or(outcome.bytes.as_ref().map(|b| b.len() as u64));
+    let name = job.target.name();
+    let key = outcome.record.as_ref().map(|r| r.key.id());
+    let log = cache.log();
+    let state = json!({
+        "key": key,
+        "hit": outcome.built.is_none(),
+        "hits": log.hits,
+        "misses": log.misses,
+        "entry": outcome.record.as_ref().zip(setting.store.as_ref()).map(|(r, s)| s.path(r).to_string_lossy().into_owned()),
+    });
+    let took = if outcome.bytes.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
+    let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
+    text.push_str(&format!("{wrote} {name}\n"));
+    Ok(Done {
+        json: json!({
+            "model": job.model.to_string_lossy(),
+            "output": name,
+            "written": outcome.bytes.is_some(),
+            "cache": state,
+        }),
+        text,
+        line: format!("{name}  {from}  {}  {took}", bytes(size.unwrap_or(0))).trim_end().to_owned(),
+    })
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|m| m.modified()).ok()
+}
+
+fn touch(path: &Path, record: Option<&Record>, store: Option<&Store>) -> Result<(), Failure> {
+    let failed =
+        |e: std::io::Error| Failure::file("BTH-O020", path, &format!("cannot be marked as new: {e}"));
+    let file = File::options().append(true).open(path).map_err(failed)?;
+    file.set_modified(SystemTime::now()).map_err(failed)?;
+    if let (Some(record), Some(store)) = (record, store) {
+        store.stamp(path, record.blob);
+    }
+    Ok(())
+}
+
+/// The model on standard input, as a file in a folder that lives as long as the first value.
+pub(super) fn standard_input(format: Option<&str>) -> Result<(tempfile::TempDir, PathBuf), Failure> {
+    let failed = |e: std::io::Error| Failure::file("BTH-O062", Path::new("standard input"), &e);
+    let mut bytes = Vec::new();
+    std::io::stdin().lock().read_to_end(&mut bytes).map_err(failed)?;
+    let folder = tempfile::Builder::new().prefix("bthc-").tempdir().map_err(failed)?;
+    let mut path = folder.path().join("stdin");
+    if let Some(format) = format {
+        path.set_extension(format);
+    }
+    std::fs::write(&path, bytes).map_err(failed)?;
+    Ok((folder, path))
+}

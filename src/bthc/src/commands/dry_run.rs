@@ -1,0 +1,55 @@
+//! What a compilation would do, and why.
+
+use super::compile::{Job, Setting, cache};
+use super::deliver::Target;
+use super::scene;
+use crate::failure::Failure;
+use crate::output;
+use crate::progress::Progress;
+use bth_compile::pipeline::{self, Foreseen};
+use serde_json::json;
+
+/// Says for each job what would be done.
+///
+/// # Errors
+/// When a source cannot be read.
+pub(super) fn show(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> Result<(), Failure> {
+    let mut reports = Vec::new();
+    let mut text = String::new();
+    for job in jobs {
+        let cache = cache(setting, &job.model);
+        let foreseen = match scene::is_scene(&job.model, setting.args) {
+            true => scene::foresee(setting, job, &cache, &progress)?,
+            false => pipeline::foresee(&job.model, &setting.options, &cache, &progress)?,
+        };
+        let (what, why) = action(setting, job, &foreseen);
+        let why = why.join(", ");
+        let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };
+        text.push_str(&format!("{}: {what}{behind}\n", job.target.name()));
+        for part in &foreseen.parts {
+            text.push_str(&format!("  {}: compile ({})\n", part.part, part.because.join(", ")));
+        }
+        reports.push(json!({
+            "model": job.model.to_string_lossy(),
+            "output": job.target.name(),
+            "action": what,
+            "because": foreseen.because,
+            "objects": foreseen.parts,
+            "objects_kept": foreseen.kept,
+        }));
+    }
+    drop(progress);
+    if setting.args.json {
+        return Ok(output::json(&json!({ "jobs": reports }))?);
+    }
+    Ok(output::text(&text)?)
+}
+
+fn action<'a>(setting: &Setting<'_>, job: &Job, foreseen: &'a Foreseen) -> (&'static str, &'a [String]) {
+    match &foreseen.record {
+        Some(record) if !job.target.needs(record, setting.store.as_ref()) => ("nothing to do", &[]),
+        Some(_) if job.target == Target::Cache => ("make again", &foreseen.because),
+        Some(_) => ("take from the cache", &[]),
+        None => ("compile", &foreseen.because),
+    }
+}

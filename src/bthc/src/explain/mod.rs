@@ -1,0 +1,25 @@
+//! What `bthc explain` adds to the table of decisions: measured costs, and a picture.
+
+mod measured;
+mod picture;
+
+pub(crate) use measured::{MeasuredNode, measure};
+pub(crate) use picture::picture;
+
+use bth_compile::bvh::BinaryBvh;
+use bth_compile::costs::{Choice, Options};
+use bth_compile::mesh::Mesh;
+use bth_compile::tets::TetMesh;
+
+/// A model and what was decided on it.
+pub(crate) struct Explained<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) tree: &'a BinaryBvh,
+    pub(crate) choice: &'a Choice,
+    pub(crate) costs: &'a Options,
+    /// Tetrahedralizations of the chosen nodes; a node that failed may be replaced by some below it.
+    pub(crate) built: &'a [(u32, TetMesh)],
+    /// The compiled model, and with a BVH only.
+    pub(crate) compiled: &'a bth::Scene,
+    pub(crate) plain: &'a bth::Scene,
+}

@@ -1,0 +1,104 @@
+//! Times of rays through compiled objects, on one thread.
+
+use bth::Scene;
+use bth::rays::{Hit, Ray, Surface};
+use bth_compile::costs::SampleRay;
+
+/// Rays in one call of a batch.
+const BATCH: usize = 1024;
+
+/// Rays of one kind, as the library takes them.
+#[derive(Clone, Debug)]
+pub(crate) struct Rays {
+    rays: Vec<Ray>,
+    /// Where each starts.
+    from: Vec<Surface>,
+}
+
+impl Rays {
+    pub(crate) fn new(samples: &[SampleRay]) -> Rays {
+        let ray = |s: &SampleRay| Ray {
+            origin: s.origin.map(|x| x as f32),
+            tmin: 0.0,
+            direction: s.direction.map(|x| x as f32),
+            tmax: s.tmax as f32,
+        };
+        let from = |s: &SampleRay| match s.from {
+            Some(triangle) => Surface { instance: 0, triangle },
+            None => Surface::NONE,
+        };
+        Rays { rays: samples.iter().map(ray).collect(), from: samples.iter().map(from).collect() }
+    }
+
+    /// The rays without their surfaces.
+    pub(crate) fn each(&self) -> impl Iterator<Item = &Ray> {
+        self.rays.iter()
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.rays.len()
+    }
+}
+
+/// How rays are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// In batches, nearest hits, with the surfaces that they start on.
+    Nearest,
+    /// In batches, any hits, with the surfaces that they start on.
+    Any,
+    /// One a call, nearest hits, with the surfaces that they start on.
+    Single,
+}
+
+/// Rays, what they go through and how.
+pub(crate) type Run<'a> = (&'a Scene, &'a Rays, Way);
+
+/// Nanoseconds of a ray in each run: the least over so many rounds, in which the runs take turns. What else the
+/// machine does can only add.
+pub(crate) fn nanoseconds(runs: &[Run<'_>], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<f64>> {
+    let mut least = vec![f64::INFINITY; runs.len()];
+    for _ in 0..=rounds {
+        for ((scene, rays, way), least) in runs.iter().zip(&mut least) {
+            if stop() {
+                return None;
+            }
+            let seconds = once(scene, rays, *way);
+            *least = least.min(1e9 * seconds / rays.len().max(1) as f64);
+        }
+    }
+    Some(least)
+}
+
+fn once(scene: &Scene, rays: &Rays, way: Way) -> f64 {
+    let (mut hits, mut found) = (vec![Hit::MISS; BATCH], vec![false; BATCH]);
+    let start = thread_seconds();
+    for (batch, from) in rays.rays.chunks(BATCH).zip(rays.from.chunks(BATCH)) {
+        match way {
+            Way::Nearest => scene.nearest_batch(batch, Some(from), &mut hits[..batch.len()]),
+            Way::Any => scene.any_batch(batch, Some(from), &mut found[..batch.len()]),
+            Way::Single => {
+                for ((ray, from), hit) in batch.iter().zip(from).zip(&mut hits) {
+                    *hit = scene.nearest(ray, *from);
+                }
+            }
+        }
+    }
+    std::hint::black_box((&hits, &found));
+    thread_seconds() - start
+}
+
+/// CPU seconds of this thread, which leave out the time in which other jobs run.
+#[cfg(unix)]
+fn thread_seconds() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
+/// Seconds on the wall clock.
+#[cfg(not(unix))]
+fn thread_seconds() -> f64 {
+    use std::sync::OnceLock;
+    static START: OnceLock<std::time::Instant> = OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+}

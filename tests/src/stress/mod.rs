@@ -1,0 +1,77 @@
+//! Rays that tracers lose, on surfaces that tracers lose them on, with answers that are checked exactly.
+//!
+//! Shapes and rays have integer coordinates times a power of two, so that a ray aimed at a vertex meets that very
+//! vertex, and what a ray must or must not meet is decided in integers, ray by ray: fast enough for 100 million.
+
+mod grid;
+mod rays;
+mod shapes;
+mod tally;
+
+pub use grid::{Grid, GridRay, LIMIT, Point, Quotient};
+pub use rays::{Aimed, Kind, Target, rays};
+pub use shapes::{Shape, shapes};
+pub use tally::Tally;
+
+use crate::structures::{Traced, bits};
+use bth::Isa;
+use bth::rays::{Hit, Ray, Surface};
+
+/// Rays that are traced together.
+const BATCH: usize = 4096;
+
+/// Traces about `count` rays of every kind through all structures of a shape, with every instruction set of this
+/// machine in turn, and adds what was found. One of `one_in` rays is compared with every triangle.
+pub fn run(shape: &Shape, structures: &[Traced], count: usize, one_in: usize, seed: u64, tally: &mut Tally) {
+    let isas: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
+    for batch in 0..count.div_ceil(BATCH) {
+        let aimed = rays(shape, BATCH.min(count - batch * BATCH), seed ^ ((batch as u64 + 1) << 20));
+        let rays: Vec<Ray> = aimed.iter().map(|a| shape.grid.ray(&a.ray)).collect();
+        let mut expected = vec![Hit::MISS; rays.len()];
+        for (i, traced) in structures.iter().enumerate() {
+            // The instruction sets take turns, and each structure meets each of them.
+            isas[(batch + i) % isas.len()].choose().expect("it is available");
+            let mut hits = vec![Hit::MISS; rays.len()];
+            traced.scene.nearest_batch(&rays, None, &mut hits);
+            if i == 0 {
+                expected = hits;
+            } else {
+                tally.different += differing(&expected, &hits);
+            }
+            let mut found = vec![false; rays.len()];
+            traced.scene.any_batch(&rays, None, &mut found);
+            tally.different +=
+                expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
+            tally.traced += 2 * rays.len() as u64;
+            if batch % 4 == i % 4 {
+                hinted(traced, &rays, &expected, tally);
+            }
+        }
+        for (i, (aimed, hit)) in aimed.iter().zip(&expected).enumerate() {
+            tally.check(shape, aimed, hit);
+            if one_in > 0 && i % one_in == batch % one_in {
+                tally.compare_with_all(shape, aimed, hit);
+            }
+        }
+    }
+    let best = Isa::best();
+    best.choose().expect("it is available");
+}
+
+/// Rays with hints, right and wrong ones, and one by one: the same bits.
+fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], tally: &mut Tally) {
+    let from: Vec<Surface> = expected.iter().map(|hit| hit.surface).collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    traced.scene.nearest_batch(rays, Some(&from), &mut hits);
+    tally.different += differing(expected, &hits);
+    tally.traced += rays.len() as u64;
+    for (ray, hit) in rays.iter().zip(expected).step_by(16) {
+        let one = traced.scene.nearest(ray, Surface::NONE);
+        tally.different += u64::from(bits(&one) != bits(hit));
+        tally.traced += 1;
+    }
+}
+
+fn differing(a: &[Hit], b: &[Hit]) -> u64 {
+    a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count() as u64
+}

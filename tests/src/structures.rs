@@ -1,0 +1,59 @@
+//! A model compiled into every structure and record.
+
+use bth::Scene;
+use bth::layout::RecordKind;
+use bth_compile::Silent;
+use bth_compile::pipeline::{Options, Structure, compile};
+use bth_scenes::Model;
+
+/// A structure compiled from a model.
+#[derive(Debug)]
+pub struct Traced {
+    /// Structure and record.
+    pub name: String,
+    /// Ready to trace.
+    pub scene: Scene,
+}
+
+/// Options that give even small models tet leaves wherever they can have them.
+pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> Options {
+    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
+    options.costs.minimum_triangles = 32;
+    options.costs.c_tet = Some(1e-3);
+    options.tets.worker = crate::worker().map(Into::into);
+    options.tets.minimum = 1;
+    options
+}
+
+/// Compiles a model; the outcome passed the checks of opening.
+///
+/// # Panics
+/// If it does not compile or open.
+pub fn compiled(model: &Model, options: &Options) -> Scene {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("model.ply");
+    bth_scenes::write::file(model, &path).expect("a model file");
+    let (compiled, _) = compile(&path, options, &Silent).unwrap_or_else(|e| panic!("{e}"));
+    bth::from_bytes(&compiled.bytes).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The model in every structure, the BVH first. Those with tetrahedra only when the worker program is there, and
+/// one tetrahedralization of the whole only for models that have one (`whole`).
+pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
+    let mut wanted = vec![("bvh".to_string(), options(Structure::Bvh, RecordKind::Link32, false))];
+    if crate::worker().is_some() {
+        for record in RecordKind::ALL {
+            wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));
+            if whole {
+                wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
+            }
+        }
+        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
+    }
+    wanted.into_iter().map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
+}
+
+/// All bits of a hit.
+pub fn bits(hit: &bth::rays::Hit) -> [u32; 5] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
+}

@@ -1,0 +1,126 @@
+//! No allocation is larger than the input justifies, whatever the input says of itself.
+#![allow(unsafe_code, reason = "an allocator that measures")]
+
+use bth_compile::Silent;
+use bth_compile::mesh::{Keep, import_bytes};
+use bth_tests::conformance::{Editor, Seal, valid};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::path::Path;
+
+thread_local! {
+    /// The largest single allocation of this thread since it was last reset, in bytes.
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Measuring;
+
+fn note(size: usize) {
+    // Threads that end allocate when the cell is gone; they are not measured.
+    let _ = LARGEST.try_with(|largest| largest.set(largest.get().max(size)));
+}
+
+// SAFETY: every call goes to the system's allocator unchanged; noting a size allocates nothing.
+unsafe impl GlobalAlloc for Measuring {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        note(layout.size());
+        // SAFETY: the caller's contract is that of this method.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(at, layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        note(layout.size());
+        // SAFETY: as above.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        note(size);
+        // SAFETY: as above.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Measuring = Measuring;
+
+/// The largest single allocation that some work makes on this thread.
+fn largest(work: impl FnOnce()) -> usize {
+    LARGEST.set(0);
+    work();
+    LARGEST.get()
+}
+
+#[test]
+fn the_measure_measures() {
+    assert!(largest(|| drop(std::hint::black_box(Vec::<u8>::with_capacity(1 << 20)))) >= 1 << 20);
+}
+
+#[test]
+fn opening_a_damaged_file_allocates_no_more_than_a_few_times_its_bytes() {
+    for case in valid() {
+        for at in (0..case.bytes.len()).step_by(4) {
+            for word in [u32::MAX, 1 << 30, 1 << 24] {
+                let mut editor = Editor::new(&case.bytes);
+                editor.put(at, &word.to_le_bytes());
+                let bytes = editor.seal(Seal::Sections);
+                let most = largest(|| {
+                    if let Ok(file) = bth::File::from_bytes(&bytes) {
+                        let _ = bth::verify::verify(&file);
+                    }
+                    let _ = bth::from_bytes(&bytes);
+                });
+                assert!(most <= 4 * bytes.len() + 4096, "{} with {word:#x} at {at}: {most} bytes", case.name);
+            }
+        }
+    }
+}
+
+/// Sources of few bytes that announce much.
+fn liars() -> Vec<(&'static str, Vec<u8>)> {
+    let text = |s: &str| s.as_bytes().to_vec();
+    let ply = |format: &str, count: &str, list: &str| {
+        text(&format!(
+            "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
+             element face {count}\nproperty list {list} int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+        ))
+    };
+    let stl = |count: u32| [&[b' '; 80][..], &count.to_le_bytes(), &[0; 50]].concat();
+    let gltf = |count: &str, length: &str| {
+        text(&format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+            "buffers":[{{"byteLength":{length},"uri":"data:application/octet-stream;base64,AAAAAAAAAAA="}}],
+            "bufferViews":[{{"buffer":0,"byteLength":{length}}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":{count},"type":"VEC3"}},
+            {{"componentType":5125,"count":{count},"type":"SCALAR"}}]}}"#
+        ))
+    };
+    let mut liars = vec![
+        ("a.off", text("OFF\n4000000000 4000000000 0\n0 0 0\n")),
+        ("b.off", text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n")),
+        ("a.obj", text("v 0 0 0\nf 4000000000 1 1\nf -4000000000 1 1\n")),
+        ("a.stl", stl(u32::MAX)),
+        ("b.stl", stl(1 << 26)),
+    ];
+    for count in ["4294967295", "1000000000", "18446744073709551615"] {
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            liars.push(("a.ply", ply(format, count, "uchar")));
+            liars.push(("b.ply", ply(format, "3", "uint")));
+        }
+        liars.push(("a.gltf", gltf(count, "8")));
+        liars.push(("b.gltf", gltf(count, count)));
+    }
+    liars
+}
+
+#[test]
+fn sources_that_announce_more_than_they_hold_allocate_little() {
+    for (name, bytes) in liars() {
+        let most = largest(|| drop(import_bytes(Path::new(name), &bytes, Keep::All, &Silent)));
+        let shown = String::from_utf8_lossy(&bytes[..bytes.len().min(120)]).into_owned();
+        assert!(most <= 1 << 20, "{name}: {most} bytes for {} of input: {shown}", bytes.len());
+    }
+}

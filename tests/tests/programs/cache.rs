@@ -1,0 +1,240 @@
+//! What is made once is not made again, and what is not as it was made is not used.
+
+use crate::support::{Run, command, folder, run_with, sphere};
+use serde_json::Value;
+use std::path::Path;
+
+/// Runs bthc with a cache in the folder.
+pub(crate) fn cached(folder: &Path, args: &[&str]) -> Run {
+    let mut command = command("bthc", folder, args);
+    command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", folder.join("cache"));
+    run_with(command)
+}
+
+/// What a compilation found in the cache, by stage, and what it missed, as `stage part`.
+fn found(json: &Value) -> (Vec<String>, Vec<String>) {
+    let hits = json["cache"]["hits"].as_object().unwrap();
+    let text = |v: &Value| v.as_str().unwrap().to_owned();
+    let misses = json["cache"]["misses"].as_array().unwrap().iter();
+    let misses = misses.map(|m| format!("{} {}", text(&m["stage"]), text(&m["part"])).trim_end().to_owned());
+    (hits.iter().map(|(stage, n)| format!("{stage} {n}")).collect(), misses.collect())
+}
+
+fn compile(folder: &Path, args: &[&str]) -> Value {
+    let all = [&["compile", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5"], args].concat();
+    cached(folder, &all).expect(0).json()
+}
+
+fn stats(folder: &Path) -> Value {
+    cached(folder, &["cache", "stats", "--json"]).expect(0).json()
+}
+
+/// A scene of `n` spheres.
+pub(crate) fn scene(n: usize) -> tempfile::TempDir {
+    let folder = folder(&[]);
+    let mut text = String::from("version = 1\n");
+    for i in 0..n {
+        std::fs::write(folder.path().join(format!("{i}.obj")), sphere(6 + i)).unwrap();
+        text += &format!("[[objects]]\nname = \"o{i}\"\nmodel = \"{i}.obj\"\n");
+        text += &format!("[[nodes]]\nname = \"n{i}\"\nobject = \"o{i}\"\ntranslation = [{}, 0, 0]\n", 3 * i);
+    }
+    std::fs::write(folder.path().join("s.manifest"), text).unwrap();
+    folder
+}
+
+#[test]
+fn an_unchanged_model_is_neither_compiled_nor_written_again() {
+    let folder = folder(&[("a.obj", &sphere(16))]);
+    let first = compile(folder.path(), &["a.obj"]);
+    assert_eq!((&first["cache"]["hit"], &first["written"]), (&false.into(), &true.into()));
+    let output = folder.path().join("a.bth");
+    let modified = |path: &Path| std::fs::metadata(path).unwrap().modified().unwrap();
+    let written = modified(&output);
+    let second = compile(folder.path(), &["a.obj"]);
+    assert_eq!((&second["cache"]["hit"], &second["written"]), (&true.into(), &false.into()));
+    assert_eq!(second["report"]["file"], first["report"]["file"]);
+    assert_eq!(modified(&output), written);
+
+    // Newer and yet the same: build systems want an output that is newer still.
+    let model = folder.path().join("a.obj");
+    std::fs::write(&model, sphere(16)).unwrap();
+    assert_eq!(compile(folder.path(), &["a.obj"])["written"], false);
+    assert!(modified(&output) >= modified(&model));
+
+    // An output that is gone or was changed comes from the cache.
+    let good = std::fs::read(&output).unwrap();
+    std::fs::write(&output, b"something else").unwrap();
+    let third = compile(folder.path(), &["a.obj"]);
+    assert_eq!((&third["cache"]["hit"], &third["written"]), (&true.into(), &true.into()));
+    assert_eq!(std::fs::read(&output).unwrap(), good);
+    let tally = &stats(folder.path())["tally"];
+    assert_eq!((&tally["hits"]["file"], &tally["misses"]["file"]["new"]), (&3.into(), &1.into()));
+}
+
+#[test]
+fn neither_name_nor_folder_nor_time_is_part_of_a_key() {
+    let (one, two) = (folder(&[("a.obj", &sphere(12))]), folder(&[("b.obj", &sphere(12))]));
+    let key =
+        |folder: &Path, model: &str| compile(folder, &[model, "--threads", "1"])["cache"]["key"].clone();
+    assert_eq!(key(one.path(), "a.obj"), key(two.path(), "b.obj"));
+}
+
+#[test]
+fn one_option_redoes_what_depends_on_it_and_says_so() {
+    let folder = folder(&[("a.obj", &sphere(24))]);
+    let (hits, misses) = found(&compile(folder.path(), &["a.obj"]));
+    assert!(hits.is_empty(), "{hits:?}");
+    let tets = misses.contains(&"tets".to_owned());
+    let all: Vec<&str> = ["file", "mesh", "bvh", "marks"].into_iter().chain(tets.then_some("tets")).collect();
+    assert_eq!(misses, all);
+
+    let json = compile(folder.path(), &["a.obj", "--tets", "tet16"]);
+    let (hits, misses) = found(&json);
+    assert_eq!(misses, ["file"], "another record: nothing but the file");
+    assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
+    assert_eq!(json["cache"]["misses"][0]["because"][0], "tets: link32 -> tet16");
+
+    let (hits, misses) = found(&compile(folder.path(), &["a.obj", "--attributes", "all"]));
+    assert_eq!((&misses[..], hits.contains(&"bvh 1".into())), (&["file".into(), "mesh".into()][..], true));
+
+    let (hits, misses) = found(&compile(folder.path(), &["a.obj", "--quality", "best"]));
+    // The node has the same triangles in the other tree, too.
+    assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
+    assert!(hits.contains(&"mesh 1".into()) && hits.len() == 1 + usize::from(tets), "{hits:?}");
+    assert!(misses.starts_with(&["file".into(), "bvh".into(), "marks".into()]), "{misses:?}");
+}
+
+#[test]
+fn the_cache_never_shows_in_the_bytes() {
+    let folder = folder(&[("a.obj", &sphere(20))]);
+    let (path, out) = (folder.path(), folder.path().join("out.bth"));
+    let variants: [&[&str]; 4] =
+        [&[], &["--quality", "best"], &["--tets", "tet20", "--subtrees", "prune"], &["--structure", "bvh"]];
+    let args = |variant: &[&'static str]| [&["a.obj", "-o", "out.bth"], variant].concat();
+    let plain: Vec<_> = variants
+        .iter()
+        .map(|variant| {
+            compile(path, &[&args(variant)[..], &["--no-cache"]].concat());
+            std::fs::read(&out).unwrap()
+        })
+        .collect();
+    for _ in 0..2 {
+        for (variant, plain) in variants.iter().zip(&plain) {
+            compile(path, &args(variant));
+            assert!(std::fs::read(&out).unwrap() == *plain, "{variant:?}");
+            std::fs::remove_file(&out).unwrap();
+        }
+    }
+}
+
+#[test]
+fn moving_an_instance_compiles_nothing_and_changing_an_object_only_that() {
+    let folder = scene(4);
+    let path = folder.path();
+    compile(path, &["s.manifest"]);
+    let whole = std::fs::read(path.join("s.bth")).unwrap();
+    let unchanged = compile(path, &["s.manifest"]);
+    assert_eq!((&unchanged["cache"]["hit"], &unchanged["written"]), (&true.into(), &false.into()));
+
+    let manifest = path.join("s.manifest");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(&manifest, text.replace("translation = [3, 0, 0]", "translation = [3, 5, 0]")).unwrap();
+    let (hits, misses) = found(&compile(path, &["s.manifest"]));
+    assert_eq!((&misses[..], &hits[..]), (&["scene".into()][..], &["object 4".into()][..]));
+    assert!(std::fs::read(path.join("s.bth")).unwrap() != whole);
+
+    std::fs::write(path.join("2.obj"), sphere(40)).unwrap();
+    let dry = cached(
+        path,
+        &["compile", "--dry-run", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5", "s.manifest"],
+    );
+    let dry = &dry.expect(0).json()["jobs"][0];
+    assert_eq!((&dry["action"], &dry["objects_kept"]), (&"compile".into(), &3.into()));
+    assert_eq!(dry["objects"][0]["part"], "2.obj flat");
+    let json = compile(path, &["s.manifest"]);
+    let (hits, misses) = found(&json);
+    assert_eq!(hits, ["object 3"]);
+    assert!(misses[1..].iter().all(|miss| miss.ends_with("2.obj flat") || miss == "tets"), "{misses:?}");
+    let cached_bytes = std::fs::read(path.join("s.bth")).unwrap();
+    compile(path, &["s.manifest", "--no-cache"]);
+    assert!(std::fs::read(path.join("s.bth")).unwrap() == cached_bytes);
+}
+
+#[test]
+fn damaged_entries_are_reported_removed_and_built_again() {
+    let folder = folder(&[("a.obj", &sphere(16))]);
+    let path = folder.path();
+    compile(path, &["a.obj"]);
+    let good = std::fs::read(path.join("a.bth")).unwrap();
+    let entries = cached(path, &["cache", "list", "--json"]).expect(0).json()["entries"].clone();
+    assert!(entries.as_array().unwrap().len() >= 4);
+    for entry in entries.as_array().unwrap() {
+        let key = entry["id"].as_str().unwrap();
+        let file = cached(path, &["cache", "path", key]).expect(0).stdout;
+        let file = Path::new(file.trim_end());
+        let mut bytes = std::fs::read(file).unwrap();
+        let last = bytes.len() - 1;
+        bytes[last / 2] ^= 1;
+        std::fs::remove_file(file).unwrap();
+        std::fs::write(file, bytes).unwrap();
+    }
+    std::fs::remove_file(path.join("a.bth")).unwrap();
+    let args = ["compile", "a.obj", "--min-tet-triangles", "64", "--c-tet", "0.5"];
+    let run = cached(path, &args).expect(0);
+    assert!(run.stderr.contains("is damaged"), "{run:?}");
+    assert_eq!(std::fs::read(path.join("a.bth")).unwrap(), good);
+    assert_eq!(cached(path, &args).expect(0).stderr, "");
+    assert!(stats(path)["tally"]["damaged"].as_u64().unwrap() >= 4);
+    cached(path, &["cache", "verify"]).expect(0);
+}
+
+#[test]
+fn the_cache_is_looked_after() {
+    let folder = scene(3);
+    let path = folder.path();
+    compile(path, &["s.manifest"]);
+    let json = |args: &[&str]| cached(path, args).expect(0).json();
+    let survey = stats(path);
+    assert_eq!(survey["records"]["object"], 3);
+    assert_eq!(survey["cap"], 20u64 << 30);
+    assert!(cached(path, &["cache", "stats"]).expect(0).stdout.contains("entries of object"));
+    let verdict = json(&["cache", "verify", "--json"]);
+    assert_eq!(verdict["damaged"], serde_json::json!([]));
+    assert_eq!(json(&["cache", "path", "--json"])["folder"], path.join("cache").to_str().unwrap());
+    let gone = json(&["cache", "gc", "--cache-size", "10k", "--json"]);
+    assert!(gone["entries"].as_u64().unwrap() > 0 && gone["left_bytes"].as_u64().unwrap() <= 10240, "{gone}");
+    json(&["cache", "clear", "--json"]);
+    assert_eq!(stats(path)["bytes"], 0);
+    let wrong = cached(path, &["cache", "path", "0123"]).expect(2);
+    assert!(wrong.stderr.contains("bthc cache list"), "{wrong:?}");
+    cached(path, &["compile", "s.manifest", "--cache-size", "1X"]).expect(2);
+    std::fs::write(path.join("file"), "").unwrap();
+    let wrong = cached(path, &["compile", "s.manifest", "--cache-dir", "file"]).expect(4);
+    assert!(wrong.stderr.contains("BTH-O060"), "{wrong:?}");
+}
+
+#[test]
+fn machines_share_what_they_made() {
+    let (here, there, shared) = (scene(3), scene(3), tempfile::tempdir().unwrap());
+    let place = shared.path().to_str().unwrap();
+    compile(here.path(), &["s.manifest", "--shared-cache", place]);
+    let json = compile(there.path(), &["s.manifest", "--shared-cache", place]);
+    let (hits, misses) = found(&json);
+    // The scene itself is put together: it is not kept, but its objects are.
+    assert_eq!((&hits[..], &misses[..]), (&["object 3".into()][..], &["scene".into()][..]));
+    let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join("s.bth")).unwrap();
+    assert!(read(&here) == read(&there));
+}
+
+#[test]
+fn shards_of_a_scene_meet_in_the_cache() {
+    let folder = scene(5);
+    let path = folder.path();
+    let shard = |which: &str| {
+        let json = compile(path, &["s.manifest", "--shard", which, "--in-cache"]);
+        json["objects"].as_u64().unwrap()
+    };
+    assert_eq!([shard("1/3"), shard("2/3"), shard("3/3")], [2, 2, 1]);
+    let (hits, misses) = found(&compile(path, &["s.manifest"]));
+    assert_eq!((&hits[..], &misses[..]), (&["object 5".into()][..], &["scene".into()][..]));
+}

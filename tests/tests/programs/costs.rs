@@ -1,0 +1,108 @@
+use crate::support::{bthc, command, folder, run_with, sphere};
+
+const CHEAP: [&str; 4] = ["--c-tet", "0.001", "--min-tet-triangles", "64"];
+
+fn worker_is_there(json: &serde_json::Value) -> bool {
+    let there = json["report"]["tets"]["worker"]["ready"].is_object();
+    if !there {
+        println!("skipped: tetrahedra need the worker bth-tetgen");
+    }
+    there
+}
+
+#[test]
+fn limits_and_weights_decide_what_is_tetrahedralized() {
+    let folder = folder(&[("ball.obj", &sphere(24))]);
+    let compile = |more: &[&str]| {
+        let args = ["compile", "ball.obj", "-o", "out.bth", "--json"];
+        bthc(folder.path(), &[&args[..], &CHEAP[..], more].concat()).expect(0).json()
+    };
+    let json = compile(&[]);
+    if !worker_is_there(&json) {
+        return;
+    }
+    let triangles = |json: &serde_json::Value| json["report"]["file"]["tet_triangles"].as_u64().unwrap();
+    let all = triangles(&json);
+    assert!(all > 1000, "{json:#}");
+    assert_eq!(json["report"]["probe"]["leaves"][0]["kept"], true);
+    let few = triangles(&compile(&["--max-bytes-per-triangle", "80"]));
+    assert!(few > 0 && few < all, "{few} of {all}");
+    assert!(triangles(&compile(&["--budget", "0.005"])) < all);
+    // Rays from outside take the BVH beside the tetrahedra.
+    assert_eq!(triangles(&compile(&["--optimize-for", "camera"])), 0);
+    assert_eq!(triangles(&compile(&["--optimize-for", "secondary"])), all);
+    assert_eq!(triangles(&compile(&["--select", "paper"])), all);
+}
+
+#[test]
+fn a_profile_decides_by_its_content_alone() {
+    let folder = folder(&[("ball.obj", &sphere(12)), ("bad.json", "{}")]);
+    let args = ["compile", "ball.obj", "--profile"];
+    bthc(folder.path(), &[&args[..], &["nowhere.json"]].concat()).expect(4);
+    let bad = bthc(folder.path(), &[&args[..], &["bad.json"]].concat()).expect(3);
+    assert!(bad.stderr.contains("BTH-I060") && bad.stderr.contains("bthc calibrate"), "{bad:?}");
+
+    let profile = include_str!("../../../src/bth-compile/src/costs/default-profile.json");
+    std::fs::write(folder.path().join("same.json"), profile.replace("  ", " ")).unwrap();
+    let bytes = |profile: &str| {
+        let args = [&args[..], &[profile, "-o", "out.bth"]].concat();
+        bthc(folder.path(), &args).expect(0);
+        std::fs::read(folder.path().join("out.bth")).unwrap()
+    };
+    assert!(bytes("default") == bytes("same.json"));
+}
+
+#[test]
+fn explain_measures_and_draws() {
+    let folder = folder(&[("ball.obj", &sphere(12))]);
+    let args = ["explain", "ball.obj", "--measure", "--picture", "out.png"];
+    let run = bthc(folder.path(), &[&args[..], &CHEAP[..]].concat()).expect(0);
+    assert!(run.stdout.contains("wrote out.png"), "{run:?}");
+    assert!(run.stdout.contains("measured") || run.stdout.contains("nothing to measure"), "{run:?}");
+    let png = std::fs::read(folder.path().join("out.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG") && png.len() > 5000, "{} bytes", png.len());
+}
+
+#[test]
+fn calibration_needs_the_worker_and_says_so() {
+    let folder = folder(&[]);
+    let mut calibrate = command("bthc", folder.path(), &["calibrate", "--rounds", "1"]);
+    calibrate.env("BTH_TETGEN", "/nonexistent/bth-tetgen");
+    let run = run_with(calibrate).expect(3);
+    assert!(run.stderr.contains("BTH-I061") && run.stderr.contains("worker"), "{run:?}");
+    assert!(!folder.path().join("bth-profile.json").exists());
+}
+
+#[test]
+fn the_rays_of_a_scene_decide_which_objects_are_tetrahedralized() {
+    // Two balls, of which the camera sees one; the other is behind it.
+    let scene = r#"version = 1
+camera = "eye"
+objects = [{ name = "seen", model = "seen.obj" }, { name = "behind", model = "behind.obj" }]
+nodes = [
+    { name = "seen", object = "seen" }, { name = "behind", object = "behind", translation = [0, 0, 6000] },
+    { name = "eye", look = { from = [0, 0, 5], to = [0, 0, 0] } },
+]
+cameras = [{ name = "eye", node = "eye", fov = 30 }]
+"#;
+    let folder = folder(&[("a.manifest", scene), ("seen.obj", &sphere(24)), ("behind.obj", &sphere(25))]);
+    let compile = |more: &[&str]| {
+        let args = ["compile", "a.manifest", "-o", "out.bth", "--json"];
+        let json = bthc(folder.path(), &[&args[..], &CHEAP[..], more].concat()).expect(0).json();
+        ["seen", "behind"].map(|name| {
+            let objects = json["scene"]["objects"].as_array().unwrap();
+            let object = objects.iter().find(|o| o["names"][0] == name).unwrap();
+            object["tet_triangles"].as_u64().unwrap()
+        })
+    };
+    let all = compile(&[]);
+    if all == [0, 0] {
+        println!("skipped: tetrahedra need the worker bth-tetgen");
+        return;
+    }
+    assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
+    // What bounces off a ball alone meets nothing more, but starts on it.
+    let weighed = compile(&["--for-scene"]);
+    assert!(weighed[0] > 0 && weighed[1] == 0, "{weighed:?}");
+    assert_eq!(compile(&["--for-scene"]), weighed);
+}

@@ -1,0 +1,196 @@
+//! Many models, build systems, filters and watching.
+
+use crate::support::{Run, bthc, command, folder, run_with, sphere, wait};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap()
+}
+
+#[test]
+fn many_models_compile_at_once_as_they_do_alone() {
+    let models: Vec<(String, String)> = (0..6).map(|i| (format!("{i}.obj"), sphere(8 + i))).collect();
+    let folder = folder(&[]);
+    let path = folder.path();
+    models.iter().for_each(|(name, text)| std::fs::write(path.join(name), text).unwrap());
+    std::fs::create_dir(path.join("out")).unwrap();
+    let names: Vec<&str> = models.iter().map(|(name, _)| name.as_str()).collect();
+    let args = [&["compile"], &names[..], &["-o", "out", "--jobs", "3", "--memory", "100"]].concat();
+    let run = bthc(path, &args).expect(0);
+    assert_eq!(run.stdout.lines().count(), 6, "{run:?}");
+    let json = bthc(path, &[&args[..], &["--json"]].concat()).expect(0).json();
+    assert_eq!(json["jobs"].as_array().unwrap().len(), 6);
+    for (i, name) in names.iter().enumerate() {
+        bthc(path, &["compile", name, "-q"]).expect(0);
+        let one = name.replace("obj", "bth");
+        assert!(read(path, &one) == read(&path.join("out"), &one));
+        assert_eq!(json["jobs"][i]["model"], **name);
+    }
+    let shard = |which: &str| {
+        let json = bthc(path, &[&args[..], &["--json", "--shard", which]].concat()).expect(0).json();
+        let jobs = json["jobs"].as_array().cloned().unwrap_or_else(|| vec![json]);
+        jobs.iter().map(|job| job["model"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!([shard("1/4"), shard("4/4")].concat(), ["0.obj", "4.obj", "3.obj"]);
+}
+
+#[test]
+fn a_failed_model_stops_no_other_and_gives_the_exit_code() {
+    let folder = folder(&[("a.obj", &sphere(8)), ("b.obj", "f 1 2 3\n"), ("c.obj", &sphere(9))]);
+    let args = ["compile", "a.obj", "b.obj", "c.obj", "missing.obj"];
+    let run = bthc(folder.path(), &args).expect(3);
+    assert!(run.stderr.contains("b.obj:1") && run.stderr.contains("missing.obj"), "{run:?}");
+    assert!(folder.path().join("a.bth").exists() && folder.path().join("c.bth").exists());
+    let json = bthc(folder.path(), &[&args[..], &["--json"]].concat()).expect(3).json();
+    let codes: Vec<_> = json["jobs"].as_array().unwrap().iter().map(|j| &j["error"]["code"]).collect();
+    assert_eq!((codes[0].is_null(), codes[1].is_string(), codes[2].is_null()), (true, true, true));
+    assert_eq!(codes[3], "BTH-O001");
+}
+
+#[test]
+fn outputs_that_would_collide_are_refused_before_anything_is_done() {
+    let folder = folder(&[("a.obj", &sphere(8)), ("a.off", "OFF\n0 0 0\n")]);
+    let path = folder.path();
+    let run = bthc(path, &["compile", "a.obj", "a.off"]).expect(2);
+    assert!(run.stderr.contains("both be written to a.bth"), "{run:?}");
+    bthc(path, &["compile", "a.obj", "a.off", "-o", "none"]).expect(2);
+    bthc(path, &["compile", "a.obj", "a.off", "-o", "-"]).expect(2);
+    assert!(!path.join("a.bth").exists());
+}
+
+#[test]
+fn a_model_passes_through_pipes() {
+    let folder = folder(&[("a.obj", &sphere(12))]);
+    let path = folder.path();
+    bthc(path, &["compile", "a.obj", "-q"]).expect(0);
+    for format in [&["--format", "obj"][..], &[]] {
+        let args = [&["compile", "-", "-o", "-"], format].concat();
+        let mut child = command("bthc", path, &args);
+        let mut child = child.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        child.stdin.take().unwrap().write_all(&read(path, "a.obj")).unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stdout == read(path, "a.bth"), "{format:?}");
+    }
+    let unnamed = bthc(path, &["compile", "-"]).expect(2);
+    assert!(unnamed.stderr.contains("-o"), "{unnamed:?}");
+    bthc(path, &["compile", "-", "-o", "empty.bth"]).expect(3);
+}
+
+#[test]
+fn dependencies_name_every_file_of_a_scene() {
+    let manifest = "version = 1\n[[objects]]\nname = \"o\"\nmodel = \"models/a b.obj\"\n[[nodes]]\nname = \"n\"\nobject = \"o\"\n";
+    let folder = folder(&[("s.manifest", manifest)]);
+    let path = folder.path();
+    std::fs::create_dir(path.join("models")).unwrap();
+    std::fs::write(path.join("models/a b.obj"), sphere(8)).unwrap();
+    bthc(path, &["compile", "s.manifest", "-q", "--depfile", "s.d"]).expect(0);
+    let text = String::from_utf8(read(path, "s.d")).unwrap();
+    assert_eq!(text, "s.bth: \\\n  s.manifest \\\n  models/a\\ b.obj\n");
+}
+
+/// Make runs the compiler when, and only when, something changed; skipped where there is no make.
+#[test]
+fn make_compiles_what_changed() {
+    let rule = "%.bth: %.manifest\n\t$(BTHC) compile $< -o $@ --depfile $@.d -q && echo compiled >> log\n-include s.bth.d\n";
+    let manifest = "version = 1\n[[objects]]\nname = \"o\"\nmodel = \"a.obj\"\n[[nodes]]\nname = \"n\"\nobject = \"o\"\n";
+    let folder = folder(&[("Makefile", rule), ("s.manifest", manifest), ("a.obj", &sphere(8))]);
+    let path = folder.path();
+    let compiler = bth_tests::target_folder().join("bthc");
+    let make = || {
+        let mut make = std::process::Command::new("make");
+        make.arg("s.bth").arg(format!("BTHC={}", compiler.display())).current_dir(path);
+        make.env("BTH_CACHE_DIR", path.join("cache")).stdout(Stdio::null());
+        make.status().map(|status| assert!(status.success()))
+    };
+    let compiled = || String::from_utf8(read(path, "log")).unwrap().lines().count();
+    let touch = |name: &str, seconds: u64| {
+        let file = std::fs::File::options().append(true).open(path.join(name)).unwrap();
+        file.set_modified(std::time::SystemTime::now() + Duration::from_secs(seconds)).unwrap();
+    };
+    if make().is_err() {
+        println!("skipped: there is no make");
+        return;
+    }
+    make().unwrap();
+    assert_eq!(compiled(), 1, "nothing changed");
+    // Same content, newer time: the compiler runs, and the output is newer again.
+    std::thread::sleep(Duration::from_millis(30));
+    touch("a.obj", 0);
+    make().unwrap();
+    make().unwrap();
+    assert_eq!(compiled(), 2);
+    std::thread::sleep(Duration::from_millis(30));
+    std::fs::write(path.join("a.obj"), sphere(9)).unwrap();
+    make().unwrap();
+    assert_eq!(compiled(), 3);
+}
+
+#[test]
+fn a_dry_run_says_what_would_be_done_and_does_nothing() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let path = folder.path();
+    let run = |args: &[&str]| -> Run {
+        let mut command = command("bthc", path, args);
+        command.env("BTH_CACHE_DIR", path.join("cache")).env_remove("BTH_NO_CACHE");
+        run_with(command)
+    };
+    let dry = |args: &[&str]| run(&[&["compile", "a.obj", "--dry-run"], args].concat()).expect(0).stdout;
+    assert_eq!(dry(&[]), "a.bth: compile (new)\n");
+    assert!(!path.join("a.bth").exists());
+    run(&["compile", "a.obj"]).expect(0);
+    assert_eq!(dry(&[]), "a.bth: nothing to do\n");
+    assert_eq!(dry(&["--structure", "bvh", "-o", "b.bth"]).split('(').next(), Some("b.bth: compile "));
+    assert_eq!(dry(&["--quality", "fast"]), "a.bth: compile (quality: balanced -> fast)\n");
+    std::fs::remove_file(path.join("a.bth")).unwrap();
+    assert_eq!(dry(&[]), "a.bth: take from the cache\n");
+    std::fs::write(path.join("a.obj"), sphere(9)).unwrap();
+    assert_eq!(dry(&[]), "a.bth: compile (source)\n");
+    assert_eq!(dry(&["--no-cache"]), "a.bth: compile (no cache)\n");
+}
+
+#[test]
+fn compiled_files_are_compared_by_content() {
+    let folder = folder(&[("a.obj", &sphere(12)), ("b.obj", &sphere(13))]);
+    let path = folder.path();
+    let compile = |model: &str, output: &str, more: &[&str]| {
+        bthc(path, &[&["compile", model, "-o", output, "-q"], more].concat()).expect(0);
+    };
+    compile("a.obj", "a.bth", &[]);
+    compile("a.obj", "same.bth", &[]);
+    compile("a.obj", "options.bth", &["--c-tet", "77"]);
+    compile("b.obj", "b.bth", &[]);
+    assert!(bthc(path, &["diff", "a.bth", "same.bth"]).expect(0).stdout.contains("identical"));
+    let options = bthc(path, &["diff", "a.bth", "options.bth"]).expect(1).stdout;
+    assert!(options.contains("content is the same") && options.contains("c_tet"), "{options}");
+    let json = bthc(path, &["diff", "a.bth", "b.bth", "--json"]).expect(1).json();
+    assert_eq!((&json["identical"], &json["same_content"]), (&false.into(), &false.into()));
+    assert!(json["sections"].as_array().unwrap().iter().any(|s| s["object"] == 0));
+    bthc(path, &["diff", "a.bth", "a.obj"]).expect(3);
+    bthc(path, &["diff", "a.bth", "missing.bth"]).expect(4);
+}
+
+#[cfg(unix)]
+#[test]
+fn watching_compiles_again_after_a_change_and_waits_out_errors() {
+    let folder = folder(&[("a.obj", &sphere(8))]);
+    let path = folder.path();
+    let mut child = command("bthc", path, &["compile", "a.obj", "--watch"]);
+    let mut child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut errors = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.next().unwrap().unwrap().starts_with("a.bth  compiled"));
+    let first = read(path, "a.bth");
+    std::fs::write(path.join("a.obj"), "f 1 2 3\n").unwrap();
+    assert!(errors.next().unwrap().unwrap().contains("a.obj:1"));
+    assert_eq!(read(path, "a.bth"), first, "a faulty model leaves the output as it was");
+    std::fs::write(path.join("a.obj"), sphere(10)).unwrap();
+    assert!(lines.next().unwrap().unwrap().starts_with("a.bth  compiled"));
+    assert_ne!(read(path, "a.bth"), first);
+    let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(sent.unwrap().success());
+    let status = wait(&mut child, Duration::from_secs(20)).expect("Ctrl-C ends it");
+    assert_eq!(status.code(), Some(130));
+}

@@ -1,0 +1,82 @@
+//! How well the cost model predicts: estimators against measured steps and times, and what selections lose.
+
+mod judge;
+mod nodes;
+pub mod record;
+mod regret;
+mod statistics;
+mod tables;
+
+pub use judge::{constants, judge};
+#[cfg(test)]
+pub(crate) use nodes::rays;
+pub use tables::{charts, markdown};
+
+use crate::args::Costs;
+use crate::isa;
+use crate::model::Model;
+use crate::output::{Head, Record};
+use crate::progress::Progress;
+use anyhow::Result;
+use nodes::Which;
+use record::CostsRecord;
+use serde_json::json;
+
+/// Measures, prints and writes the record.
+///
+/// # Errors
+/// If an option or model cannot be used or a file cannot be written.
+pub fn run(arguments: &Costs) -> Result<()> {
+    let record = measure(arguments)?;
+    Record {
+        head: &record.head,
+        title: "The cost model against measurements",
+        body: markdown(&record),
+        json: serde_json::to_value(&record)?,
+        charts: charts(&record),
+    }
+    .write(&arguments.output)
+}
+
+/// Measures all models.
+///
+/// # Errors
+/// If a model cannot be used.
+pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
+    let isa = isa::select(arguments.isa.as_deref())?;
+    let which = Which {
+        least: arguments.least,
+        most: arguments.most,
+        nodes: arguments.nodes,
+        rounds: arguments.rounds,
+    };
+    let options =
+        json!({"least": which.least, "most": which.most, "nodes": which.nodes, "rounds": which.rounds});
+    let progress = Progress::new();
+    let all = |models: &[String]| -> Result<(Vec<String>, Vec<record::Node>)> {
+        let (mut names, mut found) = (Vec::new(), Vec::new());
+        for name in models {
+            let model = Model::load(name)?;
+            found.extend(nodes::measure(&model, &which, &progress)?);
+            names.push(model.name);
+        }
+        Ok((names, found))
+    };
+    let (fitted_on, fitted) = all(&arguments.fit)?;
+    let (judged_on, judged_nodes) = all(&arguments.models)?;
+    let constants = constants(&fitted)?;
+    let mut regrets = Vec::new();
+    for name in &arguments.small {
+        regrets.push(regret::measure(&Model::load(name)?, arguments.rounds, &progress)?);
+    }
+    Ok(CostsRecord {
+        head: Head::now("costs", isa, options),
+        fitted_on,
+        judged_on,
+        constants,
+        judged: judge(&constants, &judged_nodes),
+        regrets,
+        fitted,
+        nodes: judged_nodes,
+    })
+}

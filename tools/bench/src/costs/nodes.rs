@@ -1,0 +1,185 @@
+//! Candidate nodes of models, each as an object of its own: what the estimators say of it, and what rays measure.
+
+use super::record::{ESTIMATORS, Node};
+use crate::clock::Clock;
+use crate::model::Model;
+use crate::ours::{self, Use};
+use crate::progress::Progress;
+use crate::rounds::least;
+use crate::tracer::{Batch, Tracer};
+use anyhow::Result;
+use bth::layout::RecordKind;
+use bth::rays::{Hit, Ray, Surface};
+use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
+use bth_compile::mesh::Mesh;
+use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::{Silent, bvh, marks, tets};
+use std::collections::HashMap;
+use std::time::Instant;
+
+/// Rays whose steps the sampling estimator counts, and rays that are measured.
+const SAMPLES: usize = 256;
+const RAYS: usize = 8192;
+
+/// What to measure of each model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Which {
+    /// Nodes of fewer triangles are left out.
+    pub(super) least: u32,
+    /// Nodes of more triangles are left out.
+    pub(super) most: u32,
+    /// Nodes of a model, at most.
+    pub(super) nodes: usize,
+    /// Rounds of which the fastest counts.
+    pub(super) rounds: usize,
+}
+
+/// Measures the candidate nodes of a model: suitable ones, evenly spread over their sizes.
+///
+/// # Errors
+/// If the model cannot be used.
+pub(super) fn measure(model: &Model, which: &Which, progress: &Progress) -> Result<Vec<Node>> {
+    progress.say(format!("{}: marks", model.name));
+    let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent)?;
+    let (marks, _) = marks::mark(&model.mesh, &tree, &Silent)?;
+    let count = |i: &u32| tree.nodes[*i as usize].count;
+    let mut candidates: Vec<u32> = (0..tree.nodes.len() as u32)
+        .filter(|i| (which.least..=which.most).contains(&count(i)) && marks.suitable[*i as usize])
+        .collect();
+    candidates.sort_by_key(|i| (std::cmp::Reverse(count(i)), *i));
+    let keep = which.nodes.min(candidates.len());
+    let mut nodes = Vec::new();
+    for k in 0..keep {
+        let node = candidates[k * candidates.len() / keep];
+        progress.say(format!("{}: node {} of {keep}", model.name, k + 1));
+        let first = tree.nodes[node as usize].first as usize;
+        let rows = &tree.order[first..first + tree.nodes[node as usize].count as usize];
+        nodes.extend(measure_node(&model.name, node, &part(&model.mesh, rows), which)?);
+    }
+    Ok(nodes)
+}
+
+/// Some of a mesh's triangles as a mesh.
+fn part(mesh: &Mesh, triangles: &[u32]) -> Mesh {
+    let mut part = Mesh::default();
+    let mut row_of: HashMap<u32, u32> = HashMap::new();
+    for &triangle in triangles {
+        part.triangles.push(mesh.triangles[triangle as usize].map(|v| {
+            *row_of.entry(v).or_insert_with(|| {
+                part.positions.push(mesh.positions[v as usize]);
+                part.positions.len() as u32 - 1
+            })
+        }));
+    }
+    part
+}
+
+/// `None` if TetGen fails on it.
+fn measure_node(model: &str, node: u32, mesh: &Mesh, which: &Which) -> Result<Option<Node>> {
+    let options = Options {
+        structure: Structure::Tets,
+        record: RecordKind::Link32,
+        keep_subtrees: false,
+        geometry: false,
+        ..Options::default()
+    };
+    let (tree, _) = bvh::build(mesh, &options.bvh, &Silent)?;
+    let (built, _) = tets::build(mesh, &tree, &[0], &options.tets, &Silent)?;
+    let [(0, tets)] = &built[..] else { return Ok(None) };
+    let file = pipeline::assemble(mesh, &tree, &built, &options, &Silent)?;
+    let tracer = ours::tracer(&file.bytes, Use::Hinted)?;
+    let root = &tree.nodes[0];
+    let outside = costs::outside(root.lower, root.upper, RAYS, 21);
+    let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
+    let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
+    let walker = TetWalker::new(tets);
+    let counted = [&outside, &surface].map(|rays| count(&walker, rays));
+    let times = times(&*tracer, &[&outside, &surface], which.rounds);
+
+    let triangles = tree.order.len() as u32;
+    let mut estimates = [[0.0; 2]; ESTIMATORS.len()];
+    let mut sampled_hits = [0.0; 2];
+    let mut micros = [0.0; ESTIMATORS.len()];
+    let depth = || average_depth(&tree);
+    for (row, name) in ESTIMATORS.iter().enumerate() {
+        let clock = Instant::now();
+        estimates[row] = match *name {
+            "face count" => [Estimator::FaceCount.levels(triangles, 0.0); 2],
+            "average depth" => [Estimator::AverageDepth.levels(triangles, depth()); 2],
+            "area" => [Start::Outside, Start::Surface].map(|start| costs::area_steps(tets, start)),
+            _ => {
+                // Rays of other seeds than those that are measured.
+                let outside = costs::outside(root.lower, root.upper, SAMPLES, 23);
+                let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLES, 24);
+                let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
+                // The walker is part of what sampling takes.
+                let walker = TetWalker::new(tets);
+                let counted = [outside, surface].map(|rays| count(&walker, &rays));
+                sampled_hits = counted.map(|c| c[1]);
+                counted.map(|c| c[0])
+            }
+        };
+        micros[row] = 1e6 * clock.elapsed().as_secs_f64();
+    }
+    Ok(Some(Node {
+        model: model.to_owned(),
+        node,
+        triangles,
+        bytes: (tets.tets.len() * 32 + tets.vertices.len() * 16) as f64,
+        steps: counted.map(|c| c[0]),
+        hits: counted.map(|c| c[1]),
+        nanoseconds: times,
+        estimates,
+        sampled_hits,
+        micros,
+    }))
+}
+
+/// Mean steps of rays, and the share of them that end at a triangle.
+fn count(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [f64; 2] {
+    let (mut sums, mut walked) = ([0.0; 2], 0.0f64);
+    for walk in rays.iter().filter_map(|ray| walker.walk(ray)) {
+        sums[0] += f64::from(walk.steps);
+        sums[1] += f64::from(u8::from(walk.hit));
+        walked += 1.0;
+    }
+    sums.map(|sum| sum / walked.max(1.0))
+}
+
+/// Mean depth of the leaves.
+fn average_depth(tree: &bvh::BinaryBvh) -> f64 {
+    let mut depth = vec![0u32; tree.nodes.len()];
+    let (mut sum, mut leaves) = (0.0, 0.0f64);
+    for (i, node) in tree.nodes.iter().enumerate() {
+        if node.is_leaf() {
+            (sum, leaves) = (sum + f64::from(depth[i]), leaves + 1.0);
+        } else {
+            depth[i + 1] = depth[i] + 1;
+            depth[node.right as usize] = depth[i] + 1;
+        }
+    }
+    sum / leaves.max(1.0)
+}
+
+/// Nanoseconds of a ray of each set, in batches with hints.
+fn times(tracer: &dyn Tracer, sets: &[&[SampleRay]; 2], rounds: usize) -> [f64; 2] {
+    let sets = sets.map(rays);
+    let mut hits = vec![Hit::MISS; RAYS];
+    let seconds = least(&sets, rounds, |_, (rays, from)| {
+        let batch = Batch { rays, from: Some(from), coherent: false };
+        Some(Clock::ThreadCpu.time(|| tracer.nearest(batch, &mut hits[..rays.len()])))
+    });
+    [0, 1].map(|set| 1e9 * seconds[set].unwrap_or(0.0) / sets[set].0.len().max(1) as f64)
+}
+
+/// Sampled rays as the library takes them.
+pub(crate) fn rays(samples: &[SampleRay]) -> (Vec<Ray>, Vec<Surface>) {
+    let ray = |s: &SampleRay| Ray {
+        origin: s.origin.map(|x| x as f32),
+        tmin: 0.0,
+        direction: s.direction.map(|x| x as f32),
+        tmax: s.tmax as f32,
+    };
+    let from = |s: &SampleRay| s.from.map_or(Surface::NONE, |triangle| Surface { instance: 0, triangle });
+    (samples.iter().map(ray).collect(), samples.iter().map(from).collect())
+}

@@ -1,0 +1,150 @@
+//! Scatter plots on logarithmic axes as SVG.
+
+use crate::chart::{COLOURS, text};
+use std::fmt::Write;
+
+/// Points of one colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// Its name in the legend.
+    pub name: String,
+    /// Positive x and y.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A plot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scatter {
+    /// Title.
+    pub title: String,
+    /// What x is.
+    pub x: String,
+    /// What y is.
+    pub y: String,
+    /// What is drawn.
+    pub clouds: Vec<Cloud>,
+    /// Whether to draw the line of equal x and y.
+    pub diagonal: bool,
+    /// Radius of a point.
+    pub radius: f64,
+}
+
+const LEFT: f64 = 70.0;
+const TOP: f64 = 40.0;
+const SIZE: f64 = 400.0;
+
+/// Least and greatest value of an axis, a little widened; 1 to 10 without values.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .filter(|v| *v > 0.0 && v.is_finite())
+        .fold((f64::INFINITY, 0f64), |(low, high), v| (low.min(v), high.max(v)));
+    if high == 0.0 { (1.0, 10.0) } else { (low / 1.2, high * 1.2) }
+}
+
+/// 1, 2 and 5 times powers of ten within a range; powers only where there are many.
+fn ticks((low, high): (f64, f64)) -> Vec<f64> {
+    let few = high / low < 200.0;
+    let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let steps: &[f64] = if few { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    powers
+        .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))
+        .filter(|tick| (low..=high).contains(tick))
+        .collect()
+}
+
+impl Scatter {
+    /// The picture.
+    pub fn svg(&self) -> String {
+        let all = || self.clouds.iter().flat_map(|c| &c.points);
+        let (mut xs, mut ys) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
+        if self.diagonal {
+            xs = (xs.0.min(ys.0), xs.1.max(ys.1));
+            ys = xs;
+        }
+        let place = |value: f64, (low, high): (f64, f64)| (value / low).ln() / (high / low).ln();
+        let at = |(x, y): (f64, f64)| (LEFT + SIZE * place(x, xs), TOP + SIZE * (1.0 - place(y, ys)));
+        let (width, height) = (LEFT + SIZE + 190.0, TOP + SIZE + 60.0);
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
+        );
+        text(&mut svg, 14.0, 22.0, "font-size=\"15\" font-weight=\"bold\"", &self.title);
+        let mut rule = |from: (f64, f64), to: (f64, f64), style: &str| {
+            let _ = writeln!(
+                svg,
+                "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" {style}/>",
+                from.0, from.1, to.0, to.1
+            );
+        };
+        for tick in ticks(xs) {
+            rule(at((tick, ys.0)), at((tick, ys.1)), "stroke=\"#ddd\"");
+        }
+        for tick in ticks(ys) {
+            rule(at((xs.0, tick)), at((xs.1, tick)), "stroke=\"#ddd\"");
+        }
+        if self.diagonal {
+            rule(at((xs.0, xs.0)), at((xs.1, xs.1)), "stroke=\"#333\" stroke-dasharray=\"5 4\"");
+        }
+        for tick in ticks(xs) {
+            text(
+                &mut svg,
+                at((tick, ys.0)).0,
+                TOP + SIZE + 16.0,
+                "text-anchor=\"middle\" fill=\"#555\"",
+                &tick.to_string(),
+            );
+        }
+        for tick in ticks(ys) {
+            text(
+                &mut svg,
+                LEFT - 6.0,
+                at((xs.0, tick)).1 + 4.0,
+                "text-anchor=\"end\" fill=\"#555\"",
+                &tick.to_string(),
+            );
+        }
+        text(&mut svg, LEFT + SIZE / 2.0, TOP + SIZE + 40.0, "text-anchor=\"middle\"", &self.x);
+        let turned = format!("text-anchor=\"middle\" transform=\"rotate(-90 16 {0:.0})\"", TOP + SIZE / 2.0);
+        text(&mut svg, 16.0, TOP + SIZE / 2.0, &turned, &self.y);
+        for (row, cloud) in self.clouds.iter().enumerate() {
+            let colour = COLOURS[row % COLOURS.len()];
+            let mut dot = |(x, y): (f64, f64), radius: f64| {
+                let _ = writeln!(
+                    svg,
+                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"{colour}\" fill-opacity=\"0.7\"/>"
+                );
+            };
+            cloud.points.iter().for_each(|p| dot(at(*p), self.radius));
+            let y = TOP + 14.0 + 20.0 * row as f64;
+            dot((LEFT + SIZE + 20.0, y - 4.0), 5.0);
+            text(&mut svg, LEFT + SIZE + 32.0, y, "", &cloud.name);
+        }
+        svg.push_str("</svg>\n");
+        svg
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_point_lies_in_the_plot_and_ticks_in_the_range() {
+        let cloud = Cloud { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)] };
+        let plot = Scatter {
+            title: "t".into(),
+            x: "x".into(),
+            y: "y".into(),
+            clouds: vec![cloud],
+            diagonal: true,
+            radius: 3.0,
+        };
+        let svg = plot.svg();
+        assert_eq!(svg.matches("<circle").count(), 3);
+        assert!(svg.contains("a&lt;b"));
+        assert_eq!(ticks((1.0, 12.0)), [1.0, 2.0, 5.0, 10.0]);
+        assert_eq!(ticks((1.0, 1e4)), [1.0, 10.0, 100.0, 1e3, 1e4]);
+        assert_eq!(range(std::iter::empty()), (1.0, 10.0));
+    }
+}

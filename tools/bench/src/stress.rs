@@ -1,0 +1,120 @@
+//! `bth-bench stress`: the large version of the stress tests, with a record.
+
+use crate::args::Stress;
+use crate::markdown::{count, table};
+use crate::output::{Head, Record};
+use crate::progress::Progress;
+use anyhow::{Result, ensure};
+use bth_tests::stress::{Shape, Tally, run as trace, shapes};
+use bth_tests::structures::every_structure;
+use serde_json::{Value, json};
+
+/// Rays of a shape between two looks at how far it is: a number of batches that the instruction sets divide.
+const ROUND: usize = 12 * 4096;
+
+/// Traces all shapes in turn until enough rays are traced, and writes the record.
+///
+/// # Errors
+/// If anything was wrong with any answer, or the record cannot be written.
+pub fn run(arguments: &Stress) -> Result<()> {
+    let progress = Progress::new();
+    let shapes = shapes(arguments.size);
+    let share = arguments.millions.saturating_mul(1_000_000).div_ceil(shapes.len() as u64);
+    let (mut all, mut rows, mut found) = (Tally::default(), Vec::new(), Vec::new());
+    for (number, shape) in shapes.iter().enumerate() {
+        progress.say(format!("{}: compiling", shape.name));
+        let structures = every_structure(&shape.grid.model(), shape.whole);
+        let mut tally = Tally::default();
+        let mut round = 0;
+        while tally.traced < share {
+            let seed = arguments.seed.wrapping_mul(1 << 40).wrapping_add((number as u64) << 32 | round);
+            trace(shape, &structures, ROUND, arguments.one_in, seed, &mut tally);
+            round += 1;
+            progress.say(format!("{}: {} of {} rays", shape.name, count(tally.traced), count(share)));
+        }
+        rows.push(row(shape.name, shape.grid.triangles.len(), structures.len(), &tally));
+        found.push(json(shape, structures.len(), &tally));
+        all.add(&tally);
+    }
+    rows.push(row("**all**", shapes.iter().map(|s| s.grid.triangles.len()).sum(), 0, &all));
+    drop(progress);
+
+    let isas: Vec<String> =
+        bth::Isa::ALL.iter().filter(|isa| isa.is_available()).map(|isa| isa.to_string()).collect();
+    let options = json!({ "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed });
+    let head = Head::now("stress", isas.join(", in turn "), options);
+    let json = json!({ "head": head, "shapes": found, "examples": all.examples });
+    Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() }
+        .write(&arguments.output)?;
+    ensure!(all.defects() == 0, "{} wrong answers, such as {:#?}", all.defects(), all.examples);
+    Ok(())
+}
+
+fn body(rows: &[Vec<String>]) -> String {
+    let head = [
+        "shape",
+        "triangles",
+        "structures",
+        "rays",
+        "traced",
+        "hits",
+        "missed",
+        "leaked",
+        "ghosts",
+        "bits differ",
+        "compared with all",
+        "wrong",
+        "t, 99 %",
+        "t, all",
+    ];
+    format!(
+        "Every ray goes through every structure (BVH; BTH with each record; where the shape has one, one \
+         tetrahedralization with each record), as nearest and any hit, a part also with hints and alone: *traced* \
+         counts all of these. Each tenth of the rays is of a kind: exactly at vertices; at middles of edges; along \
+         edges; in planes of faces; along axes with zeros of either sign; with directions of 2^±60 and 2^-149; with \
+         ranges that end at, just before and just behind a vertex; from the surface; from inside; from anywhere. \
+         *Missed*: a triangle that the line surely meets was not found; *leaked*: a ray from inside met nothing; \
+         *ghost*: a triangle was reported that the line does not meet. All are decided in integers. Error of t in \
+         units in the last place (99 %: to the next eighth).\n\n{}",
+        table(&head.map(str::to_owned), rows)
+    )
+}
+
+fn row(name: &str, triangles: usize, structures: usize, tally: &Tally) -> Vec<String> {
+    let mut cells = vec![name.to_owned(), count(triangles as u64)];
+    cells.push(if structures == 0 { String::new() } else { structures.to_string() });
+    let numbers = [
+        tally.rays,
+        tally.traced,
+        tally.hits,
+        tally.misses,
+        tally.leaks,
+        tally.ghosts,
+        tally.different,
+        tally.compared,
+        tally.wrong,
+    ];
+    cells.extend(numbers.map(count));
+    cells.push(format!("{:.3}", tally.error_at_99_percent()));
+    cells.push(format!("{:.3}", tally.worst));
+    cells
+}
+
+fn json(shape: &Shape, structures: usize, tally: &Tally) -> Value {
+    json!({
+        "name": shape.name,
+        "triangles": shape.grid.triangles.len(),
+        "structures": structures,
+        "rays": tally.rays,
+        "traced": tally.traced,
+        "hits": tally.hits,
+        "missed": tally.misses,
+        "leaked": tally.leaks,
+        "ghosts": tally.ghosts,
+        "bits_differ": tally.different,
+        "compared": tally.compared,
+        "wrong": tally.wrong,
+        "t_error_ulp_99": tally.error_at_99_percent(),
+        "t_error_ulp_worst": tally.worst,
+    })
+}

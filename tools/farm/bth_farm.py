@@ -1,0 +1,176 @@
+"""Shares the work on a scene out over the workers of a Dask cluster.
+
+The tasks are the ordinary programs with `--shard I/N`: `bthc compile --in-cache`, whose results meet in a cache that all
+workers see, and `bth-play`, whose frames meet in a folder. Both do what is left to do and no more, so a task may be run any
+number of times: when a worker is lost, Dask runs its tasks elsewhere.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from distributed import Client, LocalCluster, as_completed
+from distributed.scheduler import KilledWorker
+
+RETRIES = 3
+"""Times that a part is run again after its program failed, or after the worker was lost."""
+
+USAGE, FAILED, LOST = 2, 1, 4
+
+
+class Failure(Exception):
+    """A part that failed, with what its program said."""
+
+    def __init__(self, message, code=FAILED):
+        super().__init__(message)
+        self.code = code
+
+    def __reduce__(self):
+        return Failure, (self.args[0], self.code)
+
+
+def program(name):
+    """The path of a program: what the variable of its name says (`BTHC`, `BTH_PLAY`), else on the PATH, else built here."""
+    named = os.environ.get(name.upper().replace("-", "_"))
+    target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).resolve().parents[2] / "target"))
+    found = named or shutil.which(name) or shutil.which(name, path=str(target / "release"))
+    if not found:
+        raise Failure(f"{name} is not on the PATH (hint: cargo build --release, or set {name.upper().replace('-', '_')})", USAGE)
+    return found
+
+
+def run_part(name, arguments, environment):
+    """Runs a program on the worker that this is called on; its JSON. Exit codes 2 to 5 are faults of the input, which
+    would be the same everywhere."""
+    # The variables of the one who calls, not of the worker: all workers are to use one cache.
+    command = [program(name), *arguments, "--json"]
+    done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
+    if done.returncode == 0:
+        return json.loads(done.stdout)
+    said = done.stderr.strip().splitlines()[-1:] or [f"ended with {done.returncode}"]
+    failure = Failure(f"{' '.join(command)}: {said[0]}", max(done.returncode, FAILED))
+    if 2 <= done.returncode <= 5:
+        return failure
+    raise failure
+
+
+def run_parts(client, parts, environment, on_done=lambda done: None):
+    """Runs parts, each a program and its arguments; their JSON in order. `on_done` is told how many are done."""
+    futures = [
+        client.submit(run_part, name, arguments, environment, pure=False, retries=RETRIES) for name, arguments in parts
+    ]
+    try:
+        for done, future in enumerate(as_completed(futures), 1):
+            result = future.result()
+            if isinstance(result, Failure):
+                raise result
+            on_done(done)
+        return client.gather(futures)
+    except KilledWorker as lost:
+        raise Failure(f"a part was lost with {RETRIES + 1} workers: {lost}", LOST) from lost
+    finally:
+        client.cancel(futures)
+
+
+def shards(count):
+    return [f"{i}/{count}" for i in range(1, count + 1)]
+
+
+def compile_scene(client, scene, output, options, environment, count, on_done=lambda done: None):
+    """Compiles the objects of a scene on all workers, then puts the scene together here; the JSON of that."""
+    scene = str(Path(scene).resolve())
+    parts = [("bthc", ["compile", scene, "--in-cache", "--shard", shard, *options]) for shard in shards(count)]
+    objects = run_parts(client, parts, environment, on_done)
+    done = run_part("bthc", ["compile", scene, "-o", str(output), *options], environment)
+    if isinstance(done, Failure):
+        raise done
+    done["farm"] = {"parts": count, "objects": sum(part["objects"] for part in objects)}
+    return done
+
+
+def render_frames(client, scene, output, options, environment, count, on_done=lambda done: None):
+    """Renders the frames of a compiled scene on all workers; the JSON of each part."""
+    scene, output = str(Path(scene).resolve()), str(Path(output).absolute())
+    parts = [("bth-play", [scene, "-o", output, "--shard", shard, *options]) for shard in shards(count)]
+    return {"output": output, "farm": {"parts": count}, "parts": run_parts(client, parts, environment, on_done)}
+
+
+def arguments(argv):
+    parser = argparse.ArgumentParser(prog="bth-farm", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    for name, about, output in [
+        ("compile", "compile the objects of a scene, then the scene", "the compiled file"),
+        ("render", "render the frames of a scene", "numbered pictures, such as frames/####.png, in a folder that all see"),
+    ]:
+        sub = commands.add_parser(name, help=about, epilog="What follows `--` is passed on to the program of each task.")
+        sub.add_argument("scene", type=Path)
+        sub.add_argument("-o", "--output", required=True, help=output)
+        sub.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster; by default one is started on this machine")
+        sub.add_argument("--workers", type=int, metavar="N", help="workers of the cluster on this machine")
+        sub.add_argument("--parts", type=int, metavar="N", help="parts of the work; by default four for each worker")
+        sub.add_argument("--cache-dir", metavar="FOLDER", help="a cache that all workers see")
+        sub.add_argument("--shared-cache", metavar="PLACE", help="a cache behind that of each worker")
+        sub.add_argument("--json", action="store_true", help="print one JSON object")
+    split = argv.index("--") if "--" in argv else len(argv)
+    args = parser.parse_args(argv[:split])
+    args.options = argv[split + 1 :]
+    return args
+
+
+def environment_of(args):
+    """What the programs find in their environment."""
+    wanted = {"BTH_CACHE_DIR": args.cache_dir, "BTH_SHARED_CACHE": args.shared_cache}
+    names = ["BTH_CACHE_DIR", "BTH_SHARED_CACHE", "BTH_CACHE_SIZE", "BTH_TETGEN"]
+    kept = {name: os.environ[name] for name in names if name in os.environ}
+    given = {name: str(Path(value).absolute()) if "://" not in value else value for name, value in wanted.items() if value}
+    return {**kept, **given}
+
+
+def connect(args):
+    if args.scheduler:
+        return None, Client(args.scheduler, timeout="30s")
+    workers = args.workers or os.cpu_count() or 1
+    cluster = LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+    return cluster, Client(cluster)
+
+
+def main(argv=None):
+    args = arguments(sys.argv[1:] if argv is None else argv)
+    start = time.monotonic()
+    cluster = client = None
+    try:
+        cluster, client = connect(args)
+        count = args.parts or 4 * max(1, sum(client.ncores().values()))
+        options = args.options
+        if cluster and not any(option.startswith("--threads") for option in options):
+            options += ["--threads", str(max(1, (os.cpu_count() or 1) // len(cluster.workers)))]
+
+        def progress(done):
+            if sys.stderr.isatty() and not args.json:
+                print(f"\r{done} of {count} parts", end="" if done < count else "\n", file=sys.stderr, flush=True)
+
+        work = {"compile": compile_scene, "render": render_frames}[args.command]
+        done = work(client, args.scene, args.output, options, environment_of(args), count, progress)
+        done["farm"]["seconds"] = time.monotonic() - start
+    except (Failure, OSError) as error:
+        code = error.code if isinstance(error, Failure) else LOST
+        print(f"error: {error}", file=sys.stderr)
+        if args.json:
+            print(json.dumps({"error": {"message": str(error), "exit_code": code}}, indent=2))
+        return code
+    except KeyboardInterrupt:
+        return 130
+    finally:
+        for part in (client, cluster):
+            if part:
+                part.close()
+    if args.json:
+        print(json.dumps(done, indent=2))
+    else:
+        print(f"wrote {args.output} in {done['farm']['parts']} parts, {done['farm']['seconds']:.1f} s")
+    return 0

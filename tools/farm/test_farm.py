@@ -1,0 +1,112 @@
+"""Three workers, one of them killed mid-way: the same bytes and frames as on one machine.
+
+Usage: test_farm.py BTHC BTH_PLAY
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from distributed import Client, LocalCluster
+
+import bth_farm
+
+OBJECTS = 9
+FRAMES = 12
+
+
+def model(rings):
+    """A closed solid of revolution with a rough profile, as OBJ."""
+    radius = lambda i: (0 if i in (0, rings) else 8 + (i * 7) % 5)
+    turn = [(4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3)]
+    lines = [f"v {radius(i) * x} {10 * i} {radius(i) * y}" for i in range(rings + 1) for x, y in turn]
+    for i in range(rings):
+        for j in range(8):
+            a, b = 8 * i + j + 1, 8 * i + (j + 1) % 8 + 1
+            lines.append(f"f {a} {b} {b + 8} {a + 8}")
+    return "\n".join(lines) + "\n"
+
+
+def scene(folder):
+    text = f"version = 1\nframes = {{ first = 0, last = {FRAMES - 1}, rate = 12 }}\n"
+    for i in range(OBJECTS):
+        (folder / f"{i}.obj").write_text(model(40 + 10 * i))
+        text += f'[[objects]]\nname = "o{i}"\nmodel = "{i}.obj"\n'
+        text += f'[[nodes]]\nname = "n{i}"\nobject = "o{i}"\ntranslation = [{100 * i}, 0, 0]\n'
+        text += f'[[tracks]]\nnode = "n{i}"\nproperty = "translation"\ntimes = [0, 1]\n'
+        text += f"values = [[{100 * i}, 0, 0], [{100 * i}, {20 * i}, 50]]\n"
+    (folder / "s.manifest").write_text(text)
+    return folder / "s.manifest"
+
+
+def kill_one(cluster, after):
+    """Kills a worker's process when so many parts are done. Its nanny starts another one, as a farm would."""
+    killed = []
+
+    def on_done(done):
+        if done >= after and not killed:
+            worker = cluster.workers[0]
+            killed.append(worker.pid)
+            os.kill(worker.pid, signal.SIGKILL)
+
+    return killed, on_done
+
+
+def frames(folder):
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def main():
+    os.environ["BTHC"], os.environ["BTH_PLAY"] = (str(Path(p).resolve()) for p in sys.argv[1:3])
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        manifest = scene(folder)
+        play = ["--size", "96x54", "--spp", "4", "--threads", "1"]
+        env = {**os.environ, "BTH_NO_CACHE": "1"}
+        subprocess.run([os.environ["BTHC"], "compile", manifest, "-o", folder / "one.bth", "-q"], check=True, env=env)
+        (folder / "one").mkdir()
+        alone = [os.environ["BTH_PLAY"], folder / "one.bth", "-o", folder / "one/####.png", *play]
+        subprocess.run(alone, check=True, stdout=subprocess.DEVNULL)
+
+        with LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+            with Client(cluster) as client:
+                shared = {"BTH_CACHE_DIR": str(folder / "cache")}
+                killed, on_done = kill_one(cluster, 2)
+                done = bth_farm.compile_scene(
+                    client, manifest, folder / "farm.bth", ["--threads", "1"], shared, OBJECTS, on_done
+                )
+                assert killed, "no worker was killed"
+                assert done["farm"]["objects"] == OBJECTS, done["farm"]
+                assert done["cache"]["hits"] == {"object": OBJECTS}, done["cache"]
+                assert (folder / "farm.bth").read_bytes() == (folder / "one.bth").read_bytes(), "other bytes"
+
+                (folder / "farm").mkdir()
+                killed, on_done = kill_one(cluster, 1)
+                bth_farm.render_frames(
+                    client, folder / "farm.bth", folder / "farm/####.png", play, shared, 6, on_done
+                )
+                assert killed, "no worker was killed"
+                one, farm = frames(folder / "one"), frames(folder / "farm")
+                assert len(one) == FRAMES and one == farm, "other frames"
+
+                (folder / "4.obj").write_text("f 1 2 3\n")
+                try:
+                    bth_farm.compile_scene(client, manifest, folder / "x.bth", [], shared, 3)
+                except bth_farm.Failure as failure:
+                    assert failure.code == 3 and "4.obj:1" in str(failure), failure
+                else:
+                    raise AssertionError("a faulty model was compiled")
+        (folder / "4.obj").write_text(model(80))
+        farm = [sys.executable, Path(__file__).with_name("bth-farm"), "compile", manifest, "-o", folder / "local.bth"]
+        local = [*farm, "--workers", "2", "--cache-dir", folder / "cache", "--json", "--", "--quality", "fast"]
+        done = json.loads(subprocess.run(local, check=True, stdout=subprocess.PIPE).stdout)
+        assert done["farm"]["objects"] == OBJECTS and (folder / "local.bth").exists(), done["farm"]
+    print("three workers, one killed mid-way, twice: same bytes, same frames")
+
+
+if __name__ == "__main__":
+    main()

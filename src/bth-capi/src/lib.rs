@@ -155,15 +155,31 @@ pub unsafe extern "C" fn bth_any(
     }
     // SAFETY: not null, `count` bytes by contract.
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
-    // `bool` has invalid bit patterns, so the caller's memory is not passed on as one.
-    const PART: usize = 1024;
-    let mut part = [false; PART];
-    for (i, (rays, hit)) in rays.chunks(PART).zip(hit.chunks_mut(PART)).enumerate() {
-        let from = from.map(|f| &f[i * PART..i * PART + rays.len()]);
+    // `bool` has invalid bit patterns, so the caller's memory is not passed on as one. A ray alone need not pay for room
+    // that it has no use for.
+    if count <= FEW {
+        any_in_parts::<FEW>(scene, rays, from, hit);
+    } else {
+        any_in_parts::<PART>(scene, rays, from, hit);
+    }
+}
+
+/// Rays that are traced together by [`bth_any`].
+const PART: usize = 1024;
+/// As many at most go without room for a [`PART`].
+const FEW: usize = 16;
+
+/// Any hits, `N` rays at a time.
+fn any_in_parts<const N: usize>(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
+    let mut part = [false; N];
+    for (i, (rays, hit)) in rays.chunks(N).zip(hit.chunks_mut(N)).enumerate() {
+        let from = from.map(|f| &f[i * N..i * N + rays.len()]);
+        let part = &mut part[..rays.len()];
+        // Of a panic, which would be a defect, nothing is left but misses.
         part.fill(false);
-        let _ = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut part[..rays.len()])));
+        let _ = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, part)));
         for (out, found) in hit.iter_mut().zip(part) {
-            *out = found.into();
+            *out = (*found).into();
         }
     }
 }

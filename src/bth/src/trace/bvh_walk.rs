@@ -30,14 +30,22 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
-    let mut top = stacks.start(0, object.header.root);
-    while top > stacks.bottom(0) {
-        let found = match Child::from_code(stacks.code(top)) {
+    // The code of what is entered next stays out of memory: reading back what was just stored is the longest wait of a step.
+    // Its place on the stack is `top`.
+    let mut code = object.header.root;
+    let mut top = stacks.start(0, code);
+    loop {
+        let found = match Child::from_code(code) {
             Some(Child::Node(at)) => {
                 count.node();
-                let count = flight.enter_node(s, object.node(at), stacks.room(top));
-                top = stacks.replaced(top, count);
-                continue;
+                match flight.nearest_child(s, object.node(at), stacks.room(top)) {
+                    Some((nearest, others)) => {
+                        code = nearest;
+                        top = stacks.replaced(top, others + 1);
+                        continue;
+                    }
+                    None => Found::Nothing,
+                }
             }
             Some(Child::Indexed(at)) => {
                 let leaf = object.indexed_leaf(at);
@@ -54,7 +62,7 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
             Some(Child::Tets(row)) if row != walked => {
                 let subtree = object.tet_leaves[row as usize].subtree;
                 if subtree != NONE {
-                    stacks.set_code(top, subtree);
+                    code = subtree;
                     continue;
                 }
                 count.leaf();
@@ -71,5 +79,9 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
             Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
             Found::Enough => return,
         }
+        if top <= stacks.bottom(0) {
+            return;
+        }
+        code = stacks.code(top);
     }
 }

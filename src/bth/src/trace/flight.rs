@@ -43,11 +43,9 @@ impl<Q: Query> Flight<Q> {
     /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
     #[inline(always)]
     pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
-        if !self.aim.set(frame, ray) && !self.aim_in_f64(object, ray) {
-            return false;
-        }
-        self.take_over();
-        true
+        let hits = self.aim.set(frame, ray) || self.aim_in_f64(object, ray);
+        self.limit = self.aim.slabs.last;
+        hits
     }
 
     /// As [`Self::aim_at`], for rays that f32 can't prepare too.
@@ -105,6 +103,32 @@ impl<Q: Query> Flight<Q> {
         } else {
             s.compress_far_to_near(bits, enter, children, codes, keys)
         }
+    }
+
+    /// The child of a node to enter next, of those that the ray may meet, and how many others there are: those are written,
+    /// the nearest last. Which is next is found beside the sorting of the others, not after it.
+    #[inline(always)]
+    pub(crate) fn nearest_child<S: Simd>(
+        &self,
+        s: S,
+        node: &WideNode,
+        (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+    ) -> Option<(u32, usize)> {
+        let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
+        if bits == 0 {
+            return None;
+        }
+        let first = bits.trailing_zeros() as usize;
+        if bits & (bits - 1) == 0 {
+            return Some((node.child[first % WIDTH], 0));
+        }
+        let children = s.load_u(&node.child);
+        if Q::ANY {
+            return Some((node.child[first % WIDTH], s.compress(bits & (bits - 1), children, codes)));
+        }
+        let nearest = nearest_lane(s, bits, enter) % WIDTH;
+        let others = bits & !(1 << nearest);
+        Some((node.child[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
     }
 
     /// Tests the triangles of a leaf.
@@ -173,6 +197,17 @@ impl<Q: Query> Flight<Q> {
         self.take_over();
         if self.limit < limit { Found::Nearer } else { otherwise }
     }
+}
+
+/// The lane of the least key among those whose bit is set, but for the lowest bits of keys. Negative keys may seem in any
+/// order.
+#[inline(always)]
+fn nearest_lane<S: Simd>(s: S, bits: u32, key: S::F) -> usize {
+    const LANE: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+    let low = WIDTH as u32 - 1;
+    let key = s.or_u(s.and_u(s.bits(key), s.splat_u(!low)), s.load_u(&LANE));
+    let key = s.select(s.mask(bits), s.floats(key), s.splat(f32::MAX));
+    (s.least(key).to_bits() & low) as usize
 }
 
 /// What f64 leaves open.

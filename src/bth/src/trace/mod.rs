@@ -46,7 +46,7 @@ use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
 use choice::Choices;
 use packets::PacketScratch;
-use query::{Any, Nearest, Query};
+use query::{Any, Nearest};
 use single::trace;
 use stack::Stacks;
 use std::cell::Cell;
@@ -75,6 +75,7 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
+#[inline]
 pub(crate) fn nearest(
     object: &ObjectView<'_>,
     ray: &Ray,
@@ -82,18 +83,19 @@ pub(crate) fn nearest(
     instance: u32,
     scratch: &mut Scratch,
 ) -> Hit {
-    let query = Nearest::new(ray);
-    trace(object, ray, from, scratch, query, &mut ()).answer(object.triangle_ids, instance)
+    trace::<Nearest, ()>(object, ray, from, instance, scratch, &mut ())
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let mut steps = Steps::default();
-    let query = with_scratch(|scratch| trace(object, ray, from, scratch, Nearest::new(ray), &mut steps));
-    (query.answer(object.triangle_ids, instance), steps)
+    let hit =
+        with_scratch(|scratch| trace::<Nearest, Steps>(object, ray, from, instance, scratch, &mut steps));
+    (hit, steps)
 }
 
 /// Whether a ray in object space hits anything.
+#[inline]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
-    trace(object, ray, from, scratch, Any::new(ray), &mut ()).answer(object.triangle_ids, 0)
+    trace::<Any, ()>(object, ray, from, 0, scratch, &mut ())
 }

@@ -188,13 +188,8 @@ fn check(surface: &Surface, rays: &[Ray], least: LeastUse) -> [(PacketCount, usi
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = with_scratch(|scratch| {
         let mut trace = |ray: &Ray| {
-            let hit = single::trace(&object, ray, NONE, scratch, Nearest::new(ray), &mut ())
-                .answer(object.triangle_ids, 0);
-            (
-                hit,
-                single::trace(&object, ray, NONE, scratch, Any::new(ray), &mut ())
-                    .answer(object.triangle_ids, 0),
-            )
+            let hit = single::trace::<Nearest, ()>(&object, ray, NONE, 0, scratch, &mut ());
+            (hit, single::trace::<Any, ()>(&object, ray, NONE, 0, scratch, &mut ()))
         };
         rays.iter().map(&mut trace).collect()
     });

@@ -67,14 +67,10 @@ impl Aim {
     pub(crate) fn set(&mut self, frame: &Frame, ray: &Ray) -> bool {
         let (o, d) = (&ray.origin, &ray.direction);
         let size = [d[0].abs(), d[1].abs(), d[2].abs()];
-        let z = if size[0] > size[1] && size[0] > size[2] {
-            0
-        } else if size[1] > size[2] {
-            1
-        } else {
-            2
-        };
-        let greatest = size[z];
+        // Without branches, which rays of all directions would mislead.
+        let is_x = (size[0] > size[1]) & (size[0] > size[2]);
+        let z = if is_x { 0 } else { 2 - usize::from(size[1] > size[2]) };
+        let greatest = greater(greater(size[0], size[1]), size[2]);
         let (mut reach, mut farthest) = (0f32, 0f32);
         for k in 0..3 {
             let (low, high) = ((frame.lower[k] - o[k]).abs(), (frame.upper[k] - o[k]).abs());
@@ -105,8 +101,8 @@ impl Aim {
             slabs.near[k] = (d[k].to_bits() >> 31) * slabs::FAR;
         }
         let backward = d[z] < 0.0;
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let (x, y) = if backward { (y, x) } else { (x, y) };
+        const PLANE: [[[usize; 2]; 3]; 2] = [[[1, 2], [2, 0], [0, 1]], [[2, 1], [0, 2], [1, 0]]];
+        let [x, y] = PLANE[usize::from(backward)][z];
         let inverse = 1.0 / greatest;
         let forward = if backward { -1.0 } else { 1.0 };
         // Not a denormal number on the way: those cost a hundred cycles.

@@ -11,54 +11,93 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 
-/// Traces one ray and returns the query as it ends.
+/// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with.
+#[inline]
 pub(crate) fn trace<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
     from: u32,
+    instance: u32,
     scratch: &mut Scratch,
-    mut query: Q,
     count: &mut C,
-) -> Q {
+) -> Q::Answer {
+    if from == NONE || object.tet_leaves.is_empty() {
+        return through_bvh::<Q, C>(Single { object, ray, instance, start: None, scratch, count });
+    }
+    trace_from::<Q, C>(object, ray, from, instance, scratch, count)
+}
+
+/// As [`trace`], from a triangle that may lie on tetrahedra.
+#[inline(never)]
+fn trace_from<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    instance: u32,
+    scratch: &mut Scratch,
+    count: &mut C,
+) -> Q::Answer {
+    let mut query = Q::new(ray);
     let walked = match start_in_tets(object, ray, from, &mut query, count) {
-        Start::Done => return query,
+        Start::Done => return query.answer(object.triangle_ids, instance),
         Start::Walked(leaf) => leaf,
     };
-    if object.header.root == NONE || object.header.root == Child::Tets(walked).code() && walked != NONE {
-        return query;
+    if object.header.root == Child::Tets(walked).code() && walked != NONE {
+        return query.answer(object.triangle_ids, instance);
     }
-    Isa::chosen().run(Single { object, ray, walked, query, scratch, count })
+    through_bvh(Single { object, ray, instance, start: Some((&query, walked)), scratch, count })
+}
+
+#[inline]
+fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) -> Q::Answer {
+    if single.object.header.root == NONE {
+        return single.query().answer(single.object.triangle_ids, single.instance);
+    }
+    Isa::chosen().run(&mut single)
 }
 
 struct Single<'a, Q, C> {
     object: &'a ObjectView<'a>,
     ray: &'a Ray,
-    /// A tet leaf to leave out.
-    walked: u32,
-    query: Q,
+    instance: u32,
+    /// What the query has found in a tet leaf, which is to be left out.
+    start: Option<(&'a Q, u32)>,
     scratch: &'a mut Scratch,
     count: &'a mut C,
 }
 
-impl<Q: Query, C: Count> Kernel for Single<'_, Q, C> {
-    type Output = Q;
+impl<Q: Query, C> Single<'_, Q, C> {
+    /// The query as it is before the walk.
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Q {
-        let mut flight = Flight::vacant(self.query);
-        if !flight.aim_at(self.object, &Frame::new(self.object.header), self.ray) {
-            return self.query;
+    fn query(&self) -> Q {
+        self.start.map_or_else(|| Q::new(self.ray), |(query, _)| *query)
+    }
+}
+
+// By reference, and the query is made, and its answer worked out, within the kernel: copies of what was just written word by
+// word stall.
+impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
+    type Output = Q::Answer;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Q::Answer {
+        let (object, ray) = (self.object, self.ray);
+        let mut flight = Flight::vacant(self.query());
+        if flight.aim_at(object, &Frame::new(object.header), ray) {
+            if self.start.is_some() {
+                flight.take_over();
+            }
+            self.scratch.stacks.reserve(object, 1);
+            bvh_walk::walk(
+                s,
+                object,
+                ray,
+                self.start.map_or(NONE, |(_, walked)| walked),
+                &mut flight,
+                &mut self.scratch.stacks,
+                self.count,
+                |leaf, query, count| enter_tets(object, leaf, ray, query, count),
+            );
         }
-        self.scratch.stacks.reserve(self.object, 1);
-        bvh_walk::walk(
-            s,
-            self.object,
-            self.ray,
-            self.walked,
-            &mut flight,
-            &mut self.scratch.stacks,
-            self.count,
-            |leaf, query, count| enter_tets(self.object, leaf, self.ray, query, count),
-        );
-        *flight.query()
+        flight.query().answer(object.triangle_ids, self.instance)
     }
 }

@@ -2,14 +2,15 @@
 //! the rest goes through the BVH.
 
 use super::Scratch;
-use super::bvh_batch::{BatchWalk, Waiting};
-use super::bvh_walk::TetOutcome;
+use super::bvh::batch::{BatchWalk, Waiting};
+use super::bvh::walk::TetOutcome;
 use super::choice::{self, LEAST_RAYS, Way};
 use super::hinted::Hinted;
 use super::packets;
 use super::query::{Any, Deliver, Nearest, Query};
-use super::records::LaneRecords;
-use super::tet_batch::{self, Walk};
+use super::tets;
+use super::tets::batch::Walk;
+use super::tets::records::LaneRecords;
 use super::tets::{enter_tets, leaf_of_face};
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
@@ -211,10 +212,10 @@ fn walk_tets<Q: Query>(
 ) {
     let whole = whole(object);
     let any = whole != NONE || faces.iter().any(|&face| face != NONE);
-    let records = LaneRecords::new(object.records).filter(|_| any && tet_batch::Batch::<Q>::fits(object));
+    let records = LaneRecords::new(object.records).filter(|_| any && tets::batch::Batch::<Q>::fits(object));
     if let Some(records) = records {
         let leaves = vec![whole; rays.len()];
-        let mut batch = tet_batch::Batch::new(object, records, rays, faces, &leaves, queries, walks);
+        let mut batch = tets::batch::Batch::new(object, records, rays, faces, &leaves, queries, walks);
         // Without vectors the BVH is faster, and a hint of no use to it.
         let _ = Isa::chosen().run_wide(&mut batch);
     }

@@ -3,39 +3,19 @@
 #![allow(clippy::needless_range_loop)]
 
 mod batch;
-mod bvh_batch;
-mod bvh_walk;
+mod bvh;
 mod choice;
-mod coherence;
 mod crossing;
-mod flight;
 mod hinted;
 mod line;
-mod packet;
-mod packet_group;
-mod packet_hull;
-mod packet_leaf;
-mod packet_settle;
-#[cfg(test)]
-mod packet_tests;
 mod packets;
 mod prepare;
 #[cfg(test)]
 mod prepare_tests;
 mod query;
-mod records;
 mod sight;
 mod single;
 mod slabs;
-mod stack;
-mod tet_batch;
-mod tet_decide;
-mod tet_flood;
-mod tet_lanes;
-mod tet_locate;
-mod tet_queue;
-mod tet_rounds;
-mod tet_walk;
 mod tets;
 
 pub(crate) use batch::{any_batch, nearest_batch};
@@ -44,11 +24,11 @@ pub use query::Steps;
 
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
+use bvh::stack::Stacks;
 use choice::Choices;
 use packets::PacketScratch;
 use query::{Any, Nearest};
 use single::trace;
-use stack::Stacks;
 use std::cell::Cell;
 
 /// Fewer rays than these are traced one after the other.

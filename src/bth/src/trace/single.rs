@@ -1,8 +1,8 @@
 //! One ray through an object.
 
 use super::Scratch;
-use super::bvh_walk;
-use super::flight::Flight;
+use super::bvh;
+use super::bvh::flight::Flight;
 use super::prepare::Frame;
 use super::query::{Count, Query};
 use super::tets::{Start, enter_tets, start_in_tets};
@@ -87,7 +87,7 @@ impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
                 flight.take_over();
             }
             self.scratch.stacks.reserve(object, 1);
-            bvh_walk::walk(
+            bvh::walk::walk(
                 s,
                 object,
                 ray,

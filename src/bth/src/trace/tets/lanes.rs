@@ -1,6 +1,6 @@
 //! Sixteen tet walks side by side: the step from one tetrahedron to the next, in f32.
 //!
-//! As [`super::tet_walk`], but a sign counts only where f32 makes it certain. With u = 2^-24, the computed projection
+//! As [`super::walk`], but a sign counts only where f32 makes it certain. With u = 2^-24, the computed projection
 //! (x, y, z) of a point, z its depth, and W = |x| + |y| + |z|: the differences from the origin are off by a factor of
 //! 1 + u, the shear, at most 1, too, and with the roundings of the product and the last difference x and y are off by
 //! u (2|x| + 4|z|), less than δ = 4.1 u W. For two points a and b with S = |x| + |y| the cross product is then off
@@ -52,7 +52,7 @@ pub(super) const DOUBT: u32 = FACE_BIT | 1 << 30;
 /// Names of the u32 of a lane.
 pub(super) mod word {
     /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link, or
-    /// the tetrahedron and [`super::DOUBT`].
+    /// the tetrahedron and [`crate::trace::DOUBT`].
     pub(crate) const TET: usize = 0;
     /// The vertex that the link hither named.
     pub(crate) const APEX: usize = 1;
@@ -297,12 +297,12 @@ impl<S: Simd> Lanes<S> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::Line;
-    use super::super::tet_queue::Ready;
     use super::*;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel, LANES};
     use crate::testing::Rng;
+    use crate::trace::line::Line;
+    use crate::trace::tets::queue::Ready;
 
     /// For each of sixteen rays: cross products of three points in turn, their bound, and which rays lanes can take.
     struct Crosses<'a>(&'a [Ray], &'a [[f32; 4]]);

@@ -6,11 +6,11 @@
 //! hold it, so nothing that the line touches is left out, and each is visited once: it
 //! ends, and it finds every constrained face that the exact test can accept.
 
-use super::line::{Projected, Sign};
-use super::query::{Count, Query};
 use super::records::Entered;
-use super::tet_walk::{Outcome, TetSpace};
+use super::walk::{Outcome, TetSpace};
 use crate::layout::{FACE_BIT, NONE};
+use crate::trace::line::{Projected, Sign};
+use crate::trace::query::{Count, Query};
 use std::collections::HashSet;
 
 impl TetSpace<'_> {

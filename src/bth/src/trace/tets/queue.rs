@@ -1,10 +1,10 @@
 //! Rays made ready to walk, in wait for lanes that are free.
 
-use super::prepare;
-use super::tet_lanes::{Extent, Lanes, cross, float, three, word};
+use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::layout::{HullFace, NONE, TetFace};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::prepare;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or

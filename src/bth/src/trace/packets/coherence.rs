@@ -1,9 +1,9 @@
 //! Which rays go together: what a run of rays spans, and how well packets have done so far.
 
-use super::prepare::Frame;
-use super::slabs::PAD;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::prepare::Frame;
+use crate::trace::slabs::PAD;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Floats of a [`Ray`].

@@ -3,13 +3,13 @@
 //! A lane that stops makes room for the next ray: when several of a group have, what they found is taken and they
 //! are filled from the queue.
 
-use super::query::Query;
+use super::batch::{Batch, Start, vertices};
+use super::lanes::{Lanes, Step, float, word};
+use super::queue::Queue;
 use super::records::Entered;
-use super::tet_batch::{Batch, Start, vertices};
-use super::tet_lanes::{Lanes, Step, float, word};
-use super::tet_queue::Queue;
 use crate::layout::NONE;
 use crate::simd::{Kernel, LANES, Simd};
+use crate::trace::query::Query;
 
 /// Idle lanes of a group that are worth a refill.
 const WORTH_A_REFILL: u32 = 6;

@@ -1,16 +1,16 @@
 //! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
-use super::crossing::{Crossing, Estimate, estimate};
-use super::line::Line;
-use super::prepare::{Aim, Frame};
-use super::query::{Named, Query};
-use super::sight::{Block, Sight};
-use super::slabs::Slabs;
 use crate::layout::{WIDTH, WideNode};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
+use crate::trace::crossing::{Crossing, Estimate, estimate};
+use crate::trace::line::Line;
+use crate::trace::prepare::{Aim, Frame};
+use crate::trace::query::{Named, Query};
+use crate::trace::sight::{Block, Sight};
+use crate::trace::slabs::Slabs;
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less

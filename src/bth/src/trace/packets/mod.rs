@@ -1,14 +1,23 @@
 //! Which rays of a batch go in packets.
 
-use super::coherence::{Guard, Span, is_same_octant};
-use super::packet::{Entry, PACKET, Packets, Use};
-use super::packet_hull::{Beam, SegmentBox};
-use super::prepare::Frame;
-use super::query::{Deliver, Offset, Query};
+pub(crate) mod coherence;
+pub(crate) mod group;
+pub(crate) mod hull;
+pub(crate) mod leaf;
+pub(crate) mod packet;
+pub(crate) mod settle;
+#[cfg(test)]
+mod tests;
+
+use self::coherence::{Guard, Span, is_same_octant};
+use self::hull::{Beam, SegmentBox};
+use self::packet::{Entry, PACKET, Packets, Use};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::prepare::Frame;
+use crate::trace::query::{Deliver, Offset, Query};
 
 /// Fewer rays make no packet.
 const FEWEST: usize = 2 * LANES;

@@ -2,13 +2,13 @@
 //! with the work of the others.
 
 use super::flight::{Flight, Found};
-use super::prepare::{Frame, Prepared};
-use super::query::Query;
 use super::stack::{BOTTOM, Place, Stacks};
 use crate::layout::{Child, NODE_LINES, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::prepare::{Frame, Prepared};
+use crate::trace::query::Query;
 
 /// Rays on their way at once.
 const IN_FLIGHT: usize = 32;

@@ -1,15 +1,16 @@
 //! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
 
-use super::batch::Sink;
-use super::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
-use super::query::{Any, Nearest, Query};
-use super::{single, with_scratch};
 use crate::layout::{Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf};
 use crate::layout::{WIDTH, WideNode};
 use crate::object::{ObjectView, Records};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::testing::Rng;
+use crate::trace::batch::Sink;
+use crate::trace::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
+use crate::trace::query::{Any, Nearest, Query};
+use crate::trace::single;
+use crate::trace::with_scratch;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Quads of the surface along x and y, and of a leaf.

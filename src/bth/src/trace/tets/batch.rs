@@ -2,16 +2,16 @@
 //!
 //! `tet_rounds` walks; what its lanes cannot tell, `tet_decide` does.
 
-use super::line::Line;
-use super::query::Query;
+use super::lanes::{three, word};
+use super::queue::{Queue, Ready};
 use super::records::{Entered, LaneRecords};
-use super::tet_lanes::{three, word};
-use super::tet_queue::{Queue, Ready};
-use super::tet_walk::{Outcome, Place};
+use super::walk::{Outcome, Place};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::line::Line;
+use crate::trace::query::Query;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Hits that wait to be looked at in f64 together.

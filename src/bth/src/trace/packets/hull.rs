@@ -1,11 +1,11 @@
 //! What all rays of a packet together can meet: tested before the single rays are.
 
 use super::coherence::Span;
-use super::packet_group::Group;
-use super::prepare::Frame;
-use super::slabs::{self, PAD};
+use super::group::Group;
 use crate::layout::{WIDTH, WideNode};
 use crate::simd::Simd;
+use crate::trace::prepare::Frame;
+use crate::trace::slabs::{self, PAD};
 
 /// A set that contains every point at which rays of a packet can hit something.
 pub(crate) trait Hull<S: Simd> {
@@ -29,7 +29,7 @@ pub(crate) trait Hull<S: Simd> {
 /// monotonically, only their roundings for each ray need a pad. With u = 2^-24 and E the sum of the greatest coordinate
 /// of the object and that of all origins, they come to at most uE|r| each for the reciprocal and plane - c, 6uE|r|
 /// for the product and sum (twice rounded, |plane - c| <= E, |a| <= 2E|r|), 6uE|r| for a: with the
-/// half [`PAD`] = 8uE|r| of [`super::slabs`] for clamped components less than 22uE|r|; the pad is 2 · PAD = 32uE|r|.
+/// half [`PAD`] = 8uE|r| of [`crate::trace::slabs`] for clamped components less than 22uE|r|; the pad is 2 · PAD = 32uE|r|.
 ///
 /// **Triangles.** With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,

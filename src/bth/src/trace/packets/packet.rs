@@ -1,20 +1,20 @@
 //! Packets: up to 64 rays that go together through the wide BVH.
 //!
-//! A node's sixteen children are tested against what all the rays together can meet ([`super::packet_hull`]), and those that
+//! A node's sixteen children are tested against what all the rays together can meet ([`super::hull`]), and those that
 //! remain against the rays, sixteen at a time. f32 lanes leave out what certainly does not matter, as everywhere;
 //! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
-//! be computed at the end; what is not certain is decided at once ([`super::packet_settle`]).
+//! be computed at the end; what is not certain is decided at once ([`super::settle`]).
 
-use super::flight::KEY_SLACK;
-use super::packet_group::{Crossings, Group};
-use super::packet_hull::Hull;
-use super::packet_leaf::{Leaf, Points, Rays, no_points};
-use super::query::{Deliver, Query};
+use super::group::{Crossings, Group};
+use super::hull::Hull;
+use super::leaf::{Leaf, Points, Rays, no_points};
 use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::bvh::flight::KEY_SLACK;
+use crate::trace::query::{Deliver, Query};
 
 /// Groups of sixteen rays in a packet.
 const GROUPS: usize = 4;

@@ -1,12 +1,12 @@
 //! Candidates of a packet's rays, as f64 and exact arithmetic see them.
 
-use super::crossing::{Crossing, Estimate, estimate};
-use super::flight::open;
-use super::query::{Named, Query};
-use super::sight::Block;
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
+use crate::trace::bvh::flight::open;
+use crate::trace::crossing::{Crossing, Estimate, estimate};
+use crate::trace::query::{Named, Query};
+use crate::trace::sight::Block;
 
 /// A triangle that a ray may hit.
 #[derive(Clone, Copy, Debug)]

@@ -1,12 +1,22 @@
 //! One ray through the tetrahedra of a leaf, whichever record they have.
 
-use super::bvh_walk::TetOutcome;
-use super::line::Line;
-use super::query::{Count, Query};
-use super::tet_walk::{Outcome, TetSpace};
+pub(crate) mod batch;
+pub(crate) mod decide;
+pub(crate) mod flood;
+pub(crate) mod lanes;
+pub(crate) mod locate;
+pub(crate) mod queue;
+pub(crate) mod records;
+pub(crate) mod rounds;
+pub(crate) mod walk;
+
+use self::walk::{Outcome, TetSpace};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
+use crate::trace::bvh::walk::TetOutcome;
+use crate::trace::line::Line;
+use crate::trace::query::{Count, Query};
 
 /// What became of a ray where it starts.
 pub(crate) enum Start {

@@ -1,16 +1,16 @@
 //! Sixteen rays of a packet, a lane each.
 //!
-//! What [`super::slabs`] and [`super::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
-//! one box or triangle: the same operations on the same prepared floats ([`super::prepare`]), so the same bounds hold.
+//! What [`crate::trace::slabs`] and [`crate::trace::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
+//! one box or triangle: the same operations on the same prepared floats ([`crate::trace::prepare`]), so the same bounds hold.
 //! The axes of the plane need not be swapped for rays that go backward: the tests do not see handedness.
 
-use super::crossing::weigh;
-use super::prepare::{self, Aim, Frame};
-use super::query::reported;
-use super::sight::Block;
 use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::crossing::weigh;
+use crate::trace::prepare::{self, Aim, Frame};
+use crate::trace::query::reported;
+use crate::trace::sight::Block;
 use std::mem::offset_of;
 
 /// Sixteen rays, and what they have found.
@@ -29,7 +29,7 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) first: S::F,
     /// or certainly exceeds this.
     pub(crate) limit: S::F,
-    /// The axes of f64's projection ([`super::line`]).
+    /// The axes of f64's projection ([`crate::trace::line`]).
     pub(crate) axis: [S::U; 3],
     is_x: S::M,
     is_y: S::M,

@@ -1,17 +1,17 @@
 //! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time.
 //!
 //! Points are projected once for a group of sixteen rays. Most triangles are left out by the error bound of the whole
-//! leaf, which is that of [`super::sight`] for the greatest corner of all; only for the others is it worked out.
+//! leaf, which is that of [`crate::trace::sight`] for the greatest corner of all; only for the others is it worked out.
 
-use super::packet_group::Group;
-use super::packet_hull::Hull;
-use super::packet_settle::{Candidate, Settled, settle};
-use super::query::Query;
-use super::sight::{self, Block};
+use super::group::Group;
+use super::hull::Hull;
+use super::settle::{Candidate, Settled, settle};
 use crate::layout::{IndexedLeaf, RawLeaf, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::query::Query;
+use crate::trace::sight::{self, Block};
 
 /// Points of a leaf at most.
 const POINTS: usize = 3 * WIDTH;

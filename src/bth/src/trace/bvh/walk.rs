@@ -1,12 +1,12 @@
 //! The walk of one ray through the wide BVH.
 
 use super::flight::{Flight, Found};
-use super::query::{Count, Query};
 use super::stack::Stacks;
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
+use crate::trace::query::{Count, Query};
 
 /// What a tet leaf made of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

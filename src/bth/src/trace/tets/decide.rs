@@ -4,14 +4,14 @@
 //! goes back to the lanes), and what a line meets that f64 cannot tell either (by a flood). So the answers are those of
 //! the walk of one ray, to the bit.
 
-use super::line::Line;
-use super::query::Query;
+use super::batch::{Batch, Reached, Start, Walk};
+use super::lanes::DOUBT;
 use super::records::Entered;
-use super::tet_batch::{Batch, Reached, Start, Walk};
-use super::tet_lanes::DOUBT;
-use super::tet_walk::{Outcome, Place, TetSpace};
-use super::tets::{leaf_of_face, space};
+use super::walk::{Outcome, Place, TetSpace};
+use super::{leaf_of_face, space};
 use crate::layout::{FACE_BIT, NONE, TetFace};
+use crate::trace::line::Line;
+use crate::trace::query::Query;
 
 /// A ray that went back to the lanes so often is walked to its end in f64.
 const MOST_RETURNS: u8 = 16;

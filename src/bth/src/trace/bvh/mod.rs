@@ -1,0 +1,6 @@
+//! Rays through the wide BVH: many at once ([`batch`]) or one ([`walk`]), by the same steps ([`flight`]).
+
+pub(crate) mod batch;
+pub(crate) mod flight;
+pub(crate) mod stack;
+pub(crate) mod walk;

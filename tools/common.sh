@@ -33,6 +33,13 @@ install_missing() {
     have_cxx || packages+=(g++)
     have_tetgen || packages+=(libtet1.5-dev)
     [ "$1" = plain ] || have_venv || packages+=(python3 python3-venv)
+    if [ "$1" != plain ]; then
+        # What the recipes for build systems are tested with.
+        command -v make >/dev/null || packages+=(make)
+        command -v ninja >/dev/null || packages+=(ninja-build)
+        command -v cmake >/dev/null || packages+=(cmake)
+        command -v git-lfs >/dev/null || packages+=(git-lfs)
+    fi
     [ ${#packages[@]} -eq 0 ] && return 0
 
     local as_root=()

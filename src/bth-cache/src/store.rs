@@ -121,6 +121,26 @@ impl Store {
         Some(bytes)
     }
 
+    /// As [`Store::read`], into memory that `read` takes from the file's path and `bytes` shows: for contents that need
+    /// another alignment than bytes do. `copy` takes what comes from the shared store.
+    pub fn read_as<T>(
+        &self,
+        record: &Record,
+        read: impl FnOnce(&Path) -> Option<T>,
+        copy: impl FnOnce(&[u8]) -> Option<T>,
+        bytes: impl FnOnce(&T) -> &[u8],
+    ) -> Option<T> {
+        let path = self.files.blob(&record.blob);
+        if let Some(value) = read(&path)
+            && Digest::of(bytes(&value)) == record.blob
+        {
+            touch(&path);
+            return Some(value);
+        }
+        // This removes and reports what is damaged.
+        copy(&self.read(record)?)
+    }
+
     /// The file of a record's content, checked, and kept from eviction; else as [`Store::read`].
     pub fn pin(&self, record: &Record) -> Option<Pin> {
         let path = self.files.blob(&record.blob);

@@ -100,6 +100,14 @@ fn damage_is_noticed_before_a_content_is_mapped_and_by_verification() {
     damage(&records[0]);
     assert!(store.pin(&records[0]).is_none());
     assert!(store.pin(&records[1]).is_some());
+    let read_as = |record: &Record| {
+        let read = |path: &Path| std::fs::read(path).ok();
+        store.read_as(record, read, |bytes| Some(bytes.to_vec()), |bytes| bytes.as_slice())
+    };
+    assert_eq!(read_as(&records[1]), Some(content("b", 5000)));
+    damage(&records[1]);
+    assert_eq!(read_as(&records[1]), None);
+    assert!(!store.holds(&records[1]), "it is removed");
     damage(&records[2]);
     let leftover = folder.path().join("v1/blobs/.killed.1-0.bth-part");
     std::fs::write(&leftover, b"half").unwrap();

@@ -8,6 +8,7 @@ pub mod bvh;
 pub mod cached;
 pub mod costs;
 pub mod error;
+pub mod jobs;
 pub mod marks;
 pub mod mesh;
 pub mod monitor;

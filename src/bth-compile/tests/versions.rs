@@ -1,5 +1,7 @@
 //! A stage that makes something else than it did has a new version in `cached/keys.rs`: else caches would serve what
 //! the old one made.
+// Tests say what they skip.
+#![allow(clippy::print_stdout)]
 
 use bth_cache::Store;
 use bth_compile::cached::Cache;
@@ -15,6 +17,10 @@ file 2.65536 ccea7f866f50e6b5cd7857429046bbecee5a0207fa5f6f8bf67b0e31bc729371
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
 mesh 1 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
 ";
+
+/// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make others, as do other
+/// processors' floating-point instructions.
+const NOTED_TETS: &str = "tets 1 by 1.5: 31de18e7856ad5bd3674f79c451457618bfa5c7f03af3f47b6363bcdfb702072";
 
 /// A bumpy field of 32 by 32 squares and a triangle through it, in small whole numbers.
 fn model() -> String {
@@ -60,4 +66,61 @@ fn stages_that_make_something_else_have_another_version() {
     let folder = tempfile::tempdir().unwrap();
     let made = made(folder.path());
     assert_eq!(made, NOTED, "raise the version of the stage that changed, then note\n{made}");
+}
+
+/// A torus of 24 by 12 squares in whole numbers.
+fn torus() -> String {
+    let mut text = String::new();
+    let point = |i: u32, j: u32| {
+        let turn = |k: u32, of: u32| std::f64::consts::TAU * f64::from(k) / f64::from(of);
+        let (a, b) = (turn(i, 24), turn(j, 12));
+        let radius = 3000.0 + 1000.0 * b.cos();
+        [radius * a.cos(), 1000.0 * b.sin(), radius * a.sin()].map(|x| x.round() as i32)
+    };
+    for (i, j) in (0..24).flat_map(|i| (0..12).map(move |j| (i, j))) {
+        let [x, y, z] = point(i, j);
+        writeln!(text, "v {x} {y} {z}").unwrap();
+    }
+    let at = |i: u32, j: u32| 12 * (i % 24) + j % 12 + 1;
+    for (i, j) in (0..24).flat_map(|i| (0..12).map(move |j| (i, j))) {
+        let corners = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        writeln!(text, "f {} {} {} {}", corners[0], corners[1], corners[2], corners[3]).unwrap();
+    }
+    text
+}
+
+/// The worker that is built beside the tests, if there is one.
+fn worker() -> Option<std::path::PathBuf> {
+    let tests = std::env::current_exe().ok()?;
+    let beside = tests.parent()?.parent()?.join("bth-tetgen");
+    let named = std::env::var_os("BTH_TETGEN").map(std::path::PathBuf::from);
+    named.or(Some(beside)).filter(|path| path.is_file())
+}
+
+#[test]
+fn tetrahedralizations_that_are_other_ones_have_another_version() {
+    let Some(worker) = worker() else {
+        println!("skipped: there is no worker");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("model.obj");
+    std::fs::write(&source, torus()).unwrap();
+    let store = Store::open(&folder.path().join("cache"), 1 << 30).unwrap();
+    let mut options = Options { structure: Structure::Tets, ..Options::default() };
+    options.tets.worker = Some(worker);
+    let cache = Cache::new(&store, "model");
+    compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+    let entries = store.list();
+    let tets: Vec<_> = entries.iter().filter(|entry| entry.stage == "tets").collect();
+    assert_eq!(tets.len(), 1, "the whole model");
+    let of = |name: &str| tets[0].components.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str());
+    let by = format!("tets {} by {}: ", of("tets version").unwrap(), of("tetgen").unwrap());
+    let made = format!("{by}{}", tets[0].blob.hex());
+    let noted_by = NOTED_TETS.split(" by ").nth(1).and_then(|noted| noted.split(": ").next());
+    if noted_by != of("tetgen") || !cfg!(target_arch = "x86_64") {
+        println!("skipped: the noted one is of another TetGen than {made}");
+        return;
+    }
+    assert_eq!(made, NOTED_TETS, "raise the version of the stage, then note this");
 }

@@ -10,8 +10,8 @@ pub(crate) struct Jobs {
     /// Models that are compiled at once; the threads are shared among them. By default as many as there are threads.
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub(crate) jobs: Option<u32>,
-    /// Memory of all models that are compiled at once, in MiB, estimated from the sizes of their files. One is compiled in
-    /// any case.
+    /// Memory of all models and objects of scenes that are compiled at once, in MiB, estimated from the sizes of their
+    /// files. One is compiled in any case.
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) memory: Option<u64>,
     /// Say what would be done and why, and do nothing.

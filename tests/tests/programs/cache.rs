@@ -238,3 +238,24 @@ fn shards_of_a_scene_meet_in_the_cache() {
     let (hits, misses) = found(&compile(path, &["s.manifest"]));
     assert_eq!((&hits[..], &misses[..]), (&["object 5".into()][..], &["scene".into()][..]));
 }
+
+#[test]
+fn objects_that_are_compiled_at_once_come_to_the_same_file() {
+    let folder = scene(6);
+    let path = folder.path();
+    let compiled = |args: &[&str]| {
+        compile(path, &[&["s.manifest", "-o", "s.bth", "--no-cache"], args].concat());
+        std::fs::read(path.join("s.bth")).unwrap()
+    };
+    let one_by_one = compiled(&["--threads", "1"]);
+    assert!(compiled(&["--threads", "5"]) == one_by_one);
+    assert!(compiled(&["--threads", "3", "--memory", "1"]) == one_by_one, "without memory for two");
+    // Of several faulty objects the first is named, whichever fails first.
+    for faulty in ["1.obj", "4.obj"] {
+        std::fs::write(path.join(faulty), "f 1 2 3\n").unwrap();
+    }
+    for threads in ["1", "5"] {
+        let run = cached(path, &["compile", "s.manifest", "--no-cache", "--threads", threads]).expect(3);
+        assert!(run.stderr.contains("1.obj:1"), "{run:?}");
+    }
+}

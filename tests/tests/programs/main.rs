@@ -10,6 +10,8 @@ mod inspect;
 mod interrupt;
 mod pipelines;
 mod play;
+#[cfg(unix)]
+mod recipes;
 mod scenes;
 mod stress;
 mod support;

@@ -91,43 +91,6 @@ fn dependencies_name_every_file_of_a_scene() {
     assert_eq!(text, "s.bth: \\\n  s.manifest \\\n  models/a\\ b.obj\n");
 }
 
-/// Make runs the compiler when, and only when, something changed; skipped where there is no make.
-#[test]
-fn make_compiles_what_changed() {
-    let rule = "%.bth: %.manifest\n\t$(BTHC) compile $< -o $@ --depfile $@.d -q && echo compiled >> log\n-include s.bth.d\n";
-    let manifest = "version = 1\n[[objects]]\nname = \"o\"\nmodel = \"a.obj\"\n[[nodes]]\nname = \"n\"\nobject = \"o\"\n";
-    let folder = folder(&[("Makefile", rule), ("s.manifest", manifest), ("a.obj", &sphere(8))]);
-    let path = folder.path();
-    let compiler = bth_tests::target_folder().join("bthc");
-    let make = || {
-        let mut make = std::process::Command::new("make");
-        make.arg("s.bth").arg(format!("BTHC={}", compiler.display())).current_dir(path);
-        make.env("BTH_CACHE_DIR", path.join("cache")).stdout(Stdio::null());
-        make.status().map(|status| assert!(status.success()))
-    };
-    let compiled = || String::from_utf8(read(path, "log")).unwrap().lines().count();
-    let touch = |name: &str, seconds: u64| {
-        let file = std::fs::File::options().append(true).open(path.join(name)).unwrap();
-        file.set_modified(std::time::SystemTime::now() + Duration::from_secs(seconds)).unwrap();
-    };
-    if make().is_err() {
-        println!("skipped: there is no make");
-        return;
-    }
-    make().unwrap();
-    assert_eq!(compiled(), 1, "nothing changed");
-    // Same content, newer time: the compiler runs, and the output is newer again.
-    std::thread::sleep(Duration::from_millis(30));
-    touch("a.obj", 0);
-    make().unwrap();
-    make().unwrap();
-    assert_eq!(compiled(), 2);
-    std::thread::sleep(Duration::from_millis(30));
-    std::fs::write(path.join("a.obj"), sphere(9)).unwrap();
-    make().unwrap();
-    assert_eq!(compiled(), 3);
-}
-
 #[test]
 fn a_dry_run_says_what_would_be_done_and_does_nothing() {
     let folder = folder(&[("a.obj", &sphere(8))]);

@@ -120,3 +120,28 @@ fn two_compilations_of_one_model_do_the_work_once() {
         read("1.bth") == read("2.bth") && read("3.bth") == read("4.bth") && read("1.bth") == read("4.bth")
     );
 }
+
+#[test]
+fn two_scenes_with_an_object_in_common_build_it_once() {
+    let manifest = |name: &str| {
+        format!(
+            "version = 1\n[[objects]]\nname = \"o\"\nmodel = \"a.obj\"\n[[nodes]]\nname = \"{name}\"\nobject = \"o\"\n"
+        )
+    };
+    let scenes = ["1.manifest", "2.manifest", "3.manifest"];
+    let folder = crate::support::folder(&[("a.obj", &crate::support::sphere(96))]);
+    let path = folder.path();
+    scenes.map(|scene| std::fs::write(path.join(scene), manifest(scene)).unwrap());
+    let compile = |scene| {
+        let args = ["compile", scene, "--json", "--quality", "best"];
+        cached(path, &args).expect(0).json()
+    };
+    let runs = std::thread::scope(|scope| {
+        let running = scenes.map(|scene| scope.spawn(move || compile(scene)));
+        running.map(|thread| thread.join().unwrap())
+    });
+    let missed = |json: &&serde_json::Value| {
+        json["cache"]["misses"].as_array().unwrap().iter().any(|miss| miss["stage"] == "object")
+    };
+    assert_eq!(runs.iter().filter(missed).count(), 1, "one worked, the others waited");
+}

@@ -82,8 +82,14 @@ pub(crate) fn obj(positions: &[[f32; 3]], faces: &[[usize; 3]]) -> String {
     text
 }
 
-/// A closed bumpy sphere of `4 * n * (n - 1)` triangles.
+/// Text of an OBJ file with a [`sphere_mesh`].
 pub(crate) fn sphere(n: usize) -> String {
+    let (positions, faces) = sphere_mesh(n);
+    obj(&positions, &faces)
+}
+
+/// A closed bumpy sphere of `4 * n * (n - 1)` triangles.
+pub(crate) fn sphere_mesh(n: usize) -> (Vec<[f32; 3]>, Vec<[usize; 3]>) {
     let columns = 2 * n;
     let point = |row: usize, column: usize| {
         let (theta, phi) = (row as f32 / n as f32, column as f32 / columns as f32);
@@ -113,7 +119,7 @@ pub(crate) fn sphere(n: usize) -> String {
             }
         }
     }
-    obj(&positions, &faces)
+    (positions, faces)
 }
 
 /// Two triangles that cross, and one apart from them.

@@ -21,6 +21,8 @@ pub enum Command {
     Speed(Speed),
     /// Opening a compiled file and tracing the first rays, against building at the start.
     Load(Load),
+    /// Opening compiled scenes against building all their objects at the start.
+    LoadScenes(LoadScenes),
     /// Hard rays on hard surfaces, every answer checked exactly: misses, leaks, ghosts, errors of t.
     Stress(Stress),
     /// Predictions of the cost model against measurements.
@@ -112,6 +114,14 @@ pub struct Load {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub models: Models,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub starts: Starts,
+}
+
+/// How programs start, and how often.
+#[derive(Debug, Args)]
+pub struct Starts {
     /// First rays to trace.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = at_least_one)]
     pub rays: usize,
@@ -130,6 +140,17 @@ pub struct Load {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub output: Output,
+}
+
+/// `load-scenes`.
+#[derive(Debug, Args)]
+pub struct LoadScenes {
+    /// Manifests or glTF files, or `objects:N` for N generated objects.
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub starts: Starts,
 }
 
 /// `stress`.
@@ -219,6 +240,9 @@ pub struct Probe {
     /// Vector instructions of our kernels.
     #[arg(long)]
     pub isa: Option<String>,
+    /// How many of the rays are the first; all if absent.
+    #[arg(long)]
+    pub first: Option<usize>,
     /// Compiled file, or for a rival the triangles.
     pub file: PathBuf,
     /// The rays, the first of which hits.

@@ -9,6 +9,7 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Speed(arguments) => speed::run(&arguments),
         Command::Load(arguments) => load::run(&arguments),
+        Command::LoadScenes(arguments) => load::scenes::run(&arguments),
         Command::Stress(arguments) => stress::run(&arguments),
         Command::Costs(arguments) => costs::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),

@@ -68,6 +68,7 @@ fn load_record() -> LoadRecord {
         total_s: total,
         cpu_s: 0.9 * total,
         storage_bytes: storage,
+        frame_s: None,
     };
     let starts = vec![
         ("bth map warm".to_owned(), times(4e-4, Some(0))),

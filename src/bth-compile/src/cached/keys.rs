@@ -92,12 +92,21 @@ pub(crate) fn tets_of_node(
         .with("tets version", TETS)
 }
 
-/// The sections of an object of a scene.
-pub(crate) fn object(mesh: &MeshFacts, options: &Options, tetgen: &str) -> Key {
-    Key::new("object")
-        .with("geometry", mesh.geometry.hex())
-        .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
-        .with_all(components(options, tetgen))
+/// The keys of the sections of a scene's objects: what they have in common is written once.
+pub(crate) struct ObjectKeys(Vec<(String, String)>);
+
+impl ObjectKeys {
+    pub(crate) fn new(options: &Options, tetgen: &str) -> Self {
+        Self(components(options, tetgen))
+    }
+
+    /// The key of an object.
+    pub(crate) fn of(&self, mesh: &MeshFacts) -> Key {
+        Key::new("object")
+            .with("geometry", mesh.geometry.hex())
+            .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
+            .with_all(self.0.iter().cloned())
+    }
 }
 
 /// A compiled file of one model.

@@ -11,7 +11,7 @@ mod rows;
 mod sources;
 mod tree;
 
-pub(crate) use keys::{bvh, extension, file, marks, mesh, object, scene, tets_of_node};
+pub(crate) use keys::{ObjectKeys, bvh, extension, file, marks, mesh, scene, tets_of_node};
 pub use log::{Log, Miss};
 pub(crate) use results::MeshFacts;
 pub use sources::{SourceDigest, files};
@@ -94,6 +94,15 @@ impl<'a> Cache<'a> {
         let bytes = store.read(record);
         notes(store, monitor);
         bytes
+    }
+
+    /// The content of a record as a file, of which nothing but its hash, header and table has been checked.
+    pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth::File> {
+        let store = self.store?;
+        let copy = |bytes: &[u8]| bth::File::from_bytes(bytes).ok();
+        let file = store.read_as(record, |path| bth::File::read(path).ok(), copy, bth::File::bytes);
+        notes(store, monitor);
+        file
     }
 
     /// Whether the content of a record is there.

@@ -70,6 +70,7 @@ struct Reader<'r, 'a> {
 /// Reads the document of a glTF or GLB file and refuses required extensions that are not among `supported`
 /// (those that end with `_` stand for all that begin so). Also gives the binary chunk of a GLB.
 pub(crate) fn document<'a>(source: &Source<'a>, supported: &[&str]) -> Result<(Root, Option<&'a [u8]>)> {
+    source.fetched()?;
     let (json, binary) = split(source)?;
     let root: Root = serde_json::from_slice(json).map_err(|e| {
         let message = format!("expected a glTF document, found: {e}");

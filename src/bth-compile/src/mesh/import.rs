@@ -122,6 +122,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
 
 /// The format by extension, else by content.
 fn format(source: &Source<'_>) -> Result<Format> {
+    source.fetched()?;
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let by_name = match extension.as_deref() {
         Some("obj") => Some(Format::Obj),

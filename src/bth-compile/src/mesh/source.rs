@@ -39,6 +39,15 @@ impl<'a> Source<'a> {
         self.monitor.check()
     }
 
+    /// Fails for what Git LFS leaves in the place of a file that was not fetched: as OBJ it would be a model without faces.
+    pub(crate) fn fetched(&self) -> Result<()> {
+        if !self.data.starts_with(b"version https://git-lfs.github.com/") {
+            return Ok(());
+        }
+        let message = "expected a model, found the pointer of Git LFS to one";
+        Err(self.error("BTH-I001", message, "run `git lfs pull`"))
+    }
+
     /// An error of the whole file.
     pub(crate) fn error(&self, code: &'static str, message: impl Into<String>, hint: &str) -> Error {
         input_error(code, Place::File(self.path.to_owned()), message, hint)

@@ -238,11 +238,17 @@ impl Clock {
     pub(crate) fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
-        let seconds = start.elapsed().as_secs_f64();
-        match self.0.iter_mut().find(|stage| stage.name == name) {
-            Some(stage) => stage.seconds += seconds,
-            None => self.0.push(StageTime { name, seconds }),
-        }
+        self.add(Clock(vec![StageTime { name, seconds: start.elapsed().as_secs_f64() }]));
         result
+    }
+
+    /// Adds what another has timed.
+    pub(crate) fn add(&mut self, other: Clock) {
+        for StageTime { name, seconds } in other.0 {
+            match self.0.iter_mut().find(|stage| stage.name == name) {
+                Some(stage) => stage.seconds += seconds,
+                None => self.0.push(StageTime { name, seconds }),
+            }
+        }
     }
 }

@@ -38,6 +38,9 @@ pub struct Options {
     pub keep_subtrees: bool,
     /// Whether to store the positions and triangles of the source.
     pub geometry: bool,
+    /// Bytes that the objects of a scene may take which are compiled at once, by an estimate; one is compiled in any case.
+    /// The result is the same for any number.
+    pub objects_memory: u64,
 }
 
 impl Default for Options {
@@ -52,6 +55,7 @@ impl Default for Options {
             record: RecordKind::Link32,
             keep_subtrees: true,
             geometry: true,
+            objects_memory: u64::MAX,
         }
     }
 }

@@ -1,14 +1,14 @@
 //! A manifest into a file: objects that may be seen, then the scene.
 
-use super::objects::{self, ObjectReport};
-use super::{encode, meshes, visible, weights};
-use crate::cached::{self, Cache};
+use super::objects::{self, ObjectReport, Objects};
+use super::{encode, meshes, sources, visible, weights};
+use crate::cached::{self, Cache, ObjectKeys};
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{self, Clock, Compiled, Foreseen, Options, Outcome, StageTime, Structure, provenance};
 use crate::tets::WorkerStatus;
-use crate::write::{self, FileBuilder};
+use crate::write::{self, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
 use bth_scene::Manifest;
 use serde::Serialize;
@@ -58,6 +58,8 @@ pub(super) struct Context<'a> {
     pub(super) cache: &'a Cache<'a>,
     /// The tetrahedralizer as it stands in keys; nothing when objects may not be kept.
     pub(super) tetgen: Option<String>,
+    /// The keys of objects, if they may be kept.
+    pub(super) keys: Option<Arc<ObjectKeys>>,
     pub(super) monitor: &'a dyn Monitor,
     /// The scene's rays for each object of the file, if they count.
     pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
@@ -74,7 +76,8 @@ pub fn compile(
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
-    let context = Context { options, cache: &Cache::none(), tetgen: None, monitor, weights: None };
+    let context =
+        Context { options, cache: &Cache::none(), tetgen: None, keys: None, monitor, weights: None };
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, folder, &mut clock)?;
     build(manifest, &plan, name, &context, clock)
@@ -176,18 +179,35 @@ fn key(manifest: &Manifest, plan: &Plan<'_>, context: &Context<'_>) -> Result<Op
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
-    Ok(Some(cached::scene(&parts, &objects::contents(manifest, &plan.sources), context.options, tetgen)))
+    Ok(Some(cached::scene(&parts, &sources::contents(manifest, &plan.sources), context.options, tetgen)))
 }
 
 impl<'a> Context<'a> {
     fn new(options: &'a Options, cache: &'a Cache<'a>, monitor: &'a dyn Monitor) -> Result<Self> {
-        Ok(Self {
+        Ok(Self::of(options, cache, pipeline::tetgen(options, cache, monitor)?, monitor))
+    }
+
+    fn of(
+        options: &'a Options,
+        cache: &'a Cache<'a>,
+        tetgen: Option<String>,
+        monitor: &'a dyn Monitor,
+    ) -> Self {
+        let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
+        Self { options, cache, tetgen, keys, monitor, weights: None }
+    }
+
+    /// With somebody else who watches.
+    pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
+        let Self { options, cache, ref tetgen, ref keys, ref weights, .. } = *self;
+        Context {
             options,
             cache,
-            tetgen: pipeline::tetgen(options, cache, monitor)?,
+            tetgen: tetgen.clone(),
+            keys: keys.clone(),
             monitor,
-            weights: None,
-        })
+            weights: weights.clone(),
+        }
     }
 }
 
@@ -197,7 +217,7 @@ struct Plan<'a> {
     order: Vec<usize>,
     visible: Vec<bool>,
     used: Vec<bool>,
-    sources: Vec<objects::File<'a>>,
+    sources: Vec<sources::File<'a>>,
 }
 
 impl<'a> Plan<'a> {
@@ -208,7 +228,7 @@ impl<'a> Plan<'a> {
         for (node, _) in manifest.nodes.iter().zip(&visible).filter(|(_, visible)| **visible) {
             node.object.into_iter().for_each(|object| used[object] = true);
         }
-        let sources = clock.time("hash", || objects::files(manifest, folder, &used))?;
+        let sources = clock.time("hash", || sources::files(manifest, folder, &used))?;
         Ok(Self { order, visible, used, sources })
     }
 }
@@ -225,8 +245,7 @@ fn build(
     let context = match options.costs.for_scene && options.structure == Structure::Bth {
         true => {
             let weights = Some(clock.time("rays", || rays(manifest, plan, name, context))?);
-            let Context { cache, monitor, .. } = *context;
-            weighed = Context { options, cache, tetgen: context.tetgen.clone(), monitor, weights };
+            weighed = Context { weights, ..context.with_monitor(context.monitor) };
             &weighed
         }
         false => context,
@@ -241,11 +260,12 @@ fn build(
     let provenance = provenance::of_scene(&objects.sources, tetgen, options)?;
     let (bytes, resident_bytes) = clock.time("file", || {
         let mut builder = FileBuilder::new();
-        let resident = objects.write(&mut builder, options)?;
+        let resident = objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
         builder.provenance(provenance)?;
+        builder.check_limits()?;
         let bytes = builder.finish();
-        bth::from_bytes(&bytes).map_err(|e| refused(name, &e))?;
+        check(&objects, &parts, &bytes, name)?;
         Ok::<_, Error>((bytes, resident))
     })?;
 
@@ -272,6 +292,18 @@ fn build(
     Ok((Compiled { bytes }, report))
 }
 
+/// Checks what was put together as a reader will, without looking at the objects again: their sections have been checked
+/// one by one.
+fn check(objects: &Objects, parts: &SceneParts, bytes: &[u8], name: &Path) -> Result<()> {
+    let mut outline = FileBuilder::new();
+    objects.outline(&mut outline)?;
+    write::scene(&mut outline, parts)?;
+    let first_frame = |bytes: &[u8]| bth::File::from_bytes(bytes)?.check_first_frame();
+    // Places in messages are those in the whole file.
+    let whole = |error| first_frame(bytes).err().unwrap_or(error);
+    first_frame(&outline.finish()).map_err(|e| refused(name, &whole(e)))
+}
+
 /// The rays of the scene that concern each object of the file, by way of a file with BVHs only.
 fn rays(
     manifest: &Manifest,
@@ -283,7 +315,7 @@ fn rays(
     let costs = costs::Options { for_scene: false, ..context.options.costs.clone() };
     let options = Options { structure: Structure::Bvh, geometry: true, costs, ..context.options.clone() };
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
-    let plain = Context { options: &options, cache, tetgen, monitor, weights: None };
+    let plain = Context::of(&options, cache, tetgen, monitor);
     let (compiled, _) = build(manifest, plan, name, &plain, Clock::default())?;
     let mut scene = bth::from_bytes(&compiled.bytes).map_err(|e| refused(name, &e))?;
     Ok(weights::weights(&mut scene, name)?.into_iter().map(Arc::new).collect())

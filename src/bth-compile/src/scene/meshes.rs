@@ -1,7 +1,7 @@
 //! The meshes of a source file: known from the cache, or imported.
 
 use super::compile::Context;
-use super::objects::File;
+use super::sources::File;
 use crate::cached::{self, MeshFacts, Miss};
 use crate::error::Result;
 use crate::mesh::{self, Mesh};
@@ -69,11 +69,11 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |number: Option<u32>| {
         let part = file.name_of(number);
         let mesh = key(file, number, context);
-        let (Some(facts), Some(tetgen)) = (known(&mesh, context), &context.tetgen) else {
+        let (Some(facts), Some(keys)) = (known(&mesh, context), &context.keys) else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
-        let object = cached::object(&facts, context.options, tetgen);
+        let object = keys.of(&facts);
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {
             return None;

@@ -1,11 +1,14 @@
 //! Scenes: from glTF to a manifest (`import`), and from a manifest to a file (`compile`).
 
+mod at_once;
 mod compile;
 mod encode;
 mod import;
 mod import_tracks;
 mod meshes;
+mod object;
 mod objects;
+mod sources;
 mod visible;
 mod weights;
 

@@ -1,19 +1,25 @@
-//! The objects of a scene: each source read once, equal geometry stored once.
+//! The objects of a scene: each source read once, equal geometry stored once, several at once.
 
+use super::at_once::at_once;
 use super::compile::Context;
-use super::meshes;
-use crate::cached::{self, MeshFacts, SourceDigest};
-use crate::costs;
+use super::meshes::{self, Found};
+use super::object::{self, Built};
+use super::sources::File;
+use crate::cached::MeshFacts;
 use crate::error::{Error, Place, Result};
-use crate::pipeline::{self, Clock, Options, parts};
+use crate::pipeline::Clock;
 use crate::tets;
-use crate::write::{self, FileBuilder, object};
+use crate::write::FileBuilder;
 use bth::layout::kind;
 use bth_cache::Digest;
-use bth_scene::{Manifest, Source};
+use bth_scene::Manifest;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+/// Objects with more triangles keep all threads busy by themselves, and are compiled one after another.
+const LARGE: u64 = 1 << 17;
 
 /// What is stored of an object.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -45,19 +51,19 @@ pub(super) struct Objects {
     pub(super) worker: Option<tets::WorkerStatus>,
 }
 
-enum Stored {
-    Built(Box<pipeline::Object>),
-    /// From a file of the user.
-    Copied(std::rc::Rc<bth::File>, u32),
-    /// From the cache.
-    Kept(bth::File),
+/// The sections of an object, every index of which has been checked.
+struct Stored {
+    file: Arc<bth::File>,
+    object: u32,
+    /// Whether the hashes of the sections are known to be right: not in files of the user.
+    hashed: bool,
 }
 
-/// What the cache says of an object.
-#[derive(Serialize, Deserialize)]
-struct Facts {
-    object: ObjectReport,
-    worker: Option<tets::WorkerStatus>,
+/// An object that comes from a mesh.
+struct Task<'a> {
+    file: &'a File<'a>,
+    mesh: Found,
+    number: usize,
 }
 
 /// Reads and builds the objects that are used, or takes them from the cache.
@@ -69,30 +75,36 @@ pub(super) fn build(
 ) -> Result<Objects> {
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
     let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
-    for file in sources {
+    // Copied objects have their place, the others get it when they are built.
+    let mut places: Vec<Option<(Stored, ObjectReport)>> = Vec::new();
+    let mut tasks = Vec::new();
+    for (file, meshes) in sources.iter().zip(read(sources, context, clock)?) {
         if file.compiled {
             objects.sources.push(("bth".to_owned(), file.digest.file.hex()));
-            copy(&mut objects, manifest, file, &mut of_content)?;
+            copy(&mut objects, &mut places, manifest, file, &mut of_content)?;
             continue;
         }
-        let meshes = clock.time("mesh", || meshes::read(file, context))?;
         let format = meshes.first().map_or(String::new(), |m| m.facts.report.format.clone());
         objects.sources.push((format, file.digest.file.hex()));
         for ((_, rows), mesh) in file.parts.iter().zip(meshes) {
             let number = match of_content.entry(content(&mesh.facts)) {
-                std::collections::hash_map::Entry::Occupied(there) => *there.get(),
-                std::collections::hash_map::Entry::Vacant(free) => {
-                    let (stored, facts) = object_of(file, mesh, context, objects.stored.len(), clock)?;
-                    objects.note_worker(facts.worker);
-                    let number = objects.stored.len() as u32;
-                    objects.reports.push(facts.object);
-                    objects.stored.push(stored);
-                    *free.insert(number)
+                Entry::Occupied(there) => *there.get(),
+                Entry::Vacant(free) => {
+                    let number = places.len();
+                    tasks.push(Task { file, mesh, number });
+                    places.push(None);
+                    *free.insert(number as u32)
                 }
             };
             rows.iter().for_each(|row| objects.number[*row] = Some(number));
         }
     }
+    for (number, built) in build_all(tasks, context, clock)? {
+        objects.note_worker(built.facts.worker);
+        let stored = Stored { file: Arc::new(built.file), object: 0, hashed: true };
+        places[number] = Some((stored, built.facts.object));
+    }
+    (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
     for (row, object) in manifest.objects.iter().enumerate() {
         if let Some(number) = objects.number[row] {
             objects.reports[number as usize].names.push(object.name.clone());
@@ -101,126 +113,39 @@ pub(super) fn build(
     Ok(objects)
 }
 
-/// An object, from the cache or built.
-fn object_of(
-    file: &File<'_>,
-    mut mesh: meshes::Found,
-    context: &Context<'_>,
-    number: usize,
-    clock: &mut Clock,
-) -> Result<(Stored, Facts)> {
-    let Context { cache, monitor, .. } = context;
-    let weighed;
-    let options = match context.weights.as_ref().and_then(|weights| weights.get(number)) {
-        Some(rays) => {
-            let costs = costs::Options { scene: Some(rays.clone()), ..context.options.costs.clone() };
-            weighed = Options { costs, ..context.options.clone() };
-            &weighed
-        }
-        None => context.options,
+/// The meshes of all files, in order; none of compiled ones.
+fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Found>>> {
+    let bytes = |file: &&File<'_>| std::fs::metadata(&file.full).map_or(0, |m| m.len());
+    // The file and what is made of it.
+    let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
+    at_once(sources.iter().collect(), context, clock, estimate, |context, clock, file| match file.compiled {
+        true => Ok(Vec::new()),
+        false => clock.time("mesh", || meshes::read(file, context)),
+    })
+}
+
+/// Builds objects: large ones one by one, the others at once. With the number of each.
+fn build_all(tasks: Vec<Task<'_>>, context: &Context<'_>, clock: &mut Clock) -> Result<Vec<(usize, Built)>> {
+    let triangles = |task: &Task<'_>| task.mesh.facts.report.triangles;
+    let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
+        let built = object::build(task.file, &mut task.mesh, context, task.number, clock)?;
+        Ok((task.number, built))
     };
-    let key = context.tetgen.as_ref().map(|tetgen| cached::object(&mesh.facts, options, tetgen));
-    let part = file.name_of(mesh.number);
-    if let Some(key) = &key
-        && let Some((record, bytes)) = cache.fetch(key, &part, *monitor)
-        && let Ok(facts) = serde_json::from_value::<Facts>(record.report)
-        && let Ok(kept) = bth::File::from_bytes(&bytes)
-        && kept.object_count() == 1
-    {
-        return Ok((Stored::Kept(kept), facts));
+    let (large, small): (Vec<_>, Vec<_>) = tasks.into_iter().partition(|task| triangles(task) > LARGE);
+    let mut built = large.into_iter().map(|task| one(context, clock, task)).collect::<Result<Vec<_>>>()?;
+    if small.len() == 1 {
+        built.extend(small.into_iter().map(|task| one(context, clock, task)).collect::<Result<Vec<_>>>()?);
+        return Ok(built);
     }
-    let triangles = clock.time("mesh", || mesh.take(file, context))?;
-    let geometry = (triangles, &mesh.facts.geometry);
-    let (built, reports) = pipeline::build(&file.full, &part, geometry, options, cache, *monitor, clock)?;
-    let object = ObjectReport {
-        triangles: mesh.facts.report.triangles,
-        degenerate: mesh.facts.report.degenerate,
-        tet_leaves: built.tet_leaves,
-        tet_triangles: built.tet_triangles,
-        ..ObjectReport::default()
-    };
-    let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
-    let facts = Facts { object, worker };
-    if let Some(key) = key {
-        let mut builder = FileBuilder::new();
-        write::object(&mut builder, 0, &parts::parts(&built, options))?;
-        let bytes = builder.finish();
-        write::self_check(&bytes, false)?;
-        cache.put(&key, &part, &bytes, &facts, *monitor);
-    }
-    Ok((Stored::Built(Box::new(built)), facts))
-}
-
-/// A source file and what of it is used.
-pub(super) struct File<'a> {
-    /// As the manifest has it.
-    pub(super) path: &'a str,
-    /// Where it is.
-    pub(super) full: PathBuf,
-    pub(super) compiled: bool,
-    /// Mesh or object (`None` for the whole file), and the manifest's objects that are that.
-    pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
-    pub(super) digest: SourceDigest,
-}
-
-impl File<'_> {
-    /// How a part of it stands in keys.
-    pub(super) fn part(&self, part: Option<u32>) -> String {
-        let kind = if self.compiled { "object" } else { "mesh" };
-        part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
-    }
-
-    /// What stands for a part of it when misses of the cache are explained.
-    pub(super) fn name_of(&self, part: Option<u32>) -> String {
-        format!("{} {}", self.path, self.part(part))
-    }
-}
-
-/// What each used object of the manifest is made from, as it stands in keys; `unused` for the others.
-pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String> {
-    let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
-    for file in sources {
-        for (part, rows) in &file.parts {
-            let name =
-                format!("{} {} {}", file.digest.text(), file.part(*part), cached::extension(&file.full));
-            rows.iter().for_each(|row| contents[*row].clone_from(&name));
-        }
-    }
-    contents
-}
-
-/// The files of the used objects, in order of first use, hashed.
-///
-/// # Errors
-/// When one cannot be read.
-pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) -> Result<Vec<File<'a>>> {
-    let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new() };
-    let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
-    let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
-    for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
-        let (compiled, part) = match &object.source {
-            Source::Model { mesh, .. } => (false, *mesh),
-            Source::Compiled { object, .. } => (true, Some(*object)),
-        };
-        let path = object.source.path();
-        // The whole of a glTF file and single meshes are read in different ways.
-        let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
-            let full = folder.join(path);
-            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing() });
-            files.len() - 1
-        });
-        let parts = &mut files[file].parts;
-        let place = *row_of_part.entry((file, part)).or_insert_with(|| {
-            parts.push((part, Vec::new()));
-            parts.len() - 1
-        });
-        parts[place].1.push(row);
-    }
-    for file in &mut files {
-        file.digest = SourceDigest::of(&file.full)?;
-    }
-    Ok(files)
+    context.monitor.stage("objects", Some(small.iter().map(triangles).sum()));
+    let estimate = |task: &Task<'_>| object::memory(triangles(task));
+    built.extend(at_once(small, context, clock, estimate, |parts, clock, task| {
+        let triangles = triangles(&task);
+        let done = one(parts, clock, task);
+        context.monitor.advance(triangles);
+        done
+    })?);
+    Ok(built)
 }
 
 /// A hash of what makes objects equal.
@@ -232,6 +157,7 @@ fn content(mesh: &MeshFacts) -> blake3::Hash {
 /// Takes objects from a compiled file.
 fn copy(
     objects: &mut Objects,
+    places: &mut Vec<Option<(Stored, ObjectReport)>>,
     manifest: &Manifest,
     file: &File<'_>,
     of_content: &mut HashMap<blake3::Hash, u32>,
@@ -243,7 +169,7 @@ fn copy(
         message: format!("expected a compiled file that can be used: {e}"),
         hint: "compile it again".to_owned(),
     };
-    let read = std::rc::Rc::new(bth::File::read(path).map_err(|e| unusable(&e))?);
+    let read = Arc::new(bth::File::read(path).map_err(|e| unusable(&e))?);
     for (part, rows) in &file.parts {
         let object = part.unwrap_or(0);
         let view = read.check(object).map_err(|e| {
@@ -258,16 +184,16 @@ fn copy(
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
         let number = *of_content.entry(hasher.finalize()).or_insert_with(|| {
-            objects.stored.push(Stored::Copied(read.clone(), object));
-            objects.reports.push(ObjectReport {
+            let report = ObjectReport {
                 triangles: view.header.triangles.into(),
                 degenerate: view.header.dropped.into(),
                 tet_leaves: view.tet_leaves.len() as u64,
                 tet_triangles: view.tet_faces.len() as u64,
                 copied: true,
                 ..ObjectReport::default()
-            });
-            objects.stored.len() as u32 - 1
+            };
+            places.push(Some((Stored { file: read.clone(), object, hashed: false }, report)));
+            places.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
     }
@@ -283,37 +209,36 @@ impl Objects {
     }
 
     /// Adds the sections of all objects; returns how many bytes of them tracing reads.
-    pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>, options: &Options) -> Result<u64> {
+    pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<u64> {
         let mut resident = 0;
         for (number, stored) in self.stored.iter().enumerate() {
-            let number = number as u32;
-            match stored {
-                Stored::Built(built) => {
-                    let parts = parts::parts(built, options);
-                    object(builder, number, &parts)?;
-                    resident += parts::resident_bytes(&parts);
-                }
-                Stored::Kept(file) => {
-                    for section in file.sections() {
-                        // The content was checked against its name, so the hashes in it are right.
-                        let e = section.entry;
-                        builder.hashed_section(e.kind, number, e.stride, section.bytes.into(), e.hash)?;
-                    }
-                    resident += file.resident_bytes();
-                }
-                Stored::Copied(file, from) => {
-                    for section in file.sections().filter(|s| s.entry.object == *from) {
-                        let e = section.entry;
-                        // Kinds that we do not know may mean what we would break.
-                        if bth::file::kind_stride(e.kind).is_none() {
-                            continue;
-                        }
-                        builder.section(e.kind, number, e.stride, section.bytes)?;
-                        resident += if e.kind <= kind::TRIANGLE_HOMES { e.length } else { 0 };
-                    }
-                }
+            for section in stored.sections() {
+                let (e, number) = (section.entry, number as u32);
+                match stored.hashed {
+                    true => builder.hashed_section(e.kind, number, e.stride, section.bytes.into(), e.hash)?,
+                    false => builder.section(e.kind, number, e.stride, section.bytes)?,
+                };
+                resident += if e.kind <= kind::TRIANGLE_HOMES { e.length } else { 0 };
             }
         }
         Ok(resident)
+    }
+
+    /// Adds the OBJECT rows only: all that placing instances needs.
+    pub(super) fn outline<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<()> {
+        for (number, stored) in self.stored.iter().enumerate() {
+            for section in stored.sections().filter(|s| s.entry.kind == kind::OBJECT) {
+                builder.section(kind::OBJECT, number as u32, section.entry.stride, section.bytes)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Stored {
+    /// Its sections; kinds that we do not know may mean what we would break.
+    fn sections(&self) -> impl Iterator<Item = bth::file::SectionView<'_>> {
+        let known = |e: &bth::layout::SectionEntry| bth::file::kind_stride(e.kind).is_some();
+        self.file.sections().filter(move |s| s.entry.object == self.object && known(s.entry))
     }
 }

@@ -102,6 +102,19 @@ impl<'a> FileBuilder<'a> {
         content_id(&self.entries())
     }
 
+    /// Fails beyond what a reader takes.
+    ///
+    /// # Errors
+    /// `BTH-L032` with more sections than the format allows.
+    pub fn check_limits(&self) -> Result<()> {
+        let (count, most) = (self.sections.len(), bth::limits::MAX_SECTIONS);
+        if count <= most as usize {
+            return Ok(());
+        }
+        let message = format!("the file has {count} sections; the format allows {most}");
+        Err(Error::Limit { code: "BTH-L032", message })
+    }
+
     /// Bytes of the file.
     pub fn file_length(&self) -> u64 {
         let end = self.entries().last().map_or(self.table_end(), |e| e.offset + e.length);

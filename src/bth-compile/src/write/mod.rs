@@ -12,18 +12,29 @@ pub use scene::{SceneParts, scene};
 
 use crate::error::{Error, Result};
 
-/// Checks bytes that were just written as a reader will: header, table and every index.
-/// `deep` adds what `bthc verify` looks at.
+/// The file in bytes that were just written, checked as a reader will: header, table and every index.
 ///
 /// # Errors
 /// `BTH-X030`: what was written is not what the format demands, a defect of the compiler.
-pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
-    let defect =
-        |e: bth::Error| Error::Internal { code: "BTH-X030", message: format!("the written file fails: {e}") };
+pub fn checked(bytes: &[u8]) -> Result<bth::File> {
     let file = bth::File::from_bytes(bytes).map_err(defect)?;
+    (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
+    file.check_scene().map_err(defect)?;
+    Ok(file)
+}
+
+/// As [`checked`]; `deep` looks at what `bthc verify` does.
+///
+/// # Errors
+/// As [`checked`].
+pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
+    let file = checked(bytes)?;
     if deep {
-        return bth::verify::verify(&file).map(|_| ()).map_err(|mut all| defect(all.swap_remove(0)));
+        return bth::verify::verify(&file).map(drop).map_err(|mut all| defect(all.swap_remove(0)));
     }
-    (0..file.object_count()).try_for_each(|i| file.check(i).map(|_| ()).map_err(defect))?;
-    file.check_scene().map(|_| ()).map_err(defect)
+    Ok(())
+}
+
+fn defect(error: bth::Error) -> Error {
+    Error::Internal { code: "BTH-X030", message: format!("the written file fails: {error}") }
 }

@@ -272,6 +272,15 @@ impl File {
         Ok(Some(view))
     }
 
+    /// As [`Self::check_scene`], and that everything that is seen at the first frame can be placed. Looks at nothing of
+    /// the objects but their OBJECT rows.
+    ///
+    /// # Errors
+    /// As [`Self::check_scene`], `BTH-S001` and `BTH-S002` with the node.
+    pub fn check_first_frame(&self) -> Result<()> {
+        crate::instances::World::new(self).map(drop)
+    }
+
     /// Turns an offset within a section into one within the file.
     pub(crate) fn locate(&self, error: Error, object: u32) -> Error {
         let start = error.section().and_then(|s| self.section(object, s.kind)).map_or(0, |s| s.entry.offset);

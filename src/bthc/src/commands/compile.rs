@@ -44,7 +44,8 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     let mut jobs = plan(args, &models)?;
     let progress = Progress::new(args.quiet || args.json);
     let store = args.keeping.store(&|text| progress.warn(text))?;
-    let setting = Setting { args, options: args.options()?, store };
+    let options = Options { objects_memory: jobs::memory_of_objects(args, jobs.len()), ..args.options()? };
+    let setting = Setting { args, options, store };
     if let Some((part, parts)) = args.jobs.shard
         && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))
     {

@@ -1,5 +1,6 @@
 //! The files that a start reads, and what of them is in memory.
 
+use crate::rivals::embree::Place;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Ray;
 use bth_compile::mesh::Mesh;
@@ -99,7 +100,10 @@ pub(super) type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// Reads what [`mesh_bytes`] gave.
 pub(super) fn read_mesh(path: &Path) -> Result<Triangles> {
-    let bytes = std::fs::read(path)?;
+    mesh(&std::fs::read(path)?)
+}
+
+fn mesh(bytes: &[u8]) -> Result<Triangles> {
     let (head, rest) = bytes.split_at_checked(8).context("not a file of triangles")?;
     let count = u64::from_le_bytes(head.try_into()?) as usize;
     let end = count.checked_mul(12).filter(|end| *end <= rest.len()).context("not a file of triangles")?;
@@ -108,6 +112,48 @@ pub(super) fn read_mesh(path: &Path) -> Result<Triangles> {
     let position = |b: &[u8]| <[f32; 3]>::read_from_bytes(b).expect("chunks of the right size");
     let triangle = |b: &[u8]| <[u32; 3]>::read_from_bytes(b).expect("chunks of the right size");
     Ok((positions.chunks(12).map(position).collect(), triangles.chunks(12).map(triangle).collect()))
+}
+
+/// The objects of an opened scene with their lengths before them, and the places of what can be seen.
+pub(super) fn scene_bytes(scene: &bth::Scene) -> Vec<u8> {
+    let mut bytes = u64::from(scene.object_count()).to_le_bytes().to_vec();
+    for object in (0..scene.object_count()).map(|object| scene.object(object)) {
+        let head = (object.positions.len() as u64).to_le_bytes();
+        let object = [&head, object.positions.as_bytes(), object.triangles.as_bytes()].concat();
+        bytes.extend_from_slice(&(object.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&object);
+    }
+    let instances = (0..scene.instance_count()).map(|instance| scene.instance(instance));
+    for instance in instances.filter(|instance| instance.visible) {
+        bytes.extend_from_slice(&instance.object.to_le_bytes());
+        bytes.extend_from_slice(instance.to_world.map(|row| row.map(|x| x as f32)).as_bytes());
+    }
+    bytes
+}
+
+/// Reads what [`scene_bytes`] gave.
+pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<Place>)> {
+    const BROKEN: &str = "not a file of a scene";
+    let bytes = std::fs::read(path)?;
+    let mut rest = bytes.as_slice();
+    let number = |rest: &mut &[u8]| -> Result<usize> {
+        let (head, behind) = rest.split_at_checked(8).context(BROKEN)?;
+        *rest = behind;
+        Ok(usize::try_from(u64::from_le_bytes(head.try_into()?))?)
+    };
+    let mut objects = Vec::new();
+    for _ in 0..number(&mut rest)? {
+        let length = number(&mut rest)?;
+        let (object, behind) = rest.split_at_checked(length).context(BROKEN)?;
+        objects.push(mesh(object)?);
+        rest = behind;
+    }
+    ensure!(rest.len().is_multiple_of(52), BROKEN);
+    let place = |b: &[u8]| {
+        let object = u32::read_from_bytes(&b[..4]).expect("chunks of the right size");
+        (object, <[[f32; 4]; 3]>::read_from_bytes(&b[4..]).expect("chunks of the right size"))
+    };
+    Ok((objects, rest.chunks(52).map(place).collect()))
 }
 
 #[cfg(test)]

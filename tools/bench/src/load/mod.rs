@@ -5,13 +5,15 @@
 mod files;
 pub mod probe;
 mod record;
+mod scene_tables;
+pub mod scenes;
 mod tables;
 
 use record::Case;
 pub use record::{LoadRecord, ModelStarts, Run, Times};
 pub use tables::{draw, markdown};
 
-use crate::args::Load;
+use crate::args::{Load, Starts};
 use crate::model::Model;
 use crate::output::{Head, Record, note};
 use crate::progress::Progress;
@@ -47,7 +49,7 @@ pub fn run(arguments: &Load) -> Result<()> {
         json: serde_json::to_value(&record)?,
         charts: draw(&record),
     }
-    .write(&arguments.output)
+    .write(&arguments.starts.output)
 }
 
 /// Measures all models.
@@ -55,11 +57,11 @@ pub fn run(arguments: &Load) -> Result<()> {
 /// # Errors
 /// If a model cannot be used or a start fails.
 pub fn measure(arguments: &Load) -> Result<LoadRecord> {
-    let isa = isa::select(arguments.isa.as_deref())?;
-    let options = json!({"rays": arguments.rays, "rounds": arguments.rounds});
+    let isa = isa::select(arguments.starts.isa.as_deref())?;
+    let options = json!({"rays": arguments.starts.rays, "rounds": arguments.starts.rounds});
     let mut record = LoadRecord {
         head: Head::now("load", isa.clone(), options),
-        rays: arguments.rays,
+        rays: arguments.starts.rays,
         models: Vec::new(),
     };
     let progress = Progress::new();
@@ -71,7 +73,7 @@ pub fn measure(arguments: &Load) -> Result<LoadRecord> {
 
 fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) -> Result<ModelStarts> {
     let model = Model::load(which)?;
-    let scratch = Scratch::new(arguments.scratch.as_deref())?;
+    let scratch = Scratch::new(arguments.starts.scratch.as_deref())?;
     let mut cases = Vec::new();
     let mut finder_scene = None;
     for kind in [&ours::BTH, &ours::BVH] {
@@ -100,32 +102,11 @@ fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) 
     let scene = finder_scene.expect("two files were compiled");
     let options = rays::Options { size: SIZE, most: usize::MAX, view: arguments.models.view() };
     let (view, sets) = rays::sets(&Finder::new(&model, &scene), &options);
-    let rays = first_rays(&sets[0], &scene, arguments.rays)
+    let rays = first_rays(&sets[0], &scene, arguments.starts.rays)
         .with_context(|| format!("{}: the camera sees nothing", model.name))?;
     let rays = scratch.write("rays", files::ray_bytes(&rays))?;
 
-    let mut runs = Vec::new();
-    for &threads in &arguments.threads {
-        let mut taken = vec![Vec::new(); cases.len()];
-        for round in 0..=arguments.rounds {
-            for (case, taken) in cases.iter().zip(&mut taken) {
-                progress.say(format!("{}: {}, {threads} thread(s), round {round}", model.name, case.name));
-                case.cache.prepare(&case.file)?;
-                let probed = spawn(case, threads, isa, &rays).with_context(|| case.name.clone())?;
-                // The first finds programs and libraries that are on no page yet.
-                if round > 0 {
-                    taken.push(probed);
-                }
-            }
-        }
-        let hits: Vec<usize> = taken.iter().flatten().map(|p| p.hits).collect();
-        ensure!(
-            hits.iter().all(|h| h.abs_diff(hits[0]) * 100 <= hits[0]),
-            "starts disagree on what is hit: {hits:?}"
-        );
-        let times = cases.iter().zip(taken).map(|(case, taken)| (case.name.clone(), Times::medians(&taken)));
-        runs.push(Run { threads, starts: times.collect() });
-    }
+    let runs = runs(&model.name, &cases, &arguments.starts, None, isa, &rays, progress)?;
     Ok(ModelStarts {
         name: model.name.clone(),
         triangles: model.triangles(),
@@ -140,14 +121,55 @@ fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) 
 fn first_rays(primary: &RaySet, scene: &bth::Scene, count: usize) -> Option<Vec<Ray>> {
     let mut hits = vec![Hit::MISS; primary.rays.len()];
     scene.nearest_batch(&primary.rays, None, &mut hits);
-    let first = hits.iter().position(Hit::is_hit)?;
-    let spread = (0..count.min(hits.len())).map(|i| i * hits.len() / count.min(hits.len()));
-    Some([first].into_iter().chain(spread.skip(1)).map(|i| primary.rays[i]).collect())
+    first_of(&primary.rays, &hits, count)
 }
 
-fn spawn(case: &Case, threads: usize, isa: &str, rays: &Path) -> Result<Probed> {
+/// So many of the rays, evenly spread, after one that hits; `None` if none does.
+fn first_of(rays: &[Ray], hits: &[Hit], count: usize) -> Option<Vec<Ray>> {
+    let first = hits.iter().position(Hit::is_hit)?;
+    let spread = (0..count.min(hits.len())).map(|i| i * hits.len() / count.min(hits.len()));
+    Some([first].into_iter().chain(spread.skip(1)).map(|i| rays[i]).collect())
+}
+
+/// Starts all cases on all numbers of threads, interleaved. `first` of the rays are the first; all if absent.
+fn runs(
+    name: &str,
+    cases: &[Case],
+    starts: &Starts,
+    first: Option<usize>,
+    isa: &str,
+    rays: &Path,
+    progress: &Progress,
+) -> Result<Vec<Run>> {
+    let mut runs = Vec::new();
+    for &threads in &starts.threads {
+        let mut taken = vec![Vec::new(); cases.len()];
+        for round in 0..=starts.rounds {
+            for (case, taken) in cases.iter().zip(&mut taken) {
+                progress.say(format!("{name}: {}, {threads} thread(s), round {round}", case.name));
+                case.cache.prepare(&case.file)?;
+                let probed = spawn(case, threads, first, isa, rays).with_context(|| case.name.clone())?;
+                // The first finds programs and libraries that are on no page yet.
+                if round > 0 {
+                    taken.push(probed);
+                }
+            }
+        }
+        let hits: Vec<usize> = taken.iter().flatten().map(|p| p.hits).collect();
+        ensure!(
+            hits.iter().all(|h| h.abs_diff(hits[0]) * 100 <= hits[0]),
+            "starts disagree on what is hit: {hits:?}"
+        );
+        let times = cases.iter().zip(taken).map(|(case, taken)| (case.name.clone(), Times::medians(&taken)));
+        runs.push(Run { threads, starts: times.collect() });
+    }
+    Ok(runs)
+}
+
+fn spawn(case: &Case, threads: usize, first: Option<usize>, isa: &str, rays: &Path) -> Result<Probed> {
     let mut command = Command::new(std::env::current_exe()?);
     command.args(["probe", "--start", case.start.name(), "--threads", &threads.to_string(), "--isa", isa]);
+    command.args(first.map(|n| format!("--first={n}")));
     let output = command.arg(&case.file).arg(rays).output()?;
     ensure!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr).trim());
     Ok(serde_json::from_slice(&output.stdout)?)

@@ -27,6 +27,10 @@ pub enum Start {
     Embree,
     /// As above, for its robust mode.
     EmbreeRobust,
+    /// Embree builds the objects of a scene and their instances.
+    EmbreeScene,
+    /// As above, for its robust mode.
+    EmbreeSceneRobust,
 }
 
 impl Start {
@@ -37,6 +41,8 @@ impl Start {
             Start::Read => "read",
             Start::Embree => "embree",
             Start::EmbreeRobust => "embree-robust",
+            Start::EmbreeScene => "embree-scene",
+            Start::EmbreeSceneRobust => "embree-scene-robust",
         }
     }
 }
@@ -56,6 +62,8 @@ pub struct Probed {
     pub storage_bytes: Option<u64>,
     /// Rays that hit.
     pub hits: usize,
+    /// Seconds for all rays of the file, where only some of them were the first: the less of two rounds.
+    pub frame_s: Option<f64>,
 }
 
 /// Starts and prints what it took.
@@ -66,10 +74,19 @@ pub fn run(arguments: &Probe) -> Result<()> {
     isa::select(arguments.isa.as_deref())?;
     let rays = files::read_rays(&arguments.rays)?;
     let (file, threads) = (&arguments.file, arguments.threads);
+    let first = arguments.first.unwrap_or(rays.len()).min(rays.len());
     let probed = match arguments.start {
         // SAFETY: `load` wrote the file into a folder of its own and does not touch it while we run.
-        Start::Map => probe(&rays, threads, || Ok(Opened(unsafe { bth::map(file)? })))?,
-        Start::Read => probe(&rays, threads, || Ok(Opened(bth::open(file)?)))?,
+        Start::Map => probe(&rays, first, threads, || Ok(Opened(unsafe { bth::map(file)? })))?,
+        Start::Read => probe(&rays, first, threads, || Ok(Opened(bth::open(file)?)))?,
+        Start::EmbreeScene | Start::EmbreeSceneRobust => {
+            embree::available()?;
+            let (objects, places) = files::read_scene(file)?;
+            let objects = objects.into_iter().map(|(p, t)| (embree::padded(&p), t)).collect();
+            let robust = arguments.start == Start::EmbreeSceneRobust;
+            let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
+            probe(&rays, first, threads, || embree::build_instances(objects, &places, variant, threads))?
+        }
         Start::Embree | Start::EmbreeRobust => {
             // Neither the library nor the triangles are part of a build.
             embree::available()?;
@@ -77,7 +94,7 @@ pub fn run(arguments: &Probe) -> Result<()> {
             let positions = embree::padded(&positions);
             let robust = arguments.start == Start::EmbreeRobust;
             let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
-            probe(&rays, threads, || embree::build(positions, triangles, variant, threads))?
+            probe(&rays, first, threads, || embree::build(positions, triangles, variant, threads))?
         }
     };
     writeln!(std::io::stdout().lock(), "{}", serde_json::to_string(&probed)?)?;
@@ -99,7 +116,13 @@ impl Tracer for Opened {
     }
 }
 
-fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result<T>) -> Result<Probed> {
+fn probe<T: Tracer>(
+    all: &[Ray],
+    first: usize,
+    threads: usize,
+    start: impl FnOnce() -> Result<T>,
+) -> Result<Probed> {
+    let rays = &all[..first];
     let mut hits = vec![Hit::MISS; rays.len()];
     let batch = |rays| Batch { rays, from: None, coherent: true };
     let (before, cpu, clock) = (storage_bytes(), process_cpu(), Instant::now());
@@ -113,6 +136,14 @@ fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result
     let cpu_s = process_cpu() - cpu;
     anyhow::ensure!(hits[0].is_hit(), "the first ray hits nothing");
     let storage_bytes = storage_bytes().zip(before).map(|(after, before)| after - before);
+    let mut frame = vec![Hit::MISS; all.len()];
+    let mut frame_s = || {
+        let clock = Instant::now();
+        let share = all.len().div_ceil(threads);
+        spread(batch(all), &mut frame, threads, share, |batch, hits| tracer.nearest(batch, hits));
+        clock.elapsed().as_secs_f64()
+    };
+    let frame_s = (first < all.len()).then(|| frame_s().min(frame_s()));
     Ok(Probed {
         ready_s,
         first_hit_s,
@@ -120,6 +151,7 @@ fn probe<T: Tracer>(rays: &[Ray], threads: usize, start: impl FnOnce() -> Result
         cpu_s,
         storage_bytes,
         hits: hits.iter().filter(|h| h.is_hit()).count(),
+        frame_s,
     })
 }
 

@@ -63,6 +63,9 @@ pub struct Times {
     pub cpu_s: f64,
     /// Bytes that came from storage, where the system tells.
     pub storage_bytes: Option<u64>,
+    /// Seconds for a whole picture, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_s: Option<f64>,
 }
 
 impl Times {
@@ -76,6 +79,7 @@ impl Times {
             total_s: of(|p| p.total_s),
             cpu_s: of(|p| p.cpu_s),
             storage_bytes: storage.and_then(median).map(|b| b as u64),
+            frame_s: probed.iter().map(|p| p.frame_s).collect::<Option<Vec<f64>>>().and_then(median),
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::output::Chart;
 /// What the summary and the charts show.
 const SHOWN: [&str; 5] = ["bth map warm", "bth map cold", "bth read warm", "bth read cold", "bvh map warm"];
 
-fn on_threads(threads: usize) -> String {
+pub(super) fn on_threads(threads: usize) -> String {
     format!("{threads} thread{}", if threads == 1 { "" } else { "s" })
 }
 
@@ -16,7 +16,7 @@ fn threads(record: &LoadRecord) -> Vec<usize> {
     record.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())
 }
 
-fn row(cells: &[&str]) -> Vec<String> {
+pub(super) fn row(cells: &[&str]) -> Vec<String> {
     cells.iter().map(|c| (*c).to_owned()).collect()
 }
 
@@ -37,7 +37,7 @@ pub fn markdown(record: &LoadRecord) -> String {
     text
 }
 
-fn factor(value: Option<f64>) -> String {
+pub(super) fn factor(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
         Some(v) if v >= 10.0 => format!("{v:.0}×"),

@@ -9,7 +9,7 @@ use bth::layout::NONE;
 use bth::rays::{Hit, Ray, Surface};
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicPtr, AtomicUsize, Ordering};
 use std::time::Instant;
 
 type Handle = *mut c_void;
@@ -35,10 +35,12 @@ pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
 
 const TYPE_TRIANGLE: c_int = 0;
+const TYPE_INSTANCE: c_int = 121;
 const BUFFER_INDEX: c_int = 0;
 const BUFFER_VERTEX: c_int = 1;
 const FORMAT_UINT3: c_int = 0x5003;
 const FORMAT_FLOAT3: c_int = 0x9003;
+const FORMAT_ROWS: c_int = 0x9134;
 const QUERY_COHERENT: c_int = 1 << 16;
 
 /// `RTCRayHit` for one lane and `RTCRayHitN` for more; rays whose `RTCRay` part alone is used too.
@@ -153,6 +155,8 @@ struct Api {
     commit_geometry: unsafe extern "C" fn(Handle),
     attach_geometry: unsafe extern "C" fn(Handle, Handle) -> u32,
     release_geometry: unsafe extern "C" fn(Handle),
+    instanced_scene: unsafe extern "C" fn(Handle, Handle),
+    transform: unsafe extern "C" fn(Handle, u32, c_int, *const c_void),
     intersect1: Trace1,
     occluded1: Trace1,
     intersect16: Trace16,
@@ -189,6 +193,8 @@ impl Api {
                 commit_geometry: *library.get(b"rtcCommitGeometry\0")?,
                 attach_geometry: *library.get(b"rtcAttachGeometry\0")?,
                 release_geometry: *library.get(b"rtcReleaseGeometry\0")?,
+                instanced_scene: *library.get(b"rtcSetGeometryInstancedScene\0")?,
+                transform: *library.get(b"rtcSetGeometryTransform\0")?,
                 intersect1: *library.get(b"rtcIntersect1\0")?,
                 occluded1: *library.get(b"rtcOccluded1\0")?,
                 intersect16: *library.get(b"rtcIntersect16\0")?,
@@ -212,11 +218,19 @@ pub struct Scene {
     device: Handle,
     scene: Handle,
     packets: bool,
+    /// Scenes that instances in `scene` show.
+    objects: Vec<Handle>,
     /// The library refers to these.
-    _positions: Vec<[f32; 3]>,
-    _triangles: Vec<[u32; 3]>,
+    _meshes: Vec<Mesh>,
     allocated: Box<AtomicI64>,
 }
+
+/// Positions and triangles. The positions must end with one more than the triangles use: the library may read 16 bytes at
+/// the last.
+pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
+/// An object and the rows from its space to the world.
+pub type Place = (u32, [[f32; 4]; 3]);
 
 // SAFETY: the library's queries may run on any number of threads at once, and everything else is done
 // by `build` and `drop`, which have the scene for themselves.
@@ -234,8 +248,7 @@ unsafe extern "C" fn count(total: Handle, bytes: isize, _after: bool) -> bool {
     true
 }
 
-/// Builds a scene on so many threads. The positions must end with one more than the triangles use: the
-/// library may read 16 bytes at the last.
+/// Builds a scene on so many threads; see [`Mesh`].
 ///
 /// # Errors
 /// If the library is missing or reports an error.
@@ -245,49 +258,131 @@ pub fn build(
     variant: &Variant,
     threads: usize,
 ) -> Result<Scene> {
-    let api = Api::get()?;
-    let count_of_positions = positions.len().saturating_sub(1);
-    ensure!(
-        triangles.iter().flatten().all(|v| (*v as usize) < count_of_positions),
-        "a triangle uses a position that does not exist"
-    );
-    let allocated = Box::new(AtomicI64::new(0));
-    let total: *const AtomicI64 = &raw const *allocated;
-    let config = std::ffi::CString::new(format!("threads={threads}"))?;
-    // SAFETY: the calls are in the order and with the constants that the library's documentation asks
-    // for. The buffers hold as many items as is said, plus the padding that it asks for, every index
-    // is below the number of positions, and all of it, the counter too, lives in the `Scene` until
-    // after the device is released: moving a `Vec` or `Box` does not move what it points to.
-    let (device, scene, error) = unsafe {
-        let device = (api.new_device)(config.as_ptr());
-        ensure!(!device.is_null(), "the library makes no device");
-        (api.monitor)(device, count, total.cast_mut().cast());
-        let scene = (api.new_scene)(device);
-        (api.scene_flags)(scene, variant.flags);
-        (api.scene_quality)(scene, variant.quality);
-        let geometry = (api.new_geometry)(device, TYPE_TRIANGLE);
-        (api.geometry_quality)(geometry, variant.quality);
-        let (vertices, indices) = (positions.as_ptr().cast(), triangles.as_ptr().cast());
-        (api.shared_buffer)(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, vertices, 0, 12, count_of_positions);
-        (api.shared_buffer)(geometry, BUFFER_INDEX, 0, FORMAT_UINT3, indices, 0, 12, triangles.len());
-        (api.commit_geometry)(geometry);
-        (api.attach_geometry)(scene, geometry);
-        (api.release_geometry)(geometry);
-        (api.commit_scene)(scene);
-        (device, scene, (api.device_error)(device))
-    };
-    let packets = variant.packets;
-    let built =
-        Scene { api, device, scene, packets, _positions: positions, _triangles: triangles, allocated };
-    ensure!(error == 0, "the library reports error {error}");
-    Ok(built)
+    let mut scene = Scene::new(vec![(positions, triangles)], variant, threads)?;
+    scene.scene = scene.object(&scene._meshes[0], variant);
+    scene.finished()
+}
+
+/// Builds the objects of a scene, several at once, and their instances.
+///
+/// # Errors
+/// As [`build`]; if a place names no object.
+pub fn build_instances(
+    objects: Vec<Mesh>,
+    places: &[Place],
+    variant: &Variant,
+    threads: usize,
+) -> Result<Scene> {
+    ensure!(places.iter().all(|(object, _)| (*object as usize) < objects.len()), "a place without object");
+    let mut scene = Scene::new(objects, variant, threads)?;
+    let handles: Vec<AtomicPtr<c_void>> = scene._meshes.iter().map(|_| AtomicPtr::default()).collect();
+    let next = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        let work = || {
+            while let Some((mesh, handle)) =
+                scene._meshes.iter().zip(&handles).nth(next.fetch_add(1, Ordering::Relaxed))
+            {
+                handle.store(scene.object(mesh, variant), Ordering::Relaxed);
+            }
+        };
+        (1..threads).for_each(|_| drop(scope.spawn(work)));
+        work();
+    });
+    scene.objects = handles.into_iter().map(AtomicPtr::into_inner).collect();
+    let api = scene.api;
+    // SAFETY: as for `object`; the objects are committed, and live as long as the scene that shows them. The library copies
+    // a transform of twelve numbers in rows.
+    unsafe {
+        scene.scene = scene.empty(variant);
+        for (object, rows) in places {
+            let geometry = (api.new_geometry)(scene.device, TYPE_INSTANCE);
+            (api.instanced_scene)(geometry, scene.objects[*object as usize]);
+            (api.transform)(geometry, 0, FORMAT_ROWS, rows.as_ptr().cast());
+            (api.commit_geometry)(geometry);
+            (api.attach_geometry)(scene.scene, geometry);
+            (api.release_geometry)(geometry);
+        }
+        (api.commit_scene)(scene.scene);
+    }
+    scene.finished()
+}
+
+impl Scene {
+    /// Nothing but a device for these meshes.
+    fn new(meshes: Vec<Mesh>, variant: &Variant, threads: usize) -> Result<Scene> {
+        let api = Api::get()?;
+        let fits = |(positions, triangles): &Mesh| {
+            let count = positions.len().saturating_sub(1);
+            triangles.iter().flatten().all(|v| (*v as usize) < count)
+        };
+        ensure!(meshes.iter().all(fits), "a triangle uses a position that does not exist");
+        let allocated = Box::new(AtomicI64::new(0));
+        let total: *const AtomicI64 = &raw const *allocated;
+        let config = std::ffi::CString::new(format!("threads={threads}"))?;
+        // SAFETY: the counter lives in the `Scene` until after the device is released: moving a `Box` does not move what
+        // it points to.
+        let device = unsafe {
+            let device = (api.new_device)(config.as_ptr());
+            ensure!(!device.is_null(), "the library makes no device");
+            (api.monitor)(device, count, total.cast_mut().cast());
+            device
+        };
+        let (scene, packets, objects) = (std::ptr::null_mut(), variant.packets, Vec::new());
+        Ok(Scene { api, device, scene, packets, objects, _meshes: meshes, allocated })
+    }
+
+    /// A scene without geometries.
+    ///
+    /// # Safety
+    /// It must be released before the device.
+    unsafe fn empty(&self, variant: &Variant) -> Handle {
+        // SAFETY: the device is there; the constants are the library's.
+        unsafe {
+            let scene = (self.api.new_scene)(self.device);
+            (self.api.scene_flags)(scene, variant.flags);
+            (self.api.scene_quality)(scene, variant.quality);
+            scene
+        }
+    }
+
+    /// A committed scene of a mesh of this one.
+    fn object(&self, (positions, triangles): &Mesh, variant: &Variant) -> Handle {
+        let (api, count_of_positions) = (self.api, positions.len().saturating_sub(1));
+        // SAFETY: the calls are in the order and with the constants that the library's documentation asks for, which allows
+        // them from several threads for different scenes. The buffers hold as many items as is said, plus the padding
+        // that it asks for, every index is below the number of positions (`new` looked), and all of it lives in the `Scene`
+        // until after the device is released: moving a `Vec` does not move what it points to.
+        unsafe {
+            let scene = self.empty(variant);
+            let geometry = (api.new_geometry)(self.device, TYPE_TRIANGLE);
+            (api.geometry_quality)(geometry, variant.quality);
+            let (vertices, indices) = (positions.as_ptr().cast(), triangles.as_ptr().cast());
+            let shared = api.shared_buffer;
+            shared(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, vertices, 0, 12, count_of_positions);
+            shared(geometry, BUFFER_INDEX, 0, FORMAT_UINT3, indices, 0, 12, triangles.len());
+            (api.commit_geometry)(geometry);
+            (api.attach_geometry)(scene, geometry);
+            (api.release_geometry)(geometry);
+            (api.commit_scene)(scene);
+            scene
+        }
+    }
+
+    fn finished(self) -> Result<Scene> {
+        // SAFETY: the device is there.
+        let error = unsafe { (self.api.device_error)(self.device) };
+        ensure!(error == 0, "the library reports error {error}");
+        Ok(self)
+    }
 }
 
 impl Drop for Scene {
     fn drop(&mut self) {
-        // SAFETY: both were made by `build` and are released once.
+        // SAFETY: all were made above and are released once; the library knows of none that is null.
         unsafe {
-            (self.api.release_scene)(self.scene);
+            for scene in std::iter::once(&self.scene).chain(&self.objects).filter(|s| !s.is_null()) {
+                (self.api.release_scene)(*scene);
+            }
             (self.api.release_device)(self.device);
         }
     }

@@ -1,0 +1,118 @@
+//! A pool of jobs that share threads and memory.
+//!
+//! Every job runs on a thread of its own, not in a pool of rayon: there, a job that waits for another process to finish
+//! the same work could hold up one that it waits for.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
+
+/// Runs the jobs, `at_once` of them at a time as long as they need no more than `memory` bytes together by the
+/// `estimate`; one is run in any case. Results are in the order of the jobs.
+///
+/// `start` makes what the jobs of one thread have in common, such as a pool.
+pub fn run<J: Send, S, T: Send>(
+    jobs: Vec<J>,
+    at_once: usize,
+    memory: u64,
+    estimate: impl Fn(&J) -> u64 + Sync,
+    start: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, J) -> T + Sync,
+) -> Vec<T> {
+    let memory = Memory::new(memory);
+    let next = AtomicUsize::new(0);
+    let at_once = at_once.clamp(1, jobs.len().max(1));
+    let places: Vec<Mutex<(Option<J>, Option<T>)>> =
+        jobs.into_iter().map(|job| Mutex::new((Some(job), None))).collect();
+    let lock = |place: usize| Some(places.get(place)?.lock().unwrap_or_else(PoisonError::into_inner));
+    let worker = || {
+        let mut state = start();
+        loop {
+            let place = next.fetch_add(1, Ordering::Relaxed);
+            let Some(mut taken) = lock(place) else { break };
+            let Some(job) = taken.0.take() else { break };
+            drop(taken);
+            let _share = memory.take(estimate(&job));
+            let done = work(&mut state, job);
+            if let Some(mut taken) = lock(place) {
+                taken.1 = Some(done);
+            }
+        }
+    };
+    if at_once == 1 {
+        worker();
+    } else {
+        std::thread::scope(|scope| (0..at_once).for_each(|_| drop(scope.spawn(worker))));
+    }
+    let result =
+        |place: Mutex<(Option<J>, Option<T>)>| place.into_inner().unwrap_or_else(PoisonError::into_inner).1;
+    places.into_iter().map(|place| result(place).expect("every job has run")).collect()
+}
+
+/// Memory that is taken before a job and given back after it.
+struct Memory {
+    limit: u64,
+    taken: Mutex<u64>,
+    given_back: Condvar,
+}
+
+struct Share<'a>(&'a Memory, u64);
+
+impl Memory {
+    fn new(limit: u64) -> Self {
+        Self { limit, taken: Mutex::new(0), given_back: Condvar::new() }
+    }
+
+    /// Waits until there is enough, or nobody else has any.
+    fn take(&self, bytes: u64) -> Share<'_> {
+        let taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        let too_much = |taken: &mut u64| *taken > 0 && taken.saturating_add(bytes) > self.limit;
+        let mut taken = self.given_back.wait_while(taken, too_much).unwrap_or_else(PoisonError::into_inner);
+        *taken = taken.saturating_add(bytes);
+        Share(self, bytes)
+    }
+}
+
+impl Drop for Share<'_> {
+    fn drop(&mut self) {
+        let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        *taken = taken.saturating_sub(self.1);
+        self.0.given_back.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicU64;
+
+    #[test]
+    fn memory_is_shared_and_one_job_always_runs() {
+        let (now, most) = (AtomicU64::new(0), AtomicU64::new(0));
+        let jobs = vec![40, 60, 30, 500, 70, 20, 100, 10];
+        let work = |_: &mut (), bytes: u64| {
+            let sum = now.fetch_add(bytes, Ordering::SeqCst) + bytes;
+            if bytes == 500 {
+                assert_eq!(sum, 500, "alone");
+            } else {
+                most.fetch_max(sum, Ordering::SeqCst);
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+            now.fetch_sub(bytes, Ordering::SeqCst);
+            bytes
+        };
+        assert_eq!(run(jobs.clone(), 8, 100, |bytes| *bytes, || (), work), jobs);
+        assert!(most.load(Ordering::SeqCst) <= 100);
+    }
+
+    #[test]
+    fn results_are_in_order_however_many_run_at_once() {
+        for at_once in [0, 1, 3, 100] {
+            let started = AtomicUsize::new(0);
+            let start = || started.fetch_add(1, Ordering::Relaxed);
+            let squares = run((0..20u64).collect(), at_once, u64::MAX, |_| 1, start, |_, n| n * n);
+            assert_eq!(squares, (0..20).map(|n| n * n).collect::<Vec<_>>());
+            assert_eq!(started.into_inner(), at_once.clamp(1, 20));
+        }
+        assert!(run(Vec::<u8>::new(), 4, 0, |_| 0, || (), |(), n| n).is_empty());
+    }
+}

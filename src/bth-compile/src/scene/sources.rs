@@ -1,0 +1,83 @@
+//! The files that a scene's objects come from.
+
+use crate::cached::{self, SourceDigest};
+use crate::error::Result;
+use bth_cache::Digest;
+use bth_scene::{Manifest, Source};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// A source file and what of it is used.
+pub(super) struct File<'a> {
+    /// As the manifest has it.
+    pub(super) path: &'a str,
+    /// Where it is.
+    pub(super) full: PathBuf,
+    pub(super) compiled: bool,
+    /// Mesh or object (`None` for the whole file), and the manifest's objects that are that.
+    pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
+    pub(super) digest: SourceDigest,
+}
+
+impl File<'_> {
+    /// How a part of it stands in keys.
+    pub(super) fn part(&self, part: Option<u32>) -> String {
+        let kind = if self.compiled { "object" } else { "mesh" };
+        part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
+    }
+
+    /// What stands for a part of it when misses of the cache are explained.
+    pub(super) fn name_of(&self, part: Option<u32>) -> String {
+        format!("{} {}", self.path, self.part(part))
+    }
+}
+
+/// What each used object of the manifest is made from, as it stands in keys; `unused` for the others.
+pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String> {
+    let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
+    for file in sources {
+        for (part, rows) in &file.parts {
+            let name =
+                format!("{} {} {}", file.digest.text(), file.part(*part), cached::extension(&file.full));
+            rows.iter().for_each(|row| contents[*row].clone_from(&name));
+        }
+    }
+    contents
+}
+
+/// The files of the used objects, in order of first use, hashed.
+///
+/// # Errors
+/// When one cannot be read.
+pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) -> Result<Vec<File<'a>>> {
+    let mut files: Vec<File<'a>> = Vec::new();
+    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new() };
+    let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
+    let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
+    for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
+        let (compiled, part) = match &object.source {
+            Source::Model { mesh, .. } => (false, *mesh),
+            Source::Compiled { object, .. } => (true, Some(*object)),
+        };
+        let path = object.source.path();
+        // The whole of a glTF file and single meshes are read in different ways.
+        let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
+            let full = folder.join(path);
+            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing() });
+            files.len() - 1
+        });
+        let parts = &mut files[file].parts;
+        let place = *row_of_part.entry((file, part)).or_insert_with(|| {
+            parts.push((part, Vec::new()));
+            parts.len() - 1
+        });
+        parts[place].1.push(row);
+    }
+    // Of several that cannot be read it is always the first that is named.
+    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full)).collect();
+    for (file, digest) in files.iter_mut().zip(digests) {
+        file.digest = digest?;
+    }
+    Ok(files)
+}

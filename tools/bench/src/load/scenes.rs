@@ -1,0 +1,185 @@
+//! Opening a compiled scene and tracing the first rays, against building all its objects at the start.
+
+use super::files::{self, PageCache, Scratch};
+use super::probe::Start;
+use super::record::{Case, Run};
+use super::{SIZE, first_of, runs, scene_tables};
+use crate::args::LoadScenes;
+use crate::isa;
+use crate::model::position;
+use crate::output::{Head, Record, note};
+use crate::progress::Progress;
+use crate::rays::Camera;
+use crate::rivals::embree;
+use anyhow::{Context, Result};
+use bth::rays::{Hit, Ray};
+use bth_compile::Silent;
+use bth_compile::pipeline::{Options, Structure};
+use bth_compile::scene;
+use bth_scenes::{catalogue, write};
+use glam::DVec3;
+use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Everything that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneLoadRecord {
+    /// When and where.
+    #[serde(flatten)]
+    pub head: Head,
+    /// First rays that were traced.
+    pub rays: usize,
+    /// Rays of a picture.
+    pub picture: usize,
+    /// In the order of the command line.
+    pub scenes: Vec<SceneStarts>,
+}
+
+/// What was measured on a scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneStarts {
+    /// Name without folder.
+    pub name: String,
+    /// Objects.
+    pub objects: u32,
+    /// Instances.
+    pub instances: u32,
+    /// Triangles of all objects.
+    pub triangles: u64,
+    /// Seconds that compiling without a cache took, by structure.
+    pub compile_s: BTreeMap<&'static str, f64>,
+    /// Bytes of our compiled files.
+    pub file_bytes: BTreeMap<&'static str, usize>,
+    /// One for each number of threads.
+    pub runs: Vec<Run>,
+}
+
+/// Measures, prints and writes the record.
+///
+/// # Errors
+/// If an option or scene cannot be used, a start fails or a file cannot be written.
+pub fn run(arguments: &LoadScenes) -> Result<()> {
+    let starts = &arguments.starts;
+    let isa = isa::select(starts.isa.as_deref())?;
+    let options = json!({"rays": starts.rays, "rounds": starts.rounds});
+    let mut record = SceneLoadRecord {
+        head: Head::now("load-scenes", isa.clone(), options),
+        rays: starts.rays,
+        picture: (SIZE.0 * SIZE.1) as usize + starts.rays,
+        scenes: Vec::new(),
+    };
+    let progress = Progress::new();
+    for which in &arguments.scenes {
+        record.scenes.push(measure(which, arguments, &isa, &progress)?);
+    }
+    Record {
+        head: &record.head,
+        title: "Load against rebuild of scenes",
+        body: scene_tables::markdown(&record),
+        json: serde_json::to_value(&record)?,
+        charts: scene_tables::draw(&record),
+    }
+    .write(&starts.output)
+}
+
+fn measure(which: &str, arguments: &LoadScenes, isa: &str, progress: &Progress) -> Result<SceneStarts> {
+    let scratch = Scratch::new(arguments.starts.scratch.as_deref())?;
+    let source = source(which, &scratch)?;
+    let name = source.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (mut cases, mut compile_s, mut file_bytes) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
+    let mut opened = None;
+    for (kind, structure) in [("bth", Structure::Bth), ("bvh", Structure::Bvh)] {
+        progress.say(format!("{name}: compiling {kind}"));
+        let clock = Instant::now();
+        let bytes = compile(&source, structure)?;
+        compile_s.insert(kind, clock.elapsed().as_secs_f64());
+        file_bytes.insert(kind, bytes.len());
+        let file = scratch.write(&format!("{kind}.bth"), &bytes)?;
+        for start in [Start::Map, Start::Read] {
+            for cache in PageCache::ALL {
+                cases.push(Case::of_file(kind, start, cache, file.clone(), bytes.len()));
+            }
+        }
+        opened = Some(bth::from_bytes(&bytes)?);
+    }
+    let opened = opened.context("two files were compiled")?;
+    match embree::available() {
+        Ok(()) => {
+            let file = scratch.write("objects", &files::scene_bytes(&opened))?;
+            for (name, start) in [("embree", Start::EmbreeScene), ("embree robust", Start::EmbreeSceneRobust)]
+            {
+                cases.push(Case { name: name.to_owned(), ..Case::of_rival(start, file.clone()) });
+            }
+        }
+        Err(error) => note(&format!("{name}: embree: not measured: {error:#}")),
+    }
+    let rays = picture(&opened, arguments.starts.rays).with_context(|| format!("{name}: nothing is seen"))?;
+    let rays = scratch.write("rays", files::ray_bytes(&rays))?;
+    let first = Some(arguments.starts.rays);
+    let runs = runs(&name, &cases, &arguments.starts, first, isa, &rays, progress)?;
+    let objects = opened.object_count();
+    let triangles = (0..objects).map(|object| u64::from(opened.object(object).header.triangles)).sum();
+    Ok(SceneStarts {
+        name,
+        objects,
+        instances: opened.instance_count(),
+        triangles,
+        compile_s,
+        file_bytes,
+        runs,
+    })
+}
+
+/// The scene's file; that of a generated one is made.
+fn source(which: &str, scratch: &Scratch) -> Result<PathBuf> {
+    let Some(count) = which.strip_prefix("objects:") else { return Ok(PathBuf::from(which)) };
+    let count: u32 = count.parse().with_context(|| format!("{which}: expected a number of objects"))?;
+    let entry = catalogue::find("blob").context("a generated model")?;
+    let mut model = (entry.make)(800);
+    let mut text = String::from("version = 1\n");
+    for i in 0..count {
+        // Each has a shape of its own.
+        model.positions.iter_mut().for_each(|p| p[0] *= 1.0 + 1.0 / 1024.0);
+        let file = scratch.write(&format!("{i}.ply"), &write::ply(&model))?;
+        let place = [3 * (i % 40), 0, 3 * (i / 40)];
+        writeln!(text, "[[objects]]\nname = \"o{i}\"\nmodel = {:?}", file.file_name().unwrap_or_default())?;
+        writeln!(text, "[[nodes]]\nname = \"n{i}\"\nobject = \"o{i}\"\ntranslation = {place:?}")?;
+    }
+    scratch.write(&format!("{count} objects.manifest"), text.as_bytes())
+}
+
+fn compile(source: &Path, structure: Structure) -> Result<Vec<u8>> {
+    let manifest = match source.extension().is_some_and(|e| e == "manifest") {
+        true => bth_scene::read(source)?,
+        false => {
+            let name = source.file_name().unwrap_or_default().to_string_lossy();
+            scene::import(source, &name, &scene::ImportOptions::default(), &Silent)?.0
+        }
+    };
+    let folder = source.parent().unwrap_or(Path::new("."));
+    let options = Options { structure, ..Options::default() };
+    Ok(scene::compile(&manifest, folder, source, &options, &Silent)?.0.bytes)
+}
+
+/// Rays of a picture of the whole scene, after an even share of them that begins with a hit.
+fn picture(scene: &bth::Scene, first: usize) -> Option<Vec<Ray>> {
+    let boxes = (0..scene.instance_count()).filter_map(|instance| scene.instance_bounds(instance));
+    let (lower, upper) = boxes.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lower, upper), (l, u)| {
+        (lower.min(position(l)), upper.max(position(u)))
+    });
+    let corner = |k: u32| {
+        DVec3::from_array([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { lower[axis] } else { upper[axis] }))
+    };
+    let corners: Vec<DVec3> = (0..8).map(corner).collect();
+    let (middle, diagonal) = (0.5 * (lower + upper), (upper - lower).length());
+    let all = Camera::framing(&corners, middle, diagonal, DVec3::new(0.8, 0.5, 1.0), SIZE).rays();
+    let mut hits = vec![Hit::MISS; all.len()];
+    scene.nearest_batch(&all, None, &mut hits);
+    let mut rays = first_of(&all, &hits, first)?;
+    rays.extend(&all);
+    Some(rays)
+}

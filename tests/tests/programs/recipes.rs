@@ -49,7 +49,7 @@ impl Project {
     fn new() -> Self {
         let folder = folder(&[("calls", "")]);
         let at = |name: &str| folder.path().join(name);
-        ["models", "scenes", "bin"].map(|name| std::fs::create_dir(at(name)).unwrap());
+        ["models", "scenes", "bin"].iter().for_each(|name| std::fs::create_dir(at(name)).unwrap());
         std::fs::write(at("models/dragon.ply"), ply(8)).unwrap();
         std::fs::write(at("scenes/pillar.obj"), sphere(7)).unwrap();
         std::fs::write(at("scenes/hall.manifest"), HALL).unwrap();
@@ -172,7 +172,7 @@ fn a_git_lfs_project_gets_its_compiled_files_from_the_shared_cache() {
         return;
     }
     let project = Project::new();
-    ["first", "team"].map(|name| std::fs::create_dir(project.at(name)).unwrap());
+    ["first", "team"].iter().for_each(|name| std::fs::create_dir(project.at(name)).unwrap());
     let git = |folder: &str, args: &[&str]| {
         let identity = ["-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"];
         project.run(folder, "git", &[&identity, args].concat());

@@ -131,7 +131,7 @@ fn two_scenes_with_an_object_in_common_build_it_once() {
     let scenes = ["1.manifest", "2.manifest", "3.manifest"];
     let folder = crate::support::folder(&[("a.obj", &crate::support::sphere(96))]);
     let path = folder.path();
-    scenes.map(|scene| std::fs::write(path.join(scene), manifest(scene)).unwrap());
+    scenes.iter().for_each(|scene| std::fs::write(path.join(scene), manifest(scene)).unwrap());
     let compile = |scene| {
         let args = ["compile", scene, "--json", "--quality", "best"];
         cached(path, &args).expect(0).json()

@@ -14,3 +14,4 @@ mod scenes;
 mod stress;
 mod support;
 mod trace;
+mod window;

@@ -1,7 +1,7 @@
 //! C interface of bth. `include/bth.h` is the reference; this file must match it.
 #![allow(unsafe_code)] // FFI: every function takes pointers from C.
 
-mod motion;
+pub mod motion;
 
 use runtime::rays::{Hit, Ray, Surface};
 use runtime::{Code, Error, Scene};

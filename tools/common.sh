@@ -23,6 +23,8 @@ have_tetgen() {
 have_nightly() { command -v rustup >/dev/null && rustup run nightly rustc --version >/dev/null 2>&1; }
 have_miri() { have_nightly && cargo +nightly miri --version >/dev/null 2>&1; }
 have_fuzzer() { have_nightly && cargo fuzz --version >/dev/null 2>&1; }
+# A display without a screen, keys for it, and what the player loads to open a window.
+have_display() { command -v Xvfb >/dev/null && command -v xdotool >/dev/null; }
 have_venv() { command -v python3 >/dev/null && python3 -c 'import venv, ensurepip' 2>/dev/null; }
 
 # install_missing python|plain: installs the system packages that are missing, where that is possible.
@@ -40,6 +42,7 @@ install_missing() {
         command -v cmake >/dev/null || packages+=(cmake)
         command -v git-lfs >/dev/null || packages+=(git-lfs)
     fi
+    [ "$1" = plain ] || have_display || packages+=(xvfb xdotool libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0)
     [ ${#packages[@]} -eq 0 ] && return 0
 
     local as_root=()
@@ -59,5 +62,6 @@ install_missing() {
     fi
     command -v cc >/dev/null || note "No C compiler: Rust needs one to link. Install gcc or clang."
     have_tetgen || note "No TetGen: the worker is not built, and compiled files hold BVHs only."
+    [ "$1" = plain ] || have_display || note "No Xvfb or no xdotool: the test of the window is skipped."
     [ "$1" = plain ] || have_venv || note "No python3 with venv: the Python cross-checks are skipped."
 }

@@ -1,4 +1,4 @@
-//! The C interface, used by a C program (`tests/c/trace.c`) that knows `bth.h` and `libbth` only.
+//! The C interface, used by C programs (`tests/c`) that know `bth.h` and `libbth` only.
 
 use bth::rays::{Ray, Surface};
 use bth_compile::Silent;
@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 
 #[allow(clippy::print_stdout)]
 /// Builds the library and the C program; none, with a line that says why, without a C compiler.
-fn c_program(folder: &Path) -> Option<PathBuf> {
+fn c_program(folder: &Path, name: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     if Command::new(&compiler).arg("--version").stdout(Stdio::null()).status().is_err() {
@@ -17,11 +17,11 @@ fn c_program(folder: &Path) -> Option<PathBuf> {
         return None;
     }
     let library = bth_tests::built(&["bth-capi"]);
-    let program = folder.join("trace");
+    let program = folder.join(name);
     let compiled = Command::new(compiler)
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
         .arg(root.join("src/bth-capi/include"))
-        .arg(root.join("tests/c/trace.c"))
+        .arg(root.join("tests/c").join(name).with_extension("c"))
         .arg("-L")
         .arg(&library)
         .arg("-lbth")
@@ -30,7 +30,7 @@ fn c_program(folder: &Path) -> Option<PathBuf> {
         .arg(&program)
         .status()
         .expect("the C compiler runs");
-    assert!(compiled.success(), "trace.c compiles without a warning");
+    assert!(compiled.success(), "{name}.c compiles without a warning");
     Some(program)
 }
 
@@ -50,7 +50,7 @@ fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
 #[test]
 fn a_c_program_opens_traces_and_reads_errors() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let Some(program) = c_program(folder.path()) else { return };
+    let Some(program) = c_program(folder.path(), "trace") else { return };
     let model = folder.path().join("knot.obj");
     bth_scenes::write::file(&bth_scenes::knot::torus_knot(2880), &model).expect("a model");
     let options = Options {
@@ -111,4 +111,78 @@ fn a_c_program_opens_traces_and_reads_errors() {
         assert_eq!(output.status.code(), Some(1));
         assert!(text.starts_with(&format!("error {code} null ")) && text.contains(says), "{text}");
     }
+}
+
+/// A wheel that turns, and stands on its edge without any depth in frame 3.
+const SCENE: &str = r#"version = 1
+frames = { first = -1, last = 4, rate = 2 }
+objects = [{ name = "quad", model = "quad.obj" }]
+nodes = [{ name = "hub", translation = [0, 1, 0] }, { name = "spoke", parent = "hub", object = "quad", translation = [1, 0, 0] }, { name = "floor", object = "quad", scale = [3, 1, 3] }]
+tracks = [
+    { node = "hub", property = "rotation", times = [0, 2], values = [{ axis = [0, 1, 0], degrees = 0 }, { axis = [0, 1, 0], degrees = 170 }] },
+    { node = "spoke", property = "scale", interpolation = "step", times = [0, 1.5, 2], values = [[1, 1, 1], [1, 1e-30, 1], [1, 0, 1]] },
+]
+"#;
+
+#[test]
+fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "motion") else { return };
+    let quad = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
+    std::fs::write(folder.path().join("quad.obj"), quad).expect("a model");
+    let manifest = bth_scene::parse(SCENE, Path::new("wheel.manifest")).expect("a manifest");
+    let options = Options::default();
+    let (compiled, _) =
+        bth_compile::scene::compile(&manifest, folder.path(), Path::new("wheel"), &options, &Silent)
+            .expect("the wheel compiles");
+    let file = folder.path().join("wheel.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+
+    let points = [[0.0f32, 0.0], [1.5, 0.2], [-0.4, -1.3], [9.0, 9.0]];
+    let input: String = points.iter().map(|[x, z]| format!("{x} {z}\n")).collect();
+    let output = run(&program, &[file.to_str().expect("UTF-8")], &input);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("frames -1 4 2"));
+
+    let mut scene = bth::open(&file).expect("the wheel opens");
+    let mut seen = [0; 2];
+    for frame in (-1..=4).map(Some).chain([None]) {
+        let moved = match frame {
+            Some(frame) => scene.set_frame(frame),
+            None => scene.set_seconds(0.3),
+        };
+        if let Err(error) = moved {
+            let line = lines.next().expect("an error");
+            assert!(
+                line.starts_with("error -6 ") && line.contains("node \"spoke\" at 1.5 s"),
+                "{line}: {error}"
+            );
+            seen[0] += 1;
+        }
+        let time = lines.next().and_then(|line| line.strip_prefix("time ")?.parse::<f64>().ok());
+        assert_eq!(time, Some(scene.seconds()));
+        for i in 0..scene.instance_count() {
+            let view = scene.instance(i);
+            let line = lines.next().expect("an instance");
+            let fields: Vec<&str> = line.split(' ').collect();
+            let numbers = [view.object, view.node, view.visible.into()].map(|n| n.to_string());
+            assert_eq!(fields[1..4], numbers, "{frame:?}");
+            let rows: Vec<f64> = fields[4..].iter().map(|f| f.parse().expect("a number")).collect();
+            assert_eq!(rows, view.to_world.as_flattened(), "{frame:?}");
+            seen[1] += usize::from(!view.visible);
+        }
+        for [x, z] in points {
+            let ray =
+                Ray { origin: [x, 9.0, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
+            let hit = scene.nearest(&ray, Surface::NONE);
+            let line = lines.next().expect("a hit");
+            let fields: Vec<&str> = line.split(' ').collect();
+            assert_eq!(fields[1].parse::<f32>().expect("a number").to_bits(), hit.t.to_bits(), "{frame:?}");
+            let surface = [hit.surface.instance, hit.surface.triangle].map(|n| n.to_string());
+            assert_eq!(fields[2..], surface, "{frame:?}");
+        }
+    }
+    assert_eq!((lines.next(), seen), (None, [1, 1]), "an error at frame 3, nothing to see at frame 4");
 }

@@ -1,6 +1,8 @@
 //! C interface of bth. `include/bth.h` is the reference; this file must match it.
 #![allow(unsafe_code)] // FFI: every function takes pointers from C.
 
+pub mod motion;
+
 use runtime::rays::{Hit, Ray, Surface};
 use runtime::{Code, Error, Scene};
 use std::cell::RefCell;
@@ -17,6 +19,7 @@ const ERROR_FILE: i32 = -2;
 const ERROR_FORMAT: i32 = -3;
 const ERROR_VERSION: i32 = -4;
 const ERROR_INTERNAL: i32 = -5;
+const ERROR_SCENE: i32 = -6;
 
 thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
@@ -32,6 +35,7 @@ fn code_of(error: &Error) -> i32 {
     match error.code() {
         Code::Read => ERROR_FILE,
         Code::Host | Code::Version | Code::Features | Code::UnknownKind => ERROR_VERSION,
+        Code::Singular | Code::NotFinite => ERROR_SCENE,
         _ => ERROR_FORMAT,
     }
 }

@@ -9,10 +9,10 @@ Exit codes:
     0  done
     2  wrong usage
     3  bad input: the compiled file cannot be used
-    4  a file could not be read or written";
+    4  a file could not be read or written, or there is no display for a window";
 
 /// Renders compiled BTH files and scenes to pictures and animations.
-#[derive(Debug, Parser)]
+#[derive(Clone, Debug, Parser)]
 #[command(name = "bth-play", version, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
     /// The compiled file; or a scene manifest (.manifest, .toml) or model, which is compiled first with the bthc beside this
@@ -21,8 +21,18 @@ pub(crate) struct Args {
     file: Option<PathBuf>,
     /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or .y4m); or `-` for
     /// YUV4MPEG2 on standard output.
-    #[arg(short, long, value_name = "FILE", required_unless_present = "completions")]
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["completions", "window"])]
     output: Option<PathBuf>,
+    /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined to --spp samples while
+    /// nothing moves. H prints the keys.
+    #[arg(long, conflicts_with_all = ["output", "shard", "force"])]
+    pub(crate) window: bool,
+    /// Where the key P of the window writes the picture; by default bth-play.png.
+    #[arg(long, value_name = "FILE", requires = "window", conflicts_with = "output")]
+    pub(crate) screenshot: Option<PathBuf>,
+    /// Close the window after it has shown N pictures, and write the last to the file of --screenshot.
+    #[arg(long, value_name = "N", requires = "window", conflicts_with = "output", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) window_frames: Option<u32>,
     /// Frames of a scene, both included, or one; by default the first for a picture, else all of them.
     #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     pub(crate) frames: Option<(i32, i32)>,
@@ -129,16 +139,22 @@ pub(crate) enum Axis {
 }
 
 impl Args {
-    /// The compiled file and the picture; clap has seen to it that they are there.
-    pub(crate) fn paths(&self) -> Result<(&Path, &Path), Failure> {
-        match (&self.file, &self.output) {
-            (Some(file), Some(output)) => Ok((file, output)),
-            _ => Err(Failure::Usage("a file and an output are needed".to_owned())),
-        }
+    /// The compiled file or source; clap has seen to it that it is there.
+    pub(crate) fn file(&self) -> Result<&Path, Failure> {
+        self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
+    }
+
+    /// Where pictures go; clap has seen to it that it is there unless they go to a window.
+    pub(crate) fn output(&self) -> Result<&Path, Failure> {
+        self.output.as_deref().ok_or_else(|| Failure::Usage("an output is needed".to_owned()))
     }
 }
 
 impl Mode {
+    /// All of them, in the order of their keys in the window.
+    pub(crate) const ALL: [Mode; 6] =
+        [Mode::Shaded, Mode::Normals, Mode::Ao, Mode::Steps, Mode::Path, Mode::Instances];
+
     /// As on the command line.
     pub(crate) fn name(self) -> &'static str {
         match self {

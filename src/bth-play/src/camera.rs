@@ -94,6 +94,28 @@ impl Camera {
         center + self.right * shift.x + self.up * shift.y - self.forward * distance
     }
 
+    /// The camera with the same lens at another place.
+    pub(crate) fn moved(self, eye: DVec3, forward: DVec3, vertical: DVec3) -> Self {
+        let Self { extent, parallel, near, far, .. } = self;
+        Self { parallel, near, far, ..Self::looking(eye, forward, vertical, extent) }
+    }
+
+    /// The camera for a picture of another shape: as high as before.
+    pub(crate) fn reshaped(self, (width, height): (u32, u32)) -> Self {
+        let aspect = f64::from(width) / f64::from(height);
+        Self { extent: DVec2::new(self.extent.y * aspect, self.extent.y), ..self }
+    }
+
+    /// Half the height of the picture where it is so far away.
+    pub(crate) fn half_height(&self, distance: f64) -> f64 {
+        if self.parallel { self.extent.y } else { self.extent.y * distance }
+    }
+
+    /// With parallel rays: the camera that sees a part of the height, or more.
+    pub(crate) fn widened(self, factor: f64) -> Self {
+        if self.parallel { Self { extent: self.extent * factor, ..self } } else { self }
+    }
+
     /// The ray through a point of the picture: (-1, -1) is the lower left corner, (1, 1) the upper right.
     pub(crate) fn sight(&self, at: DVec2) -> Sight {
         let at = at * self.extent;

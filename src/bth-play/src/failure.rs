@@ -20,6 +20,8 @@ pub(crate) enum Failure {
     Manifest { path: PathBuf, message: String, hint: String },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
+    /// There is no window, or it stopped working (exit code 4).
+    Window(String),
     /// Standard output was closed by its reader.
     ClosedOutput,
 }
@@ -67,6 +69,10 @@ impl Failure {
             }
             Self::File { path, message } => {
                 ("BTH-P002", 4, format!("{}: BTH-P002: {message}", path.display()))
+            }
+            Self::Window(message) => {
+                let hint = "a window needs a display (DISPLAY or WAYLAND_DISPLAY) and the libraries libX11, libXcursor, libXi and libxkbcommon-x11; -o writes pictures without";
+                ("BTH-P004", 4, format!("BTH-P004: {message} (hint: {hint})"))
             }
             Self::ClosedOutput => ("", 0, String::new()),
         }

@@ -3,26 +3,27 @@
 use crate::args::{Args, Mode};
 use crate::camera::{self, Camera, Sight};
 use crate::clay::{self, Studio};
+use crate::develop::develop;
 use crate::failure::Failure;
 use crate::lights::Lights;
 use crate::occlusion::{Queue, Start};
-use crate::picture::{Picture, quantized, srgb};
+use crate::path;
+use crate::picture::Picture;
+use crate::progress::Progress;
 use crate::sampling::{Sampler, cosine_hemisphere};
 use crate::stage::{Space, Stage};
 use crate::surface::Surfaces;
-use crate::{legend, path, ramp};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use glam::{DVec2, DVec3, Vec3};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
-use std::io::IsTerminal;
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
 /// Pixels along the side of a tile.
-const TILE: u32 = 16;
+pub(crate) const TILE: u32 = 16;
 /// Ambient-occlusion rays per sample.
 const AO_RAYS: u32 = 4;
 /// Dark enough that open surfaces, which are white, stand out.
@@ -75,10 +76,12 @@ pub(crate) struct Frame<'a> {
     args: &'a Args,
 }
 
+/// A part of the picture.
 #[derive(Default)]
-struct Tile {
-    pixels: Vec<(u32, u32)>,
-    colors: Vec<Vec3>,
+pub(crate) struct Tile {
+    pub(crate) pixels: Vec<(u32, u32)>,
+    /// Means over the samples; what they are depends on the mode.
+    pub(crate) colors: Vec<Vec3>,
     /// Nearest-hit rays beyond those of the camera.
     nearest_rays: u64,
     any_rays: u64,
@@ -86,7 +89,7 @@ struct Tile {
 }
 
 /// Shades samples that have been traced.
-enum Shader {
+pub(crate) enum Shader {
     Clay(Studio),
     Path(Lights),
     /// What the mode needs is at hand.
@@ -101,24 +104,35 @@ pub(crate) fn render(
     args: &Args,
     progress: &Progress,
 ) -> Result<(Picture, Summary), Failure> {
-    let surfaces = Surfaces::new(scene);
-    if !matches!(args.mode, Mode::Steps) {
-        surfaces.require_geometry(file)?;
-    }
-    let (camera, interior) = (stage.camera(scene, args), stage.interior);
-    let reach = stage.space.diagonal() * if interior { 0.08 } else { 0.5 };
-    let frame = Frame { scene, surfaces, space: &stage.space, camera, interior, reach, args };
+    let frame = Frame::new(scene, file, stage, stage.camera(scene, args), args)?;
     Ok(frame.render(progress))
 }
 
-impl Frame<'_> {
-    fn render(&self, progress: &Progress) -> (Picture, Summary) {
-        let start = Instant::now();
-        let (width, height) = self.args.size;
-        let columns = width.div_ceil(TILE);
-        let count = columns * height.div_ceil(TILE);
+impl<'a> Frame<'a> {
+    /// A scene at its time, seen by a camera.
+    ///
+    /// # Errors
+    /// If the file lacks what the mode needs.
+    pub(crate) fn new(
+        scene: &'a Scene,
+        file: &Path,
+        stage: &'a Stage,
+        camera: Camera,
+        args: &'a Args,
+    ) -> Result<Self, Failure> {
+        let surfaces = Surfaces::new(scene);
+        if !matches!(args.mode, Mode::Steps) {
+            surfaces.require_geometry(file)?;
+        }
+        let interior = stage.interior;
+        let reach = stage.space.diagonal() * if interior { 0.08 } else { 0.5 };
+        Ok(Frame { scene, surfaces, space: &stage.space, camera, interior, reach, args })
+    }
+
+    /// What shades the samples of this frame.
+    pub(crate) fn shader(&self) -> Shader {
         let vertical = camera::vertical(self.args.up);
-        let shader = match self.args.mode {
+        match self.args.mode {
             Mode::Shaded => {
                 let ground = !self.args.no_ground && self.scene.description().is_none();
                 Shader::Clay(Studio::new(self, vertical, ground))
@@ -131,18 +145,26 @@ impl Frame<'_> {
                 Shader::Path(Lights::new(self.scene, self.space, vertical, lamp))
             }
             Mode::Normals | Mode::Ao | Mode::Steps | Mode::Instances => Shader::Plain,
-        };
-        let tiles: Vec<Tile> = (0..count)
+        }
+    }
+
+    fn render(&self, progress: &Progress) -> (Picture, Summary) {
+        let start = Instant::now();
+        let shader = self.shader();
+        let tiles: Vec<Tile> = (0..tile_count(self.args.size))
             .into_par_iter()
-            .map(|i| {
-                let tile = self.tile(i % columns * TILE, i / columns * TILE, &shader);
-                progress.0.inc(1);
+            .map(|number| {
+                let tile = self.tile(number, 0..self.args.spp, &shader);
+                progress.tile_done();
                 tile
             })
             .collect();
         let seconds = start.elapsed().as_secs_f64();
-        let picture = self.picture(&tiles);
-        (picture, self.summary(&tiles, seconds))
+        let mut colors = vec![Vec3::ZERO; pixel_count(self.args.size)];
+        for tile in &tiles {
+            tile.place(&mut colors, self.args.size.0, |color, mean| *color = mean);
+        }
+        (develop(&colors, self.args), self.summary(&tiles, seconds))
     }
 
     /// Times that light is reflected.
@@ -160,9 +182,9 @@ impl Frame<'_> {
             .collect()
     }
 
-    fn sample(&self, (x, y): (u32, u32), index: u32) -> Sample {
+    fn sample(&self, (x, y): (u32, u32), index: u32, alone: bool) -> Sample {
         let sampler = Sampler::new(x, y);
-        let within = if self.args.spp == 1 { DVec2::splat(0.5) } else { sampler.point(0, index) };
+        let within = if alone { DVec2::splat(0.5) } else { sampler.point(0, index) };
         let (width, height) = self.args.size;
         let part = (DVec2::new(f64::from(x), f64::from(y)) + within)
             / DVec2::new(f64::from(width), f64::from(height));
@@ -170,11 +192,15 @@ impl Frame<'_> {
         Sample { sampler, index, at, sight: self.camera.sight(at) }
     }
 
-    fn tile(&self, left: u32, top: u32, shader: &Shader) -> Tile {
-        let pixels = self.pixels(left, top);
+    /// Renders some of the samples of a tile. The first one alone goes through the middle of its pixel.
+    pub(crate) fn tile(&self, number: u32, indices: Range<u32>, shader: &Shader) -> Tile {
+        let columns = self.args.size.0.div_ceil(TILE);
+        let pixels = self.pixels(number % columns * TILE, number / columns * TILE);
         let mut tile = Tile { colors: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
-        for index in 0..self.args.spp {
-            let samples: Vec<Sample> = tile.pixels.iter().map(|&pixel| self.sample(pixel, index)).collect();
+        let (count, alone) = (indices.len() as f32, indices == (0..1));
+        for index in indices {
+            let samples: Vec<Sample> =
+                tile.pixels.iter().map(|&pixel| self.sample(pixel, index, alone)).collect();
             let ray = |s: &Sample| Ray {
                 origin: s.sight.origin.as_vec3().to_array(),
                 tmin: s.sight.range.0 as f32,
@@ -201,7 +227,7 @@ impl Frame<'_> {
                     (Shader::Plain, _) => self.normals(&samples, &hits),
                 }
             };
-            tile.colors.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color / self.args.spp as f32);
+            tile.colors.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color / count);
         }
         tile
     }
@@ -272,29 +298,6 @@ impl Frame<'_> {
         rays.iter().map(count).collect()
     }
 
-    fn picture(&self, tiles: &[Tile]) -> Picture {
-        let (width, height) = self.args.size;
-        let mut picture = Picture { width, height, pixels: vec![[0; 3]; width as usize * height as usize] };
-        let maximum = match self.args.mode {
-            Mode::Steps => self.args.scale.unwrap_or_else(|| high_end(tiles)),
-            _ => 0,
-        };
-        let display = |color: Vec3| match self.args.mode {
-            Mode::Shaded | Mode::Ao | Mode::Path | Mode::Instances => color.to_array().map(srgb),
-            Mode::Normals => color.to_array(),
-            Mode::Steps => ramp::color(color.x / maximum as f32),
-        };
-        for tile in tiles {
-            for (&(x, y), &color) in tile.pixels.iter().zip(&tile.colors) {
-                picture.set(x, y, quantized(display(color)));
-            }
-        }
-        if self.args.mode == Mode::Steps {
-            legend::draw(&mut picture, maximum);
-        }
-        picture
-    }
-
     fn summary(&self, tiles: &[Tile], seconds: f64) -> Summary {
         let pixels = u64::from(self.args.size.0) * u64::from(self.args.size.1);
         let camera_rays = pixels * u64::from(self.args.spp);
@@ -312,14 +315,23 @@ impl Frame<'_> {
     }
 }
 
-/// The upper end of the heat map: the 99.8th percentile, so that single pixels do not darken the
-/// rest, rounded up to a multiple of 4 so that the legend's numbers are whole.
-fn high_end(tiles: &[Tile]) -> u32 {
-    let mut values: Vec<f32> = tiles.iter().flat_map(|t| t.colors.iter().map(|c| c.x)).collect();
-    let Some(last) = values.len().checked_sub(1) else { return 4 };
-    let rank = last - last / 500;
-    let (_, value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    (value.ceil() as u32).max(1).next_multiple_of(4)
+impl Tile {
+    /// Does something with each pixel of a picture, in rows of `width`, and its mean here.
+    pub(crate) fn place(&self, picture: &mut [Vec3], width: u32, act: impl Fn(&mut Vec3, Vec3)) {
+        for (&(x, y), &mean) in self.pixels.iter().zip(&self.colors) {
+            act(&mut picture[y as usize * width as usize + x as usize], mean);
+        }
+    }
+}
+
+/// Tiles of a picture.
+pub(crate) fn tile_count((width, height): (u32, u32)) -> u32 {
+    width.div_ceil(TILE) * height.div_ceil(TILE)
+}
+
+/// Pixels of a picture.
+pub(crate) fn pixel_count((width, height): (u32, u32)) -> usize {
+    width as usize * height as usize
 }
 
 /// A colour for a number: hues far apart for successive ones (golden ratio), in linear light.
@@ -328,37 +340,4 @@ pub(crate) fn hue(number: u32) -> Vec3 {
     let third = std::f32::consts::TAU / 3.0;
     let wave = |shift: f32| (0.5 + 0.5 * (angle - shift).cos()).powf(1.5);
     Vec3::new(wave(0.0), wave(third), wave(2.0 * third)) * 0.8 + 0.06
-}
-
-/// Progress on a terminal.
-pub(crate) struct Progress(ProgressBar);
-
-impl Progress {
-    /// For so many frames.
-    pub(crate) fn new(frames: &[i32], args: &Args) -> Self {
-        let (width, height) = args.size;
-        let tiles = u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE)) * frames.len() as u64;
-        let visible = std::io::stderr().is_terminal();
-        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(tiles), target);
-        let style = ProgressStyle::with_template(
-            "rendering {bar:30} {human_pos}/{human_len} tiles  {msg}  {eta} left",
-        );
-        let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
-        if frames.len() > 1 {
-            bar.set_message(format!("{} frames", frames.len()));
-        }
-        Self(bar)
-    }
-
-    /// Ends a frame.
-    pub(crate) fn done(&self) {
-        self.0.tick();
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.0.finish_and_clear();
-    }
 }

@@ -3,6 +3,7 @@
 mod args;
 mod camera;
 mod clay;
+mod develop;
 mod failure;
 mod frame;
 mod inside;
@@ -12,6 +13,7 @@ mod manifests;
 mod occlusion;
 mod path;
 mod picture;
+mod progress;
 mod ramp;
 mod report;
 mod sampling;
@@ -19,6 +21,7 @@ mod sequence;
 mod sink;
 mod stage;
 mod surface;
+mod window;
 
 use clap::{CommandFactory, Parser};
 use failure::Failure;
@@ -47,7 +50,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         None => bth::Isa::from_environment().map(|_| ()),
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
-    let (file, output) = args.paths()?;
+    let file = args.file()?;
     // What is mapped from the cache is not evicted before the end of the program.
     let compiled;
     let (file, mut scene) = if manifests::is_source(file) {
@@ -61,6 +64,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         .build()
         .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
+    if args.window {
+        let shown = window::show(&mut scene, file, args, &pool)?;
+        return report::window(args, &shown);
+    }
+    let output = args.output()?;
     let (report, quiet) = pool.install(|| sequence::render(&mut scene, file, output, args))?;
     report::show(args, &scene, file, &report, threads, quiet)
 }

@@ -3,6 +3,7 @@
 use crate::args::Args;
 use crate::failure::Failure;
 use crate::sequence::Report;
+use crate::window::Shown;
 use bth::Scene;
 use serde::Serialize;
 use serde_json::json;
@@ -15,12 +16,29 @@ pub(crate) fn warn(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
 }
 
+/// Says something on standard error.
+pub(crate) fn note(text: &str) {
+    // As above.
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
 /// Prints text on standard output.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
     out.flush()?;
     Ok(())
+}
+
+/// Prints what a window showed until it was closed, for people or as JSON.
+pub(crate) fn window(args: &Args, shown: &Shown) -> Result<(), Failure> {
+    if args.json {
+        return print(&format!("{:#}\n", json!({ "window": shown })));
+    }
+    print(&format!(
+        "{}x{}: {} pictures in {:.1} s; last frame {}, mode {}\n",
+        shown.width, shown.height, shown.pictures, shown.seconds, shown.frame, shown.mode
+    ))
 }
 
 /// Memory and what of the file was used.

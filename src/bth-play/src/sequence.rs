@@ -3,6 +3,7 @@
 use crate::args::Args;
 use crate::failure::Failure;
 use crate::frame::{self, Summary};
+use crate::progress::Progress;
 use crate::sink::Sink;
 use crate::stage::Stage;
 use bth::Scene;
@@ -39,15 +40,20 @@ pub(crate) struct Report {
 }
 
 /// The first and last frame of a file; one frame for files without a scene.
-fn range(scene: &Scene) -> ((i32, i32), f64) {
+pub(crate) fn range(scene: &Scene) -> ((i32, i32), f64) {
     scene.description().map_or(((0, 0), 24.0), |view| {
         let scene = &view.scene[0];
         ((scene.first_frame, scene.last_frame), scene.rate)
     })
 }
 
-/// The frames that are asked for.
-fn wanted(scene: &Scene, file: &Path, args: &Args, output: &Path) -> Result<(i32, i32), Failure> {
+/// The frames that are asked for; without an output those for a window.
+pub(crate) fn wanted(
+    scene: &Scene,
+    file: &Path,
+    args: &Args,
+    output: Option<&Path>,
+) -> Result<(i32, i32), Failure> {
     let ((first, last), _) = range(scene);
     match args.frames {
         Some((a, b)) if a < first || b > last => Err(Failure::Usage(format!(
@@ -55,13 +61,14 @@ fn wanted(scene: &Scene, file: &Path, args: &Args, output: &Path) -> Result<(i32
             file.display()
         ))),
         Some(frames) => Ok(frames),
-        None if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
-            && !output.to_string_lossy().contains('#') =>
-        {
-            Ok((first, first))
-        }
+        None if output.is_some_and(is_one_picture) => Ok((first, first)),
         None => Ok((first, last)),
     }
+}
+
+fn is_one_picture(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+        && !output.to_string_lossy().contains('#')
 }
 
 /// Renders the frames that are asked for.
@@ -72,7 +79,7 @@ pub(crate) fn render(
     args: &Args,
 ) -> Result<(Report, bool), Failure> {
     let (whole, rate) = range(scene);
-    let (first, last) = wanted(scene, file, args, output)?;
+    let (first, last) = wanted(scene, file, args, Some(output))?;
     let mut frames: Vec<i32> = (first..=last).collect();
     let mut sink = Sink::new(output, args.size, frames.len(), rate)?;
     if let Some((part, parts)) = args.shard {
@@ -95,7 +102,7 @@ pub(crate) fn render(
     report.skipped = before - frames.len();
     if !frames.is_empty() {
         let stage = Stage::new(scene, file, args, whole)?;
-        let bar = frame::Progress::new(&frames, args);
+        let bar = Progress::new(&frames, args);
         for number in frames {
             let start = Instant::now();
             let update = scene.set_frame(number)?;

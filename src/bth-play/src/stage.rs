@@ -132,6 +132,14 @@ impl Stage {
         Ok(stage)
     }
 
+    /// The camera of the scene that it stands with, if any.
+    pub(crate) fn carrier(&self) -> Option<u32> {
+        match self.stand {
+            Stand::Fixed(_) => None,
+            Stand::Carried(row) => Some(row),
+        }
+    }
+
     /// The camera at the scene's time.
     pub(crate) fn camera(&self, scene: &Scene, args: &Args) -> Camera {
         match self.stand {

@@ -16,3 +16,4 @@ mod scenes;
 mod stress;
 mod support;
 mod trace;
+mod window;

@@ -30,7 +30,7 @@ fn scene() -> tempfile::TempDir {
 }
 
 /// Runs a program whose cache lies in the folder.
-fn run(program: &str, folder: &Path, args: &[&str]) -> Run {
+pub(crate) fn run(program: &str, folder: &Path, args: &[&str]) -> Run {
     let mut command = command(program, folder, args);
     command.env("BTH_CACHE_DIR", folder.join("cache"));
     run_with(command)
@@ -42,7 +42,7 @@ fn play(folder: &Path, args: &[&str]) -> Run {
     run("bth-play", folder, &all)
 }
 
-fn compiled() -> tempfile::TempDir {
+pub(crate) fn compiled() -> tempfile::TempDir {
     let folder = scene();
     run("bthc", folder.path(), &["compile", "scene.manifest"]).expect(0);
     folder

@@ -1,6 +1,6 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `load`, `stress`, `costs` and `paper` are
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `load`, `stress`, `costs`, `paper` and `scenes` are
 //! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
 #![warn(missing_docs)]
 
@@ -22,6 +22,7 @@ pub mod rays;
 pub mod rivals;
 pub mod rounds;
 pub mod scatter;
+pub mod scenes;
 pub mod speed;
 pub mod stress;
 pub mod tracer;

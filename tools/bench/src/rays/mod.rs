@@ -136,7 +136,7 @@ fn shoot(finder: &Finder<'_>, options: &Options) -> (View, Shot) {
 }
 
 /// A ray in single precision; the direction is a unit vector.
-pub(super) fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Ray {
+pub(crate) fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Ray {
     Ray {
         origin: origin.to_array().map(|x| x as f32),
         tmin: 0.0,

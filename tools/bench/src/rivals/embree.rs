@@ -12,15 +12,15 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicI64, AtomicPtr, AtomicUsize, Ordering};
 use std::time::Instant;
 
-type Handle = *mut c_void;
+pub(super) type Handle = *mut c_void;
 type Function = *const c_void;
 
 /// How a scene is built and traced.
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {
-    quality: c_int,
-    flags: c_int,
-    packets: bool,
+    pub(super) quality: c_int,
+    pub(super) flags: c_int,
+    pub(super) packets: bool,
 }
 
 const QUALITY_MEDIUM: c_int = 1;
@@ -34,18 +34,18 @@ pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
 
-const TYPE_TRIANGLE: c_int = 0;
-const TYPE_INSTANCE: c_int = 121;
-const BUFFER_INDEX: c_int = 0;
-const BUFFER_VERTEX: c_int = 1;
-const FORMAT_UINT3: c_int = 0x5003;
-const FORMAT_FLOAT3: c_int = 0x9003;
-const FORMAT_ROWS: c_int = 0x9134;
+pub(super) const TYPE_TRIANGLE: c_int = 0;
+pub(super) const BUFFER_INDEX: c_int = 0;
+pub(super) const BUFFER_VERTEX: c_int = 1;
+pub(super) const FORMAT_UINT3: c_int = 0x5003;
+pub(super) const FORMAT_FLOAT3: c_int = 0x9003;
+pub(super) const TYPE_INSTANCE: c_int = 121;
+pub(super) const FORMAT_ROWS: c_int = 0x9134;
 const QUERY_COHERENT: c_int = 1 << 16;
 
 /// `RTCRayHit` for one lane and `RTCRayHitN` for more; rays whose `RTCRay` part alone is used too.
 #[repr(C, align(64))]
-struct RayHit<const N: usize> {
+pub(super) struct RayHit<const N: usize> {
     origin: [[f32; N]; 3],
     near: [f32; N],
     direction: [[f32; N]; 3],
@@ -93,23 +93,34 @@ impl<const N: usize> RayHit<N> {
 
     #[inline(always)]
     fn hit(&self, lane: usize) -> Hit {
+        self.hit_of(lane, 0)
+    }
+
+    /// The hit of a lane in the instance that the library names.
+    #[inline(always)]
+    pub(super) fn placed_hit(&self, lane: usize) -> Hit {
+        self.hit_of(lane, self.instance[0][lane])
+    }
+
+    #[inline(always)]
+    fn hit_of(&self, lane: usize, instance: u32) -> Hit {
         if self.geometry[lane] == NONE {
             return Hit::MISS;
         }
-        let surface = Surface { instance: 0, triangle: self.primitive[lane] };
+        let surface = Surface { instance, triangle: self.primitive[lane] };
         Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], surface }
     }
 
     /// The library marks an occluded ray so.
     #[inline(always)]
-    fn occluded(&self, lane: usize) -> bool {
+    pub(super) fn occluded(&self, lane: usize) -> bool {
         self.far[lane] == f32::NEG_INFINITY
     }
 }
 
 /// `RTCIntersectArguments`, and `RTCOccludedArguments`, which is the same.
 #[repr(C)]
-struct Arguments {
+pub(super) struct Arguments {
     flags: c_int,
     features: u32,
     context: Handle,
@@ -134,37 +145,41 @@ impl Arguments {
 
 /// Which lanes of a packet hold rays: -1, else 0.
 #[repr(C, align(64))]
-struct Lanes([c_int; 16]);
+pub(super) struct Lanes([c_int; 16]);
 
-type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut Arguments);
-type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut Arguments);
+pub(super) type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut Arguments);
+pub(super) type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut Arguments);
 
-struct Api {
-    new_device: unsafe extern "C" fn(*const c_char) -> Handle,
-    release_device: unsafe extern "C" fn(Handle),
-    device_error: unsafe extern "C" fn(Handle) -> c_int,
-    monitor: unsafe extern "C" fn(Handle, unsafe extern "C" fn(Handle, isize, bool) -> bool, Handle),
-    new_scene: unsafe extern "C" fn(Handle) -> Handle,
-    release_scene: unsafe extern "C" fn(Handle),
-    scene_flags: unsafe extern "C" fn(Handle, c_int),
-    scene_quality: unsafe extern "C" fn(Handle, c_int),
-    commit_scene: unsafe extern "C" fn(Handle),
-    new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
-    geometry_quality: unsafe extern "C" fn(Handle, c_int),
-    shared_buffer: unsafe extern "C" fn(Handle, c_int, u32, c_int, *const c_void, usize, usize, usize),
-    commit_geometry: unsafe extern "C" fn(Handle),
-    attach_geometry: unsafe extern "C" fn(Handle, Handle) -> u32,
-    release_geometry: unsafe extern "C" fn(Handle),
-    instanced_scene: unsafe extern "C" fn(Handle, Handle),
-    transform: unsafe extern "C" fn(Handle, u32, c_int, *const c_void),
-    intersect1: Trace1,
-    occluded1: Trace1,
-    intersect16: Trace16,
-    occluded16: Trace16,
+pub(super) struct Api {
+    pub(super) new_device: unsafe extern "C" fn(*const c_char) -> Handle,
+    pub(super) release_device: unsafe extern "C" fn(Handle),
+    pub(super) device_error: unsafe extern "C" fn(Handle) -> c_int,
+    pub(super) monitor:
+        unsafe extern "C" fn(Handle, unsafe extern "C" fn(Handle, isize, bool) -> bool, Handle),
+    pub(super) new_scene: unsafe extern "C" fn(Handle) -> Handle,
+    pub(super) release_scene: unsafe extern "C" fn(Handle),
+    pub(super) scene_flags: unsafe extern "C" fn(Handle, c_int),
+    pub(super) scene_quality: unsafe extern "C" fn(Handle, c_int),
+    pub(super) commit_scene: unsafe extern "C" fn(Handle),
+    pub(super) new_geometry: unsafe extern "C" fn(Handle, c_int) -> Handle,
+    pub(super) geometry_quality: unsafe extern "C" fn(Handle, c_int),
+    pub(super) shared_buffer:
+        unsafe extern "C" fn(Handle, c_int, u32, c_int, *const c_void, usize, usize, usize),
+    pub(super) commit_geometry: unsafe extern "C" fn(Handle),
+    pub(super) attach_geometry: unsafe extern "C" fn(Handle, Handle) -> u32,
+    pub(super) release_geometry: unsafe extern "C" fn(Handle),
+    pub(super) intersect1: Trace1,
+    pub(super) occluded1: Trace1,
+    pub(super) intersect16: Trace16,
+    pub(super) occluded16: Trace16,
+    pub(super) instanced_scene: unsafe extern "C" fn(Handle, Handle),
+    pub(super) transform: unsafe extern "C" fn(Handle, u32, c_int, *const f32),
+    pub(super) enable_geometry: unsafe extern "C" fn(Handle),
+    pub(super) disable_geometry: unsafe extern "C" fn(Handle),
 }
 
 impl Api {
-    fn get() -> Result<&'static Api> {
+    pub(super) fn get() -> Result<&'static Api> {
         static API: OnceLock<std::result::Result<Api, String>> = OnceLock::new();
         API.get_or_init(|| Api::load().map_err(|e| format!("{e:#}")))
             .as_ref()
@@ -193,12 +208,14 @@ impl Api {
                 commit_geometry: *library.get(b"rtcCommitGeometry\0")?,
                 attach_geometry: *library.get(b"rtcAttachGeometry\0")?,
                 release_geometry: *library.get(b"rtcReleaseGeometry\0")?,
-                instanced_scene: *library.get(b"rtcSetGeometryInstancedScene\0")?,
-                transform: *library.get(b"rtcSetGeometryTransform\0")?,
                 intersect1: *library.get(b"rtcIntersect1\0")?,
                 occluded1: *library.get(b"rtcOccluded1\0")?,
                 intersect16: *library.get(b"rtcIntersect16\0")?,
                 occluded16: *library.get(b"rtcOccluded16\0")?,
+                instanced_scene: *library.get(b"rtcSetGeometryInstancedScene\0")?,
+                transform: *library.get(b"rtcSetGeometryTransform\0")?,
+                enable_geometry: *library.get(b"rtcEnableGeometry\0")?,
+                disable_geometry: *library.get(b"rtcDisableGeometry\0")?,
             })
         }
     }
@@ -407,32 +424,42 @@ pub fn padded(positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     positions.iter().copied().chain([[0.0; 3]]).collect()
 }
 
-impl Scene {
-    fn singly(&self, batch: Batch<'_>, trace: Trace1, mut done: impl FnMut(usize, &RayHit<1>)) {
-        let mut arguments = Arguments::new(batch.coherent);
-        let mut lane = RayHit::<1>::EMPTY;
-        for (i, ray) in batch.rays.iter().enumerate() {
-            lane.set(0, ray);
-            // SAFETY: the scene is committed, and both structures are as the library defines them.
-            unsafe { trace(self.scene, &mut lane, &mut arguments) };
-            done(i, &lane);
-        }
+/// Traces rays through a committed scene one by one.
+pub(super) fn singly(
+    scene: Handle,
+    batch: Batch<'_>,
+    trace: Trace1,
+    mut done: impl FnMut(usize, &RayHit<1>),
+) {
+    let mut arguments = Arguments::new(batch.coherent);
+    let mut lane = RayHit::<1>::EMPTY;
+    for (i, ray) in batch.rays.iter().enumerate() {
+        lane.set(0, ray);
+        // SAFETY: the scene is committed, and both structures are as the library defines them.
+        unsafe { trace(scene, &mut lane, &mut arguments) };
+        done(i, &lane);
     }
+}
 
-    fn packets(&self, batch: Batch<'_>, trace: Trace16, mut done: impl FnMut(usize, &RayHit<16>, usize)) {
-        let mut arguments = Arguments::new(batch.coherent);
-        let mut lanes = RayHit::<16>::EMPTY;
-        for (packet, rays) in batch.rays.chunks(16).enumerate() {
-            let mut used = Lanes([0; 16]);
-            for (lane, ray) in rays.iter().enumerate() {
-                lanes.set(lane, ray);
-                used.0[lane] = -1;
-            }
-            // SAFETY: as above; the mask and the packet have the alignment that the library asks for.
-            unsafe { trace(&used, self.scene, &mut lanes, &mut arguments) };
-            for lane in 0..rays.len() {
-                done(packet * 16 + lane, &lanes, lane);
-            }
+/// Traces rays through a committed scene in packets.
+pub(super) fn packets(
+    scene: Handle,
+    batch: Batch<'_>,
+    trace: Trace16,
+    mut done: impl FnMut(usize, &RayHit<16>, usize),
+) {
+    let mut arguments = Arguments::new(batch.coherent);
+    let mut lanes = RayHit::<16>::EMPTY;
+    for (packet, rays) in batch.rays.chunks(16).enumerate() {
+        let mut used = Lanes([0; 16]);
+        for (lane, ray) in rays.iter().enumerate() {
+            lanes.set(lane, ray);
+            used.0[lane] = -1;
+        }
+        // SAFETY: as above; the mask and the packet have the alignment that the library asks for.
+        unsafe { trace(&used, scene, &mut lanes, &mut arguments) };
+        for lane in 0..rays.len() {
+            done(packet * 16 + lane, &lanes, lane);
         }
     }
 }
@@ -440,17 +467,17 @@ impl Scene {
 impl Tracer for Scene {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         if self.packets {
-            self.packets(batch, self.api.intersect16, |i, lanes, lane| hits[i] = lanes.hit(lane));
+            packets(self.scene, batch, self.api.intersect16, |i, lanes, lane| hits[i] = lanes.hit(lane));
         } else {
-            self.singly(batch, self.api.intersect1, |i, lane| hits[i] = lane.hit(0));
+            singly(self.scene, batch, self.api.intersect1, |i, lane| hits[i] = lane.hit(0));
         }
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
         if self.packets {
-            self.packets(batch, self.api.occluded16, |i, lanes, lane| found[i] = lanes.occluded(lane));
+            packets(self.scene, batch, self.api.occluded16, |i, lanes, lane| found[i] = lanes.occluded(lane));
         } else {
-            self.singly(batch, self.api.occluded1, |i, lane| found[i] = lane.occluded(0));
+            singly(self.scene, batch, self.api.occluded1, |i, lane| found[i] = lane.occluded(0));
         }
     }
 }

@@ -1,0 +1,119 @@
+//! The part of the C interface that moves scenes and looks at their instances.
+
+use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
+use runtime::{Error, Scene};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// `bth_instance` of `bth.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Instance {
+    to_world: [[f64; 4]; 3],
+    object: u32,
+    node: u32,
+    visible: u32,
+    reserved: u32,
+}
+
+const _: () = assert!(size_of::<Instance>() == 112);
+
+/// Frames and rate of a scene; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; each of the others is null or may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_frames(scene: *const Scene, first: *mut i32, last: *mut i32, rate: *mut f64) {
+    // SAFETY: null or valid by contract.
+    let view = unsafe { scene.as_ref() }.and_then(Scene::description);
+    let found =
+        view.map_or((0, 0, 1.0), |v| (v.scene[0].first_frame, v.scene[0].last_frame, v.scene[0].rate));
+    // SAFETY: each is null, and then passed over, or may be written by contract.
+    unsafe {
+        first.as_mut().into_iter().for_each(|out| *out = found.0);
+        last.as_mut().into_iter().for_each(|out| *out = found.1);
+        rate.as_mut().into_iter().for_each(|out| *out = found.2);
+    }
+}
+
+/// Time of a scene; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_seconds(scene: *const Scene) -> f64 {
+    // SAFETY: null or valid by contract.
+    unsafe { scene.as_ref() }.map_or(0.0, Scene::seconds)
+}
+
+/// Moves a scene to a time; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open, and nothing else uses it meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32 {
+    if !seconds.is_finite() {
+        return fail(ERROR_ARGUMENT, format!("bth_set_seconds: expected a finite time, found {seconds}"));
+    }
+    // SAFETY: handed on.
+    unsafe { moved(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
+}
+
+/// Moves a scene to a frame; see `bth.h`.
+///
+/// # Safety
+/// As for [`bth_set_seconds`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_set_frame(scene: *mut Scene, frame: i32) -> i32 {
+    // SAFETY: handed on.
+    unsafe { moved(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
+}
+
+/// # Safety
+/// As for [`bth_set_seconds`].
+unsafe fn moved(scene: *mut Scene, name: &str, go: impl FnOnce(&mut Scene) -> Result<(), Error>) -> i32 {
+    // SAFETY: null or open, and ours alone by contract.
+    let Some(scene) = (unsafe { scene.as_mut() }) else {
+        return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
+    };
+    // Unwinding must not reach C.
+    match catch_unwind(AssertUnwindSafe(|| go(scene))) {
+        Ok(Ok(())) => OK,
+        Ok(Err(error)) => fail(code_of(&error), error.to_string()),
+        Err(_) => fail(ERROR_INTERNAL, format!("{name}: internal error")),
+    }
+}
+
+/// Number of instances; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_instance_count(scene: *const Scene) -> u32 {
+    // SAFETY: null or valid by contract.
+    unsafe { scene.as_ref() }.map_or(0, Scene::instance_count)
+}
+
+/// An instance; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `instance` is null or may be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_get_instance(scene: *const Scene, row: u32, instance: *mut Instance) -> i32 {
+    // SAFETY: each is null or valid by contract.
+    let (Some(scene), Some(out)) = (unsafe { scene.as_ref() }, unsafe { instance.as_mut() }) else {
+        return fail(ERROR_ARGUMENT, "bth_get_instance: scene and instance must not be null".into());
+    };
+    if row >= scene.instance_count() {
+        let count = scene.instance_count();
+        return fail(ERROR_ARGUMENT, format!("bth_get_instance: expected a row below {count}, found {row}"));
+    }
+    let view = scene.instance(row);
+    *out = Instance {
+        to_world: view.to_world,
+        object: view.object,
+        node: view.node,
+        visible: view.visible.into(),
+        reserved: 0,
+    };
+    OK
+}

@@ -1,0 +1,86 @@
+//! What the keys do.
+
+use crate::args::Mode;
+use winit::keyboard::KeyCode;
+
+/// What the window answers to H, and README and help promise.
+pub(crate) const HELP: &str = "\
+1 2 3 4 5 6     mode: shaded, normals, ao, steps, path, instances
+Space           play, pause
+Left, Right     one frame back, on; Shift: ten
+Home, End       first, last frame; or drag the bar at the bottom
+drag            orbit around what is in the middle of the picture
+right drag      move sideways (also Shift and drag)
+wheel           nearer, farther
+W S A D E Q     fly forwards, backwards, left, right, up, down; Shift: faster
+C               next camera of the scene
+R               the camera of the beginning
+P               pause, and write the picture to a file once it is refined
+H               print this
+Escape          close
+";
+
+/// What a key asks for at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    Mode(Mode),
+    Toggle,
+    Step(i32),
+    First,
+    Last,
+    NextCamera,
+    Reset,
+    Save,
+    Help,
+    Close,
+}
+
+/// What pressing a key asks for. Keys are meant by their place, as on a keyboard of the United States.
+pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
+    let step = if shift { 10 } else { 1 };
+    Some(match key {
+        KeyCode::Digit1 | KeyCode::Numpad1 => Action::Mode(Mode::ALL[0]),
+        KeyCode::Digit2 | KeyCode::Numpad2 => Action::Mode(Mode::ALL[1]),
+        KeyCode::Digit3 | KeyCode::Numpad3 => Action::Mode(Mode::ALL[2]),
+        KeyCode::Digit4 | KeyCode::Numpad4 => Action::Mode(Mode::ALL[3]),
+        KeyCode::Digit5 | KeyCode::Numpad5 => Action::Mode(Mode::ALL[4]),
+        KeyCode::Digit6 | KeyCode::Numpad6 => Action::Mode(Mode::ALL[5]),
+        KeyCode::Space => Action::Toggle,
+        KeyCode::ArrowLeft => Action::Step(-step),
+        KeyCode::ArrowRight => Action::Step(step),
+        KeyCode::Home => Action::First,
+        KeyCode::End => Action::Last,
+        KeyCode::KeyC => Action::NextCamera,
+        KeyCode::KeyR => Action::Reset,
+        KeyCode::KeyP => Action::Save,
+        KeyCode::KeyH => Action::Help,
+        KeyCode::Escape => Action::Close,
+        _ => return None,
+    })
+}
+
+/// The direction that a key flies in while it is down: right, up, forward.
+pub(crate) fn flight(key: KeyCode) -> Option<[f64; 3]> {
+    Some(match key {
+        KeyCode::KeyW => [0.0, 0.0, 1.0],
+        KeyCode::KeyS => [0.0, 0.0, -1.0],
+        KeyCode::KeyD => [1.0, 0.0, 0.0],
+        KeyCode::KeyA => [-1.0, 0.0, 0.0],
+        KeyCode::KeyE => [0.0, 1.0, 0.0],
+        KeyCode::KeyQ => [0.0, -1.0, 0.0],
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_names_every_mode_in_the_order_of_its_keys() {
+        let names: Vec<&str> = Mode::ALL.iter().map(|m| m.name()).collect();
+        assert!(HELP.contains(&names.join(", ")), "{HELP}");
+        assert_eq!(action(KeyCode::Digit4, false), Some(Action::Mode(Mode::Steps)));
+        assert_eq!(action(KeyCode::ArrowLeft, true), Some(Action::Step(-10)));
+    }
+}

@@ -1,0 +1,155 @@
+//! What traces scenes: our compiled files, and Embree's instances.
+
+use super::Source;
+use crate::ours::BATCH;
+use crate::rivals::embree::{self, Variant};
+use crate::rivals::embree_instances::{Instances, Object, Place};
+use crate::tracer::{Batch, Tracer};
+use anyhow::{Context, Result, anyhow};
+use bth::Scene;
+use bth::rays::Hit;
+use bth_compile::costs::Select;
+use bth_compile::pipeline::{Options, Structure};
+use std::path::Path;
+use std::time::Instant;
+
+/// What can be measured.
+pub(super) struct Kind {
+    pub(super) name: &'static str,
+    how: How,
+}
+
+enum How {
+    /// Compiled like this, traced in batches with hints.
+    Ours(fn(&mut Options)),
+    Embree(Variant),
+}
+
+/// All of them; the second is the plain BVH, which finds the rays and against which others are compared.
+pub(super) const KINDS: [Kind; 6] = [
+    Kind { name: "bth", how: How::Ours(|_| {}) },
+    Kind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh) },
+    Kind { name: "bth, paper's rule", how: How::Ours(by_the_paper) },
+    Kind { name: "embree", how: How::Embree(embree::DEFAULT) },
+    Kind { name: "embree robust", how: How::Embree(embree::ROBUST) },
+    Kind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
+];
+
+fn by_the_paper(options: &mut Options) {
+    options.costs.select = Select::Paper;
+}
+
+/// A scene at a frame.
+pub(super) struct Frame {
+    number: i32,
+    places: Vec<Place>,
+}
+
+impl Frame {
+    /// What a scene shows now.
+    pub(super) fn of(scene: &Scene, number: i32) -> Frame {
+        let place = |i: u32| Some(scene.instance(i)).filter(|v| v.visible).map(|v| v.to_world);
+        Frame { number, places: (0..scene.instance_count()).map(place).collect() }
+    }
+}
+
+/// A scene that moves, and traces.
+pub(super) trait Moving {
+    /// Shows something else, so that the next frame is an update in full.
+    fn hide(&mut self) -> Result<()>;
+    /// Shows a frame.
+    fn show(&mut self, frame: &Frame) -> Result<()>;
+    /// Nearest hits.
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
+}
+
+/// A contender.
+pub(super) struct Contender {
+    pub(super) name: &'static str,
+    pub(super) ours: bool,
+    pub(super) moving: Box<dyn Moving>,
+    pub(super) build_s: f64,
+    /// Share of the objects' triangles in tetrahedra.
+    pub(super) in_tets: f64,
+}
+
+/// A compiled scene.
+pub(super) struct Compiled {
+    pub(super) bytes: Vec<u8>,
+    in_tets: f64,
+    seconds: f64,
+}
+
+/// Compiles a scene.
+pub(super) fn compile(source: &Source, kind: &Kind) -> Result<Compiled> {
+    let How::Ours(set) = kind.how else { return Err(anyhow!("not one of ours")) };
+    let mut options = Options::default();
+    set(&mut options);
+    let start = Instant::now();
+    let (compiled, report) = bth_compile::scene::compile(
+        &source.manifest,
+        &source.folder,
+        Path::new(&source.name),
+        &options,
+        &bth_compile::Silent,
+    )?;
+    let seconds = start.elapsed().as_secs_f64();
+    let triangles: u64 = report.objects.iter().map(|o| o.triangles).sum();
+    let in_tets: u64 = report.objects.iter().map(|o| o.tet_triangles).sum();
+    Ok(Compiled { bytes: compiled.bytes, in_tets: in_tets as f64 / triangles.max(1) as f64, seconds })
+}
+
+/// Builds a contender; `shown` has the geometry of the objects.
+pub(super) fn build(source: &Source, kind: &Kind, shown: &Scene) -> Result<Contender> {
+    let start = Instant::now();
+    if let How::Embree(variant) = &kind.how {
+        let objects = (0..shown.object_count()).map(|i| {
+            let view = shown.object(i);
+            Object { positions: embree::padded(view.positions), triangles: view.triangles.to_vec() }
+        });
+        let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
+        let instances = Instances::new(objects.collect(), &object_of, variant, 1)?;
+        let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
+        return Ok(Contender { name: kind.name, ours: false, moving, build_s, in_tets: 0.0 });
+    }
+    let compiled = compile(source, kind)?;
+    let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
+    let (build_s, in_tets) = (compiled.seconds, compiled.in_tets);
+    Ok(Contender { name: kind.name, ours: true, moving: Box::new(Ours(scene)), build_s, in_tets })
+}
+
+struct Ours(Scene);
+
+impl Moving for Ours {
+    fn hide(&mut self) -> Result<()> {
+        // A time that no frame shows.
+        self.0.set_seconds(-1e3)?;
+        Ok(())
+    }
+
+    fn show(&mut self, frame: &Frame) -> Result<()> {
+        self.0.set_frame(frame.number)?;
+        Ok(())
+    }
+
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            self.0.nearest_batch(batch.rays, batch.from, hits);
+        }
+    }
+}
+
+impl Moving for Instances {
+    fn hide(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    fn show(&mut self, frame: &Frame) -> Result<()> {
+        self.place(&frame.places);
+        Ok(())
+    }
+
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        Tracer::nearest(self, batch, hits);
+    }
+}

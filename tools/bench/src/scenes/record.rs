@@ -1,0 +1,71 @@
+//! What `scenes` measured, as it is written to JSON.
+
+use crate::output::Head;
+use serde::Serialize;
+
+/// Everything.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScenesRecord {
+    /// When and where.
+    #[serde(flatten)]
+    pub head: Head,
+    /// In the order of the command line.
+    pub scenes: Vec<SceneRecord>,
+}
+
+/// A scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneRecord {
+    /// Its name.
+    pub name: String,
+    /// Instances, seen or not.
+    pub instances: u32,
+    /// Objects.
+    pub objects: u32,
+    /// Triangles of all instances.
+    pub triangles: u64,
+    /// The frames that were measured.
+    pub frames: Vec<i32>,
+    /// Rays of each set, all frames together.
+    pub rays: [u64; 3],
+    /// The contenders.
+    pub rows: Vec<Row>,
+    /// What could not be built, and why.
+    pub left_out: Vec<String>,
+}
+
+/// A contender.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Its name.
+    pub name: String,
+    /// Whether it is one of ours, whose answers have to be the same to the last bit.
+    pub ours: bool,
+    /// Seconds to compile or build the objects.
+    pub build_s: f64,
+    /// Share of the objects' triangles in tetrahedra.
+    pub in_tets: f64,
+    /// Milliseconds of a frame: the update, then each set of rays. Medians of the rounds, mean over the frames.
+    pub milliseconds: [f64; 4],
+    /// Answers that are others than those of our plain BVH.
+    pub differ: u64,
+}
+
+/// Parts of a frame that are compared: the camera rays, the first bounce, and all of them; each with the update.
+pub(super) const PARTS: [&str; 3] = ["camera", "diffuse", "path"];
+
+impl Row {
+    /// Milliseconds of a frame that traces these rays.
+    pub fn frame(&self, part: usize) -> f64 {
+        let [update, camera, diffuse, later] = self.milliseconds;
+        update + [camera, diffuse, camera + diffuse + later][part]
+    }
+}
+
+impl SceneRecord {
+    /// How many times as fast one is as another, for a part of the frame.
+    pub fn speedup(&self, of: &str, over: &str, part: usize) -> Option<f64> {
+        let row = |name: &str| self.rows.iter().find(|r| r.name == name);
+        Some(row(over)?.frame(part) / row(of)?.frame(part))
+    }
+}

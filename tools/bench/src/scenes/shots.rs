@@ -1,0 +1,119 @@
+//! The rays of a frame: the camera's, and those of the diffuse bounces after it.
+
+use crate::model::position;
+use crate::rays::{Camera, LIFT, Random, ray};
+use crate::tracer::Batch;
+use anyhow::{Context, Result, ensure};
+use bth::Scene;
+use bth::layout::NONE;
+use bth::rays::{Hit, Ray, Surface};
+use glam::DVec3;
+
+/// Times that light is reflected, as `bth-play --mode path` does by default.
+pub(super) const BOUNCES: u32 = 4;
+/// Relative difference of t up to which another triangle at the same place is no other answer of a tracer that rounds.
+const SAME: f32 = 1e-4;
+
+/// Rays of one kind.
+pub(super) struct Set {
+    pub(super) rays: Vec<Ray>,
+    from: Option<Vec<Surface>>,
+    coherent: bool,
+    /// The answers of our plain BVH.
+    expected: Vec<Hit>,
+}
+
+/// The rays of a frame, by [`super::SETS`].
+pub(super) struct Shots {
+    pub(super) sets: [Set; 3],
+}
+
+impl Set {
+    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<Surface>>, coherent: bool) -> Set {
+        let mut expected = vec![Hit::MISS; rays.len()];
+        scene.nearest_batch(&rays, None, &mut expected);
+        Set { rays, from, coherent, expected }
+    }
+
+    pub(super) fn batch(&self) -> Batch<'_> {
+        Batch { rays: &self.rays, from: self.from.as_deref(), coherent: self.coherent }
+    }
+
+    /// Answers that are others: in any bit for ours, in what is hit or where for others.
+    pub(super) fn differences(&self, hits: &[Hit], ours: bool) -> u64 {
+        let same = |a: &Hit, b: &Hit| {
+            a == b || !ours && a.is_hit() && b.is_hit() && (a.t - b.t).abs() <= SAME * a.t.abs()
+        };
+        self.expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count() as u64
+    }
+}
+
+impl Shots {
+    /// Of a scene at its time, seen by its camera.
+    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<Shots> {
+        let (camera, diagonal) = camera(scene, size)?;
+        let first = Set::of(scene, camera.rays(), None, true);
+        let mut random = Random(1);
+        let lift = LIFT * diagonal;
+        let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut random);
+        let second = Set::of(scene, rays, Some(from), false);
+        let (mut later, mut from): (Vec<Ray>, Vec<Surface>) = Default::default();
+        let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
+        for _ in 1..BOUNCES {
+            let (next, starts) = onward(scene, &rays, &hits, lift, &mut random);
+            let set = Set::of(scene, next, None, false);
+            later.extend(&set.rays);
+            from.extend(starts);
+            (rays, hits) = (set.rays, set.expected);
+        }
+        let third = Set::of(scene, later, Some(from), false);
+        Ok(Shots { sets: [first, second, third] })
+    }
+}
+
+/// The first camera of the scene, or one that sees all of it; and the diagonal of what there is to see.
+fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
+    let view = scene.description().context("a scene")?;
+    let mut corners = Vec::new();
+    let (mut lower, mut upper) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (low, high) in (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)) {
+        let ends = [position(low), position(high)];
+        (lower, upper) = (lower.min(ends[0]), upper.max(ends[1]));
+        let corner = |i: usize| DVec3::new(ends[i & 1].x, ends[i >> 1 & 1].y, ends[i >> 2].z);
+        corners.extend((0..8).map(corner));
+    }
+    ensure!(!corners.is_empty(), "nothing is to be seen");
+    let diagonal = (upper - lower).length();
+    let row = if view.scene[0].camera == NONE { 0 } else { view.scene[0].camera };
+    let Some(lens) = view.cameras.get(row as usize) else {
+        let from = DVec3::new(0.8, 0.5, 1.0);
+        return Ok((Camera::framing(&corners, (lower + upper) / 2.0, diagonal, from, size), diagonal));
+    };
+    let (rows, _) = scene.node(lens.node);
+    let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
+    let tangent = (lens.size / 2.0).to_radians().tan();
+    let camera = Camera { eye: column(3), target: column(3) - column(2), tangent, size };
+    Ok((camera, diagonal))
+}
+
+/// Cosine-weighted rays from where rays hit, and the surfaces there.
+fn onward(
+    scene: &Scene,
+    rays: &[Ray],
+    hits: &[Hit],
+    lift: f64,
+    random: &mut Random,
+) -> (Vec<Ray>, Vec<Surface>) {
+    let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
+        let direction = position(from.direction);
+        let object = scene.object(scene.object_of(hit.surface.instance));
+        let [a, b, c] =
+            object.triangles[hit.surface.triangle as usize].map(|v| position(object.positions[v as usize]));
+        let normal = scene.normal_to_world(hit.surface.instance, (b - a).cross(c - a).to_array());
+        let normal = DVec3::from_array(normal).normalize();
+        let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
+        let point = position(from.origin) + direction * f64::from(hit.t) + normal * lift;
+        (ray(point, random.cosine(normal), f64::INFINITY), hit.surface)
+    });
+    onward.unzip()
+}

@@ -19,6 +19,8 @@ pub struct Arguments {
 pub enum Command {
     /// Rays per second of our structures and the rivals.
     Speed(Speed),
+    /// Run time and bytes against every kind of error, ours and rivals'.
+    Accuracy(Accuracy),
     /// Opening a compiled file and tracing the first rays, against building at the start.
     Load(Load),
     /// Opening compiled scenes against building all their objects at the start.
@@ -103,6 +105,32 @@ pub struct Speed {
     #[arg(long, value_name = "NAME")]
     pub isa: Option<String>,
     /// Small pictures and one round: whether it works, not how fast it is.
+    #[arg(long)]
+    pub quick: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `accuracy`.
+#[derive(Debug, Args)]
+pub struct Accuracy {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median time counts; one more comes before and warms up.
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Only these tracers; a star at the end stands for any ending.
+    #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub tracers: Names,
+    /// One of this many rays is compared with every triangle in exact arithmetic.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_one)]
+    pub one_in: usize,
+    /// Small pictures, few rays and one round: whether it works, not how fast it is.
     #[arg(long)]
     pub quick: bool,
     #[command(flatten)]

@@ -1,9 +1,10 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `load`, `stress`, `costs`, `paper` and `scenes` are
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `accuracy`, `load`, `stress`, `costs`, `paper` and `scenes` are
 //! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
 #![warn(missing_docs)]
 
+pub mod accuracy;
 pub mod args;
 pub mod chart;
 pub mod clock;

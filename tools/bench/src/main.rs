@@ -1,13 +1,14 @@
 //! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
 
 use bth_bench::args::{Arguments, Command};
-use bth_bench::{costs, load, output, paper, scenes, speed, stress};
+use bth_bench::{accuracy, costs, load, output, paper, scenes, speed, stress};
 use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Speed(arguments) => speed::run(&arguments),
+        Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Load(arguments) => load::run(&arguments),
         Command::LoadScenes(arguments) => load::scenes::run(&arguments),
         Command::Stress(arguments) => stress::run(&arguments),

@@ -10,6 +10,8 @@ pub struct Cloud {
     pub name: String,
     /// Positive x and y.
     pub points: Vec<(f64, f64)>,
+    /// What stands beside each; of none, where there are too many points.
+    pub labels: Vec<String>,
 }
 
 /// A plot.
@@ -25,6 +27,8 @@ pub struct Scatter {
     pub clouds: Vec<Cloud>,
     /// Whether to draw the line of equal x and y.
     pub diagonal: bool,
+    /// Whether to join the points that none is below and left of (Pareto).
+    pub front: bool,
     /// Radius of a point.
     pub radius: f64,
 }
@@ -50,6 +54,30 @@ fn ticks((low, high): (f64, f64)) -> Vec<f64> {
         .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))
         .filter(|tick| (low..=high).contains(tick))
         .collect()
+}
+
+/// A tick as it is written: short also where it is tiny.
+fn written(tick: f64) -> String {
+    if tick < 1e-3 { format!("{tick:.0e}") } else { tick.to_string() }
+}
+
+/// Corners of the stairs below which no point lies: the points that no other is both left of and below of, from left to
+/// right, and between two of them the inner corner.
+fn stairs(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = points.collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut corners: Vec<(f64, f64)> = Vec::new();
+    for (x, y) in points {
+        match corners.last() {
+            Some((_, last)) if y >= *last => {}
+            Some((_, last)) => {
+                let corner = (x, *last);
+                corners.extend([corner, (x, y)]);
+            }
+            None => corners.push((x, y)),
+        }
+    }
+    corners
 }
 
 impl Scatter {
@@ -86,13 +114,19 @@ impl Scatter {
         if self.diagonal {
             rule(at((xs.0, xs.0)), at((xs.1, xs.1)), "stroke=\"#333\" stroke-dasharray=\"5 4\"");
         }
+        if self.front {
+            let corners = stairs(all().copied());
+            for pair in corners.windows(2) {
+                rule(at(pair[0]), at(pair[1]), "stroke=\"#999\" stroke-dasharray=\"3 3\"");
+            }
+        }
         for tick in ticks(xs) {
             text(
                 &mut svg,
                 at((tick, ys.0)).0,
                 TOP + SIZE + 16.0,
                 "text-anchor=\"middle\" fill=\"#555\"",
-                &tick.to_string(),
+                &written(tick),
             );
         }
         for tick in ticks(ys) {
@@ -101,7 +135,7 @@ impl Scatter {
                 LEFT - 6.0,
                 at((xs.0, tick)).1 + 4.0,
                 "text-anchor=\"end\" fill=\"#555\"",
-                &tick.to_string(),
+                &written(tick),
             );
         }
         text(&mut svg, LEFT + SIZE / 2.0, TOP + SIZE + 40.0, "text-anchor=\"middle\"", &self.x);
@@ -116,9 +150,14 @@ impl Scatter {
                 );
             };
             cloud.points.iter().for_each(|p| dot(at(*p), self.radius));
+            let places = cloud.points.iter().map(|p| at(*p));
+            let named: Vec<_> = places.zip(&cloud.labels).collect();
             let y = TOP + 14.0 + 20.0 * row as f64;
             dot((LEFT + SIZE + 20.0, y - 4.0), 5.0);
             text(&mut svg, LEFT + SIZE + 32.0, y, "", &cloud.name);
+            for ((x, y), label) in named {
+                text(&mut svg, x + self.radius + 2.0, y - 3.0, "font-size=\"9\" fill=\"#333\"", label);
+            }
         }
         svg.push_str("</svg>\n");
         svg
@@ -131,20 +170,29 @@ mod tests {
 
     #[test]
     fn every_point_lies_in_the_plot_and_ticks_in_the_range() {
-        let cloud = Cloud { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)] };
+        let cloud =
+            Cloud { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)], labels: vec!["c".into()] };
         let plot = Scatter {
             title: "t".into(),
             x: "x".into(),
             y: "y".into(),
             clouds: vec![cloud],
             diagonal: true,
+            front: false,
             radius: 3.0,
         };
         let svg = plot.svg();
         assert_eq!(svg.matches("<circle").count(), 3);
-        assert!(svg.contains("a&lt;b"));
+        assert!(svg.contains("a&lt;b") && svg.contains(">c</text>"));
         assert_eq!(ticks((1.0, 12.0)), [1.0, 2.0, 5.0, 10.0]);
         assert_eq!(ticks((1.0, 1e4)), [1.0, 10.0, 100.0, 1e3, 1e4]);
         assert_eq!(range(std::iter::empty()), (1.0, 10.0));
+    }
+
+    #[test]
+    fn no_point_lies_below_the_stairs() {
+        let points = [(3.0, 3.0), (1.0, 5.0), (2.0, 6.0), (4.0, 1.0), (4.0, 2.0)];
+        let corners = [(1.0, 5.0), (3.0, 5.0), (3.0, 3.0), (4.0, 3.0), (4.0, 1.0)];
+        assert_eq!(stairs(points.into_iter()), corners);
     }
 }

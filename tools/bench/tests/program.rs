@@ -87,3 +87,48 @@ fn misspelled_names_are_refused_before_anything_is_measured() {
     let done = bench(&["speed", "no-such-model"]);
     assert!(String::from_utf8(done.stderr).unwrap().contains("neither a file nor a model"));
 }
+
+#[test]
+fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let tracers = "bvh,bvh scalar,bth,obvhs bvh2,k-d tree,embree compact";
+    let done = bench(&[
+        "accuracy",
+        "torus-knot:320",
+        "blob:400",
+        "--quick",
+        "--tracer",
+        tracers,
+        "--out",
+        out,
+        "--name",
+        "quick",
+    ]);
+    let (printed, said) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
+    assert!(done.status.success(), "{said}");
+    assert!(printed.contains("## All models") && said.contains("embree compact: not measured"), "{said}");
+
+    let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect();
+    let find = |end: &str| files.iter().find(|f| f.to_str().unwrap().ends_with(end)).expect(end);
+    let record = json(find("-quick.json"));
+    for model in record["models"].as_array().unwrap() {
+        for tracer in model["tracers"].as_array().unwrap() {
+            assert_eq!(tracer["aimed"]["rays"], 4000, "{tracer}");
+            assert!(tracer["nanoseconds"]["vertices"].as_f64().unwrap() > 0.0, "{tracer}");
+            let defects = ["false_misses", "leaks", "ghosts", "wrong_neighbours"].map(|kind| {
+                tracer["aimed"][kind].as_u64().unwrap() + tracer["ordinary"][kind].as_u64().unwrap()
+            });
+            let exact = ["bvh", "bth"].contains(&tracer["group"].as_str().unwrap());
+            // Rays exactly at vertices are lost by those that are not exact: were none, nothing would be measured.
+            assert_eq!(exact, defects == [0; 4], "{tracer}");
+            if exact {
+                assert!(tracer["t_ulp"]["max"].as_f64().unwrap() < 0.51, "{tracer}");
+                assert_eq!(tracer["rmse"], 0.0, "{tracer}");
+            }
+        }
+    }
+    for chart in ["wrong-against-time", "t-against-time", "t-against-bytes", "picture-against-bytes"] {
+        find(&format!("-quick-{chart}.svg"));
+    }
+}

@@ -115,6 +115,7 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
         let cloud = |e: usize| Cloud {
             name: ESTIMATORS[e].to_owned(),
             points: record.nodes.iter().map(|n| (n.nanoseconds[start], predicted(e, n))).collect(),
+            labels: Vec::new(),
         };
         let scatter = Scatter {
             title: format!("Predicted against measured, rays from {start_name}"),
@@ -122,6 +123,7 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
             y: "predicted ns a ray".to_owned(),
             clouds: (0..ESTIMATORS.len()).map(cloud).collect(),
             diagonal: true,
+            front: false,
             radius: 2.5,
         };
         charts.push(Chart { name: format!("scatter-{start_name}"), svg: scatter.svg() });
@@ -135,9 +137,10 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
         y: "median relative error of ns".to_owned(),
         clouds: ESTIMATORS
             .iter()
-            .map(|e| Cloud { name: (*e).to_owned(), points: judged(e).collect() })
+            .map(|e| Cloud { name: (*e).to_owned(), points: judged(e).collect(), labels: Vec::new() })
             .collect(),
         diagonal: false,
+        front: false,
         radius: 6.0,
     };
     charts.push(Chart { name: "pareto".to_owned(), svg: pareto.svg() });

@@ -25,12 +25,15 @@ pub struct Variant {
 
 const QUALITY_MEDIUM: c_int = 1;
 const QUALITY_HIGH: c_int = 2;
+const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
 /// What a caller gets who sets nothing; one ray a call.
 pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false };
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
+/// The mode that saves memory; one ray a call.
+pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
 

@@ -1,0 +1,143 @@
+//! What is compared: every structure, record and instruction set of ours, and the rivals.
+
+use super::truth::Geometry;
+use crate::model::Model;
+use crate::names::Names;
+use crate::ours::{self, Compiled, Kind};
+use crate::progress::Progress;
+use crate::rivals::RIVALS;
+use crate::speed::record::LeftOut;
+use crate::tracer::Contender;
+use anyhow::Result;
+use bth::Isa;
+use std::rc::Rc;
+
+/// A way to trace a model.
+pub(super) struct Subject {
+    /// Its name in tables.
+    pub(super) name: String,
+    /// Whose it is, for colours.
+    pub(super) group: &'static str,
+    pub(super) contender: Rc<Contender>,
+    /// Vector instructions, where they are ours to choose.
+    pub(super) isa: Option<Isa>,
+    /// Row of [`Subjects::geometries`]: the triangles that it has.
+    pub(super) geometry: usize,
+    /// Whether every answer has to be right.
+    pub(super) exact: bool,
+}
+
+/// All of them.
+pub(super) struct Subjects {
+    pub(super) subjects: Vec<Subject>,
+    /// The first is that of the source.
+    pub(super) geometries: Vec<Geometry>,
+    pub(super) left_out: Vec<LeftOut>,
+}
+
+/// Groups of tracers, in the order of the legend.
+pub(super) const GROUPS: [&str; 6] = ["bvh", "bth", "tets", "embree", "tinybvh", "others"];
+
+fn group(name: &str) -> &'static str {
+    GROUPS.into_iter().find(|group| name.starts_with(group)).unwrap_or("others")
+}
+
+/// Kinds that are measured with every instruction set, and not with the best only.
+fn on_every_isa(kind: &Kind) -> bool {
+    [ours::BVH.name, "tets link32"].contains(&kind.name)
+}
+
+/// Instruction sets of this machine, the best first.
+fn isas() -> Vec<Isa> {
+    Isa::ALL.into_iter().rev().filter(|isa| isa.is_available()).collect()
+}
+
+/// Names of all, whether this machine has them or not.
+pub(super) fn names() -> Vec<String> {
+    let own = ours::KINDS.iter().flat_map(|kind| {
+        let others = Isa::ALL.into_iter().filter(|_| on_every_isa(kind));
+        std::iter::once(kind.name.to_owned()).chain(others.map(|isa| format!("{} {isa}", kind.name)))
+    });
+    own.chain(RIVALS.iter().map(|rival| rival.name.to_owned())).collect()
+}
+
+impl Subjects {
+    /// Builds the selected ones. What cannot be built is left out and noted.
+    pub(super) fn build(
+        model: &Model,
+        bvh: &Compiled,
+        names: &Names,
+        progress: &Progress,
+    ) -> Result<Subjects> {
+        let mut all = Subjects {
+            subjects: Vec::new(),
+            geometries: vec![Geometry::new(&bvh.bytes, model.triangles())?],
+            left_out: Vec::new(),
+        };
+        // A model without one tetrahedralization of the whole has it with no record.
+        let mut no_tets = None;
+        for kind in &ours::KINDS {
+            let uses = uses(kind, names);
+            if uses.is_empty() {
+                continue;
+            }
+            progress.say(format!("{}: compiling {}", model.name, kind.name));
+            let compiled = match (&no_tets, kind.is_tets()) {
+                (Some(why), true) => Err(anyhow::anyhow!("{why}")),
+                _ if kind.name == ours::BVH.name => Ok(bvh.clone()),
+                _ => ours::compile(model, kind),
+            };
+            match compiled {
+                Ok(compiled) => all.add(kind, &compiled, uses)?,
+                Err(error) => {
+                    let why = format!("{error:#}");
+                    if kind.is_tets() {
+                        no_tets = Some(why.clone());
+                    }
+                    all.left_out.push(LeftOut { name: kind.name.to_owned(), why });
+                }
+            }
+        }
+        for rival in RIVALS.iter().filter(|rival| names.select(rival.name)) {
+            progress.say(format!("{}: building {}", model.name, rival.name));
+            match rival.build(model, 1) {
+                Ok(contender) => all.subjects.push(Subject {
+                    name: rival.name.to_owned(),
+                    group: group(rival.name),
+                    contender: Rc::new(contender),
+                    isa: None,
+                    geometry: 0,
+                    exact: false,
+                }),
+                Err(error) => {
+                    all.left_out.push(LeftOut { name: rival.name.to_owned(), why: format!("{error:#}") });
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
+        // The first is the batch without hints.
+        let Some(contender) = ours::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
+        let contender = Rc::new(contender);
+        self.subjects.extend(uses.into_iter().map(|(name, isa)| Subject {
+            name,
+            group: group(kind.name),
+            contender: contender.clone(),
+            isa: Some(isa),
+            geometry: 0,
+            exact: true,
+        }));
+        Ok(())
+    }
+}
+
+/// The selected ways to trace a structure: with the best instructions, and where it is to be, with the others.
+fn uses(kind: &Kind, names: &Names) -> Vec<(String, Isa)> {
+    let named = |(i, isa): (usize, Isa)| match i {
+        0 => Some((kind.name.to_owned(), isa)),
+        _ => on_every_isa(kind).then(|| (format!("{} {isa}", kind.name), isa)),
+    };
+    isas().into_iter().enumerate().filter_map(named).filter(|(name, _)| names.select(name)).collect()
+}

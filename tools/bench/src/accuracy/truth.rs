@@ -1,0 +1,83 @@
+//! The exact answers to a set of rays.
+
+use crate::rays::RaySet;
+use crate::tracer::{Batch, Tracer};
+use anyhow::{Result, ensure};
+use bth::Scene;
+use bth::rays::{Hit, Ray};
+use bth_oracle::Crossing;
+use rayon::prelude::*;
+
+/// Triangles as they are stored in a compiled file, and what finds the nearest.
+pub struct Geometry {
+    scene: Scene,
+    /// By id in the source; of a triangle without area, points at infinity, which nothing meets.
+    corners: Vec<[[f32; 3]; 3]>,
+}
+
+/// The exact nearest hit of a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact {
+    /// As our runtime reports it.
+    pub hit: Hit,
+    /// t before it is rounded to f32; infinite for a miss.
+    pub t: f64,
+}
+
+impl Geometry {
+    /// Of a compiled plain BVH.
+    ///
+    /// # Errors
+    /// If the runtime refuses the file, which would be a fault of ours.
+    pub fn new(bytes: &[u8], triangles: usize) -> Result<Geometry> {
+        let scene = bth::from_bytes(bytes)?;
+        let mut corners = vec![[[f32::INFINITY; 3]; 3]; triangles];
+        for triangle in bth_oracle::triangles(&scene.object(0)) {
+            corners[triangle.id as usize] = triangle.corners;
+        }
+        Ok(Geometry { scene, corners })
+    }
+
+    /// Where the line of a ray meets a triangle.
+    pub fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Crossing> {
+        let corners = self.corners.get(triangle as usize)?;
+        corners.iter().flatten().all(|x| x.is_finite()).then(|| bth_oracle::crossing(ray, *corners))?
+    }
+
+    /// The exact answers to a set. Our BVH finds them, as every triangle against every ray would take days; one in
+    /// `one_in` rays is compared with every triangle in exact arithmetic.
+    ///
+    /// # Errors
+    /// If one of those differs: our BVH would be wrong then, and this measurement worthless.
+    pub fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
+        let mut hits = vec![Hit::MISS; set.rays.len()];
+        self.scene.nearest_batch(&set.rays, None, &mut hits);
+        let wrong = (0..set.rays.len()).into_par_iter().step_by(one_in.max(1)).find_any(|&i| {
+            let truth = bth_oracle::nearest(&self.corners, &set.rays[i]);
+            truth.map(|t| (t.t_f64() as f32, t.triangles[0]))
+                != hits[i].is_hit().then(|| (hits[i].t, hits[i].surface.triangle))
+        });
+        ensure!(
+            wrong.is_none(),
+            "{}: our answer to ray {} is not the exact one",
+            set.name,
+            wrong.unwrap_or_default()
+        );
+        let exact = |(ray, hit): (&Ray, &Hit)| {
+            let at = self.crossing(ray, hit.surface.triangle);
+            Exact { hit: *hit, t: at.map_or(f64::INFINITY, |at| bth_oracle::to_f64(&at.t)) }
+        };
+        Ok(set.rays.par_iter().zip(&hits).map(exact).collect())
+    }
+}
+
+/// As what draws the exact picture.
+impl Tracer for Geometry {
+    fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
+        self.scene.nearest_batch(batch.rays, None, hits);
+    }
+
+    fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
+        self.scene.any_batch(batch.rays, None, found);
+    }
+}

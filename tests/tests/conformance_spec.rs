@@ -43,6 +43,7 @@ fn size_of_type(name: &str) -> usize {
     }
     match name {
         "u8" => 1,
+        "u16" => 2,
         "u32" | "i32" | "f32" => 4,
         "u64" | "f64" | "Link" => 8,
         _ => panic!("unknown type {name}"),
@@ -60,10 +61,14 @@ fn byte_tables_are_those_of_the_structures() {
         Header { identifier writer_version minimum_reader_version file_length section_offset section_count reserved
             required_features optional_features content_id table_hash header_hash }
         SectionEntry { kind flags object alignment offset length stride reserved count hash }
-        Object { lower upper root record triangles dropped depth reserved }
+        Object { lower upper root record triangles dropped depth coordinates grid_origin displacement }
         WideNode { bounds child }
         IndexedLeaf { vertex corner first triangles vertices reserved }
         RawLeaf { corner first triangles reserved }
+        IndexedLeaf16 { vertex corner first triangles vertices reserved }
+        IndexedLeaf21 { vertex high corner first triangles vertices reserved }
+        RawLeaf16 { corner first triangles reserved }
+        RawLeaf21 { corner high first triangles reserved }
         TetLeaf { lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags }
         TetVertex { position reserved }
         TetFace { vertex triangle tet opposite }

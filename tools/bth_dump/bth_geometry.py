@@ -1,11 +1,13 @@
-"""Geometry (format-spec/README.md, "Verifying"): F201 to F207, with exact rational arithmetic."""
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F208, with exact rational arithmetic."""
 
 import struct
 from fractions import Fraction
 
 import bth_container as c
+import bth_leaves
 from bth_container import NONE
-from bth_indices import INDEXED, NODE, TETS, child
+from bth_indices import TETS, child
+from bth_leaves import NODE
 from bth_tets import FACE_BIT
 
 
@@ -39,28 +41,25 @@ def check_geometry(view, tets):
     homes = _tree(view)
     for leaf, found in zip(view.tet_leaves, tets):
         _tet_leaf(view, leaf, found)
+    _displacement(view)
     missing = [t for t in range(view.triangles) if t not in homes]
     if len(missing) != view.dropped:
         raise view.invalid("F203", f"{len(missing)} triangles in no leaf, {view.dropped} dropped", c.OBJECT, 36)
     for t in missing:
-        if view.source and not is_zero_area([view.positions[v] for v in view.source[t]]):
+        if view.source and not is_zero_area(_source(view, t)):
             raise view.invalid("F207", f"triangle {t} has an area but no leaf", c.TRIANGLES, 12 * t)
 
 
-def _leaf_triangles(view, kind, line):
-    """Rows of TRIANGLE_IDS and corners of a leaf's triangles."""
-    at = 64 * line
-    if kind == INDEXED:
-        rows = struct.unpack_from("<48f", view.lines, at)
-        first, count = struct.unpack_from("<2I", view.lines, at + 240)
-        for t in range(count):
-            corners = (view.lines[at + 192 + 16 * k + t] for k in range(3))
-            yield first + t, [(rows[v], rows[16 + v], rows[32 + v]) for v in corners]
-    else:
-        rows = struct.unpack_from("<144f", view.lines, at)
-        first, count = struct.unpack_from("<2I", view.lines, at + 576)
-        for t in range(count):
-            yield first + t, [tuple(rows[48 * k + 16 * a + t] for a in range(3)) for k in range(3)]
+def _source(view, t):
+    """Corners of a triangle of the source, on the grid if there is one."""
+    return [bth_leaves.nearest(view.grid, view.positions[v]) for v in view.source[t]]
+
+
+def _displacement(view):
+    for row, p in enumerate(view.positions if view.grid else ()):
+        square = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(p, bth_leaves.nearest(view.grid, p)))
+        if square > Fraction(view.grid.displacement) ** 2:
+            raise view.invalid("F208", f"{p} is {float(square) ** 0.5} from the grid", c.POSITIONS, 12 * row)
 
 
 def _tree(view):
@@ -69,7 +68,7 @@ def _tree(view):
 
     def triangle(t, corners, number, section, at):
         if view.source:
-            source = [view.positions[v] for v in view.source[t]]
+            source = _source(view, t)
             if bits(source) != bits(corners):
                 raise view.invalid(number, f"triangle {t} is {source} in the source, {corners} here", section, at)
             if is_zero_area(source):
@@ -102,7 +101,7 @@ def _tree(view):
                 points += corners
             stack.append((leaf.subtree, [], index))
         else:
-            for row, corners in _leaf_triangles(view, kind, index):
+            for row, corners in bth_leaves.triangles(view, kind, index):
                 t = view.triangle_ids[row]
                 if leaf_row is None:
                     home(t, c.TRIANGLE_IDS, 4 * row)
@@ -112,7 +111,7 @@ def _tree(view):
                     if not here or t in beside[leaf_row]:
                         raise view.invalid("F203", f"triangle {t} in a subtree", c.TRIANGLE_IDS, 4 * row)
                     beside[leaf_row].add(t)
-                triangle(t, corners, "F201", c.LINES, 64 * index)
+                triangle(t, corners, "F201", c.LINES, 32 * bth_leaves.halves(view, kind, index).start)
                 points += corners
         late.append((boxes, points))
     for boxes, points in late:

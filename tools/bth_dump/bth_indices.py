@@ -4,12 +4,13 @@ import math
 import struct
 
 import bth_container as c
+import bth_leaves
 from bth_container import NONE
+from bth_leaves import INDEXED, NODE, RAW
 from bth_tets import derive
 
 MAX_DEPTH = 96
-NODE, INDEXED, RAW, TETS = "node", "indexed", "raw", "tets"
-LINES_OF = {NODE: 7, INDEXED: 4, RAW: 10}
+TETS = "tets"
 F32_MAX = struct.unpack("<f", struct.pack("<I", 0x7F7FFFFF))[0]
 
 
@@ -45,7 +46,6 @@ def _header(view):
     need(view.depth <= MAX_DEPTH, "F110", f"depth {view.depth}", 40)
     good = view.bounds_are_zero if view.root == NONE else is_box(view.lower, view.upper)
     need(good, "F103", f"bounds {view.lower} to {view.upper}", 0)
-    need(not any(view.reserved), "F104", "reserved fields are not zero", 44)
 
 
 def _sources(view):
@@ -106,9 +106,9 @@ def _homes(view):
 
 
 def _tree(view):
-    lines = len(view.lines) // 64
+    halves = len(view.lines) // 32
     claimed, referenced = set(), set()
-    # Code, nodes above, line of the parent, whether in a subtree, section and byte of the reference.
+    # Code, nodes above, first half line of the parent, whether in a subtree, section and byte of the reference.
     stack = [(view.root, 0, -1, False, c.OBJECT, 24)]
     while stack:
         code, depth, parent, in_subtree, section, at = stack.pop()
@@ -126,25 +126,26 @@ def _tree(view):
             referenced.add(index)
             stack.append((view.tet_leaves[index].subtree, depth, -1, True, c.TET_LEAVES, 64 * index + 56))
             continue
-        block = range(index, index + LINES_OF[kind])
-        if block.stop > lines:
-            raise view.invalid("F106", f"{kind} at line {index} of {lines}", section, at)
-        if index <= parent:
-            raise view.invalid("F107", f"line {index} below line {parent}", section, at)
+        block = bth_leaves.halves(view, kind, index)
+        if block.stop > halves:
+            raise view.invalid("F106", f"{kind} at half line {block.start} of {halves}", section, at)
+        if block.start <= parent:
+            raise view.invalid("F107", f"half line {block.start} below half line {parent}", section, at)
         if not claimed.isdisjoint(block):
-            raise view.invalid("F108", f"{kind} at line {index}", section, at)
+            raise view.invalid("F108", f"{kind} at half line {block.start}", section, at)
         claimed.update(block)
         if kind == NODE:
             if depth + 1 > min(view.depth, MAX_DEPTH):
                 raise view.invalid("F110", f"{depth + 1} nodes on a path", section, at)
             codes = _slots(view, index)
             for slot in reversed(range(16)):
-                stack.append((codes[slot], depth + 1, index, in_subtree, c.LINES, 64 * index + 384 + 4 * slot))
+                stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, 64 * index + 384 + 4 * slot))
         else:
-            (_indexed if kind == INDEXED else _raw)(view, index)
-    if len(claimed) != lines:
-        first = next(line for line in range(lines) if line not in claimed)
-        raise view.invalid("F109", f"line {first} is no block's", c.LINES, 64 * first)
+            bth_leaves.check(view, kind, index)
+    for half in range(halves):
+        spare = view.grid and half % 2 and not any(view.lines[32 * half : 32 * half + 32])
+        if half not in claimed and not spare:
+            raise view.invalid("F109", f"half line {half} is no block's", c.LINES, 32 * half)
     if len(referenced) != len(view.tet_leaves):
         raise view.invalid("F123", "a tet leaf without a reference", c.TET_LEAVES)
     for row, triangle in enumerate(view.triangle_ids):
@@ -164,47 +165,3 @@ def _slots(view, line):
         elif codes[i] != NONE or lower[i] != (F32_MAX,) * 3 or upper[i] != (-F32_MAX,) * 3:
             raise view.invalid("F111", f"slot {i} is neither used nor empty", c.LINES, 64 * line + 4 * i)
     return codes
-
-
-def _leaf_rows(view, line, first, triangles):
-    if not 1 <= triangles <= 16:
-        raise view.invalid("F113", f"{triangles} triangles", c.LINES, 64 * line)
-    if first + triangles > len(view.triangle_ids):
-        raise view.invalid("F115", f"{triangles} rows from {first}", c.LINES, 64 * line)
-
-
-def _coordinates(view, line, count, used):
-    """Checks rows of 16 coordinates of which some are used."""
-    for row in range(count):
-        at = 64 * (line + row)
-        values, bits = struct.unpack_from("<16f", view.lines, at), struct.unpack_from("<16I", view.lines, at)
-        for i in range(16):
-            if i < used and not math.isfinite(values[i]):
-                raise view.invalid("F117", f"coordinate {values[i]}", c.LINES, at + 4 * i)
-            if i >= used and bits[i] != bits[0]:
-                raise view.invalid("F118", "an unused coordinate differs from that of slot 0", c.LINES, at + 4 * i)
-
-
-def _indexed(view, line):
-    at = 64 * line
-    first, triangles, vertices, reserved = struct.unpack_from("<4I", view.lines, at + 240)
-    if not 1 <= vertices <= 16:
-        raise view.invalid("F113", f"{vertices} vertices", c.LINES, at + 248)
-    _leaf_rows(view, line, first, triangles)
-    for k in range(48):
-        corner = view.lines[at + 192 + k]
-        if k % 16 < triangles and corner >= vertices:
-            raise view.invalid("F114", f"corner {corner}", c.LINES, at + 192 + k)
-        if k % 16 >= triangles and corner:
-            raise view.invalid("F118", f"unused corner {corner}", c.LINES, at + 192 + k)
-    _coordinates(view, line, 3, vertices)
-    if reserved:
-        raise view.invalid("F118", "a reserved field is not zero", c.LINES, at + 252)
-
-
-def _raw(view, line):
-    first, triangles = struct.unpack_from("<2I", view.lines, 64 * line + 576)
-    _leaf_rows(view, line, first, triangles)
-    _coordinates(view, line, 9, triangles)
-    if any(view.lines[64 * line + 584 : 64 * line + 640]):
-        raise view.invalid("F118", "reserved fields are not zero", c.LINES, 64 * line + 584)

@@ -1,5 +1,6 @@
 """The sections of an object as Python values (format-spec/README.md, "Objects")."""
 
+import math
 import struct
 from collections import namedtuple
 
@@ -13,6 +14,15 @@ TetLeaf = namedtuple(
 )
 TetFace = namedtuple("TetFace", "vertex triangle tet opposite")
 HullFace = namedtuple("HullFace", "vertex tet opposite")
+Grid = namedtuple("Grid", "bits origin step displacement")
+
+
+def _is_exact(origin, step, bits):
+    """Whether all points of an axis of a grid are f32."""
+    if not math.isfinite(origin) or origin / step % 1:
+        return False
+    first, last = origin / step, origin / step + (1 << bits) - 1
+    return abs(first) <= 1 << 24 and last <= 1 << 24 and last * step <= (2 - 2**-23) * 2.0**127
 
 
 class ObjectView:
@@ -24,8 +34,8 @@ class ObjectView:
         self.lower, self.upper = struct.unpack_from("<3f", raw), struct.unpack_from("<3f", raw, 12)
         self.bounds_are_zero = not any(raw[:24])
         self.root, self.record_code, self.triangles, self.dropped, self.depth = struct.unpack_from("<5I", raw, 24)
-        self.reserved = struct.unpack_from("<5I", raw, 44)
         self.lines = self.bytes(c.LINES)
+        self.grid = self._grid(raw)
         self.triangle_ids = self.rows(c.TRIANGLE_IDS, "<I", scalar=True)
         self.triangle_homes = self.rows(c.TRIANGLE_HOMES, "<I", scalar=True)
         self.tet_leaves = [TetLeaf(r[:3], r[3:6], *r[6:]) for r in self.rows(c.TET_LEAVES, "<6f10I")]
@@ -38,6 +48,22 @@ class ObjectView:
         self.normals = self.rows(c.NORMALS, "<3f")
         self.uvs = self.rows(c.UVS, "<2f")
         self._read_tets()
+
+    def _grid(self, raw):
+        """The grid of the leaves' coordinates; None for f32."""
+        bits, *exponents = struct.unpack_from("<4B", raw, 44)
+        origin, displacement = struct.unpack_from("<3f", raw, 48), struct.unpack_from("<f", raw, 60)[0]
+        if not any(raw[44:48]):
+            grid, wrong = None, any(raw[48:64])
+        else:
+            wrong = bits not in (16, 21) or not all(1 <= e <= 254 for e in exponents)
+            wrong = wrong or not 0 <= displacement < math.inf
+            wrong = wrong or not self.container.header.required_features & c.FEATURE_GRID
+            grid = Grid(bits, origin, tuple(math.ldexp(1.0, e - 127) for e in exponents), displacement)
+            wrong = wrong or not all(_is_exact(o, s, bits) for o, s in zip(grid.origin, grid.step))
+        if wrong:
+            raise self.invalid("F104", f"coordinates {raw[44:64].hex()}", c.OBJECT, 44)
+        return grid
 
     def _read_tets(self):
         entry = self.container.by_key.get((self.index, c.TETS))

@@ -1,4 +1,4 @@
-//! The BTH compiler: mesh → bvh → marks → costs → tets → write.
+//! The BTH compiler: mesh → coordinates → bvh → marks → costs → tets → write.
 //!
 //! Each stage is `fn(&Input, &Options, &dyn Monitor) -> Result<(Output, Report)>`,
 //! knows nothing of files or terminals, and gives the same output at any number of threads.
@@ -6,6 +6,7 @@
 
 pub mod bvh;
 pub mod cached;
+pub mod coordinates;
 pub mod costs;
 pub mod error;
 pub mod jobs;

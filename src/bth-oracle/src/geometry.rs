@@ -21,7 +21,8 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
         match Child::from_code(code) {
             Some(Child::Node(line)) => stack.extend(object.node(line).child),
             Some(Child::Indexed(line)) => {
-                let leaf = object.indexed_leaf(line);
+                let mut room = None;
+                let leaf = object.indexed(line, &mut room);
                 for row in 0..leaf.triangles as usize {
                     let corners = [0, 1, 2].map(|c| {
                         let vertex = usize::from(leaf.corner[c][row]);
@@ -31,7 +32,8 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                 }
             }
             Some(Child::Raw(line)) => {
-                let leaf = object.raw_leaf(line);
+                let mut room = None;
+                let leaf = object.raw(line, &mut room);
                 for row in 0..leaf.triangles as usize {
                     let corners = leaf.corner.map(|axes| axes.map(|values| values[row]));
                     found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });

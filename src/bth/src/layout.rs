@@ -4,8 +4,10 @@
 //! All numbers are little-endian. Structures have no padding and no pointers:
 //! what refers to something else is an index, and [`NONE`] is no index.
 
+mod grid;
 mod scene;
 
+pub use grid::*;
 pub use scene::*;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -49,7 +51,7 @@ pub struct Header {
     pub section_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bits that a reader must know to read the file.
+    /// Bits that a reader must know to read the file: [`FEATURE_GRID`].
     pub required_features: u64,
     /// Bits that a reader may ignore.
     pub optional_features: u64,
@@ -86,6 +88,9 @@ pub struct SectionEntry {
     /// BLAKE3 (first 128 bits) of the section's bytes.
     pub hash: [u8; 16],
 }
+
+/// Bit of [`Header::required_features`]: an object stores the coordinates of its triangle leaves on a [`Grid`].
+pub const FEATURE_GRID: u64 = 1;
 
 /// Flag bit of [`SectionEntry::flags`]: unknown kinds with it are refused.
 pub const SECTION_REQUIRED: u32 = 1;
@@ -174,8 +179,14 @@ pub struct Object {
     pub dropped: u32,
     /// Wide nodes on the longest path from the root.
     pub depth: u32,
-    /// Zero.
-    pub reserved: [u32; 5],
+    /// Bits of a coordinate of a triangle leaf in the lowest byte: 16, 21, or 0 for `f32`. Then per axis the exponent
+    /// field, as of an `f32`, of the power of two between neighbouring points of the [`Grid`]. All zero for `f32`, as
+    /// the following.
+    pub coordinates: u32,
+    /// The grid's least point.
+    pub grid_origin: [f32; 3],
+    /// Greatest distance of a stored vertex from that of the source, object space.
+    pub displacement: f32,
 }
 
 /// Which record the `TETS` section holds (`Object::record`).
@@ -225,9 +236,9 @@ impl RecordKind {
 pub enum Child {
     /// Line of a [`WideNode`].
     Node(u32),
-    /// Line of an [`IndexedLeaf`].
+    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`IndexedLeaf16`] or [`IndexedLeaf21`].
     Indexed(u32),
-    /// Line of a [`RawLeaf`].
+    /// Line of a [`RawLeaf`]; on a grid the half line of a [`RawLeaf16`] or [`RawLeaf21`].
     Raw(u32),
     /// Row of `TET_LEAVES`.
     Tets(u32),
@@ -433,7 +444,8 @@ assert_layout! {
         required_features 48, optional_features 56, content_id 64, table_hash 96, header_hash 112 }
     SectionEntry 64 { kind 0, flags 4, object 8, alignment 12, offset 16, length 24, stride 32, count 40, hash 48 }
     Line 64 {}
-    Object 64 { lower 0, upper 12, root 24, record 28, triangles 32, dropped 36, depth 40 }
+    Object 64 { lower 0, upper 12, root 24, record 28, triangles 32, dropped 36, depth 40, coordinates 44,
+        grid_origin 48, displacement 60 }
     WideNode 448 { child 384 }
     IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }
     RawLeaf 640 { first 576, triangles 580 }

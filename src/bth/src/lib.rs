@@ -28,6 +28,7 @@ mod simd;
 #[cfg(test)]
 mod testing;
 mod trace;
+mod unpack;
 pub mod verify;
 
 pub use error::{Code, Error};

@@ -40,6 +40,8 @@ impl Records<'_> {
 pub struct ObjectView<'a> {
     /// Bounds, root and counts.
     pub header: &'a Object,
+    /// Where coordinates of triangle leaves lie, unless they are `f32`.
+    pub grid: Option<Grid>,
     /// Nodes and triangle leaves.
     pub lines: &'a [Line],
     /// Source id of each triangle in leaf order.
@@ -83,14 +85,14 @@ impl<'a> ObjectView<'a> {
     pub fn node(&self, line: u32) -> &'a WideNode {
         self.block(line, NODE_LINES)
     }
-    /// The indexed leaf at a line; panics as [`Self::node`] does.
+    /// The indexed leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
-    pub fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
+    pub(crate) fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
         self.block(line, INDEXED_LINES)
     }
-    /// The raw leaf at a line; panics as [`Self::node`] does.
+    /// The raw leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
-    pub fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
+    pub(crate) fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
         self.block(line, RAW_LINES)
     }
 }

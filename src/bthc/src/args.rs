@@ -2,6 +2,7 @@
 
 use crate::cache_args::{Cache, Keeping};
 use crate::jobs_args::Jobs;
+use bth::layout::GridBits;
 use bth_compile::mesh::Keep;
 use clap::{Args as Group, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -74,6 +75,14 @@ pub(crate) struct Compile {
     /// Record that stores a tetrahedron.
     #[arg(long, value_enum, default_value_t = Record::Link32, value_name = "RECORD")]
     pub(crate) tets: Record,
+    /// Bits of a coordinate of a triangle leaf: f32, 21 or 16 over the object's box. Fewer make smaller files; vertices
+    /// move to the nearest points of a grid. By default f32, or what --max-error asks for.
+    #[arg(long, value_name = "BITS", value_enum)]
+    pub(crate) coordinates: Option<Coordinates>,
+    /// Greatest distance that a vertex may move: in the units of the object (0.001), or as a share of the diagonal of its box
+    /// (0.01%). The fewest bits that honour it are taken; with --coordinates, more is refused.
+    #[arg(long, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
+    pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
     /// Shading attributes to keep.
     #[arg(long, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
@@ -507,6 +516,19 @@ impl From<Probe> for bth_compile::costs::Probe {
     }
 }
 
+/// Bits of a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Coordinates {
+    /// As in the source.
+    F32,
+    /// 21 bits.
+    #[value(name = "21")]
+    B21,
+    /// 16 bits.
+    #[value(name = "16")]
+    B16,
+}
+
 impl From<Structure> for bth_compile::pipeline::Structure {
     fn from(structure: Structure) -> Self {
         match structure {
@@ -527,6 +549,7 @@ impl Compile {
             structure: self.structure.into(),
             attributes: self.attributes.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
+            coordinates: self.coordinates(),
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
                 None => self.structure == Structure::Bth && !self.compact,
@@ -543,6 +566,17 @@ impl Compile {
             options.tets.memory = mib << 20;
         }
         Ok(options)
+    }
+
+    fn coordinates(&self) -> bth_compile::coordinates::Options {
+        let bits = match self.coordinates {
+            // Asked for by name: nothing moves, whatever may.
+            Some(Coordinates::F32) => return Default::default(),
+            Some(Coordinates::B21) => Some(GridBits::B21),
+            Some(Coordinates::B16) => Some(GridBits::B16),
+            None => None,
+        };
+        bth_compile::coordinates::Options { bits, max_error: self.max_error }
     }
 }
 

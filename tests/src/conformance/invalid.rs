@@ -65,7 +65,7 @@ fn container() -> Vec<Case> {
             4,
         ),
         broken("F007-unknown-feature", "triangle", Seal::Header, |e| {
-            e.put(offset_of!(Header, required_features), &one);
+            e.put(offset_of!(Header, required_features), &2u32.to_le_bytes());
         }),
         broken("F008-table-too-long", "triangle", Seal::Header, |e| {
             e.put(offset_of!(Header, section_count), &1000u32.to_le_bytes());
@@ -163,6 +163,8 @@ fn container() -> Vec<Case> {
 const INNER: usize = 448;
 const LEAF: usize = 896;
 const RAW: usize = 1152;
+/// Byte of LINES of `grid-21` behind its last leaf: nodes, three indexed leaves and two raw ones.
+const GRID_END: usize = LEAF + 3 * 160 + 2 * 416;
 /// Byte of a node's child code.
 const fn child(slot: usize) -> usize {
     384 + 4 * slot
@@ -173,6 +175,7 @@ fn tree() -> Vec<Case> {
     let object = |name, at, value| field(name, base, kind::OBJECT, at, value);
     let line = |name, at, value| field(name, base, kind::LINES, at, value);
     let nan = f32::NAN.to_bits();
+    let grid = |name, kind, at, value| field(name, "grid-21", kind, at, value);
     vec![
         object("F101-record-without-tets", offset_of!(Object, record), 1),
         field("F101-other-record", "tets-tet20", kind::OBJECT, offset_of!(Object, record), 4),
@@ -186,7 +189,14 @@ fn tree() -> Vec<Case> {
             offset_of!(Object, upper),
             1f32.to_bits(),
         ),
-        object("F104-reserved", offset_of!(Object, reserved), 1),
+        object("F104-bits", offset_of!(Object, coordinates), 17),
+        object("F104-origin-of-no-grid", offset_of!(Object, grid_origin), 1),
+        object("F104-not-announced", offset_of!(Object, coordinates), 0x7f7f_7f10),
+        grid("F104-step", kind::OBJECT, offset_of!(Object, coordinates), 0x00ff_7f10),
+        grid("F104-origin-between", kind::OBJECT, offset_of!(Object, grid_origin), 1e-7f32.to_bits()),
+        grid("F104-displacement", kind::OBJECT, offset_of!(Object, displacement), nan),
+        grid("F109-half-a-line", kind::LINES, GRID_END, 1),
+        grid("F118-high-bit", kind::LINES, LEAF + 96, 1 << 15),
         line("F105-unassigned", child(0), 7 << 29),
         object("F105-root", offset_of!(Object, root), 1 << 29),
         line("F106-node", child(0), Child::Node(10_000).code()),
@@ -286,6 +296,8 @@ fn geometry() -> Vec<Case> {
     let half = 0.5f32.to_bits();
     vec![
         field("F201-other-vertex", base, kind::LINES, LEAF + 132, half),
+        field("F201-other-point", "grid-16", kind::LINES, LEAF + 4, 1),
+        field("F208-displacement", "grid-21", kind::OBJECT, offset_of!(Object, displacement), 1),
         field("F202-other-vertex", tets, kind::TET_VERTICES, 16, half),
         field("F203-triangle-twice", base, kind::TRIANGLE_IDS, 4, 0),
         field("F203-subtree-of-others", tets, kind::TRIANGLE_IDS, 4, 4),

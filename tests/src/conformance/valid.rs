@@ -2,6 +2,8 @@
 
 use super::Case;
 use bth::layout::*;
+use bth_compile::bvh::Wide;
+use bth_compile::coordinates::pack;
 use bth_compile::write::{FileBuilder, ObjectParts, Source, object};
 use zerocopy::IntoBytes;
 
@@ -12,7 +14,9 @@ pub fn valid() -> Vec<Case> {
         Case::new("nothing-to-hit", nothing_to_hit()),
         Case::new("triangle", triangle()),
         Case::new("triangle-bare", triangle_bare()),
-        Case::new("two-levels", two_levels()),
+        Case::new("two-levels", two_levels(None)),
+        Case::new("grid-16", two_levels(Some(GridBits::B16))),
+        Case::new("grid-21", two_levels(Some(GridBits::B21))),
         Case::new("two-objects", two_objects()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
@@ -123,8 +127,9 @@ fn triangle_bare() -> Vec<u8> {
 }
 
 /// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
-/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept.
-fn two_levels() -> Vec<u8> {
+/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are on a
+/// grid, a little beside the source's positions.
+fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
     let mut positions = Vec::new();
     for y in 0..6 {
         for x in 0..5 {
@@ -163,6 +168,23 @@ fn two_levels() -> Vec<u8> {
     all.extend(lines(indexed(&range(16, 24), 16).as_bytes()));
     all.extend(lines(indexed(&range(24, 32), 24).as_bytes()));
     all.extend(lines(raw(&range(32, 40), 32).as_bytes()));
+    let mut wide = Wide {
+        lines: all,
+        triangle_ids: (0..40).collect(),
+        root: Child::Node(0).code(),
+        depth: 2,
+        subtrees: Vec::new(),
+    };
+    let bounds = bounds(&positions);
+    let grid = bits.map(|bits| {
+        let step = [8.0, 8.0, 16.0].map(|extent| extent / (1u32 << bits as u32) as f32);
+        let grid = Grid { bits, origin: [0.0; 3], step };
+        pack(&mut wide, &grid).expect("a few lines");
+        // So that who compares with the source has to round.
+        let off = step.map(|s| 0.375 * s);
+        positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| p[k] + off[k]));
+        (grid, off.iter().map(|x| x * x).sum::<f32>().sqrt().next_up())
+    });
     let normals = vec![[0.0, 0.0, 1.0]; positions.len()];
     let uvs: Vec<_> = positions.iter().map(|p| [p[0] / 4.0, p[1] / 5.0]).collect();
     let source = Source {
@@ -173,12 +195,13 @@ fn two_levels() -> Vec<u8> {
         uvs: &uvs,
     };
     file(&ObjectParts {
-        bounds: Some(bounds(&positions)),
-        root: Child::Node(0).code(),
+        bounds: Some(bounds),
+        root: wide.root,
         triangles: 41,
         dropped: 1,
-        lines: &all,
-        triangle_ids: &(0..40).collect::<Vec<_>>(),
+        grid,
+        lines: &wide.lines,
+        triangle_ids: &wide.triangle_ids,
         source: Some(source),
         ..ObjectParts::default()
     })
@@ -252,6 +275,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         root: Child::Node(0).code(),
         triangles: 6,
         dropped: 1,
+        grid: None,
         lines: &all,
         triangle_ids: &[4, 0, 1],
         record: Some(record),

@@ -4,8 +4,9 @@ use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Context, Result};
 use bth::Scene;
-use bth::layout::RecordKind;
+use bth::layout::{GridBits, RecordKind};
 use bth::rays::{Hit, Surface};
+use bth_compile::coordinates;
 use bth_compile::pipeline::{self, Options, Structure};
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,17 +21,20 @@ pub struct Kind {
     pub name: &'static str,
     structure: Structure,
     record: RecordKind,
+    bits: Option<GridBits>,
 }
+
+const LINK32: Kind = Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, bits: None };
 
 /// The structures. The default file comes first, then the plain BVH, which is also what finds the hits
 /// that secondary rays start from.
 pub const KINDS: [Kind; 6] = [
-    Kind { name: "bth", structure: Structure::Bth, record: RecordKind::Link32 },
-    Kind { name: "bvh", structure: Structure::Bvh, record: RecordKind::Link32 },
-    Kind { name: "tets link32", structure: Structure::Tets, record: RecordKind::Link32 },
-    Kind { name: "tets tet32", structure: Structure::Tets, record: RecordKind::Tet32 },
-    Kind { name: "tets tet20", structure: Structure::Tets, record: RecordKind::Tet20 },
-    Kind { name: "tets tet16", structure: Structure::Tets, record: RecordKind::Tet16 },
+    Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
+    Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
+    Kind { name: "tets link32", ..LINK32 },
+    Kind { name: "tets tet32", record: RecordKind::Tet32, ..LINK32 },
+    Kind { name: "tets tet20", record: RecordKind::Tet20, ..LINK32 },
+    Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
 ];
 
 /// The default file.
@@ -38,7 +42,18 @@ pub const BTH: Kind = KINDS[0];
 /// The plain BVH.
 pub const BVH: Kind = KINDS[1];
 
+/// The plain BVH with coordinates of fewer bits: other triangles, so other answers.
+pub const ON_GRID: [Kind; 2] = [
+    Kind { name: "bvh 21 bits", bits: Some(GridBits::B21), ..BVH },
+    Kind { name: "bvh 16 bits", bits: Some(GridBits::B16), ..BVH },
+];
+
 impl Kind {
+    /// Whether its triangles are not those of the source.
+    pub fn is_on_grid(&self) -> bool {
+        self.bits.is_some()
+    }
+
     /// Whether it is a tetrahedralization of the whole model, which not every model has.
     pub fn is_tets(&self) -> bool {
         self.structure == Structure::Tets
@@ -63,6 +78,7 @@ impl Kind {
         Options {
             structure: self.structure,
             record: self.record,
+            coordinates: coordinates::Options { bits: self.bits, max_error: None },
             keep_subtrees: !self.is_tets(),
             ..Options::default()
         }

@@ -68,6 +68,14 @@ pub struct CollapseReport {
     pub seconds: f64,
 }
 
+impl CollapseReport {
+    /// Takes down how many bytes there are.
+    pub(crate) fn measure(&mut self, wide: &Wide) {
+        self.bytes = 64 * wide.lines.len() as u64 + 4 * wide.triangle_ids.len() as u64;
+        self.bytes_per_triangle = self.bytes as f64 / (wide.triangle_ids.len() as f64).max(1.0);
+    }
+}
+
 /// Collapses a binary BVH to the nodes and leaves of the file. The nodes in `cut` (ascending, none
 /// below another) become tet leaves: the i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
 ///
@@ -109,8 +117,7 @@ pub fn collapse(
     report.depth = wide.depth;
     report.node_visits /= root_area;
     report.leaf_visits /= root_area;
-    report.bytes = 64 * wide.lines.len() as u64 + 4 * wide.triangle_ids.len() as u64;
-    report.bytes_per_triangle = report.bytes as f64 / (wide.triangle_ids.len() as f64).max(1.0);
+    report.measure(&wide);
     report.seconds = start.elapsed().as_secs_f64();
     Ok((wide, report))
 }

@@ -15,6 +15,7 @@ use zerocopy::{Immutable, IntoBytes};
 
 /// Versions of what the stages make.
 const MESH: &str = "1";
+const COORDINATES: &str = "1";
 const BVH: &str = "1";
 const MARKS: &str = "1";
 const COSTS: &str = "2";
@@ -40,7 +41,7 @@ pub(crate) fn extension(path: &Path) -> String {
 }
 
 /// Hash of a mesh's positions and triangles, which is what all stages but the last read.
-pub(super) fn geometry(mesh: &Mesh) -> Digest {
+pub(crate) fn geometry(mesh: &Mesh) -> Digest {
     let mut hasher = Rows::new("geometry");
     hasher.add(&mesh.positions);
     hasher.add(&mesh.triangles);
@@ -154,6 +155,12 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
         ("collapse version", COLLAPSE.to_owned()),
         ("file version", format!("{FILE}.{}", bth::layout::WRITER_VERSION)),
     ];
+    if options.coordinates != Default::default() {
+        all.extend([
+            ("coordinates", text(&options.coordinates)),
+            ("coordinates version", COORDINATES.to_owned()),
+        ]);
+    }
     if options.structure != Structure::Bvh {
         all.extend([
             ("tets", options.record.name().to_owned()),

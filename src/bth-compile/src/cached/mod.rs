@@ -11,7 +11,7 @@ mod rows;
 mod sources;
 mod tree;
 
-pub(crate) use keys::{ObjectKeys, bvh, extension, file, marks, mesh, scene, tets_of_node};
+pub(crate) use keys::{ObjectKeys, bvh, extension, file, geometry, marks, mesh, scene, tets_of_node};
 pub use log::{Log, Miss};
 pub(crate) use results::MeshFacts;
 pub use sources::{SourceDigest, files};

@@ -13,7 +13,7 @@ pub use options::{Options, Structure};
 use crate::cached::{self, Cache, Topology};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::{bvh, costs, marks, mesh, tets};
+use crate::{bvh, coordinates, costs, marks, mesh, tets};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -34,6 +34,9 @@ pub struct Report {
     pub seconds: Vec<StageTime>,
     /// Import.
     pub mesh: mesh::Report,
+    /// Coordinates, unless they are `f32`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinates: Option<coordinates::Report>,
     /// Binary BVH.
     pub bvh: bvh::Report,
     /// Marking; absent when no tetrahedra were asked for, as the next two.
@@ -121,16 +124,20 @@ fn compile_model(
         resident_bytes,
         resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
     };
-    let Reports { bvh, marks, costs, tets, probe, collapse } = reports;
+    let Reports { coordinates, bvh, marks, costs, tets, probe, collapse } = reports;
     let seconds = clock.0;
+    let mesh = mesh_report;
     let report =
-        Report { source_blake3, seconds, mesh: mesh_report, bvh, marks, costs, tets, probe, collapse, file };
+        Report { source_blake3, seconds, mesh, coordinates, bvh, marks, costs, tets, probe, collapse, file };
     Ok((Compiled { bytes }, report))
 }
 
 /// An object that is ready to be written.
 pub(crate) struct Object {
+    /// As it is traced.
     pub(crate) mesh: mesh::Mesh,
+    /// How it was before, if its positions were moved.
+    on_grid: Option<coordinates::OnGrid>,
     tree: bvh::BinaryBvh,
     wide: bvh::Wide,
     /// Absent without tet leaves.
@@ -141,6 +148,7 @@ pub(crate) struct Object {
 
 /// What the stages from the mesh to the wide BVH found; see [`Report`].
 pub(crate) struct Reports {
+    coordinates: Option<coordinates::Report>,
     bvh: bvh::Report,
     marks: Option<marks::Report>,
     costs: Option<costs::Report>,
@@ -154,12 +162,19 @@ pub(crate) struct Reports {
 pub(crate) fn build(
     source: &Path,
     part: &str,
-    (mesh, geometry): (mesh::Mesh, &bth_cache::Digest),
+    (mut mesh, geometry): (mesh::Mesh, &bth_cache::Digest),
     options: &Options,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
     clock: &mut Clock,
 ) -> Result<(Object, Reports)> {
+    let mut on_grid = None;
+    if options.coordinates != coordinates::Options::default() {
+        on_grid =
+            clock.time("coordinates", || coordinates::place(source, &mut mesh, &options.coordinates))?;
+    }
+    let moved = on_grid.as_ref().map(|_| cached::geometry(&mesh));
+    let geometry = moved.as_ref().unwrap_or(geometry);
     let (tree, bvh_report) = clock.time("bvh", || {
         cache.stage(
             || cached::bvh(geometry, &options.bvh),
@@ -190,14 +205,16 @@ pub(crate) fn build(
         (meshes, probe) = clock.time("probe", || structure::probe(&mesh, &tree, built, options, monitor))?;
         reports = (Some(marks_report), costs_report, Some(tets_report));
     }
-    let (object, collapse) = clock.time("collapse", || object(mesh, tree, meshes, options, monitor))?;
+    let (object, collapse) =
+        clock.time("collapse", || object((mesh, on_grid), tree, meshes, options, monitor))?;
     let (marks, costs, tets) = reports;
-    Ok((object, Reports { bvh: bvh_report, marks, costs, tets, probe, collapse }))
+    let coordinates = object.on_grid.as_ref().map(coordinates::OnGrid::report);
+    Ok((object, Reports { coordinates, bvh: bvh_report, marks, costs, tets, probe, collapse }))
 }
 
 /// Joins what the stages made of a mesh.
 fn object(
-    mesh: mesh::Mesh,
+    (mesh, on_grid): (mesh::Mesh, Option<coordinates::OnGrid>),
     tree: bvh::BinaryBvh,
     built: Vec<(u32, tets::TetMesh)>,
     options: &Options,
@@ -205,12 +222,16 @@ fn object(
 ) -> Result<(Object, bvh::CollapseReport)> {
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
-    let (wide, collapse) = bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor)?;
+    let (mut wide, mut collapse) = bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor)?;
+    if let Some(on_grid) = &on_grid {
+        coordinates::pack(&mut wide, &on_grid.grid)?;
+        collapse.measure(&wide);
+    }
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
     let (tet_leaves, tet_triangles) =
         (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
-    Ok((Object { mesh, tree, wide, encoded, tet_leaves, tet_triangles }, collapse))
+    Ok((Object { mesh, on_grid, tree, wide, encoded, tet_leaves, tet_triangles }, collapse))
 }
 
 /// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes: for
@@ -225,7 +246,7 @@ pub fn assemble(
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<Compiled> {
-    let (object, _) = object(mesh.clone(), tree.clone(), built.to_vec(), options, monitor)?;
+    let (object, _) = object((mesh.clone(), None), tree.clone(), built.to_vec(), options, monitor)?;
     let (bytes, _) = parts::file(&object, "{}".to_owned(), options)?;
     Ok(Compiled { bytes })
 }

@@ -1,6 +1,6 @@
 //! The options of a compilation.
 
-use crate::{bvh, costs, mesh, tets};
+use crate::{bvh, coordinates, costs, mesh, tets};
 use bth::layout::RecordKind;
 use serde::Serialize;
 
@@ -24,6 +24,8 @@ pub struct Options {
     pub structure: Structure,
     /// Shading attributes to keep.
     pub attributes: mesh::Keep,
+    /// Coordinates that triangle leaves store.
+    pub coordinates: coordinates::Options,
     /// Builder of the binary BVH.
     pub bvh: bvh::Options,
     /// Collapse to the wide BVH; `keep_subtrees` below overrules the one in here.
@@ -48,6 +50,7 @@ impl Default for Options {
         Self {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
+            coordinates: coordinates::Options::default(),
             bvh: bvh::Options::default(),
             collapse: bvh::CollapseOptions::default(),
             costs: costs::Options::default(),

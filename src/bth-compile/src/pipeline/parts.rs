@@ -37,9 +37,11 @@ pub(crate) fn parts<'a>(object: &'a Object, options: &Options) -> write::ObjectP
         parts.hull_faces = &encoded.hulls;
         parts.triangle_homes = &encoded.homes;
     }
+    parts.grid = object.on_grid.as_ref().map(|on| (on.grid, on.displacement));
     let mut source = write::Source::default();
     if options.geometry {
-        (source.positions, source.triangles) = (&mesh.positions, &mesh.triangles);
+        let positions = object.on_grid.as_ref().map_or(&mesh.positions, |on| &on.source);
+        (source.positions, source.triangles) = (positions, &mesh.triangles);
     }
     if let Some(attributes) = &mesh.attributes {
         source.corners = &attributes.corners;

@@ -47,7 +47,7 @@ pub(crate) fn of_scene(
 }
 
 fn chosen(options: &Options) -> serde_json::Value {
-    json!({
+    let mut chosen = json!({
         "structure": options.structure,
         "quality": options.bvh.quality,
         "attributes": options.attributes,
@@ -55,7 +55,11 @@ fn chosen(options: &Options) -> serde_json::Value {
         "selection": (options.structure == Structure::Bth).then_some(&options.costs),
         "keep_subtrees": options.keep_subtrees,
         "geometry": options.geometry,
-    })
+    });
+    if options.coordinates != Default::default() {
+        chosen["coordinates"] = json!(options.coordinates);
+    }
+    chosen
 }
 
 fn text(value: serde_json::Value) -> Result<String> {

@@ -313,7 +313,9 @@ fn rays(
 ) -> Result<Vec<Arc<costs::Weighting>>> {
     let Context { cache, monitor, .. } = *context;
     let costs = costs::Options { for_scene: false, ..context.options.costs.clone() };
-    let options = Options { structure: Structure::Bvh, geometry: true, costs, ..context.options.clone() };
+    let coordinates = Default::default();
+    let options =
+        Options { structure: Structure::Bvh, geometry: true, costs, coordinates, ..context.options.clone() };
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
     let (compiled, _) = build(manifest, plan, name, &plain, Clock::default())?;

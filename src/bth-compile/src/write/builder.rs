@@ -142,7 +142,7 @@ impl<'a> FileBuilder<'a> {
             section_offset: size_of::<Header>() as u64,
             section_count: entries.len() as u32,
             reserved: 0,
-            required_features: 0,
+            required_features: self.required_features(),
             optional_features: 0,
             content_id: content_id(&entries),
             table_hash: hash128(entries.as_bytes()),
@@ -159,6 +159,15 @@ impl<'a> FileBuilder<'a> {
             at = entry.offset + entry.length;
         }
         out.write_all(&zeros[..(header.file_length - at) as usize])
+    }
+
+    /// What the objects need.
+    fn required_features(&self) -> u64 {
+        let at = std::mem::offset_of!(Object, coordinates);
+        let on_grid = |((_, kind), section): (&(u32, u32), &Section<'_>)| {
+            *kind == kind::OBJECT && section.bytes.get(at..at + 4).is_some_and(|code| code != [0; 4])
+        };
+        if self.sections.iter().any(on_grid) { FEATURE_GRID } else { 0 }
     }
 
     fn table_end(&self) -> u64 {

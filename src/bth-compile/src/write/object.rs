@@ -18,6 +18,8 @@ pub struct ObjectParts<'a> {
     pub triangles: u32,
     /// Triangles of zero area, which no leaf holds.
     pub dropped: u32,
+    /// Grid of the coordinates in triangle leaves, and the greatest distance that a vertex moved; `None` for `f32`.
+    pub grid: Option<(Grid, f32)>,
     /// Nodes and triangle leaves.
     pub lines: &'a [Line],
     /// Source id of each triangle in leaf order.
@@ -71,6 +73,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     // Without tet leaves there is no record, and no triangle has a home.
     let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
     let (lower, upper) = parts.bounds.unwrap_or_default();
+    let (coordinates, grid_origin) = parts.grid.map_or_else(Default::default, |(grid, _)| grid.fields());
     let header = Object {
         lower,
         upper,
@@ -79,7 +82,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
-        reserved: [0; 5],
+        coordinates,
+        grid_origin,
+        displacement: parts.grid.map_or(0.0, |(_, displacement)| displacement),
     };
     let row: Cow<'a, [u8]> = header.as_bytes().to_vec().into();
     builder.section(kind::OBJECT, index, size_of::<Object>() as u32, row)?;

@@ -5,8 +5,28 @@ use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
+/// Checks a triangle leaf at a byte of LINES.
+pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
+    let rows = view.triangle_ids.len();
+    let checked = match child {
+        Child::Indexed(index) => indexed(view.indexed(index, &mut None), start, rows),
+        Child::Raw(index) => raw(view.raw(index, &mut None), start, rows),
+        Child::Node(_) | Child::Tets(_) => Ok(()),
+    };
+    if view.grid.is_none() {
+        return checked;
+    }
+    // Places within an unpacked leaf are none of the file.
+    let whole = |e: Error| Error::within(e.code(), kind::LINES, start, e.expected(), e.found());
+    checked.map_err(whole)?;
+    match view.unused_bits(child) {
+        0 => Ok(()),
+        found => Err(Error::within(Code::LeafUnused, kind::LINES, start, "0", format!("{found:#x}"))),
+    }
+}
+
 /// Checks an indexed leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
-pub(super) fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
+fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
     let fail = |code, offset: usize, expected: &str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
@@ -42,7 +62,7 @@ pub(super) fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()>
 }
 
 /// Checks a raw leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
-pub(super) fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
+fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
     counts(leaf.triangles, start + offset_of!(RawLeaf, triangles) as u64)?;
     range(leaf.first, leaf.triangles, rows, start + offset_of!(RawLeaf, first) as u64)?;
     for (k, row) in leaf.corner.iter().flatten().enumerate() {

@@ -78,14 +78,6 @@ fn header(view: &ObjectView) -> Result<()> {
         let expected = if h.root == NONE { "zeros, without a root" } else { "finite bounds, lower <= upper" };
         return fail(Code::ObjectBounds, 0, expected.into(), format!("{:?} to {:?}", h.lower, h.upper));
     }
-    if h.reserved != [0; 5] {
-        return fail(
-            Code::ObjectReserved,
-            offset_of!(Object, reserved),
-            "zeros".into(),
-            format!("{:?}", h.reserved),
-        );
-    }
     Ok(())
 }
 

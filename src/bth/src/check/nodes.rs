@@ -6,14 +6,15 @@ use crate::layout::*;
 use crate::limits;
 use crate::object::ObjectView;
 use std::mem::offset_of;
+use zerocopy::IntoBytes;
 
 /// A reference to a child that is still to be visited.
 struct Visit {
     code: u32,
     /// Wide nodes above it.
     depth: u32,
-    /// Line of the node that refers to it, if one does.
-    parent: Option<u32>,
+    /// First half line of the node that refers to it, if one does.
+    parent: Option<u64>,
     /// Whether it lies in the subtree beside a tet leaf.
     in_subtree: bool,
     /// Where the reference stands: section and byte of it.
@@ -25,7 +26,9 @@ struct Visit {
 /// A block is claimed when it is reached; claiming a line twice is an error. So every block is
 /// visited once, the work is O(lines) and there is no cycle.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
-    let mut claimed = Bits::new(view.lines.len());
+    // By half lines, in which leaves on a grid are counted.
+    let halves = 2 * view.lines.len();
+    let mut claimed = Bits::new(halves);
     let mut referenced = Bits::new(view.tet_leaves.len());
     let root = Visit {
         code: view.header.root,
@@ -53,11 +56,9 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
                 format!("{:#010x}", visit.code),
             );
         };
-        let (line, lines) = match child {
-            Child::Node(line) => (line, NODE_LINES),
-            Child::Indexed(line) => (line, INDEXED_LINES),
-            Child::Raw(line) => (line, RAW_LINES),
-            Child::Tets(row) => {
+        let (first, count) = match (child, view.half_lines(child)) {
+            (_, Some(block)) => block,
+            (Child::Tets(row), _) => {
                 let rows = view.tet_leaves.len();
                 if row as usize >= rows {
                     return fail(Code::ChildRange, format!("a row below {rows}"), row.to_string());
@@ -79,26 +80,28 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
                 });
                 continue;
             }
+            _ => unreachable!("all but tet leaves have blocks"),
         };
-        if line as usize + lines > view.lines.len() {
-            let expected = format!("{lines} lines below {}", view.lines.len());
+        let line = first / 2;
+        if first + count as u64 > halves as u64 {
+            let expected = format!("{} lines below {}", count.div_ceil(2), view.lines.len());
             return fail(Code::ChildRange, expected, format!("line {line}"));
         }
-        if visit.parent.is_some_and(|parent| line <= parent) {
+        if visit.parent.is_some_and(|parent| first <= parent) {
             return fail(Code::ChildOrder, "a line behind the parent's".into(), format!("line {line}"));
         }
-        for l in line..line + lines as u32 {
-            if claimed.set(l as usize) {
+        for half in first as usize..first as usize + count {
+            if claimed.set(half) {
                 return fail(
                     Code::Overlap,
                     "a block of its own".into(),
-                    format!("line {l}, which another block has"),
+                    format!("line {}, which another block has", half / 2),
                 );
             }
         }
-        let start = line as u64 * size_of::<Line>() as u64;
+        let start = first * HALF_LINE as u64;
         match child {
-            Child::Node(_) => {
+            Child::Node(line) => {
                 let depth = visit.depth + 1;
                 if depth > view.header.depth.min(limits::MAX_DEPTH as u32) {
                     let expected = format!(
@@ -116,19 +119,23 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
                     stack.push(Visit {
                         code,
                         depth,
-                        parent: Some(line),
+                        parent: Some(first),
                         in_subtree: visit.in_subtree,
                         place,
                     });
                 }
             }
-            Child::Indexed(_) => leaves::indexed(view.indexed_leaf(line), start, view.triangle_ids.len())?,
-            Child::Raw(_) => leaves::raw(view.raw_leaf(line), start, view.triangle_ids.len())?,
+            Child::Indexed(_) | Child::Raw(_) => leaves::check(view, child, start)?,
             Child::Tets(_) => unreachable!("handled above"),
         }
     }
-    if let Some(line) = (0..view.lines.len()).find(|&l| !claimed.get(l)) {
-        let at = (line * size_of::<Line>()) as u64;
+    let bytes = view.lines.as_bytes();
+    let may_stay = |half: usize| {
+        let own = &bytes[half * HALF_LINE..][..HALF_LINE];
+        view.grid.is_some() && half % 2 == 1 && own.iter().all(|b| *b == 0)
+    };
+    if let Some(half) = (0..halves).find(|&half| !claimed.get(half) && !may_stay(half)) {
+        let at = (half * HALF_LINE) as u64;
         return Err(Error::within(
             Code::Unclaimed,
             kind::LINES,

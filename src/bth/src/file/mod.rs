@@ -157,7 +157,7 @@ impl File {
     ///
     /// # Errors
     /// `BTH-O003` when there is no such object, `BTH-F101` when its tetrahedron records are of another kind
-    /// than it says.
+    /// than it says, `BTH-F104` when its coordinates are.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
         self.view(object).copied()
     }
@@ -203,8 +203,10 @@ impl File {
                 return Err(self.locate(error, object));
             }
         };
+        let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         Ok(ObjectView {
             header,
+            grid,
             lines: self.slice(object, kind::LINES),
             triangle_ids: self.slice(object, kind::TRIANGLE_IDS),
             tet_leaves: self.slice(object, kind::TET_LEAVES),
@@ -219,6 +221,20 @@ impl File {
             normals: self.slice(object, kind::NORMALS),
             uvs: self.slice(object, kind::UVS),
         })
+    }
+
+    /// The grid of an object, which the file must announce.
+    fn grid(&self, object: &Object) -> Result<Option<Grid>> {
+        let at = std::mem::offset_of!(Object, coordinates) as u64;
+        let wrong = |expected: &str, found: String| {
+            Error::within(Code::Coordinates, kind::OBJECT, at, expected.to_owned(), found)
+        };
+        let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
+        let grid = Grid::of(object).map_err(|what| wrong(expected, what.to_owned()))?;
+        if grid.is_some() && self.header().required_features & FEATURE_GRID == 0 {
+            return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
+        }
+        Ok(grid)
     }
 
     /// The sections of an object with every index checked: tracing it neither reads out of bounds nor loops.

@@ -18,6 +18,7 @@ pub(super) fn check(view: &ObjectView, report: &mut Report) -> Result<()> {
         report.tets += leaf.tets as u64;
     }
     dropped(view, &seen)?;
+    displacement(view)?;
     report.tet_leaves += view.tet_leaves.len() as u64;
     report.triangles += (view.header.triangles - view.header.dropped) as u64;
     report.dropped += view.header.dropped as u64;
@@ -74,6 +75,7 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
     // Children come after their parents, so backwards every content is complete when its turn comes.
     let mut in_subtree = vec![0u32; view.tet_leaves.len()];
     while let Some(mut visit) = visits.pop() {
+        let start = view.half_lines(visit.child).map_or(0, |(first, _)| first * HALF_LINE as u64);
         match visit.child {
             Child::Node(_) => {}
             Child::Tets(row) => {
@@ -83,7 +85,8 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
                 }
             }
             Child::Indexed(line) => {
-                let leaf = view.indexed_leaf(line);
+                let mut room = None;
+                let leaf = view.indexed(line, &mut room);
                 for t in 0..leaf.triangles as usize {
                     let corners = [0, 1, 2].map(|k| {
                         let v = leaf.corner[k][t] as usize;
@@ -91,7 +94,7 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
                     });
                     leaf_triangle(
                         view,
-                        line,
+                        start,
                         leaf.first as usize + t,
                         corners,
                         &mut visit,
@@ -101,12 +104,13 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
                 }
             }
             Child::Raw(line) => {
-                let leaf = view.raw_leaf(line);
+                let mut room = None;
+                let leaf = view.raw(line, &mut room);
                 for t in 0..leaf.triangles as usize {
                     let corners = [0, 1, 2].map(|k| [0, 1, 2].map(|axis| leaf.corner[k][axis][t]));
                     leaf_triangle(
                         view,
-                        line,
+                        start,
                         leaf.first as usize + t,
                         corners,
                         &mut visit,
@@ -158,10 +162,10 @@ fn outside(section: u32, at: u64, bounds: &Bounds, content: &Bounds) -> Error {
     Error::within(Code::Containment, section, at, expected, format!("{:?} to {:?}", bounds.0, bounds.1))
 }
 
-/// A triangle of a leaf, by its row of TRIANGLE_IDS.
+/// A triangle of a leaf at a byte of LINES, by its row of TRIANGLE_IDS.
 fn leaf_triangle(
     view: &ObjectView,
-    line: u32,
+    start: u64,
     row: usize,
     corners: [[f32; 3]; 3],
     visit: &mut Visit,
@@ -188,7 +192,7 @@ fn leaf_triangle(
     } else {
         once(id, seen, kind::TRIANGLE_IDS, at)?;
     }
-    same_as_source(view, id, corners, Code::LeafSource, kind::LINES, line as u64 * 64)
+    same_as_source(view, id, corners, Code::LeafSource, kind::LINES, start)
 }
 
 /// A constrained face, by its row.
@@ -235,8 +239,30 @@ fn same_as_source(
     Ok(())
 }
 
+/// A triangle of the source, on the grid if there is one.
 fn source(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
-    Some(view.triangles.get(id as usize)?.map(|v| view.positions[v as usize]))
+    let corners = view.triangles.get(id as usize)?.map(|v| view.positions[v as usize]);
+    Some(view.grid.map_or(corners, |grid| corners.map(|p| grid.nearest(p))))
+}
+
+/// Checks that no position of the source is farther from its point of the grid than is said.
+fn displacement(view: &ObjectView) -> Result<()> {
+    let Some(grid) = &view.grid else { return Ok(()) };
+    let most = f64::from(view.header.displacement);
+    for (row, position) in view.positions.iter().enumerate() {
+        let found = distance(*position, grid.nearest(*position));
+        if found > most {
+            let (at, expected) = (12 * row as u64, format!("at most {most} from the grid"));
+            return Err(Error::within(Code::Displacement, kind::POSITIONS, at, expected, found.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Distance of two points; in f64, so good to about 2^-51 of it.
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    let squares = [0, 1, 2].map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2));
+    squares.iter().sum::<f64>().sqrt()
 }
 
 /// Checks that as many triangles are left out as the object says, and the right ones.

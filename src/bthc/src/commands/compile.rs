@@ -193,6 +193,10 @@ fn summary(report: &Report) -> String {
     nonzero(&mut facts, "elements skipped", mesh.skipped);
     nonzero(&mut facts, "boundary edges", mesh.boundary_edges);
     nonzero(&mut facts, "non-manifold edges", mesh.non_manifold_edges);
+    if let Some(found) = &report.coordinates {
+        facts.row(["coordinates", &format!("{} bits", found.bits)]);
+        facts.row(["vertices moved by at most", &found.displacement.to_string()]);
+    }
     if let Some(marks) = &report.marks {
         facts.row(["suitable nodes", &format!("{} of {}", count(marks.suitable), count(marks.nodes))]);
     }

@@ -50,7 +50,8 @@ fn describe(file: &File) -> Result<Value, Failure> {
         let view = file.object(i)?;
         let h = view.header;
         Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
-            "depth": h.depth, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
+            "depth": h.depth, "coordinates": view.grid.map_or(32, |grid| grid.bits as u32),
+            "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
     };
@@ -99,6 +100,10 @@ fn summary(file: &File) -> Result<String, Failure> {
         facts.row(["triangles", &count(view.header.triangles.into())]);
         facts.row(["dropped", &count(view.header.dropped.into())]);
         facts.row(["depth", &count(view.header.depth.into())]);
+        if let Some(grid) = &view.grid {
+            facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
+            facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
+        }
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
         facts.row(["tetrahedra", &count(view.records.len() as u64)]);

@@ -52,9 +52,14 @@ fn isas() -> Vec<Isa> {
     Isa::ALL.into_iter().rev().filter(|isa| isa.is_available()).collect()
 }
 
+/// Our structures.
+fn kinds() -> impl Iterator<Item = &'static Kind> {
+    ours::KINDS.iter().chain(&ours::ON_GRID)
+}
+
 /// Names of all, whether this machine has them or not.
 pub(super) fn names() -> Vec<String> {
-    let own = ours::KINDS.iter().flat_map(|kind| {
+    let own = kinds().flat_map(|kind| {
         let others = Isa::ALL.into_iter().filter(|_| on_every_isa(kind));
         std::iter::once(kind.name.to_owned()).chain(others.map(|isa| format!("{} {isa}", kind.name)))
     });
@@ -76,7 +81,7 @@ impl Subjects {
         };
         // A model without one tetrahedralization of the whole has it with no record.
         let mut no_tets = None;
-        for kind in &ours::KINDS {
+        for kind in kinds() {
             let uses = uses(kind, names);
             if uses.is_empty() {
                 continue;
@@ -88,7 +93,7 @@ impl Subjects {
                 _ => ours::compile(model, kind),
             };
             match compiled {
-                Ok(compiled) => all.add(kind, &compiled, uses)?,
+                Ok(compiled) => all.add(model, kind, &compiled, uses)?,
                 Err(error) => {
                     let why = format!("{error:#}");
                     if kind.is_tets() {
@@ -117,16 +122,26 @@ impl Subjects {
         Ok(all)
     }
 
-    fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
+    fn add(
+        &mut self,
+        model: &Model,
+        kind: &Kind,
+        compiled: &Compiled,
+        uses: Vec<(String, Isa)>,
+    ) -> Result<()> {
         // The first is the batch without hints.
         let Some(contender) = ours::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
         let contender = Rc::new(contender);
+        if kind.is_on_grid() {
+            self.geometries.push(Geometry::new(&compiled.bytes, model.triangles())?);
+        }
+        let geometry = if kind.is_on_grid() { self.geometries.len() - 1 } else { 0 };
         self.subjects.extend(uses.into_iter().map(|(name, isa)| Subject {
             name,
             group: group(kind.name),
             contender: contender.clone(),
             isa: Some(isa),
-            geometry: 0,
+            geometry,
             exact: true,
         }));
         Ok(())

@@ -153,12 +153,13 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                 let at = lists.leaf.get(i);
                 let slot = &mut slots[at];
                 let ray = &self.rays[slot.ray];
+                let (mut indexed, mut raw) = (None, None);
                 let found = match Child::from_code(self.stacks.code(slot.top)) {
                     Some(Child::Indexed(line)) => {
-                        slot.flight.enter_leaf(s, self.object, ray, self.object.indexed_leaf(line))
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.indexed(line, &mut indexed))
                     }
                     Some(Child::Raw(line)) => {
-                        slot.flight.enter_leaf(s, self.object, ray, self.object.raw_leaf(line))
+                        slot.flight.enter_leaf(s, self.object, ray, self.object.raw(line, &mut raw))
                     }
                     Some(Child::Tets(row)) => {
                         if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
@@ -284,7 +285,7 @@ fn enter_tets<Q: Query>(
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
-    let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
+    let first = object.place(code);
     for i in 0..NODE_LINES {
         s.prefetch(first.wrapping_add(i));
     }

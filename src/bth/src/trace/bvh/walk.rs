@@ -48,13 +48,15 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 }
             }
             Some(Child::Indexed(at)) => {
-                let leaf = object.indexed_leaf(at);
+                let mut room = None;
+                let leaf = object.indexed(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
                 flight.enter_leaf(s, object, ray, leaf)
             }
             Some(Child::Raw(at)) => {
-                let leaf = object.raw_leaf(at);
+                let mut room = None;
+                let leaf = object.raw(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
                 flight.enter_leaf(s, object, ray, leaf)

@@ -110,13 +110,15 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                     top += count;
                 }
                 Some(Child::Indexed(line)) => {
-                    let leaf = Leaf { block: object.indexed_leaf(line), code };
+                    let mut room = None;
+                    let leaf = Leaf { block: object.indexed(line, &mut room), code };
                     if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
                 }
                 Some(Child::Raw(line)) => {
-                    let leaf = Leaf { block: object.raw_leaf(line), code };
+                    let mut room = None;
+                    let leaf = Leaf { block: object.raw(line, &mut room), code };
                     if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
@@ -231,7 +233,7 @@ fn farthest_limit<S: Simd>(s: S, groups: &[Group<S>]) -> f32 {
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
-    let first = object.lines.as_ptr().wrapping_add((code & (Child::INDEX_LIMIT - 1)) as usize);
+    let first = object.place(code);
     for i in 0..NODE_LINES {
         s.prefetch(first.wrapping_add(i));
     }

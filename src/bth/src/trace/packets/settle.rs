@@ -34,13 +34,14 @@ impl Candidate {
     #[inline(always)]
     fn read<C>(&self, object: &ObjectView<'_>, corners: impl Corners<Output = C>) -> Option<(u32, C)> {
         let at = self.triangle as usize;
+        let (mut indexed, mut raw) = (None, None);
         match Child::from_code(self.leaf)? {
             Child::Indexed(line) => {
-                let leaf = object.indexed_leaf(line);
+                let leaf = object.indexed(line, &mut indexed);
                 Some((leaf.first + at as u32, corners.of(leaf, at)))
             }
             Child::Raw(line) => {
-                let leaf = object.raw_leaf(line);
+                let leaf = object.raw(line, &mut raw);
                 Some((leaf.first + at as u32, corners.of(leaf, at)))
             }
             Child::Node(_) | Child::Tets(_) => None,

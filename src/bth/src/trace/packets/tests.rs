@@ -123,7 +123,9 @@ impl Surface {
             triangles: 10_000,
             dropped: 0,
             depth: 2,
-            reserved: [0; 5],
+            coordinates: 0,
+            grid_origin: [0.0; 3],
+            displacement: 0.0,
         };
         Surface { header, lines, ids, points }
     }
@@ -131,6 +133,7 @@ impl Surface {
     fn view(&self) -> ObjectView<'_> {
         ObjectView {
             header: &self.header,
+            grid: None,
             lines: &self.lines,
             triangle_ids: &self.ids,
             tet_leaves: &[],

@@ -1,0 +1,309 @@
+//! Which grid: the finest that so many bits reach over the object's box.
+
+use crate::error::{Error, Place, Result};
+use crate::mesh::Mesh;
+use bth::layout::{Grid, GridBits};
+use serde::{Serialize, Serializer};
+use std::path::Path;
+use std::str::FromStr;
+
+/// How far a vertex may move.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaxError {
+    /// In the units of the object.
+    Absolute(f64),
+    /// As a share of the diagonal of the object's box.
+    OfDiagonal(f64),
+}
+
+impl FromStr for MaxError {
+    type Err = String;
+
+    /// A distance, or a percentage of the diagonal of the object's box: `0.001`, `0.01%`.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let (number, percent) = match text.strip_suffix('%') {
+            Some(number) => (number, true),
+            None => (text, false),
+        };
+        match number.trim().parse::<f64>() {
+            Ok(value) if value >= 0.0 && value.is_finite() => {
+                Ok(if percent { MaxError::OfDiagonal(value / 100.0) } else { MaxError::Absolute(value) })
+            }
+            _ => {
+                Err("expected a distance from 0, such as 0.001, or a share of the diagonal, such as 0.01%"
+                    .into())
+            }
+        }
+    }
+}
+
+impl MaxError {
+    /// In the units of an object with this diagonal.
+    fn distance(self, diagonal: f64) -> f64 {
+        match self {
+            MaxError::Absolute(distance) => distance,
+            MaxError::OfDiagonal(share) => share * diagonal,
+        }
+    }
+}
+
+/// Which coordinates triangle leaves store.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Options {
+    /// So many bits. Without: `f32`, or if `max_error` is given the fewest that honour it.
+    #[serde(serialize_with = "number_of_bits")]
+    pub bits: Option<GridBits>,
+    /// Greatest distance that a vertex may move.
+    pub max_error: Option<MaxError>,
+}
+
+fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result::Result<S::Ok, S::Error> {
+    bits.map(|b| b as u32).serialize(to)
+}
+
+/// What became of the coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Bits of a coordinate.
+    pub bits: u32,
+    /// Greatest distance that a vertex moved, object space.
+    pub displacement: f32,
+    /// Between neighbouring points of the grid.
+    pub step: [f32; 3],
+}
+
+/// A mesh's positions on a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct OnGrid {
+    pub(crate) grid: Grid,
+    /// Greatest distance that a position moved, rounded up.
+    pub(crate) displacement: f32,
+    /// Positions of the mesh as they were.
+    pub(crate) source: Vec<[f32; 3]>,
+}
+
+impl OnGrid {
+    pub(crate) fn report(&self) -> Report {
+        let Grid { bits, step, .. } = self.grid;
+        Report { bits: bits as u32, displacement: self.displacement, step }
+    }
+}
+
+/// Moves the positions of a mesh to a grid, if one is asked for.
+///
+/// # Errors
+/// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object has no grid of so many
+/// bits.
+pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &Options) -> Result<Option<OnGrid>> {
+    let Some(bounds) = bounds(&mesh.positions) else { return Ok(None) };
+    let found = |bits: GridBits| {
+        let grid = grid(bits, bounds)?;
+        Some((grid, displacement(&grid, &mesh.positions)))
+    };
+    let allowed = options.max_error.map_or(f64::INFINITY, |most| most.distance(diagonal(bounds)));
+    let (grid, displacement) = match (options.bits, options.max_error) {
+        (None, None) => return Ok(None),
+        (None, Some(_)) => {
+            let fits = |(_, displacement): &(Grid, f32)| f64::from(*displacement) <= allowed;
+            match GridBits::ALL.into_iter().filter_map(found).find(fits) {
+                Some(fits) => fits,
+                None => return Ok(None),
+            }
+        }
+        (Some(bits), _) => {
+            let (grid, moved) = found(bits).ok_or_else(|| too_large(source, bits))?;
+            if f64::from(moved) > allowed {
+                return Err(too_far(source, bits, moved, allowed, found(GridBits::B21)));
+            }
+            (grid, moved)
+        }
+    };
+    let moved = mesh.positions.iter().map(|p| grid.nearest(*p)).collect();
+    Ok(Some(OnGrid { grid, displacement, source: std::mem::replace(&mut mesh.positions, moved) }))
+}
+
+fn too_far(source: &Path, bits: GridBits, moved: f32, allowed: f64, finer: Option<(Grid, f32)>) -> Error {
+    let hint = match finer.filter(|(grid, by)| grid.bits != bits && f64::from(*by) <= allowed) {
+        Some((_, by)) => {
+            format!(
+                "21 bits move vertices by at most {by}; without --coordinates the fewest bits that fit are taken"
+            )
+        }
+        None => "without --coordinates, coordinates stay f32 where no fewer bits fit".to_owned(),
+    };
+    Error::Input {
+        code: "BTH-I070",
+        place: Place::File(source.to_owned()),
+        message: format!(
+            "expected vertices to move by at most {allowed} (--max-error), but coordinates of {} bits move one by {moved}",
+            bits as u32
+        ),
+        hint,
+    }
+}
+
+fn too_large(source: &Path, bits: GridBits) -> Error {
+    Error::Input {
+        code: "BTH-I071",
+        place: Place::File(source.to_owned()),
+        message: format!(
+            "coordinates are so great that points of a grid of {} bits would be infinite",
+            bits as u32
+        ),
+        hint: "scale the model down, or leave out --coordinates".to_owned(),
+    }
+}
+
+/// Least and greatest coordinates.
+type Bounds = [[f32; 2]; 3];
+
+fn bounds(positions: &[[f32; 3]]) -> Option<Bounds> {
+    let first = positions.first()?;
+    let mut bounds = first.map(|x| [x, x]);
+    for point in positions {
+        for (end, x) in bounds.iter_mut().zip(point) {
+            *end = [end[0].min(*x), end[1].max(*x)];
+        }
+    }
+    Some(bounds)
+}
+
+fn diagonal(bounds: Bounds) -> f64 {
+    bounds.iter().map(|[low, high]| (f64::from(*high) - f64::from(*low)).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The finest grid of so many bits that holds a box; none near the greatest numbers.
+fn grid(bits: GridBits, bounds: Bounds) -> Option<Grid> {
+    let mut grid = Grid { bits, origin: [0.0; 3], step: [1.0; 3] };
+    for (axis, ends) in bounds.into_iter().enumerate() {
+        let mut fits = |exponent: i32| {
+            let step = 2f64.powi(exponent);
+            let [low, high] = ends.map(|x| (f64::from(x) / step).round_ties_even());
+            (grid.step[axis], grid.origin[axis]) = (step as f32, (low * step) as f32);
+            high - low <= f64::from(bits.most()) && grid.is_exact(axis)
+        };
+        (first_exponent(bits, ends)..=127).find(|exponent| fits(*exponent))?;
+    }
+    Some(grid)
+}
+
+/// An exponent below which the box has too many steps for sure; that of a normal number.
+fn first_exponent(bits: GridBits, [low, high]: [f32; 2]) -> i32 {
+    let extent = f64::from(high) - f64::from(low);
+    let floor = |x: f64| ((x.to_bits() >> 52) as i32 & 0x7ff) - 1023;
+    let steps = if extent > 0.0 { floor(extent) - bits as i32 - 1 } else { i32::MIN };
+    // And its greatest coordinate more than 2^24.
+    let greatest = f64::from(low.abs().max(high.abs()));
+    let multiples = if greatest > 0.0 { floor(greatest) - 24 } else { i32::MIN };
+    steps.max(multiples).max(-126)
+}
+
+/// Greatest distance of a position from its point, rounded up.
+fn displacement(grid: &Grid, positions: &[[f32; 3]]) -> f32 {
+    let square = |p: &[f32; 3]| {
+        let q = grid.nearest(*p);
+        (0..3).map(|k| (f64::from(p[k]) - f64::from(q[k])).powi(2)).sum::<f64>()
+    };
+    let exact = positions.iter().map(square).fold(0.0, f64::max).sqrt();
+    let rounded = exact as f32;
+    // One more than rounding up needs, for the roundings of f64 before.
+    if exact == 0.0 { 0.0 } else { rounded.next_up() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = f32> {
+        let bits = any::<u32>().prop_map(f32::from_bits).prop_filter("finite", |x| x.is_finite());
+        prop_oneof![-1.0f32..1.0, 1e6f32..1.0001e6, -1e-30f32..1e-30, bits, Just(0.0), Just(f32::MAX)]
+    }
+
+    fn mesh(positions: Vec<[f32; 3]>) -> Mesh {
+        Mesh { positions, ..Mesh::default() }
+    }
+
+    fn exact_distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+        (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+        /// Every vertex of random points at any scale: on the grid, and no farther than is said; the bound is not
+        /// looser than half the diagonal of a cell; what is on the grid stays.
+        #[test]
+        fn no_vertex_moves_farther_than_is_said(points in prop::collection::vec(prop::array::uniform3(number()), 1..40)) {
+            for bits in GridBits::ALL {
+                let options = Options { bits: Some(bits), max_error: None };
+                let mut moved = mesh(points.clone());
+                let found = place(Path::new("a"), &mut moved, &options);
+                if points.iter().flatten().any(|x| x.abs() > 2f32.powi(110)) {
+                    prop_assert!(found.is_ok() || found.unwrap_err().to_string().contains("BTH-I071"));
+                    continue;
+                }
+                let on = found.unwrap().unwrap();
+                prop_assert_eq!(&on.source, &points);
+                let cell = on.grid.step.map(f64::from).iter().map(|s| s * s).sum::<f64>().sqrt();
+                prop_assert!(f64::from(on.displacement) <= 0.5001 * cell);
+                for (p, q) in points.iter().zip(&moved.positions) {
+                    prop_assert!(exact_distance(*p, *q) <= f64::from(on.displacement));
+                    for axis in 0..3 {
+                        prop_assert!(on.grid.is_exact(axis));
+                        let steps = on.grid.steps(axis, q[axis]);
+                        prop_assert!((0..=i64::from(bits.most())).contains(&steps), "{}", steps);
+                        prop_assert_eq!(on.grid.coordinate(axis, steps as u32).to_bits(), q[axis].to_bits());
+                        // Half a step at most, so no coordinate has left its nearest point.
+                        let off = (f64::from(p[axis]) - f64::from(q[axis])).abs();
+                        prop_assert!(off <= 0.5 * f64::from(on.grid.step[axis]));
+                    }
+                }
+                let mut again = mesh(moved.positions.clone());
+                place(Path::new("a"), &mut again, &options).unwrap();
+                prop_assert_eq!(&again.positions, &moved.positions);
+            }
+        }
+    }
+
+    /// Of a box of whole numbers, a half of one is the finest step that 16 bits reach.
+    #[test]
+    fn grids_are_as_fine_as_their_bits_allow() {
+        let bounds = [[-3.0, 32764.0], [0.0, 32768.0], [5.0, 5.0]];
+        let found = grid(GridBits::B16, bounds).unwrap();
+        assert_eq!((found.step[0], found.step[1], found.origin[0]), (0.5, 1.0, -3.0));
+        assert_eq!(found.nearest([0.25, 0.5, 5.0]), [0.0, 0.0, 5.0]);
+    }
+
+    #[test]
+    fn the_fewest_bits_that_honour_a_bound_are_taken() {
+        let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
+        let bits = |max_error| {
+            let options = Options { bits: None, max_error: Some(max_error) };
+            place(Path::new("a"), &mut mesh(points.clone()), &options).unwrap().map(|on| on.grid.bits)
+        };
+        assert_eq!(bits(MaxError::OfDiagonal(1e-4)), Some(GridBits::B16));
+        assert_eq!(bits(MaxError::Absolute(1e-6)), Some(GridBits::B21));
+        assert_eq!(bits(MaxError::Absolute(0.0)), None);
+    }
+
+    #[test]
+    fn too_few_bits_are_refused_with_what_would_do() {
+        let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
+        let options = Options { bits: Some(GridBits::B16), max_error: Some(MaxError::Absolute(1e-6)) };
+        let error = place(Path::new("a.ply"), &mut mesh(points), &options).unwrap_err().to_string();
+        assert!(
+            error.contains("BTH-I070") && error.contains("hint: 21 bits move vertices by at most"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn bounds_are_distances_or_percentages() {
+        let parsed = ["0.5", "1e-3", "0.01%", "-1", "nan", "x%"].map(|t| t.parse::<MaxError>().ok());
+        let expected = [Some(MaxError::Absolute(0.5)), Some(MaxError::Absolute(1e-3))];
+        assert_eq!(parsed[..2], expected);
+        assert!(matches!(parsed[2], Some(MaxError::OfDiagonal(share)) if (share - 1e-4).abs() < 1e-18));
+        assert_eq!(parsed[3..], [None; 3]);
+    }
+}

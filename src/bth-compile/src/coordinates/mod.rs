@@ -1,0 +1,10 @@
+//! Coordinates in fewer bits: vertices move to the points of a grid, once and before anything is built from them. So
+//! what shares a vertex goes on sharing it, closed surfaces stay closed, and all that comes after is exact for the
+//! vertices as they are stored.
+
+mod choose;
+mod pack;
+
+pub use choose::{MaxError, Options, Report};
+pub(crate) use choose::{OnGrid, place};
+pub use pack::pack;

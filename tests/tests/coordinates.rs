@@ -1,0 +1,144 @@
+//! Leaves on a grid: no vertex moves farther than the file says, answers are exact for the triangles as they are stored,
+//! and files are as small as is promised.
+#![allow(clippy::print_stdout, reason = "says what was skipped")]
+
+#[allow(dead_code)]
+mod corpus_support;
+
+use bth::layout::{GridBits, RecordKind};
+use bth::rays::{Hit, Ray, Surface};
+use bth::{File, Isa, Scene};
+use bth_compile::coordinates::Options;
+use bth_compile::mesh::{self, Keep, Mesh};
+use bth_compile::pipeline::{Structure, compile};
+use bth_compile::{Silent, pipeline};
+use bth_scenes::{Model, blob, knot, soup};
+use bth_tests::oracle;
+use bth_tests::structures::bits;
+use std::path::Path;
+
+/// A compiled file.
+fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::Options) -> File {
+    options.coordinates = Options { bits: grid, max_error: None };
+    let (compiled, report) = compile(path, &options, &Silent).unwrap();
+    assert_eq!(report.coordinates.map(|c| c.bits), grid.map(|b| b as u32));
+    File::from_bytes(&compiled.bytes).unwrap()
+}
+
+fn plain() -> pipeline::Options {
+    bth_tests::structures::options(Structure::Bvh, RecordKind::Link32, false)
+}
+
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Every corner of every stored triangle against its source, and the share of the bytes that traversal reads.
+fn check_file(path: &Path, mesh: &Mesh, grid: GridBits) -> f64 {
+    let file = compiled(path, Some(grid), plain());
+    let verified = bth::verify::verify(&file).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
+    assert_eq!(verified.compared_with_source, 1);
+    let object = file.check(0).unwrap();
+    let most = f64::from(object.header.displacement);
+    for triangle in oracle::triangles(&object) {
+        for (stored, source) in triangle.corners.into_iter().zip(mesh.corners(triangle.id)) {
+            assert!(distance(stored, source) <= most, "{stored:?} {source:?} {most}");
+            // What shares a vertex goes on sharing it: where a vertex goes depends on itself alone.
+            assert_eq!(stored, object.grid.unwrap().nearest(source));
+        }
+    }
+    file.resident_bytes() as f64 / compiled(path, None, plain()).resident_bytes() as f64
+}
+
+fn written(model: &Model, folder: &Path) -> std::path::PathBuf {
+    let path = folder.join("model.ply");
+    bth_scenes::write::file(model, &path).unwrap();
+    path
+}
+
+#[test]
+fn no_vertex_is_farther_from_its_source_than_the_file_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut paths = Vec::new();
+    for (i, model) in [knot::torus_knot(2000), blob::blob(2000), soup::soup(500)].iter().enumerate() {
+        let folder = folder.path().join(i.to_string());
+        std::fs::create_dir(&folder).unwrap();
+        paths.push(written(model, &folder));
+    }
+    let ours = paths.len();
+    if let Some(data) = corpus_support::data() {
+        paths.extend(["teapot.ply", "fandisk.ply"].map(|name| data.join("static").join(name)));
+    }
+    for (i, path) in paths.iter().enumerate() {
+        let (mesh, _) = mesh::import(path, Keep::None, &Silent).unwrap();
+        let shares = [GridBits::B21, GridBits::B16].map(|grid| check_file(path, &mesh, grid));
+        // What is promised of closed meshes, and kept by triangles that share nothing too.
+        if i < ours {
+            assert!(shares[0] <= 0.8 && shares[1] <= 0.65, "{}: {shares:?}", path.display());
+        }
+    }
+}
+
+#[test]
+fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
+    let folder = tempfile::tempdir().unwrap();
+    for (model, whole) in [(blob::blob(400), true), (soup::soup(120), false)] {
+        let path = written(&model, folder.path());
+        for grid in GridBits::ALL {
+            let mut structures = vec![plain()];
+            if bth_tests::worker().is_some() {
+                let with = |s| bth_tests::structures::options(s, RecordKind::Link32, s == Structure::Bth);
+                structures.push(with(Structure::Bth));
+                structures.extend(whole.then(|| with(Structure::Tets)));
+            }
+            for options in structures {
+                let file = compiled(&path, Some(grid), options);
+                bth::verify::verify(&file).unwrap();
+                let scene = bth::from_bytes(file.bytes()).unwrap();
+                check_answers(&scene);
+            }
+        }
+    }
+}
+
+/// t but for a double rounding, and the same triangle or one that the line crosses at this very t; weights as exact as is
+/// promised, relative to their sum.
+fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
+    let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= 1.0 / f64::from(1 << 24);
+    if a.t.to_bits().abs_diff(b.t.to_bits()) > 1 {
+        return false;
+    }
+    if a.surface == b.surface {
+        return near(a.u, b.u) && near(a.v, b.v);
+    }
+    let named = triangles.iter().find(|t| t.id == a.surface.triangle);
+    named.and_then(|t| oracle::crossing(ray, t.corners)).is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
+}
+
+/// Nearest and any hits, in batches, coherent ones too, and alone, with every instruction set, against every triangle.
+fn check_answers(scene: &Scene) {
+    let triangles = oracle::triangles(&scene.object(0));
+    let corners: Vec<_> = triangles.iter().map(|t| t.corners).collect();
+    let mut rays = bth_tests::rays::assorted(&corners, 300, 5);
+    // Neighbours that are alike go in packets.
+    let like = rays[0];
+    rays.extend((0..128).map(|i| {
+        let mut ray = like;
+        ray.direction[i % 3] *= 1.0 + i as f32 * 1e-4;
+        ray
+    }));
+    let world = oracle::World::new(scene);
+    let expected: Vec<Hit> = rays.iter().map(|ray| world.hit(ray)).collect();
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        isa.choose().unwrap();
+        let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+        scene.nearest_batch(&rays, None, &mut hits);
+        scene.any_batch(&rays, None, &mut found);
+        for (i, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
+            assert!(same(&hits[i], expected, ray, &triangles), "{isa}: {ray:?} {:?} {expected:?}", hits[i]);
+            assert_eq!(found[i], expected.is_hit(), "{isa}: {ray:?}");
+            assert_eq!(bits(&scene.nearest(ray, Surface::NONE)), bits(&hits[i]), "{isa}: {ray:?}");
+        }
+    }
+    Isa::best().choose().unwrap();
+}

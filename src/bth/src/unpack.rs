@@ -1,4 +1,6 @@
 //! Triangle leaves on a grid as leaves of `f32`, exactly: what traces, checks and verifies leaves sees these only.
+// Iterators and closures would be compiled without the vectors that tracing has.
+#![allow(clippy::needless_range_loop)]
 
 use crate::layout::*;
 use crate::object::ObjectView;

@@ -61,8 +61,9 @@ mod tests {
 
     #[test]
     fn finds_exactly_the_pairs_that_all_pairs_find() {
-        for seed in 0..60 {
-            let mesh = patch(1000 + seed, 20 + 3 * seed as usize);
+        let large = (0..60).map(|seed| patch(1000 + seed, 20 + 3 * seed as usize));
+        let small = (60..3000).map(|seed| patch(1000 + seed, 4 + seed as usize % 14));
+        for (seed, mesh) in large.chain(small).enumerate() {
             let bvh = median_bvh(&mesh);
             let t = |id: u32| Triangle { corners: mesh.corners(id), vertices: mesh.triangles[id as usize] };
             let mut triangles = std::collections::BTreeSet::new();

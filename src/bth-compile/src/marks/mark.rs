@@ -217,8 +217,10 @@ mod tests {
 
     #[test]
     fn marks_equal_all_pairs_in_every_node() {
-        for seed in 0..60 {
-            let mesh = patch(seed, 30 + seed as usize * 2);
+        // A few large patches and thousands of small ones, of which many nodes are suitable.
+        let large = (0..60).map(|seed| patch(seed, 30 + seed as usize * 2));
+        let small = (60..3000).map(|seed| patch(seed, 4 + seed as usize % 14));
+        for (seed, mesh) in large.chain(small).enumerate() {
             let bvh = median_bvh(&mesh);
             let (marks, report) = mark(&mesh, &bvh, &Silent).unwrap();
             assert_eq!(marks.suitable, brute_force(&mesh, &bvh), "seed {seed}");

@@ -37,4 +37,4 @@ pub use instances::Update;
 pub use motion::InstanceView;
 pub use scene::{Scene, from_bytes, map, open};
 pub use simd::{Isa, IsaError};
-pub use trace::{Hinted, Steps};
+pub use trace::{Hinted, Steps, Test};

@@ -6,7 +6,7 @@ use crate::instances::World;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Steps};
+use crate::trace::{self, Steps, Test};
 use std::path::Path;
 
 /// An open file, ready to trace. A file with a scene shows its instances at a time (see
@@ -175,6 +175,21 @@ impl Scene {
                 }
             }
         });
+    }
+
+    /// As [`Self::nearest_batch`] without hints, by another test of triangles, each ray on its own and none in packets: to
+    /// measure what exact answers cost. With `Test::Exact` the answers are those of [`Self::nearest_batch`]; with the others
+    /// they are not exact and depend on the instruction set. In scenes and files of several objects every test is exact.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    pub fn nearest_batch_by(&self, test: Test, rays: &[Ray], hits: &mut [Hit]) {
+        check_lengths(rays, None, hits.len());
+        if self.world.is_some() || self.object_count() != 1 {
+            return self.nearest_batch(rays, None, hits);
+        }
+        hits.fill(Hit::MISS);
+        trace::with_scratch(|scratch| trace::nearest_batch_by(self.view(0), rays, test, scratch, hits));
     }
 
     /// Whether each of many rays hits anything.

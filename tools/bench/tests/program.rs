@@ -92,7 +92,7 @@ fn misspelled_names_are_refused_before_anything_is_measured() {
 fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let tracers = "bvh,bvh scalar,bth,obvhs bvh2,k-d tree,embree compact";
+    let tracers = "bvh,bvh scalar,bvh 21 bits,bvh test *,bth,obvhs bvh2,k-d tree,embree compact";
     let done = bench(&[
         "accuracy",
         "torus-knot:320",
@@ -119,10 +119,12 @@ fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
             let defects = ["false_misses", "leaks", "ghosts", "wrong_neighbours"].map(|kind| {
                 tracer["aimed"][kind].as_u64().unwrap() + tracer["ordinary"][kind].as_u64().unwrap()
             });
-            let exact = ["bvh", "bth"].contains(&tracer["group"].as_str().unwrap());
+            let name = tracer["name"].as_str().unwrap();
+            let f32_decides = ["bvh test watertight", "bvh test fast"].contains(&name);
+            let exact = !f32_decides && ["bvh", "bth"].contains(&tracer["group"].as_str().unwrap());
             // Rays exactly at vertices are lost by those that are not exact: were none, nothing would be measured.
             assert_eq!(exact, defects == [0; 4], "{tracer}");
-            if exact {
+            if exact && name != "bvh 21 bits" {
                 assert!(tracer["t_ulp"]["max"].as_f64().unwrap() < 0.51, "{tracer}");
                 assert_eq!(tracer["rmse"], 0.0, "{tracer}");
             }

@@ -8,6 +8,7 @@ use super::choice::{self, LEAST_RAYS, Way};
 use super::hinted::Hinted;
 use super::packets;
 use super::query::{Any, Deliver, Nearest, Query};
+use super::quick::{Quick, Test};
 use super::tets;
 use super::tets::batch::Walk;
 use super::tets::records::LaneRecords;
@@ -31,6 +32,34 @@ pub(crate) fn nearest_batch(
     hits: &mut [Hit],
 ) {
     trace::<Nearest>(object, rays, from, scratch, Sink { ids: object.triangle_ids, answers: hits, instance });
+}
+
+/// Nearest hits of rays in object space by a test, each ray on its own.
+pub(crate) fn nearest_batch_by(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    test: Test,
+    scratch: &mut Scratch,
+    hits: &mut [Hit],
+) {
+    fn through<Q: Query<Answer = Hit>>(
+        object: &ObjectView<'_>,
+        rays: &[Ray],
+        scratch: &mut Scratch,
+        answers: &mut [Hit],
+    ) {
+        let waiting = Waiting { order: None, queries: None, walked: None };
+        let mut sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
+        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
+    }
+    if object.header.root == NONE {
+        return;
+    }
+    match test {
+        Test::Exact => through::<Nearest>(object, rays, scratch, hits),
+        Test::Watertight => through::<Quick<true>>(object, rays, scratch, hits),
+        Test::Fast => through::<Quick<false>>(object, rays, scratch, hits),
+    }
 }
 
 /// Whether rays in object space hit anything; `from` as for [`nearest_batch`].

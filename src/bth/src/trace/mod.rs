@@ -13,14 +13,16 @@ mod prepare;
 #[cfg(test)]
 mod prepare_tests;
 mod query;
+mod quick;
 mod sight;
 mod single;
 mod slabs;
 mod tets;
 
-pub(crate) use batch::{any_batch, nearest_batch};
+pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by};
 pub use hinted::Hinted;
 pub use query::Steps;
+pub use quick::Test;
 
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};

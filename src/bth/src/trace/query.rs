@@ -1,6 +1,7 @@
 //! What a traversal looks for: the nearest hit or any hit; and what it counts.
 
 use super::crossing::Crossing;
+use super::quick::Test;
 use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
 
@@ -56,6 +57,8 @@ impl<'a> Named<'a> {
 pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
+    /// How triangles of leaves are decided.
+    const TEST: Test = Test::Exact;
     /// What the caller gets.
     type Answer;
     /// `ids` are those of the object, in leaf order.

@@ -3,6 +3,7 @@
 use super::judge::Defects;
 use super::record::{AccuracyRecord, Errors, ModelErrors, ORDINARY, Summary};
 use crate::markdown::{count, table};
+use crate::ours::TESTS;
 
 /// All tables of a record.
 pub fn markdown(record: &AccuracyRecord) -> String {
@@ -10,6 +11,7 @@ pub fn markdown(record: &AccuracyRecord) -> String {
     if record.models.len() > 1 {
         text.push_str(&summary(record));
     }
+    text.push_str(&tests(record));
     for model in &record.models {
         text.push_str(&page(model));
     }
@@ -78,6 +80,32 @@ fn summary(record: &AccuracyRecord) -> String {
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",
         record.models.len(),
+        table(&head(&names), &rows)
+    )
+}
+
+/// What exact answers cost: the same walk with three tests of triangles.
+fn tests(record: &AccuracyRecord) -> String {
+    let mut rows = Vec::new();
+    for model in &record.models {
+        let ns = |test: &str, set: &str| {
+            model.tracers.iter().find(|t| t.name == test)?.nanoseconds.get(set).copied()
+        };
+        for set in model.rays.keys() {
+            let times: Option<Vec<f64>> = TESTS.iter().map(|(name, _)| ns(name, set)).collect();
+            let Some(times) = times else { continue };
+            let mut row = vec![format!("{}, {set}", model.name)];
+            row.extend(times.iter().map(|ns| format!("{ns:.0}")));
+            row.extend(times[1..].iter().map(|other| format!("{:+.1} %", 100.0 * (times[0] / other - 1.0))));
+            rows.push(row);
+        }
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    let names = ["rays", "exact", "watertight", "fast", "exact over watertight", "exact over fast"];
+    format!(
+        "## Tests of triangles\n\nns a ray with the same walk, each ray on its own (`Scene::nearest_batch_by`).\n\n{}\n",
         table(&head(&names), &rows)
     )
 }

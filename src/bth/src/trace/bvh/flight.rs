@@ -9,6 +9,7 @@ use crate::trace::crossing::{Crossing, Estimate, estimate};
 use crate::trace::line::Line;
 use crate::trace::prepare::{Aim, Frame};
 use crate::trace::query::{Named, Query};
+use crate::trace::quick::Test;
 use crate::trace::sight::{Block, Sight};
 use crate::trace::slabs::Slabs;
 use zerocopy::FromZeros;
@@ -140,6 +141,9 @@ impl<Q: Query> Flight<Q> {
         ray: &Ray,
         block: &B,
     ) -> Found {
+        if Q::TEST != Test::Exact {
+            return self.enter_leaf_quickly(s, object, block);
+        }
         let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.limit);
         if found.maybe == 0 {
             return Found::Nothing;
@@ -149,6 +153,20 @@ impl<Q: Query> Flight<Q> {
             return Found::Enough;
         }
         self.decide(s, object, ray, block, found.maybe)
+    }
+
+    /// As [`Self::enter_leaf`], as f32 sees the triangles.
+    #[inline(always)]
+    fn enter_leaf_quickly<S: Simd, B: Block>(&mut self, s: S, object: &ObjectView<'_>, block: &B) -> Found {
+        let watertight = Q::TEST == Test::Watertight;
+        let Some(found) = self.aim.sight.nearby(s, block, watertight, self.limit) else {
+            return Found::Nothing;
+        };
+        let t = found.depth / self.aim.slabs.scale;
+        let weight = [found.weight[0].into(), found.weight[1].into(), 1.0];
+        let place = block.first() + found.triangle as u32;
+        self.query.offer(Named::place(place, object.triangle_ids), Crossing { t: t.into(), weight });
+        self.settled(Found::Nothing)
     }
 
     /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.

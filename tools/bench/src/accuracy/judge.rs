@@ -159,7 +159,7 @@ mod tests {
     fn defects_are_told_apart() {
         let model = Model::load("torus-knot:320").unwrap();
         let bytes = ours::compile(&model, &ours::BVH).unwrap().bytes;
-        let geometry = Geometry::new(&bytes, model.triangles()).unwrap();
+        let geometry = Geometry::new(&bytes).unwrap();
         let neighbours = Neighbours(&model.mesh.triangles);
         let set = crate::accuracy::aimed::set(&model, crate::accuracy::aimed::Target::Vertices, 200);
         let truth = geometry.answers(&set, 1).unwrap();

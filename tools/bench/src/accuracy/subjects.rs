@@ -77,7 +77,7 @@ impl Subjects {
     ) -> Result<Subjects> {
         let mut all = Subjects {
             subjects: Vec::new(),
-            geometries: vec![Geometry::new(&bvh.bytes, model.triangles())?],
+            geometries: vec![Geometry::new(&bvh.bytes)?],
             left_out: Vec::new(),
         };
         // A model without one tetrahedralization of the whole has it with no record.
@@ -94,7 +94,7 @@ impl Subjects {
                 _ => ours::compile(model, kind),
             };
             match compiled {
-                Ok(compiled) => all.add(model, kind, &compiled, uses)?,
+                Ok(compiled) => all.add(kind, &compiled, uses)?,
                 Err(error) => {
                     let why = format!("{error:#}");
                     if kind.is_tets() {
@@ -144,7 +144,7 @@ impl Subjects {
         let Some(contender) = ours::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
         let contender = Rc::new(contender);
         if kind.is_on_grid() {
-            self.geometries.push(Geometry::new(&compiled.bytes, model.triangles())?);
+            self.geometries.push(Geometry::new(&compiled.bytes)?);
         }
         let geometry = if kind.is_on_grid() { self.geometries.len() - 1 } else { 0 };
         self.subjects.extend(uses.into_iter().map(|(name, isa)| Subject {

@@ -75,7 +75,7 @@ fn summary(record: &AccuracyRecord) -> String {
     };
     let rows: Vec<Vec<String>> = record.summaries().iter().map(row).collect();
     let names =
-        ["tracer", "ns", "B/tri", "wrong", "aimed", "|Δt|/t, 99 %", "ulp, greatest", "RMSE", "1-SSIM"];
+        ["tracer", "ns", "B/tri", "wrong", "aimed", "Δt/t, 99 %", "ulp, greatest", "RMSE", "1-SSIM"];
     format!(
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",
@@ -147,7 +147,7 @@ fn page(model: &ModelErrors) -> String {
         row
     };
     let names =
-        ["tracer", "|Δt|/t: median", "99 %", "greatest", "ulp: median", "99 %", "greatest", "RMSE", "1-SSIM"];
+        ["tracer", "Δt/t: median", "99 %", "greatest", "ulp: median", "99 %", "greatest", "RMSE", "1-SSIM"];
     let rows: Vec<Vec<String>> = model.tracers.iter().map(errors).collect();
     text.push_str(&table(&head(&names), &rows));
     text.push('\n');

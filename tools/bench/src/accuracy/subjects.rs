@@ -133,13 +133,7 @@ impl Subjects {
         Ok(all)
     }
 
-    fn add(
-        &mut self,
-        model: &Model,
-        kind: &Kind,
-        compiled: &Compiled,
-        uses: Vec<(String, Isa)>,
-    ) -> Result<()> {
+    fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
         // The first is the batch without hints.
         let Some(contender) = ours::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
         let contender = Rc::new(contender);

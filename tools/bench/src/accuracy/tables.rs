@@ -74,8 +74,7 @@ fn summary(record: &AccuracyRecord) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = record.summaries().iter().map(row).collect();
-    let names =
-        ["tracer", "ns", "B/tri", "wrong", "aimed", "Δt/t, 99 %", "ulp, greatest", "RMSE", "1-SSIM"];
+    let names = ["tracer", "ns", "B/tri", "wrong", "aimed", "Δt/t, 99 %", "ulp, greatest", "RMSE", "1-SSIM"];
     format!(
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",

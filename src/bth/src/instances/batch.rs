@@ -9,7 +9,9 @@ use crate::file::File;
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
+use crate::simd::{Isa, Kernel, Simd};
 use crate::trace::{self, Scratch, Steps};
+use std::cell::RefCell;
 
 /// Rays that are under way together.
 const CHUNK: usize = 1024;
@@ -50,6 +52,57 @@ impl Round<'_> {
     }
 }
 
+/// Rays under way, whose memory a thread keeps.
+#[derive(Default)]
+struct Ways {
+    /// Of each ray of a chunk.
+    walks: Vec<Walk>,
+    /// The rays that go on.
+    active: Vec<u32>,
+    visits: Vec<Visit>,
+}
+
+thread_local! {
+    static WAYS: RefCell<Ways> = RefCell::default();
+}
+
+/// Takes each ray that is under way to its next instance; those that have come to their end are under way no more.
+struct Advance<'a, Q> {
+    round: &'a Round<'a>,
+    query: &'a Q,
+    /// The ray of the first walk.
+    first: usize,
+    walks: &'a mut [Walk],
+    active: &'a mut Vec<u32>,
+    visits: &'a mut Vec<Visit>,
+}
+
+impl<Q: Query> Kernel for Advance<'_, Q> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let world = self.round.world;
+        let mut kept = 0;
+        for at in 0..self.active.len() {
+            let i = self.active[at];
+            let ray = i as usize;
+            let Some(tmax) = self.query.tmax(ray) else { continue };
+            let walk = &mut self.walks[ray - self.first];
+            let mut next = walk.next(s, &world.top, tmax);
+            // There it has been.
+            if next.is_some() && next == world.start_of(self.round.from, ray) {
+                next = walk.next(s, &world.top, tmax);
+            }
+            let Some(instance) = next else { continue };
+            self.visits.push(world.visit(ray, instance));
+            self.active[kept] = i;
+            kept += 1;
+        }
+        self.active.truncate(kept);
+    }
+}
+
 impl World {
     /// Nearest hits; of equal t the instance of least number is reported.
     pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
@@ -78,11 +131,12 @@ impl World {
 
     fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl Query) {
         let round = Round { world: self, file, rays, from };
-        let mut walks: Vec<Walk> = Vec::new();
-        let mut active: Vec<u32> = Vec::new();
-        let mut visits: Vec<Visit> = Vec::new();
+        // Taken out while they are in use, so that a panic leaves nothing half done behind.
+        let mut ways = WAYS.take();
+        let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
+            let Ways { walks, active, visits } = &mut ways;
             walks.resize_with(walks.len().max(end - first), Walk::default);
             active.clear();
             visits.clear();
@@ -93,24 +147,13 @@ impl World {
                     visits.extend(self.start_of(from, i).map(|instance| self.visit(i, instance)));
                 }
             }
-            self.trace(&round, query, &mut visits);
+            self.trace(&round, query, visits);
             while !active.is_empty() {
-                active.retain(|&i| {
-                    let ray = i as usize;
-                    let start = self.start_of(from, ray);
-                    let Some(tmax) = query.tmax(ray) else { return false };
-                    let walk = &mut walks[ray - first];
-                    let mut next = walk.next(&self.top, tmax);
-                    if next.is_some() && next == start {
-                        next = walk.next(&self.top, tmax);
-                    }
-                    let Some(instance) = next else { return false };
-                    visits.push(self.visit(ray, instance));
-                    true
-                });
-                self.trace(&round, query, &mut visits);
+                isa.run(Advance { round: &round, query, first, walks, active, visits });
+                self.trace(&round, query, visits);
             }
         }
+        WAYS.set(ways);
     }
 
     /// The instance that a ray is said to start on, if it can be seen.

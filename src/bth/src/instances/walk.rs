@@ -3,6 +3,7 @@
 use super::top_level::{INSTANCE, TopLevel};
 use crate::layout::{NONE, WIDTH, WideNode};
 use crate::rays::Ray;
+use crate::simd::Simd;
 
 /// Pad of a plane relative to the greatest coordinate in play. Half covers the roundings of the slab test
 /// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the raising of small components.
@@ -48,8 +49,10 @@ impl Walk {
         self.tmin = ((f64::from(ray.tmin) * self.scale) as f32).next_down();
         (self.reciprocal, self.near_addend) = ([0.0; 3], [f32::NEG_INFINITY; 3]);
         self.far_addend = [f32::INFINITY; 3];
+        // A power of two: exact.
+        let unit = 1.0 / self.scale;
         for k in 0..3 {
-            let d = direction[k] / self.scale;
+            let d = direction[k] * unit;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
             self.near[k] = usize::from(d.is_sign_negative());
             if extent + pad < LARGEST_COORDINATE {
@@ -64,7 +67,8 @@ impl Walk {
 
     /// The next instance whose box the ray may meet at a t that, rounded to f32, is at most `tmax`; `None` at the
     /// end of the way.
-    pub(crate) fn next(&mut self, top: &TopLevel, tmax: f32) -> Option<u32> {
+    #[inline(always)]
+    pub(crate) fn next<S: Simd>(&mut self, s: S, top: &TopLevel, tmax: f32) -> Option<u32> {
         const SLACK: f64 = 1.0 / (1 << 22) as f64;
         let tmax = f64::from(tmax);
         let limit =
@@ -76,28 +80,34 @@ impl Walk {
             if code & INSTANCE != 0 {
                 return Some(code & !INSTANCE);
             }
-            self.open(&top.nodes[code as usize], limit);
+            self.open(s, &top.nodes[code as usize], limit);
         }
         None
     }
 
+    /// Puts the children of a node that the ray may meet onto the stack.
     #[inline(always)]
-    fn open(&mut self, node: &WideNode, limit: f32) {
-        let (mut enter, mut leave) = ([self.tmin; WIDTH], [limit; WIDTH]);
+    fn open<S: Simd>(&mut self, s: S, node: &WideNode, limit: f32) {
+        let (mut enter, mut leave) = (s.splat(self.tmin), s.splat(limit));
         for k in 0..3 {
-            let (near, far) = (&node.bounds[k][self.near[k]], &node.bounds[k][1 - self.near[k]]);
-            for i in 0..WIDTH {
-                let t = near[i] * self.reciprocal[k] + self.near_addend[k];
-                enter[i] = if t > enter[i] { t } else { enter[i] };
-                let t = far[i] * self.reciprocal[k] + self.far_addend[k];
-                leave[i] = if t < leave[i] { t } else { leave[i] };
-            }
+            let reciprocal = s.splat(self.reciprocal[k]);
+            let near = s.load(&node.bounds[k][self.near[k]]);
+            let far = s.load(&node.bounds[k][1 - self.near[k]]);
+            enter = s.max(s.fma(near, reciprocal, s.splat(self.near_addend[k])), enter);
+            leave = s.min(s.fma(far, reciprocal, s.splat(self.far_addend[k])), leave);
         }
+        let child = s.load_u(&node.child);
+        let met = s.and_not(s.le(enter, leave), s.eq_u(child, s.splat_u(NONE)));
+        let bits = s.mask_bits(met);
+        if bits == 0 {
+            return;
+        }
+        let (mut codes, mut depths) = ([0; WIDTH], [0.0; WIDTH]);
+        let count = s.compress(bits, child, &mut codes);
+        s.compress_f(bits, enter, &mut depths);
         let base = self.stack.len();
-        for i in 0..WIDTH {
-            if enter[i] <= leave[i] && node.child[i] != NONE {
-                self.stack.push((enter[i], node.child[i]));
-            }
+        for i in 0..count {
+            self.stack.push((depths[i], codes[i]));
         }
         // Descending; at most sixteen.
         let pushed = &mut self.stack[base..];

@@ -1,6 +1,7 @@
 //! What the end-to-end, conformance and corruption tests share.
 
 pub mod conformance;
+pub mod crowd;
 pub mod rays;
 pub mod rng;
 pub mod stress;

@@ -135,3 +135,21 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
         assert!(worst <= 1.0, "instance {instance}: {worst} of the bound");
     }
 }
+
+#[test]
+fn instances_take_less_than_200_bytes_whether_or_not_each_has_tracks_of_its_own() {
+    for own_tracks in [false, true] {
+        let count = 10_000;
+        let mut scene = bth::from_bytes(&bth_tests::crowd::crowd(count, own_tracks)).unwrap();
+        for frame in [0, 17, 1200] {
+            let update = scene.set_frame(frame).unwrap();
+            assert_eq!(update.visible, count as usize);
+            let (instances, hierarchy) = scene.heap_bytes();
+            let each = (instances + hierarchy) as f64 / f64::from(count);
+            assert!(
+                each < 200.0,
+                "frame {frame}, own tracks {own_tracks}: {instances} and {hierarchy}, {each} each"
+            );
+        }
+    }
+}

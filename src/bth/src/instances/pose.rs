@@ -1,4 +1,6 @@
 //! Where the nodes are at a time: tracks, then the hierarchy from the top, only what moved.
+//!
+//! Values of tracks are not kept: what moved is found by the keys around both times, and only that is evaluated.
 
 use super::SceneView;
 use super::affine::Affine;
@@ -13,12 +15,13 @@ const HIDDEN: u8 = 2;
 /// The hierarchy at a time.
 #[derive(Debug)]
 pub(crate) struct Pose {
-    /// Value of each track; NaN before the first update.
-    values: Vec<[f64; 4]>,
+    /// Of the last update; NaN before the first.
+    seconds: f64,
     /// Per node [`MOVED`] and [`HIDDEN`].
     state: Vec<u8>,
-    /// Per node its row in `world`, or `NONE`: only nodes with children keep their transform.
-    world_row: Vec<u32>,
+    /// The nodes with children, ascending: only these keep their transform.
+    parents: Vec<u32>,
+    /// Per node of `parents` its transform to the world.
     world: Vec<Affine>,
     /// Per node its first track; one more at the end.
     first_track: Vec<u32>,
@@ -27,15 +30,10 @@ pub(crate) struct Pose {
 impl Pose {
     /// Of a checked scene; nothing is placed before the first update.
     pub(crate) fn new(view: &SceneView<'_>) -> Pose {
-        let mut world_row = vec![NONE; view.nodes.len()];
-        let mut rows = 0;
-        for parent in view.nodes.iter().map(|n| n.parent).filter(|p| *p != NONE) {
-            let row = &mut world_row[parent as usize];
-            if *row == NONE {
-                *row = rows;
-                rows += 1;
-            }
-        }
+        let mut parents: Vec<u32> = view.nodes.iter().map(|n| n.parent).filter(|p| *p != NONE).collect();
+        parents.sort_unstable();
+        parents.dedup();
+        parents.shrink_to_fit();
         let first_track = if view.tracks.is_empty() {
             Vec::new()
         } else {
@@ -43,35 +41,37 @@ impl Pose {
             (0..=view.nodes.len()).map(first).collect()
         };
         Pose {
-            values: vec![[f64::NAN; 4]; view.tracks.len()],
+            seconds: f64::NAN,
             state: vec![0; view.nodes.len()],
-            world_row,
-            world: vec![Affine::IDENTITY; rows as usize],
+            world: vec![Affine::IDENTITY; parents.len()],
+            parents,
             first_track,
         }
     }
 
     /// Moves to a time; returns how many nodes moved, were hidden or came to sight. With `all` every node counts.
     pub(crate) fn update(&mut self, view: &SceneView<'_>, seconds: f64, all: bool) -> usize {
-        let mut moved = 0;
+        let before = std::mem::replace(&mut self.seconds, seconds);
+        let (mut moved, mut parent_rows) = (0, 0);
         for row in 0..view.nodes.len() {
-            let changed = self.evaluate(view, row, seconds);
+            let is_parent = self.parents.get(parent_rows) == Some(&(row as u32));
+            let world_row = parent_rows;
+            parent_rows += usize::from(is_parent);
+            let changed = !all && self.differs(view, row, before);
             let node = &view.nodes[row];
             let above = match node.parent {
                 NONE => 0,
                 parent => self.state[parent as usize],
             };
-            let before = self.state[row] & HIDDEN;
             if !(all || changed || above & MOVED != 0) {
-                self.state[row] = before;
+                self.state[row] &= HIDDEN;
                 continue;
             }
             moved += 1;
             let hidden = above & HIDDEN != 0 || !self.is_seen(view, row as u32);
             self.state[row] = MOVED | if hidden { HIDDEN } else { 0 };
-            if self.world_row[row] != NONE {
-                let world = self.below(view, node.parent, &self.local(view, row as u32));
-                self.world[self.world_row[row] as usize] = world;
+            if is_parent {
+                self.world[world_row] = self.below(view, node.parent, &self.local(view, row as u32));
             }
         }
         moved
@@ -89,17 +89,16 @@ impl Pose {
 
     /// From a node's space to the world.
     pub(crate) fn world(&self, view: &SceneView<'_>, node: u32) -> Affine {
-        match self.world_row[node as usize] {
-            NONE => self.below(view, view.nodes[node as usize].parent, &self.local(view, node)),
-            row => self.world[row as usize],
+        match self.parents.binary_search(&node) {
+            Ok(row) => self.world[row],
+            Err(_) => self.below(view, view.nodes[node as usize].parent, &self.local(view, node)),
         }
     }
 
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(self.values.as_slice())
-            + size_of_val(self.state.as_slice())
-            + size_of_val(self.world_row.as_slice())
+        size_of_val(self.state.as_slice())
+            + size_of_val(self.parents.as_slice())
             + size_of_val(self.world.as_slice())
             + size_of_val(self.first_track.as_slice())
     }
@@ -115,15 +114,9 @@ impl Pose {
         }
     }
 
-    /// Evaluates the tracks of a node; whether one has another value than before.
-    fn evaluate(&mut self, view: &SceneView<'_>, node: usize, seconds: f64) -> bool {
-        let mut changed = false;
-        for i in self.tracks_of(node) {
-            let value = tracks::value(view, &view.tracks[i], seconds);
-            changed |= value != self.values[i];
-            self.values[i] = value;
-        }
-        changed
+    /// Whether a track of a node has another value than at another time.
+    fn differs(&self, view: &SceneView<'_>, node: usize, before: f64) -> bool {
+        self.tracks_of(node).any(|i| tracks::differs(view, &view.tracks[i], before, self.seconds))
     }
 
     /// From a node's space to its parent's, with the values of its tracks.
@@ -140,7 +133,7 @@ impl Pose {
         let node = &view.nodes[row as usize];
         let mut parts: [f64; 10] = std::array::from_fn(|i| node.transform[i]);
         for i in self.tracks_of(row as usize) {
-            let value = self.values[i];
+            let value = tracks::value(view, &view.tracks[i], self.seconds);
             match Property::from_code(view.tracks[i].property) {
                 Some(Property::Translation) => parts[..3].copy_from_slice(&value[..3]),
                 Some(Property::Rotation) => parts[3..7].copy_from_slice(&value),
@@ -154,15 +147,21 @@ impl Pose {
     /// Whether a node's own flag, its track of visibility and its scale let it be seen.
     fn is_seen(&self, view: &SceneView<'_>, row: u32) -> bool {
         let node = &view.nodes[row as usize];
-        let is_visible = |i: &usize| view.tracks[*i].property == Property::Visible as u32;
-        let seen = match self.tracks_of(row as usize).find(is_visible) {
-            Some(track) => self.values[track][0] != 0.0,
+        let of = |property: Property| {
+            let mut tracks = self.tracks_of(row as usize).map(|i| &view.tracks[i]);
+            let track = tracks.find(|track| track.property == property as u32)?;
+            Some(tracks::value(view, track, self.seconds))
+        };
+        let seen = match of(Property::Visible) {
+            Some(value) => value[0] != 0.0,
             None => node.flags & NODE_HIDDEN == 0,
         };
         seen && if node.flags & NODE_MATRIX != 0 {
             !Affine::of_matrix(node).is_zero()
         } else {
-            !self.parts(view, row)[7..].contains(&0.0)
+            let own = [node.transform[7], node.transform[8], node.transform[9]];
+            let scale = of(Property::Scale).map_or(own, |value| [value[0], value[1], value[2]]);
+            !scale.contains(&0.0)
         }
     }
 }

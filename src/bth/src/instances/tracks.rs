@@ -30,6 +30,21 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
     if property == Property::Rotation { great_circle(a, b, part) } else { mix(a, b, part) }
 }
 
+/// Whether the value of a checked track may differ between two times: if not, it is the same. Evaluates it only where the
+/// times lie between other keys.
+pub(crate) fn differs(view: &SceneView<'_>, track: &Track, a: f64, b: f64) -> bool {
+    let (times, _) = view.keys(track, 0);
+    let after = |seconds: f64| times.partition_point(|t| *t <= seconds);
+    let row = after(a);
+    if a == b || row == after(b) && (row == 0 || row == times.len()) {
+        return false;
+    }
+    if row == after(b) && track.interpolation == Interpolation::Step as u32 {
+        return false;
+    }
+    value(view, track, a) != value(view, track, b)
+}
+
 fn mix(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
 }
@@ -74,24 +89,13 @@ fn great_circle(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
 mod tests {
     use super::*;
 
-    /// The value of a single track.
-    fn sample(
-        property: Property,
-        interpolation: Interpolation,
-        times: &[f64],
-        values: &[f64],
-        t: f64,
-    ) -> Vec<f64> {
-        let track = Track {
-            node: 0,
-            property: property as u32,
-            interpolation: interpolation as u32,
-            keys: times.len() as u32,
-            first_time: 0,
-            first_value: 0,
-            reserved: [0; 2],
-        };
-        let view = SceneView {
+    fn track_of(property: Property, interpolation: Interpolation, keys: u32) -> Track {
+        let (property, interpolation) = (property as u32, interpolation as u32);
+        Track { node: 0, property, interpolation, keys, first_time: 0, first_value: 0, reserved: [0; 2] }
+    }
+
+    fn view_of<'a>(times: &'a [f64], values: &'a [f64]) -> SceneView<'a> {
+        SceneView {
             scene: &[],
             nodes: &[],
             instances: &[],
@@ -101,7 +105,18 @@ mod tests {
             cameras: &[],
             lights: &[],
             names: &[],
-        };
+        }
+    }
+
+    /// The value of a single track.
+    fn sample(
+        property: Property,
+        interpolation: Interpolation,
+        times: &[f64],
+        values: &[f64],
+        t: f64,
+    ) -> Vec<f64> {
+        let (track, view) = (track_of(property, interpolation, times.len() as u32), view_of(times, values));
         value(&view, &track, t)[..property.width()].to_vec()
     }
 
@@ -117,6 +132,27 @@ mod tests {
         }
         assert_eq!(at(Interpolation::Step, 2.999), [0.0; 3]);
         assert_eq!(at(Interpolation::Linear, 1.5), [1.0, 2.0, 0.5]);
+    }
+
+    #[test]
+    fn values_differ_where_they_are_others() {
+        let values: Vec<f64> = [0.0, 1.0, 1.0, 3.0].iter().flat_map(|x| [*x; 3]).collect();
+        for (interpolation, a, b, differ) in [
+            (Interpolation::Linear, 0.1, 0.2, true),
+            (Interpolation::Linear, 1.1, 1.9, false),
+            (Interpolation::Linear, 0.9, 1.9, true),
+            (Interpolation::Linear, -3.0, 0.0, false),
+            (Interpolation::Linear, 3.0, 7.0, false),
+            (Interpolation::Linear, f64::NAN, 0.5, true),
+            (Interpolation::Step, 0.1, 0.9, false),
+            (Interpolation::Step, 0.9, 1.0, true),
+            (Interpolation::Step, 1.0, 2.9, false),
+        ] {
+            let track = track_of(Property::Scale, interpolation, 4);
+            let view = view_of(&[0.0, 1.0, 2.0, 3.0], &values);
+            assert_eq!(differs(&view, &track, a, b), differ, "{interpolation:?} {a} {b}");
+            assert_eq!(differs(&view, &track, b, a), differ, "{interpolation:?} {b} {a}");
+        }
     }
 
     #[test]

@@ -15,6 +15,9 @@ use std::cell::RefCell;
 
 /// Rays that are under way together.
 const CHUNK: usize = 1024;
+/// Rays through one instance from which on they are traced apart from those through others: enough for a packet, if they go
+/// together.
+const PACKET: usize = 64;
 
 /// A ray that is to be traced through an instance in this round.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +62,48 @@ struct Ways {
     walks: Vec<Walk>,
     /// The rays that go on.
     active: Vec<u32>,
-    visits: Vec<Visit>,
+    visits: Visits,
+}
+
+/// What rays are to be traced through.
+#[derive(Default)]
+struct Visits {
+    /// In order of the rays.
+    all: Vec<Visit>,
+    /// By instance.
+    sorted: Vec<Visit>,
+    /// Those through instances that few rays visit.
+    few: Vec<Visit>,
+    /// Where those of each instance go.
+    place: Vec<u32>,
+}
+
+impl Visits {
+    /// Fills `sorted`: by instance, of one in order of the rays.
+    fn sort(&mut self, instances: usize) {
+        let Visits { all, sorted, place, .. } = self;
+        sorted.clear();
+        if instances > 4 * all.len() {
+            sorted.extend_from_slice(all);
+            sorted.sort_unstable_by_key(|v| (v.instance, v.ray));
+            return;
+        }
+        place.clear();
+        place.resize(instances, 0);
+        for visit in &*all {
+            place[visit.instance as usize] += 1;
+        }
+        let mut next = 0;
+        for count in &mut *place {
+            next += std::mem::replace(count, next);
+        }
+        sorted.resize(all.len(), Visit { object: 0, ray: 0, instance: 0 });
+        for visit in all {
+            let at = &mut place[visit.instance as usize];
+            sorted[*at as usize] = *visit;
+            *at += 1;
+        }
+    }
 }
 
 thread_local! {
@@ -74,7 +118,7 @@ struct Advance<'a, Q> {
     first: usize,
     walks: &'a mut [Walk],
     active: &'a mut Vec<u32>,
-    visits: &'a mut Vec<Visit>,
+    visits: &'a mut Visits,
 }
 
 impl<Q: Query> Kernel for Advance<'_, Q> {
@@ -95,7 +139,7 @@ impl<Q: Query> Kernel for Advance<'_, Q> {
                 next = walk.next(s, &world.top, tmax);
             }
             let Some(instance) = next else { continue };
-            self.visits.push(world.visit(ray, instance));
+            self.visits.all.push(world.visit(ray, instance));
             self.active[kept] = i;
             kept += 1;
         }
@@ -139,12 +183,12 @@ impl World {
             let Ways { walks, active, visits } = &mut ways;
             walks.resize_with(walks.len().max(end - first), Walk::default);
             active.clear();
-            visits.clear();
+            visits.all.clear();
             // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
             for i in first..end {
                 if walks[i - first].start(&rays[i], &self.top) {
                     active.push(i as u32);
-                    visits.extend(self.start_of(from, i).map(|instance| self.visit(i, instance)));
+                    visits.all.extend(self.start_of(from, i).map(|instance| self.visit(i, instance)));
                 }
             }
             self.trace(&round, query, visits);
@@ -171,15 +215,25 @@ impl World {
         self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
     }
 
-    fn trace(&self, round: &Round<'_>, query: &mut impl Query, visits: &mut Vec<Visit>) {
-        // Rays keep their order within an object: neighbours are likely to take the same way.
-        visits.sort_unstable_by_key(|v| (v.object, v.ray));
-        for group in visits.chunk_by(|a, b| a.object == b.object) {
-            self.touch(group[0].object);
-            let object = round.file.view(group[0].object).expect("checked when opened");
-            query.trace(round, object, group);
+    fn trace(&self, round: &Round<'_>, query: &mut impl Query, visits: &mut Visits) {
+        // In the space of one instance neighbours stay neighbours, and take the same way.
+        visits.sort(self.placed.len());
+        let mut trace = |visits: &[Visit]| {
+            self.touch(visits[0].object);
+            let object = round.file.view(visits[0].object).expect("checked when opened");
+            query.trace(round, object, visits);
+        };
+        visits.few.clear();
+        for same in visits.sorted.chunk_by(|a, b| a.instance == b.instance) {
+            if same.len() >= PACKET {
+                trace(same);
+            } else {
+                visits.few.extend_from_slice(same);
+            }
         }
-        visits.clear();
+        visits.few.sort_by_key(|v| v.object);
+        visits.few.chunk_by(|a, b| a.object == b.object).for_each(trace);
+        visits.all.clear();
     }
 }
 

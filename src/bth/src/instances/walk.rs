@@ -4,6 +4,7 @@ use super::top_level::{INSTANCE, TopLevel};
 use crate::layout::{NONE, WIDTH, WideNode};
 use crate::rays::Ray;
 use crate::simd::Simd;
+use crate::trace::KEY_SLACK;
 
 /// Pad of a plane relative to the greatest coordinate in play. Half covers the roundings of the slab test
 /// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the raising of small components.
@@ -23,14 +24,17 @@ pub(crate) struct Walk {
     far_addend: [f32; 3],
     scale: f64,
     tmin: f32,
-    /// Children that wait: a lower bound of t (scaled) and the code. The nearest lies on top.
-    stack: Vec<(f32, u32)>,
+    /// Children that wait, the nearest on top: their codes,
+    codes: Vec<u32>,
+    /// and lower bounds of t (scaled), but for the slack of [`KEY_SLACK`].
+    keys: Vec<f32>,
+    /// How many wait. Beyond them both vectors have room for the children of a node.
+    waiting: usize,
 }
 
 impl Walk {
     /// Starts a ray; false when it hits nothing for want of a line or of instances.
     pub(crate) fn start(&mut self, ray: &Ray, top: &TopLevel) -> bool {
-        self.stack.clear();
         let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
         let greatest = direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
         let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
@@ -46,7 +50,8 @@ impl Walk {
         if start > f64::from(top.reach) {
             pad += f64::from(top.looseness) * start;
         }
-        self.tmin = ((f64::from(ray.tmin) * self.scale) as f32).next_down();
+        // A number even for a tmin of -infinity: lanes are written into the low bits of keys, which would make NaN of that.
+        self.tmin = ((f64::from(ray.tmin) * self.scale) as f32).next_down().max(-f32::MAX);
         (self.reciprocal, self.near_addend) = ([0.0; 3], [f32::NEG_INFINITY; 3]);
         self.far_addend = [f32::INFINITY; 3];
         // A power of two: exact.
@@ -61,8 +66,21 @@ impl Walk {
                 self.far_addend[k] = (-origin[k] * r + pad * r.abs()) as f32;
             }
         }
-        self.stack.push((f32::NEG_INFINITY, 0));
+        self.waiting = 0;
+        self.make_room();
+        (self.codes[0], self.keys[0]) = (0, -f32::MAX);
+        self.waiting = 1;
         true
+    }
+
+    /// Makes room for the children of a node.
+    #[inline(always)]
+    fn make_room(&mut self) {
+        if self.codes.len() < self.waiting + WIDTH {
+            let len = (self.waiting + WIDTH).next_multiple_of(4 * WIDTH);
+            self.codes.resize(len, NONE);
+            self.keys.resize(len, 0.0);
+        }
     }
 
     /// The next instance whose box the ray may meet at a t that, rounded to f32, is at most `tmax`; `None` at the
@@ -73,8 +91,11 @@ impl Walk {
         let tmax = f64::from(tmax);
         let limit =
             (((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * self.scale) as f32).next_up();
-        while let Some((enter, code)) = self.stack.pop() {
-            if enter > limit {
+        let key_limit = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
+        while self.waiting > 0 {
+            self.waiting -= 1;
+            let (key, code) = (self.keys[self.waiting], self.codes[self.waiting]);
+            if key > key_limit {
                 continue;
             }
             if code & INSTANCE != 0 {
@@ -99,24 +120,10 @@ impl Walk {
         let child = s.load_u(&node.child);
         let met = s.and_not(s.le(enter, leave), s.eq_u(child, s.splat_u(NONE)));
         let bits = s.mask_bits(met);
-        if bits == 0 {
-            return;
-        }
-        let (mut codes, mut depths) = ([0; WIDTH], [0.0; WIDTH]);
-        let count = s.compress(bits, child, &mut codes);
-        s.compress_f(bits, enter, &mut depths);
-        let base = self.stack.len();
-        for i in 0..count {
-            self.stack.push((depths[i], codes[i]));
-        }
-        // Descending; at most sixteen.
-        let pushed = &mut self.stack[base..];
-        for i in 1..pushed.len() {
-            let mut at = i;
-            while at > 0 && pushed[at - 1].0 < pushed[at].0 {
-                pushed.swap(at - 1, at);
-                at -= 1;
-            }
-        }
+        self.make_room();
+        let room = self.waiting..self.waiting + WIDTH;
+        let codes = (&mut self.codes[room.clone()]).try_into().expect("room for a node's children");
+        let keys = (&mut self.keys[room]).try_into().expect("room for a node's children");
+        self.waiting += s.compress_far_to_near(bits, enter, child, codes, keys);
     }
 }

@@ -20,6 +20,7 @@ mod slabs;
 mod tets;
 
 pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by};
+pub(crate) use bvh::flight::KEY_SLACK;
 pub use hinted::Hinted;
 pub use query::Steps;
 pub use quick::Test;

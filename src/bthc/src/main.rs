@@ -1,12 +1,10 @@
 //! `bthc`, the BTH compiler: compiles models, inspects and verifies compiled files, traces rays.
 
 mod args;
-mod cache_args;
 mod calibrate;
 mod commands;
 mod explain;
 mod failure;
-mod jobs_args;
 mod measure;
 mod output;
 mod progress;

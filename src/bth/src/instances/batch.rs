@@ -4,6 +4,7 @@
 use super::World;
 use super::affine::ObjectRay;
 use super::placed::Placed;
+use super::visits::{Visit, Visits};
 use super::walk::Walk;
 use crate::file::File;
 use crate::layout::NONE;
@@ -18,14 +19,6 @@ const CHUNK: usize = 1024;
 /// Rays through one instance from which on they are traced apart from those through others: enough for a packet, if they go
 /// together.
 const PACKET: usize = 64;
-
-/// A ray that is to be traced through an instance in this round.
-#[derive(Clone, Copy, Debug)]
-struct Visit {
-    object: u32,
-    ray: u32,
-    instance: u32,
-}
 
 /// What a query makes of rays in an object.
 trait Query {
@@ -63,47 +56,6 @@ struct Ways {
     /// The rays that go on.
     active: Vec<u32>,
     visits: Visits,
-}
-
-/// What rays are to be traced through.
-#[derive(Default)]
-struct Visits {
-    /// In order of the rays.
-    all: Vec<Visit>,
-    /// By instance.
-    sorted: Vec<Visit>,
-    /// Those through instances that few rays visit.
-    few: Vec<Visit>,
-    /// Where those of each instance go.
-    place: Vec<u32>,
-}
-
-impl Visits {
-    /// Fills `sorted`: by instance, of one in order of the rays.
-    fn sort(&mut self, instances: usize) {
-        let Visits { all, sorted, place, .. } = self;
-        sorted.clear();
-        if instances > 4 * all.len() {
-            sorted.extend_from_slice(all);
-            sorted.sort_unstable_by_key(|v| (v.instance, v.ray));
-            return;
-        }
-        place.clear();
-        place.resize(instances, 0);
-        for visit in &*all {
-            place[visit.instance as usize] += 1;
-        }
-        let mut next = 0;
-        for count in &mut *place {
-            next += std::mem::replace(count, next);
-        }
-        sorted.resize(all.len(), Visit { object: 0, ray: 0, instance: 0 });
-        for visit in all {
-            let at = &mut place[visit.instance as usize];
-            sorted[*at as usize] = *visit;
-            *at += 1;
-        }
-    }
 }
 
 thread_local! {
@@ -387,142 +339,5 @@ impl Query for Counted<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::affine::Affine;
-    use super::*;
-    use crate::testing::Rng;
-
-    const FILES: [&[u8]; 2] = [
-        include_bytes!("../../../../format-spec/conformance/valid/two-objects.bth"),
-        include_bytes!("../../../../format-spec/conformance/valid/two-levels.bth"),
-    ];
-
-    fn unit(rng: &mut Rng) -> f64 {
-        rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0
-    }
-
-    /// Rigid, scaled, mirrored, sheared, and often on a coarse grid, so that rays meet edges exactly.
-    fn transform(rng: &mut Rng, spread: f64) -> Affine {
-        let coarse = rng.below(3) == 0;
-        let number = |rng: &mut Rng| if coarse { (unit(rng) * 2.0).round() } else { unit(rng) };
-        let mut parts = [0.0; 10];
-        parts.iter_mut().for_each(|x| *x = number(rng));
-        parts[6] += 1.5;
-        parts[7..].iter_mut().for_each(|x| *x += x.signum() * 0.01 + 0.02);
-        parts[..3].iter_mut().for_each(|x| *x *= spread);
-        let mut affine = Affine::from_parts(&parts);
-        if rng.below(4) == 0 {
-            let (row, column) = (rng.below(3) as usize, rng.below(3) as usize);
-            affine.linear[row][column] += number(rng) * 50.0;
-        }
-        affine
-    }
-
-    fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Affine>) {
-        let spread = [0.0, 1.0, 4.0, 1e4][rng.below(4) as usize];
-        let transforms: Vec<Affine> = (0..count).map(|_| transform(rng, spread)).collect();
-        let place = |transform: &Affine, number: u64| {
-            let number = (number % u64::from(file.object_count())) as u32;
-            Placed::new(transform, number, file.object_header(number)).ok()
-        };
-        let placed = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
-        (World::of_places(placed, file.object_count()), transforms)
-    }
-
-    /// All instances, one after another, without the top level.
-    fn brute(world: &World, file: &File, ray: &Ray) -> Hit {
-        let mut best = Hit::MISS;
-        for (number, placed) in world.placed.iter().enumerate() {
-            let Some(placed) = placed else { continue };
-            let object = placed.inverse.ray(ray);
-            let view = file.object(placed.object()).unwrap();
-            let hit = trace::nearest(&view, &object.ray, NONE, number as u32, &mut Scratch::default());
-            best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
-        }
-        best
-    }
-
-    fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
-        let targets = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.25, 0.0], [0.2, 0.3, 0.0]];
-        (0..count)
-            .map(|i| {
-                let transform = &transforms[rng.below(transforms.len() as u64) as usize];
-                let target = transform.apply(targets[rng.below(5) as usize]);
-                // From close by to so far away that the boxes must be widened for the ray.
-                let away = [0.0, 1.0, 10.0, 1e3, 1e5, 1e7, 1e12][rng.below(7) as usize];
-                let mut origin = [0, 1, 2].map(|k| (target[k] + unit(rng) * away) as f32);
-                if rng.below(3) == 0 {
-                    let k = rng.below(3) as usize;
-                    origin[k] = target[k] as f32;
-                }
-                let scale = [1.0, 1e-20, 1e15, 0.3][i % 4];
-                let direction = [0, 1, 2].map(|k| ((target[k] - f64::from(origin[k])) * scale) as f32);
-                let (tmin, tmax) = match rng.below(5) {
-                    0 => (0.0, (1.0 / scale) as f32),
-                    1 => ((1.0 / scale) as f32, f32::INFINITY),
-                    2 => (f32::NEG_INFINITY, f32::INFINITY),
-                    _ => (0.0, f32::INFINITY),
-                };
-                Ray { origin, tmin, direction, tmax }
-            })
-            .collect()
-    }
-
-    #[test]
-    fn the_top_level_and_hints_change_no_answer() {
-        let mut rng = Rng(11);
-        let (mut hits_seen, mut far_hits, mut all) = (0, 0, 0);
-        for round in 0..600 {
-            let file = File::from_bytes(FILES[round % 2]).unwrap();
-            let count = [1, 2, 7, 16, 17, 40, 300][round % 7];
-            let (world, transforms) = world(&file, &mut rng, count);
-            let rays = rays(&mut rng, &transforms, 40);
-            let from: Vec<Surface> = rays
-                .iter()
-                .map(|_| Surface {
-                    instance: rng.below(count as u64 + 2) as u32,
-                    triangle: rng.below(3) as u32,
-                })
-                .collect();
-            for from in [None, Some(from.as_slice())] {
-                let mut hits = vec![Hit::MISS; rays.len()];
-                let mut found = vec![false; rays.len()];
-                world.nearest(&file, &rays, from, &mut hits);
-                world.any(&file, &rays, from, &mut found);
-                for (i, ray) in rays.iter().enumerate() {
-                    let expected = brute(&world, &file, ray);
-                    assert_eq!(hits[i], expected, "round {round}, ray {i}: {ray:?}");
-                    assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
-                    if i % 8 == 0 {
-                        assert_eq!(world.nearest_counted(&file, ray, Surface::NONE).0, expected);
-                    }
-                    let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
-                    far_hits += u32::from(expected.is_hit() && start > world.top.reach);
-                    hits_seen += u32::from(expected.is_hit());
-                    all += 1;
-                }
-            }
-        }
-        assert!(hits_seen > all / 3 && far_hits > 500, "{hits_seen} of {all} hit, {far_hits} from afar");
-    }
-
-    #[test]
-    fn rays_without_a_line_hit_nothing() {
-        let file = File::from_bytes(FILES[0]).unwrap();
-        let world = world(&file, &mut Rng(3), 50).0;
-        let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
-        for ray in [
-            Ray { origin: [f32::NAN, 0.0, 0.0], ..good },
-            Ray { direction: [0.0, -0.0, 0.0], ..good },
-            Ray { direction: [f32::INFINITY, 0.0, 0.0], ..good },
-            Ray { tmin: 2.0, ..good },
-            Ray { tmax: f32::NAN, ..good },
-            Ray { tmin: f32::NAN, ..good },
-        ] {
-            let (mut hit, mut found) = ([Hit::MISS], [true]);
-            world.nearest(&file, &[ray], None, &mut hit);
-            world.any(&file, &[ray], None, &mut found);
-            assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
-        }
-    }
-}
+#[path = "batch_tests.rs"]
+mod tests;

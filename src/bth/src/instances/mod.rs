@@ -10,6 +10,7 @@ mod pose;
 mod top_level;
 mod tracks;
 mod view;
+mod visits;
 mod walk;
 mod world;
 

@@ -1,6 +1,6 @@
 //! `bthc cache`: looks after the cache.
 
-use crate::cache_args::{Cache, Command};
+use crate::args::cache::{Cache, Command};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;

@@ -1,0 +1,50 @@
+//! Which ray goes through which instance next.
+
+/// A ray that is to be traced through an instance in this round.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Visit {
+    pub(super) object: u32,
+    pub(super) ray: u32,
+    pub(super) instance: u32,
+}
+
+/// What rays are to be traced through.
+#[derive(Default)]
+pub(super) struct Visits {
+    /// In order of the rays.
+    pub(super) all: Vec<Visit>,
+    /// By instance.
+    pub(super) sorted: Vec<Visit>,
+    /// Those through instances that few rays visit.
+    pub(super) few: Vec<Visit>,
+    /// Where those of each instance go.
+    place: Vec<u32>,
+}
+
+impl Visits {
+    /// Fills `sorted`: by instance, of one in order of the rays.
+    pub(super) fn sort(&mut self, instances: usize) {
+        let Visits { all, sorted, place, .. } = self;
+        sorted.clear();
+        if instances > 4 * all.len() {
+            sorted.extend_from_slice(all);
+            sorted.sort_unstable_by_key(|v| (v.instance, v.ray));
+            return;
+        }
+        place.clear();
+        place.resize(instances, 0);
+        for visit in &*all {
+            place[visit.instance as usize] += 1;
+        }
+        let mut next = 0;
+        for count in &mut *place {
+            next += std::mem::replace(count, next);
+        }
+        sorted.resize(all.len(), Visit { object: 0, ray: 0, instance: 0 });
+        for visit in all {
+            let at = &mut place[visit.instance as usize];
+            sorted[*at as usize] = *visit;
+            *at += 1;
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! What `bthc compile` and the commands beside it are told of models and of what is to be built.
+
+use super::cache::Keeping;
+use super::choices::*;
+use super::jobs::Jobs;
+use super::{EXIT_CODES, threads};
+use bth::layout::GridBits;
+use clap::Args as Group;
+use std::path::PathBuf;
+
+/// Compile a model (OBJ, PLY, STL, OFF) or a scene (glTF, GLB, scene manifest) into a BTH file.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Compile {
+    /// Models or scenes; what ends with .manifest or .toml is a scene manifest. `-` is a model from standard input.
+    #[arg(required = true, value_name = "MODEL")]
+    pub(crate) models: Vec<PathBuf>,
+    /// The compiled file, or the folder for several; by default each model's name with the extension .bth, beside it. `-` is
+    /// standard output.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) jobs: Jobs,
+    #[command(flatten)]
+    pub(crate) keeping: Keeping,
+    /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
+    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "strict"])]
+    pub(crate) flatten: bool,
+    #[command(flatten)]
+    pub(crate) gltf: Gltf,
+    /// What to build.
+    #[arg(long, value_enum, default_value_t = Structure::Bth)]
+    pub(crate) structure: Structure,
+    #[command(flatten)]
+    pub(crate) selection: Selection,
+    /// Record that stores a tetrahedron.
+    #[arg(long, value_enum, default_value_t = Record::Link32, value_name = "RECORD")]
+    pub(crate) tets: Record,
+    /// Bits of a coordinate of a triangle leaf: f32, 21 or 16 over the object's box. Fewer make smaller files; vertices
+    /// move to the nearest points of a grid. By default f32, or what --max-error asks for.
+    #[arg(long, value_name = "BITS", value_enum)]
+    pub(crate) coordinates: Option<Coordinates>,
+    /// Greatest distance that a vertex may move: in the units of the object (0.001), or as a share of the diagonal of its box
+    /// (0.01%). The fewest bits that honour it are taken; with --coordinates, more is refused.
+    #[arg(long, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
+    pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
+    /// Shading attributes to keep.
+    #[arg(long, value_enum, default_value_t = Attributes::None)]
+    pub(crate) attributes: Attributes,
+    /// The BVH under each tet leaf: rays that do not start on a known surface take it, and are much faster so.
+    /// By default kept with `--structure bth` and pruned with `tets`.
+    #[arg(long, value_enum)]
+    pub(crate) subtrees: Option<Subtrees>,
+    /// The smallest tetrahedralizations: short for `--tets tet16 --subtrees prune`. Some 100 bytes a triangle where all
+    /// triangles are in tetrahedra, in place of 180 to 200.
+    #[arg(long, conflicts_with_all = ["tets", "subtrees"])]
+    pub(crate) compact: bool,
+    /// Leave out the positions and triangles of the source (tracing does not need them).
+    #[arg(long)]
+    pub(crate) no_geometry: bool,
+    /// Threads; 0 for one per processor. The result does not depend on it.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
+    pub(crate) threads: usize,
+    /// Seconds that the tetrahedralization of one node may take; by default according to its size.
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    pub(crate) tet_deadline: Option<u64>,
+    /// Memory of a tetrahedralization worker, in MiB.
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(16..=1_048_576))]
+    pub(crate) tet_memory: Option<u64>,
+    /// Print the reports of all stages as one JSON object on standard output.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// What of a glTF file becomes a scene.
+#[derive(Clone, Debug, Group)]
+#[command(next_help_heading = "Scenes from glTF")]
+pub(crate) struct Gltf {
+    /// Scene by name or number; by default the file's own choice.
+    #[arg(long, value_name = "SCENE")]
+    pub(crate) scene: Option<String>,
+    /// Animation by name or number, `all` or `none`. Of two that move the same thing the first is taken.
+    #[arg(long, value_name = "ANIMATION", default_value = "all")]
+    pub(crate) animation: String,
+    /// Frames per second.
+    #[arg(long, default_value_t = 24.0, value_parser = positive)]
+    pub(crate) rate: f64,
+    /// Refuse what would be ignored: skins, morph targets, animations of other things.
+    #[arg(long)]
+    pub(crate) strict: bool,
+}
+
+impl Gltf {
+    /// The options of the import.
+    pub(crate) fn options(&self) -> bth_compile::scene::ImportOptions {
+        use bth_compile::scene::Chosen;
+        let animation = match self.animation.as_str() {
+            "all" => Chosen::All,
+            "none" => Chosen::None,
+            name => Chosen::One(name.to_owned()),
+        };
+        bth_compile::scene::ImportOptions {
+            scene: self.scene.clone(),
+            animation,
+            rate: self.rate,
+            strict: self.strict,
+        }
+    }
+}
+
+/// How nodes are selected for tetrahedralization.
+#[derive(Clone, Debug, Group)]
+pub(crate) struct Selection {
+    /// Effort of the BVH builder.
+    #[arg(long, value_enum, default_value_t = Quality::Balanced)]
+    pub(crate) quality: Quality,
+    /// How the steps of a ray through a tetrahedralization are estimated.
+    #[arg(long, value_enum, default_value_t = Estimator::FaceCount)]
+    pub(crate) estimator: Estimator,
+    /// How nodes are selected.
+    #[arg(long, value_enum, default_value_t = Select::Best)]
+    pub(crate) select: Select,
+    /// Which rays the file is for.
+    #[arg(long, value_enum, default_value_t = OptimizeFor::Balanced)]
+    pub(crate) optimize_for: OptimizeFor,
+    /// What tracing costs: `default`, or a file that `bthc calibrate` wrote. Files of one profile are the same
+    /// on every machine.
+    #[arg(long, value_name = "PROFILE", default_value = "default")]
+    pub(crate) profile: PathBuf,
+    /// Bytes that tracing may read for each triangle, the BVH included; what saves least for its size stays BVH.
+    #[arg(long, value_name = "BYTES", value_parser = positive)]
+    pub(crate) max_bytes_per_triangle: Option<f64>,
+    /// Seconds of one thread for tetrahedralization, as the profile estimates them; what saves least for its time
+    /// stays BVH.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    pub(crate) budget: Option<f64>,
+    /// For scenes: let the rays of their cameras, lights and frames decide, instead of rays from everywhere. What none of
+    /// them meets is not tetrahedralized.
+    #[arg(long)]
+    pub(crate) for_scene: bool,
+    /// What decides, when the tetrahedra are there, whether they stay.
+    #[arg(long, value_enum, default_value_t = Probe::Steps)]
+    pub(crate) probe: Probe,
+    /// Least number of triangles that is worth a tetrahedralization.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) min_tet_triangles: Option<u32>,
+    /// Nanoseconds that a step through a tetrahedron is taken to cost; less means more tetrahedra.
+    #[arg(long, value_name = "NANOSECONDS", value_parser = positive)]
+    pub(crate) c_tet: Option<f64>,
+}
+
+/// A finite positive number.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("expected a number above 0".into()),
+    }
+}
+
+impl Compile {
+    /// The options of the compiler that this command line stands for.
+    ///
+    /// # Errors
+    /// If the profile cannot be used.
+    pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::Options> {
+        let mut options = bth_compile::pipeline::Options {
+            structure: self.structure.into(),
+            attributes: self.attributes.into(),
+            record: if self.compact { Record::Tet16 } else { self.tets }.into(),
+            coordinates: self.coordinates(),
+            keep_subtrees: match self.subtrees {
+                Some(subtrees) => subtrees == Subtrees::Keep,
+                None => self.structure == Structure::Bth && !self.compact,
+            },
+            geometry: !self.no_geometry,
+            ..Default::default()
+        };
+        self.selection.apply(&mut options)?;
+        if let Some(seconds) = self.tet_deadline {
+            options.tets.deadline = std::time::Duration::from_secs(seconds);
+            options.tets.deadline_per_triangle = std::time::Duration::ZERO;
+        }
+        if let Some(mib) = self.tet_memory {
+            options.tets.memory = mib << 20;
+        }
+        Ok(options)
+    }
+
+    fn coordinates(&self) -> bth_compile::coordinates::Options {
+        let bits = match self.coordinates {
+            // Asked for by name: nothing moves, whatever may.
+            Some(Coordinates::F32) => return Default::default(),
+            Some(Coordinates::B21) => Some(GridBits::B21),
+            Some(Coordinates::B16) => Some(GridBits::B16),
+            None => None,
+        };
+        bth_compile::coordinates::Options { bits, max_error: self.max_error }
+    }
+}
+
+impl Selection {
+    /// Sets the options that concern the selection.
+    ///
+    /// # Errors
+    /// If the profile cannot be used.
+    pub(crate) fn apply(&self, options: &mut bth_compile::pipeline::Options) -> bth_compile::Result<()> {
+        options.bvh.quality = self.quality.into();
+        let costs = &mut options.costs;
+        costs.estimator = self.estimator.into();
+        costs.select = self.select.into();
+        costs.optimize_for = self.optimize_for.into();
+        costs.probe = self.probe.into();
+        costs.for_scene = self.for_scene;
+        costs.max_bytes_per_triangle = self.max_bytes_per_triangle;
+        costs.budget = self.budget;
+        costs.c_tet = self.c_tet;
+        if self.profile.as_os_str() != "default" {
+            costs.profile = bth_compile::costs::Profile::read(&self.profile)?;
+        }
+        if let Some(triangles) = self.min_tet_triangles {
+            costs.minimum_triangles = triangles;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,220 @@
+//! The command line: one definition feeds parsing, help, completions and the manual page.
+
+pub(crate) mod cache;
+mod choices;
+mod compile;
+mod jobs;
+
+pub(crate) use cache::*;
+pub(crate) use compile::*;
+
+use clap::{Args as Group, Parser, Subcommand};
+use std::path::PathBuf;
+
+pub(crate) const EXIT_CODES: &str = "\
+Exit codes:
+    0  done
+    1  a check failed (verify, cache verify), or files differ (diff)
+    2  wrong usage
+    3  bad input: the model or the compiled file cannot be used
+    4  a file could not be read or written
+    5  the model exceeds a limit of the format
+   70  internal error; please report it
+  130  cancelled";
+
+/// Compiles triangle models into BTH files, for tracing rays without building anything at the start.
+#[derive(Debug, Parser)]
+#[command(name = "bthc", version, after_help = EXIT_CODES, max_term_width = 100)]
+pub(crate) struct Args {
+    /// Instruction set for tracing: scalar, avx2 or avx512. By default what BTH_ISA says, else the best of this
+    /// machine. Answers do not depend on it.
+    #[arg(long, global = true, value_name = "ISA")]
+    pub(crate) isa: Option<bth::Isa>,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Compile(Box<Compile>),
+    Cache(Cache),
+    Diff(Diff),
+    Import(Import),
+    Info(Info),
+    Verify(Verify),
+    Explain(Explain),
+    Calibrate(Calibrate),
+    Marks(Marks),
+    Trace(Trace),
+    Completions(Completions),
+    /// Print the manual page (roff).
+    Man,
+}
+
+/// Write a scene manifest from a glTF scene, to be edited and compiled. It refers to the meshes of the glTF file,
+/// so it must stand beside it or in a folder above.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Import {
+    /// The glTF or GLB file.
+    pub(crate) model: PathBuf,
+    /// The manifest; by default the model's name with the extension .manifest, beside it.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) gltf: Gltf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print nothing but errors.
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// Show what a BTH file contains.
+#[derive(Debug, Group)]
+pub(crate) struct Info {
+    /// The compiled file.
+    #[arg(required_unless_present = "cpu")]
+    pub(crate) file: Option<PathBuf>,
+    /// Show the processor's features that tracing may use.
+    #[arg(long)]
+    pub(crate) cpu: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Check a BTH file completely: hashes, indices and geometry.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Verify {
+    /// The compiled file.
+    pub(crate) file: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Compare two compiled files by content: objects, sections, options that made them.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Diff {
+    /// A compiled file.
+    pub(crate) first: PathBuf,
+    /// Another one.
+    pub(crate) second: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Show which nodes of a model would be tetrahedralized, which not, and why, with the costs.
+#[derive(Debug, Group)]
+pub(crate) struct Explain {
+    /// The model.
+    pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) selection: Selection,
+    /// Tetrahedralize the chosen nodes and measure, too: predicted beside measured costs.
+    #[arg(long)]
+    pub(crate) measure: bool,
+    /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a PNG.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+    /// Nodes to show, largest first; 0 for all.
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    pub(crate) top: usize,
+    /// Threads; 0 for one per processor.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
+    pub(crate) threads: usize,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Measure what tracing costs on this machine, for `--profile`. Takes below a minute without models.
+#[derive(Debug, Group)]
+#[command(after_help = EXIT_CODES)]
+pub(crate) struct Calibrate {
+    /// Models to measure on besides our own; they must be free of bad contacts.
+    pub(crate) models: Vec<PathBuf>,
+    /// The profile.
+    #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json")]
+    pub(crate) output: PathBuf,
+    /// Rounds of which the fastest counts.
+    #[arg(long, default_value_t = 15, value_name = "N", value_parser = rounds)]
+    pub(crate) rounds: usize,
+    /// Print the profile as one JSON object on standard output, too.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// List the triangles of a model that are in bad contact with another one, and so cannot be
+/// tetrahedralized together: crossings, overlaps, T-junctions, duplicates.
+#[derive(Debug, Group)]
+pub(crate) struct Marks {
+    /// The model.
+    pub(crate) model: PathBuf,
+    /// Also write the triangles that were read, as a .tris file.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) tris: Option<PathBuf>,
+    /// Threads; 0 for one per processor.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
+    pub(crate) threads: usize,
+    /// Print one JSON object, with the ids as `bad_triangles`.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Trace the rays of a .rays file and write a .hits file.
+#[derive(Debug, Group)]
+pub(crate) struct Trace {
+    /// The compiled file.
+    pub(crate) file: PathBuf,
+    /// The rays.
+    pub(crate) rays: PathBuf,
+    /// Where the hits go.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Ask only whether anything is hit: the triangle of a hit is 0 and t is 0.
+    #[arg(long)]
+    pub(crate) any: bool,
+    /// A .from file: the triangle that each ray starts on. Changes speed only.
+    #[arg(long, value_name = "FILE", conflicts_with = "exact")]
+    pub(crate) from: Option<PathBuf>,
+    /// Compare every ray with every triangle in exact arithmetic instead of walking the structure: the truth to
+    /// compare with, some million times slower on large models. Instances count where their transforms put them,
+    /// without the rounding of rays in the object's space.
+    #[arg(long)]
+    pub(crate) exact: bool,
+    /// Threads; 0 for one per processor.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = threads)]
+    pub(crate) threads: usize,
+    /// Print one JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Print a completion script.
+#[derive(Debug, Group)]
+pub(crate) struct Completions {
+    /// The shell.
+    pub(crate) shell: clap_complete::Shell,
+}
+
+/// A number of rounds that ends.
+fn rounds(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if (1..=10_000).contains(&n) => Ok(n),
+        _ => Err("expected a number from 1 to 10000".to_owned()),
+    }
+}
+
+/// A number of threads that a machine may have.
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= 4096 => Ok(n),
+        _ => Err("expected a number from 0 to 4096".to_owned()),
+    }
+}

@@ -9,7 +9,9 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 14] = files![
+const VALID: [(&str, &[u8]); 16] = files![
+    "grid-16",
+    "grid-21",
     "no-objects",
     "nothing-to-hit",
     "scene-empty",

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The folder into which cargo builds (`target/debug` or `target/release`).
+/// The folder into which cargo builds (`target/debug`, `target/release`, `target/checks`).
 pub fn target_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the test's own path");
     let deps = test.parent().expect("a folder");
@@ -28,8 +28,11 @@ pub fn built(packages: &[&str]) -> PathBuf {
     let mut build = Command::new(cargo);
     build.args(["build", "--quiet", "--target-dir"]).arg(folder.parent().expect("a folder"));
     build.args(packages.iter().flat_map(|p| ["-p", p]));
-    if folder.ends_with("release") {
-        build.arg("--release");
+    match folder.file_name().and_then(|name| name.to_str()) {
+        None | Some("debug") => {}
+        Some(profile) => {
+            build.args(["--profile", profile]);
+        }
     }
     let status = build.current_dir(env!("CARGO_MANIFEST_DIR")).status().expect("cargo starts");
     assert!(status.success(), "{packages:?} do not build");

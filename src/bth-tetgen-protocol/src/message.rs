@@ -29,15 +29,25 @@ pub struct Job {
 
 /// A planted fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Fault {
     /// Die by a signal.
-    Crash = 1,
+    Crash,
     /// Never answer.
-    Hang = 2,
+    Hang,
     /// Take all memory there is.
-    Hog = 3,
+    Hog,
+    /// Answer what is no reply.
+    Garble,
+    /// Greet again.
+    Greet,
+    /// Answer with tetrahedra of other points than were sent.
+    Invent,
+    /// Say that the job failed.
+    Fail(Failure),
 }
+
+/// Added to a [`Failure`] that is to be told of.
+const FAIL: u8 = 0x80;
 
 /// What the worker answers.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +99,51 @@ pub enum Failure {
     Other = 7,
 }
 
+impl Fault {
+    fn code(self) -> u8 {
+        match self {
+            Fault::Crash => 1,
+            Fault::Hang => 2,
+            Fault::Hog => 3,
+            Fault::Garble => 4,
+            Fault::Greet => 5,
+            Fault::Invent => 6,
+            Fault::Fail(failure) => FAIL | failure as u8,
+        }
+    }
+
+    fn from_code(code: u8) -> Result<Self, Error> {
+        Ok(match code {
+            1 => Fault::Crash,
+            2 => Fault::Hang,
+            3 => Fault::Hog,
+            4 => Fault::Garble,
+            5 => Fault::Greet,
+            6 => Fault::Invent,
+            FAIL.. => Fault::Fail(Failure::from_code(code & !FAIL)?),
+            _ => return Err(Error::Malformed("unknown fault")),
+        })
+    }
+}
+
+impl Failure {
+    /// All.
+    pub const ALL: [Failure; 7] = [
+        Failure::Request,
+        Failure::Memory,
+        Failure::Internal,
+        Failure::Intersection,
+        Failure::TooSmall,
+        Failure::Input,
+        Failure::Other,
+    ];
+
+    fn from_code(code: u8) -> Result<Self, Error> {
+        let found = Self::ALL.into_iter().find(|failure| *failure as u8 == code);
+        found.ok_or(Error::Malformed("unknown failure"))
+    }
+}
+
 impl Request {
     /// The message's bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -103,7 +158,7 @@ impl Request {
                 put_rows(&mut to, &job.quads, u32::to_le_bytes);
                 to
             }
-            Request::Fault(fault) => vec![2, *fault as u8],
+            Request::Fault(fault) => vec![2, fault.code()],
         }
     }
 
@@ -131,12 +186,7 @@ impl Request {
                 }
                 Request::Job(job)
             }
-            2 => Request::Fault(match from.byte()? {
-                1 => Fault::Crash,
-                2 => Fault::Hang,
-                3 => Fault::Hog,
-                _ => return Err(Error::Malformed("unknown fault")),
-            }),
+            2 => Request::Fault(Fault::from_code(from.byte()?)?),
             _ => return Err(Error::Malformed("unknown request")),
         };
         from.end()?;
@@ -186,16 +236,7 @@ impl Reply {
                 Reply::Done(Tetrahedra { points, tets })
             }
             3 => {
-                let failure = match from.byte()? {
-                    1 => Failure::Request,
-                    2 => Failure::Memory,
-                    3 => Failure::Internal,
-                    4 => Failure::Intersection,
-                    5 => Failure::TooSmall,
-                    6 => Failure::Input,
-                    7 => Failure::Other,
-                    _ => return Err(Error::Malformed("unknown failure")),
-                };
+                let failure = Failure::from_code(from.byte()?)?;
                 Reply::Failed { failure, text: from.text()? }
             }
             _ => return Err(Error::Malformed("unknown reply")),
@@ -270,7 +311,9 @@ mod tests {
     use super::*;
 
     fn requests() -> Vec<Request> {
-        vec![
+        let faults = [Fault::Crash, Fault::Hang, Fault::Hog, Fault::Garble, Fault::Greet, Fault::Invent];
+        let faults = faults.into_iter().chain(Failure::ALL.map(Fault::Fail)).map(Request::Fault);
+        let jobs = vec![
             Request::Job(Job::default()),
             Request::Job(Job {
                 switches: "pzQ".into(),
@@ -278,28 +321,17 @@ mod tests {
                 triangles: vec![[0, 1, 2], [2, 1, 3]],
                 quads: vec![[0, 1, 2, 3]],
             }),
-            Request::Fault(Fault::Crash),
-            Request::Fault(Fault::Hang),
-            Request::Fault(Fault::Hog),
-        ]
+        ];
+        jobs.into_iter().chain(faults).collect()
     }
 
     fn replies() -> Vec<Reply> {
-        let failures = [
-            Failure::Request,
-            Failure::Memory,
-            Failure::Internal,
-            Failure::Intersection,
-            Failure::TooSmall,
-            Failure::Input,
-            Failure::Other,
-        ];
         let mut all = vec![
             Reply::Hello { protocol: PROTOCOL, tetgen: "1.5".into() },
             Reply::Done(Tetrahedra::default()),
             Reply::Done(Tetrahedra { points: vec![[0.5; 3]; 5], tets: vec![[0, 1, 2, 3], [4, 1, 2, 3]] }),
         ];
-        all.extend(failures.map(|failure| Reply::Failed { failure, text: "päng".into() }));
+        all.extend(Failure::ALL.map(|failure| Reply::Failed { failure, text: "päng".into() }));
         all
     }
 

@@ -2,7 +2,9 @@
 
 use std::io::{self, BufWriter, Read, Write};
 
-use bth_tetgen_protocol::{Error, Failure, Fault, PROTOCOL, Reply, Request, read_frame, write_frame};
+use bth_tetgen_protocol::{
+    Error, Failure, Fault, PROTOCOL, Reply, Request, Tetrahedra, read_frame, write_frame,
+};
 
 use crate::tetgen;
 
@@ -12,8 +14,9 @@ use crate::tetgen;
 /// When the compiler is gone, or sends what is no frame.
 pub(crate) fn serve(mut input: impl Read, output: impl Write) -> io::Result<()> {
     let mut output = BufWriter::with_capacity(1 << 16, output);
-    let mut send = |reply: &Reply| write_frame(&mut output, &reply.to_bytes()).map_err(io::Error::other);
-    send(&Reply::Hello { protocol: PROTOCOL, tetgen: tetgen::VERSION.into() })?;
+    let send =
+        |output: &mut _, reply: &Reply| write_frame(output, &reply.to_bytes()).map_err(io::Error::other);
+    send(&mut output, &hello())?;
     loop {
         let frame = match read_frame(&mut input) {
             Ok(frame) => frame,
@@ -28,14 +31,18 @@ pub(crate) fn serve(mut input: impl Read, output: impl Write) -> io::Result<()> 
                     Err((failure, text)) => Reply::Failed { failure, text },
                 }
             }
+            Ok(Request::Fault(Fault::Garble)) => {
+                write_frame(&mut output, b"no reply").map_err(io::Error::other)?;
+                continue;
+            }
             Ok(Request::Fault(fault)) => misbehave(fault),
             Err(error) => Reply::Failed { failure: Failure::Request, text: error.to_string() },
         };
-        match send(&reply) {
+        match send(&mut output, &reply) {
             Ok(()) => {}
             // A reply that no frame can hold is a failed job; the pipe still works.
             Err(error) if reply_is_too_long(&error) => {
-                send(&Reply::Failed { failure: Failure::Memory, text: error.to_string() })?;
+                send(&mut output, &Reply::Failed { failure: Failure::Memory, text: error.to_string() })?;
             }
             Err(error) => return Err(error),
         }
@@ -46,8 +53,15 @@ fn reply_is_too_long(error: &io::Error) -> bool {
     error.get_ref().and_then(|e| e.downcast_ref::<Error>()).is_some_and(|e| matches!(e, Error::TooLong(_)))
 }
 
+fn hello() -> Reply {
+    Reply::Hello { protocol: PROTOCOL, tetgen: tetgen::VERSION.into() }
+}
+
 fn misbehave(fault: Fault) -> Reply {
     match fault {
+        Fault::Greet | Fault::Garble => hello(),
+        Fault::Invent => Reply::Done(Tetrahedra { points: vec![[0.5; 3]; 4], tets: vec![[0, 1, 2, 3]] }),
+        Fault::Fail(failure) => Reply::Failed { failure, text: "as planted".into() },
         Fault::Crash => std::process::abort(),
         Fault::Hang => loop {
             std::thread::park();

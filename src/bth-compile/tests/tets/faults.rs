@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bth_compile::tets::{Options, Report, WorkerStatus, build};
 use bth_compile::{Error, Monitor, Silent};
-use bth_tetgen_protocol::Fault;
+use bth_tetgen_protocol::{Failure, Fault};
 
 use crate::meshes::{bvh, cube, nodes_of_at_most, torus};
 use crate::oracle::assert_holds;
@@ -49,6 +49,29 @@ fn a_memory_hog_costs_one_node() {
     let Some(options) = with_worker("hog") else { return };
     let report = one_node_is_lost(Options { memory: 512 << 20, ..options }, Fault::Hog);
     assert_eq!(report.failures["out_of_memory"], 1);
+}
+
+/// Whatever a worker answers costs its node, is counted under its own name, and is tried again where that may help.
+#[test]
+fn every_answer_that_is_none_costs_one_node_and_is_named() {
+    let Some(options) = with_worker("every failure") else { return };
+    let cases = [
+        (Fault::Garble, "bad_answer", 4),
+        (Fault::Greet, "bad_answer", 4),
+        (Fault::Invent, "points_moved", 4),
+        (Fault::Fail(Failure::Request), "tetgen_other", 4),
+        (Fault::Fail(Failure::Memory), "out_of_memory", 1),
+        (Fault::Fail(Failure::Internal), "tetgen_internal", 4),
+        (Fault::Fail(Failure::Intersection), "tetgen_intersection", 4),
+        (Fault::Fail(Failure::TooSmall), "tetgen_too_small", 4),
+        (Fault::Fail(Failure::Input), "tetgen_other", 4),
+        (Fault::Fail(Failure::Other), "tetgen_other", 4),
+    ];
+    for (fault, name, attempts) in cases {
+        let report = one_node_is_lost(options.clone(), fault);
+        assert_eq!(report.failures.get(name), Some(&attempts), "{fault:?}: {:?}", report.failures);
+        assert_eq!(report.failures.values().sum::<u64>(), attempts, "{fault:?}: {:?}", report.failures);
+    }
 }
 
 #[test]

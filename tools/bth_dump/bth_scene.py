@@ -50,7 +50,7 @@ class SceneView:
 
     def check_name(self, row, kind):
         end = row.name + row.name_length
-        self.need(end <= len(self.names), "F153", f"name {row.name}..{end}", kind)
+        self.need(end <= len(self.names) and row.name_length <= 4096, "F153", f"name {row.name}..{end}", kind)
         try:
             self.name(row)
         except UnicodeDecodeError as error:

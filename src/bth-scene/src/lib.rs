@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod error;
+pub mod limits;
 mod model;
 mod names;
 mod read;

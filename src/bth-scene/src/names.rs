@@ -1,6 +1,7 @@
 //! Names: each unique within its table, references looked up.
 
 use crate::error::{Result, code};
+use crate::limits::MAX_NAME;
 use crate::table::{Table, Value};
 use std::collections::HashMap;
 
@@ -12,7 +13,7 @@ pub(crate) struct Names<'a> {
 }
 
 impl<'a> Names<'a> {
-    /// Collects the names of tables; fails on one that is empty, holds control characters or is used twice.
+    /// Collects the names of tables; fails on one that is empty or too long, holds control characters or is used twice.
     pub(crate) fn collect(what: &'static str, tables: &[Table<'a>]) -> Result<Self> {
         let mut rows = HashMap::with_capacity(tables.len());
         for (row, table) in tables.iter().enumerate() {
@@ -21,6 +22,10 @@ impl<'a> Names<'a> {
             if name.is_empty() || name.chars().any(char::is_control) {
                 let message = "expected a name without control characters";
                 return Err(value.error(code::NAME, message, "give it a name"));
+            }
+            if name.len() > MAX_NAME {
+                let message = format!("expected a name of at most {MAX_NAME} bytes, found {}", name.len());
+                return Err(value.error(code::NAME, message, "give it a shorter name"));
             }
             if rows.insert(name, row).is_some() {
                 let message = format!("the {what} \"{name}\" is there already");

@@ -1,11 +1,13 @@
 //! Reads a manifest strictly.
 
 use crate::error::{Error, Result, code};
+use crate::limits::{MAX_MANIFEST, MAX_PATH};
 use crate::model::*;
 use crate::names::Names;
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
 use crate::table::{Document, Table, Value};
+use std::io::Read;
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -27,14 +29,21 @@ const FRAME_LIMIT: i64 = 1 << 24;
 /// # Errors
 /// [`code::READ`] when it cannot be read, else those of [`parse`].
 pub fn read(path: &Path) -> Result<Manifest> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error {
-        code: code::READ,
-        path: path.to_owned(),
-        line: 0,
-        column: 0,
-        message: format!("cannot read: {e}"),
-        hint: "check the path and its permissions; manifests are UTF-8".to_owned(),
-    })?;
+    let failed = |message: String, hint: &str| {
+        let path = path.to_owned();
+        Error { code: code::READ, path, line: 0, column: 0, message, hint: hint.to_owned() }
+    };
+    let cannot = |e: std::io::Error| {
+        failed(format!("cannot read: {e}"), "check the path and its permissions; manifests are UTF-8")
+    };
+    let mut text = String::new();
+    // One byte more than allowed tells that there is more, however long the file says that it is.
+    let file = std::fs::File::open(path).map_err(cannot)?;
+    file.take(MAX_MANIFEST + 1).read_to_string(&mut text).map_err(cannot)?;
+    if text.len() as u64 > MAX_MANIFEST {
+        let message = format!("expected a manifest of at most {MAX_MANIFEST} bytes, found more");
+        return Err(failed(message, "is this a manifest? split the scene if it is"));
+    }
     parse(&text, path)
 }
 
@@ -120,6 +129,10 @@ fn object(table: &Table<'_>) -> Result<Object> {
 /// A path that stays within the manifest's folder on every system.
 fn path(value: &Value<'_>) -> Result<String> {
     let text = value.string()?;
+    if text.len() > MAX_PATH {
+        let message = format!("expected a path of at most {MAX_PATH} bytes, found {}", text.len());
+        return Err(value.error(code::PATH, message, "use shorter names of folders"));
+    }
     let inside = |part: &str| !part.is_empty() && part != "." && part != "..";
     if text.split('/').all(inside) && !text.contains(['\\', ':', '\0']) {
         return Ok(text.to_owned());

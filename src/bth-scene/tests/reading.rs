@@ -206,6 +206,14 @@ fn cycles_are_refused() {
 }
 
 #[test]
+fn names_and_paths_beyond_the_limits_are_refused() {
+    let long = format!("\"{}\"", "n".repeat(bth_scene::limits::MAX_NAME + 1));
+    refused("\"arm\"", &long, "BTH-M008", &long, "at most 4096 bytes, found 4097");
+    let path = format!("\"{}b.ply\"", "folder/".repeat(bth_scene::limits::MAX_PATH / 7));
+    refused("\"models/ball.ply\"", &path, "BTH-M011", &path, "at most 4096 bytes");
+}
+
+#[test]
 fn paths_that_leave_the_folder_are_refused() {
     for path in [
         "/etc/passwd",

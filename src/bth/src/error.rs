@@ -93,7 +93,7 @@ codes! {
     Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and zeros."
     Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
     NodeTransform "F152" "A node's transform is finite; one of parts has a quaternion that is not zero and ends with zeros."
-    Name "F153" "Names lie within NAMES and are UTF-8."
+    Name "F153" "Names lie within NAMES, are UTF-8 and have at most 4,096 bytes."
     Instance "F154" "Instances refer to nodes and objects of the file; their other fields are zero."
     Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist, visibility changes in steps, of a node with a matrix only visibility, and reserved fields are zero."
     TrackRanges "F156" "A track has at least one key; the ranges of successive tracks follow each other, lie within TIMES and VALUES and together cover them."

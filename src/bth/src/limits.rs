@@ -8,3 +8,5 @@ pub const MAX_SECTIONS: u32 = 1 << 20;
 pub const MAX_TRIANGLES: u32 = 1 << 30;
 /// Tetrahedra of an object.
 pub const MAX_TETS: u32 = 1 << 30;
+/// Bytes of a name of a node, camera or light.
+pub const MAX_NAME: u32 = 4096;

@@ -159,6 +159,15 @@ fn check_limits(manifest: &Manifest) -> Result<()> {
             return Err(Error::Limit { code: "BTH-L050", message });
         }
     }
+    let nodes = manifest.nodes.iter().map(|n| &n.name);
+    let names = nodes.chain(manifest.cameras.iter().map(|c| &c.name));
+    let mut names = names.chain(manifest.lights.iter().map(|l| &l.name));
+    if let Some(long) = names.find(|name| name.len() > bth::limits::MAX_NAME as usize) {
+        let (start, most) = (long.chars().take(40).collect::<String>(), bth::limits::MAX_NAME);
+        let message =
+            format!("a name may have {most} bytes; the one that starts \"{start}\" has {}", long.len());
+        return Err(Error::Limit { code: "BTH-L050", message });
+    }
     Ok(())
 }
 

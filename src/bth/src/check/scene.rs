@@ -89,7 +89,12 @@ fn node(view: &SceneView<'_>, row: usize, node: &Node) -> std::result::Result<()
     }
     if !view.is_name(node.name, node.name_length) {
         let found = (node.name, node.name_length);
-        return violation(Code::Name, offset_of!(Node, name), "a name within NAMES", found);
+        return violation(
+            Code::Name,
+            offset_of!(Node, name),
+            "a name of at most 4096 bytes within NAMES",
+            found,
+        );
     }
     Ok(())
 }
@@ -252,5 +257,10 @@ fn named(view: &SceneView<'_>, first: u32, length: u32) -> std::result::Result<(
     if view.is_name(first, length) {
         return Ok(());
     }
-    violation(Code::Name, offset_of!(Camera, name), "a name within NAMES", (first, length))
+    violation(
+        Code::Name,
+        offset_of!(Camera, name),
+        "a name of at most 4096 bytes within NAMES",
+        (first, length),
+    )
 }

@@ -1,6 +1,7 @@
 //! A view of the scene sections: typed slices, zero-copy.
 
 use crate::layout::*;
+use crate::limits::MAX_NAME;
 
 /// The scene sections of a file. Sections that the file lacks are empty.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +47,7 @@ impl<'a> SceneView<'a> {
 
     /// Whether a name is one.
     pub(crate) fn is_name(&self, first: u32, length: u32) -> bool {
-        self.name(first, length).is_some()
+        length <= MAX_NAME && self.name(first, length).is_some()
     }
 
     /// Times and values of a track, which has been checked.

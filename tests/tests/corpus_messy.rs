@@ -69,7 +69,7 @@ fn limited(bthc: &Path) -> Command {
     }
     let mut command = Command::new("sh");
     let limits = format!("ulimit -S -t {CPU_SECONDS} && ulimit -S -v {MEMORY_KIB} && exec \"$0\" \"$@\"");
-    command.arg("-c").arg(limits).arg(bthc);
+    command.arg("-c").arg(limits).arg(bthc).env("BTH_NO_CACHE", "1");
     command
 }
 

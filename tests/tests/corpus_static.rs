@@ -41,8 +41,8 @@ fn chosen(data: &Path) -> Vec<(PathBuf, u64)> {
 }
 
 fn bthc(program: &Path, arguments: &[&std::ffi::OsStr]) -> Ended {
-    let ended =
-        run(Command::new(program).args(arguments), LIMIT).unwrap_or_else(|e| panic!("{arguments:?}: {e}"));
+    let ended = run(Command::new(program).args(arguments).env("BTH_NO_CACHE", "1"), LIMIT)
+        .unwrap_or_else(|e| panic!("{arguments:?}: {e}"));
     assert_eq!(ended.code, Some(0), "{arguments:?}: {}{}", ended.stdout, ended.stderr);
     ended
 }

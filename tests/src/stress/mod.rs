@@ -18,7 +18,7 @@ use bth::Isa;
 use bth::rays::{Hit, Ray, Surface};
 
 /// Rays that are traced together.
-const BATCH: usize = 4096;
+const BATCH: usize = 1024;
 
 /// Traces about `count` rays of every kind through all structures of a shape, with every instruction set of this
 /// machine in turn, and adds what was found. One of `one_in` rays is compared with every triangle.

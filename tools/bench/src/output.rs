@@ -80,9 +80,20 @@ impl Record<'_> {
     /// # Errors
     /// If something cannot be written.
     pub fn write(&self, to: &Output) -> Result<()> {
-        let page = |charts: &str| {
-            format!("# {}, {}\n\n{}\n{charts}{}", self.title, self.head.date, self.head.markdown(), self.body)
-        };
+        self.save(to)?;
+        std::io::stdout().lock().write_all(self.page("").as_bytes())?;
+        Ok(())
+    }
+
+    fn page(&self, charts: &str) -> String {
+        format!("# {}, {}\n\n{}\n{charts}{}", self.title, self.head.date, self.head.markdown(), self.body)
+    }
+
+    /// Writes the files alone.
+    ///
+    /// # Errors
+    /// If something cannot be written.
+    pub fn save(&self, to: &Output) -> Result<()> {
         let json = format!("{:#}\n", self.json);
         if let Some(path) = &to.json {
             write(path, &json)?;
@@ -101,9 +112,8 @@ impl Record<'_> {
                 pictures.push_str(&format!("![{}]({file})\n\n", chart.name));
             }
             write(&folder.join(format!("{stem}.json")), &json)?;
-            write(&folder.join(format!("{stem}.md")), &page(&pictures))?;
+            write(&folder.join(format!("{stem}.md")), &self.page(&pictures))?;
         }
-        std::io::stdout().lock().write_all(page("").as_bytes())?;
         Ok(())
     }
 }

@@ -6,48 +6,84 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Tally, run as trace, shapes};
-use bth_tests::structures::every_structure;
+use bth_tests::structures::{Traced, every_structure};
 use serde_json::{Value, json};
 
-/// Rays of a shape between two looks at how far it is: a number of batches that the instruction sets divide.
-const ROUND: usize = 12 * 4096;
+/// Rays of a shape in a round: a number of batches that the instruction sets divide.
+const ROUND: usize = 12 * 1024;
 
-/// Traces all shapes in turn until enough rays are traced, and writes the record.
+/// A shape on its way.
+struct Run {
+    shape: Shape,
+    structures: Vec<Traced>,
+    tally: Tally,
+}
+
+/// Traces rounds of all shapes until enough rays are traced of each, and writes the record after every round: what was
+/// traced is told whenever the run ends.
 ///
 /// # Errors
 /// If anything was wrong with any answer, or the record cannot be written.
 pub fn run(arguments: &Stress) -> Result<()> {
     let progress = Progress::new();
+    let start = std::time::Instant::now();
     let shapes = shapes(arguments.size);
     let share = arguments.millions.saturating_mul(1_000_000).div_ceil(shapes.len() as u64);
-    let (mut all, mut rows, mut found) = (Tally::default(), Vec::new(), Vec::new());
-    for (number, shape) in shapes.iter().enumerate() {
+    let compiled = shapes.into_iter().map(|shape| {
         progress.say(format!("{}: compiling", shape.name));
         let structures = every_structure(&shape.grid.model(), shape.whole);
-        let mut tally = Tally::default();
-        let mut round = 0;
-        while tally.traced < share {
+        Run { shape, structures, tally: Tally::default() }
+    });
+    let mut runs: Vec<Run> = compiled.collect();
+    let mut round = 0;
+    loop {
+        let mut traced = false;
+        for (number, run) in runs.iter_mut().enumerate().filter(|(_, run)| run.tally.traced < share) {
             let seed = arguments.seed.wrapping_mul(1 << 40).wrapping_add((number as u64) << 32 | round);
-            trace(shape, &structures, ROUND, arguments.one_in, seed, &mut tally);
-            round += 1;
-            progress.say(format!("{}: {} of {} rays", shape.name, count(tally.traced), count(share)));
+            trace(&run.shape, &run.structures, ROUND, arguments.one_in, seed, &mut run.tally);
+            traced = true;
         }
-        rows.push(row(shape.name, shape.grid.triangles.len(), structures.len(), &tally));
-        found.push(json(shape, structures.len(), &tally));
-        all.add(&tally);
+        let all = total(&runs);
+        let seconds = start.elapsed().as_secs();
+        if !traced {
+            drop(progress);
+            return record(arguments, &runs, &all, seconds, true);
+        }
+        record(arguments, &runs, &all, seconds, false)?;
+        progress.say(format!("{} of {} rays", count(all.traced), count(share * runs.len() as u64)));
+        ensure!(all.defects() == 0, "{} wrong answers, such as {:#?}", all.defects(), all.examples);
+        round += 1;
     }
-    rows.push(row("**all**", shapes.iter().map(|s| s.grid.triangles.len()).sum(), 0, &all));
-    drop(progress);
+}
 
+fn total(runs: &[Run]) -> Tally {
+    let mut all = Tally::default();
+    runs.iter().for_each(|run| all.add(&run.tally));
+    all
+}
+
+fn record(arguments: &Stress, runs: &[Run], all: &Tally, seconds: u64, is_last: bool) -> Result<()> {
+    let mut rows: Vec<_> = runs
+        .iter()
+        .map(|run| row(run.shape.name, run.triangles(), run.structures.len(), &run.tally))
+        .collect();
+    rows.push(row("**all**", runs.iter().map(Run::triangles).sum(), 0, all));
     let isas: Vec<String> =
         bth::Isa::ALL.iter().filter(|isa| isa.is_available()).map(|isa| isa.to_string()).collect();
-    let options = json!({ "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed });
+    let options = json!({
+        "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed, "seconds": seconds
+    });
     let head = Head::now("stress", isas.join(", in turn "), options);
+    let found: Vec<_> = runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.tally)).collect();
     let json = json!({ "head": head, "shapes": found, "examples": all.examples });
-    Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() }
-        .write(&arguments.output)?;
-    ensure!(all.defects() == 0, "{} wrong answers, such as {:#?}", all.defects(), all.examples);
-    Ok(())
+    let record = Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() };
+    if is_last { record.write(&arguments.output) } else { record.save(&arguments.output) }
+}
+
+impl Run {
+    fn triangles(&self) -> usize {
+        self.shape.grid.triangles.len()
+    }
 }
 
 fn body(rows: &[Vec<String>]) -> String {

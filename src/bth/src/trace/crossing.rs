@@ -6,7 +6,7 @@
 
 use super::line::{Line, PROJECTION_ERROR};
 use super::query::reported;
-use crate::expansion::Expansion;
+use crate::expansion::{EDGE, Expansion, VOLUME};
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32.
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
@@ -184,7 +184,7 @@ impl Line {
     /// The weight of the edge p→q, with an exact sign: det[d, p-o, q-o] brought to the same unit and
     /// handedness.
     fn exact_weight(&self, p: [f64; 3], q: [f64; 3]) -> f64 {
-        let mut sum = Expansion::new();
+        let mut sum = Expansion::<EDGE>::new();
         sum.add_edge(self.origin, self.direction, p, q);
         sum.value() * self.inverse_depth.abs()
     }
@@ -193,17 +193,18 @@ impl Line {
     fn exact_crossing(&self, corners: [[f64; 3]; 3]) -> Crossing {
         let [a, b, c] = corners;
         let edge = |p, q| {
-            let mut sum = Expansion::new();
+            let mut sum = Expansion::<EDGE>::new();
             sum.add_edge(self.origin, self.direction, p, q);
             sum
         };
-        let mut whole = Expansion::new();
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            whole.add_edge(self.origin, self.direction, p, q);
-        }
-        let mut volume = Expansion::new();
+        let (second, third) = (edge(c, a), edge(a, b));
+        let mut whole = Expansion::<{ 3 * EDGE }>::new();
+        whole.add_edge(self.origin, self.direction, b, c);
+        whole.add_sum(&second);
+        whole.add_sum(&third);
+        let mut volume = Expansion::<VOLUME>::new();
         volume.add_volume(self.origin, a, b, c);
         let whole = whole.value();
-        Crossing { t: volume.value() / whole, weight: [edge(c, a).value(), edge(a, b).value(), whole] }
+        Crossing { t: volume.value() / whole, weight: [second.value(), third.value(), whole] }
     }
 }

@@ -1,6 +1,6 @@
 //! Signs that are right whatever the rounding: f64 first, exact sums where it leaves them open.
 
-use crate::expansion::Expansion;
+use crate::expansion::{Expansion, VOLUME};
 use std::cmp::Ordering;
 
 /// On which side of the plane through a, b, c the point d lies: `Greater` where (b-a)x(c-a) points to,
@@ -14,7 +14,7 @@ pub(crate) fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Orderi
     if det.abs() > 16.0 * f64::EPSILON * size {
         return det.total_cmp(&0.0);
     }
-    let mut volume = Expansion::new();
+    let mut volume = Expansion::<VOLUME>::new();
     let [a, b, c, d] = [a, b, c, d].map(|p| p.map(f64::from));
     volume.add_volume(d, a, b, c);
     // det[a-d, b-d, c-d] is positive behind the plane.
@@ -25,7 +25,7 @@ pub(crate) fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Orderi
 pub(crate) fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
-        let mut sum = Expansion::new();
+        let mut sum = Expansion::<12>::new();
         for [p, q] in [[a, b], [b, c], [c, a]] {
             sum.add_product(p[i], q[j], 1.0);
             sum.add_product(-p[j], q[i], 1.0);

@@ -13,12 +13,38 @@ use crate::trace::line::{Projected, Sign};
 use crate::trace::query::{Count, Query};
 use std::collections::HashSet;
 
+/// Tetrahedra that a flood has been in: mostly some ten around a vertex, but all of a fan where that is the vertex.
+struct Seen {
+    few: [u32; 48],
+    len: usize,
+    many: HashSet<u32>,
+}
+
+impl Seen {
+    fn new() -> Self {
+        Seen { few: [0; 48], len: 0, many: HashSet::new() }
+    }
+
+    /// Adds one; false if it was there.
+    fn insert(&mut self, tet: u32) -> bool {
+        if self.few[..self.len].contains(&tet) {
+            return false;
+        }
+        if self.len == self.few.len() {
+            return self.many.insert(tet);
+        }
+        self.few[self.len] = tet;
+        self.len += 1;
+        true
+    }
+}
+
 impl TetSpace<'_> {
     /// Offers all constrained faces of the leaf that the line can touch up to the query's limit.
     #[inline(never)]
     pub(crate) fn flood<Q: Query, C: Count>(&self, query: &mut Q, count: &mut C) -> Outcome {
         count.flood();
-        let mut seen = HashSet::new();
+        let mut seen = Seen::new();
         let mut open: Vec<(u32, Entered)> = Vec::new();
         for face in self.hull {
             if self.touches(&face.vertex.map(|v| self.project(v))) && seen.insert(face.tet) {

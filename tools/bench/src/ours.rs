@@ -147,10 +147,11 @@ pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
 }
 
 /// The tests of triangles, each in the same walk, so that they can be compared.
-pub const TESTS: [(&str, Test); 3] = [
+pub const TESTS: [(&str, Test); 4] = [
     ("bvh test exact", Test::Exact),
     ("bvh test watertight", Test::Watertight),
     ("bvh test fast", Test::Fast),
+    ("bvh test moeller", Test::MoellerTrumbore),
 ];
 
 /// A contender that decides triangles so.

@@ -8,7 +8,7 @@ use super::choice::{self, LEAST_RAYS, Way};
 use super::hinted::Hinted;
 use super::packets;
 use super::query::{Any, Deliver, Nearest, Query};
-use super::quick::{Quick, Test};
+use super::quick::{Fast, MoellerTrumbore, Quick, Test, Watertight};
 use super::tets;
 use super::tets::batch::Walk;
 use super::tets::records::LaneRecords;
@@ -57,8 +57,9 @@ pub(crate) fn nearest_batch_by(
     }
     match test {
         Test::Exact => through::<Nearest>(object, rays, scratch, hits),
-        Test::Watertight => through::<Quick<true>>(object, rays, scratch, hits),
-        Test::Fast => through::<Quick<false>>(object, rays, scratch, hits),
+        Test::Watertight => through::<Quick<Watertight>>(object, rays, scratch, hits),
+        Test::Fast => through::<Quick<Fast>>(object, rays, scratch, hits),
+        Test::MoellerTrumbore => through::<Quick<MoellerTrumbore>>(object, rays, scratch, hits),
     }
 }
 

@@ -74,6 +74,8 @@ pub(crate) trait Block {
     /// The corners along these axes.
     fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3];
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
+    /// The corners as they are: `[corner][x, y, z]`.
+    fn points<S: Simd>(&self, s: S) -> Corners<S>;
 }
 
 /// The points at these places.
@@ -128,6 +130,11 @@ impl Block for IndexedLeaf {
         let points = sight.project(s, &self.vertex);
         [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
     }
+    #[inline(always)]
+    fn points<S: Simd>(&self, s: S) -> Corners<S> {
+        let points = [s.load(&self.vertex[0]), s.load(&self.vertex[1]), s.load(&self.vertex[2])];
+        [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
+    }
 }
 
 impl Block for RawLeaf {
@@ -164,6 +171,11 @@ impl Block for RawLeaf {
             sight.project(s, &self.corner[1]),
             sight.project(s, &self.corner[2]),
         ]
+    }
+    #[inline(always)]
+    fn points<S: Simd>(&self, s: S) -> Corners<S> {
+        let point = |rows: &[[f32; WIDTH]; 3]| [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])];
+        [point(&self.corner[0]), point(&self.corner[1]), point(&self.corner[2])]
     }
 }
 

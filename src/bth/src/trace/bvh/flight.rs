@@ -142,7 +142,7 @@ impl<Q: Query> Flight<Q> {
         block: &B,
     ) -> Found {
         if Q::TEST != Test::Exact {
-            return self.enter_leaf_quickly(s, object, block);
+            return self.enter_leaf_quickly(s, object, ray, block);
         }
         let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.limit);
         if found.maybe == 0 {
@@ -157,15 +157,20 @@ impl<Q: Query> Flight<Q> {
 
     /// As [`Self::enter_leaf`], as f32 sees the triangles.
     #[inline(always)]
-    fn enter_leaf_quickly<S: Simd, B: Block>(&mut self, s: S, object: &ObjectView<'_>, block: &B) -> Found {
-        let watertight = Q::TEST == Test::Watertight;
-        let Some(found) = self.aim.sight.nearby(s, block, watertight, self.limit) else {
+    fn enter_leaf_quickly<S: Simd, B: Block>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        ray: &Ray,
+        block: &B,
+    ) -> Found {
+        let Some(found) = self.aim.sight.nearby(s, block, ray, Q::TEST, self.limit, self.aim.slabs.scale)
+        else {
             return Found::Nothing;
         };
-        let t = found.depth / self.aim.slabs.scale;
         let weight = [found.weight[0].into(), found.weight[1].into(), 1.0];
         let place = block.first() + found.triangle as u32;
-        self.query.offer(Named::place(place, object.triangle_ids), Crossing { t: t.into(), weight });
+        self.query.offer(Named::place(place, object.triangle_ids), Crossing { t: found.t.into(), weight });
         self.settled(Found::Nothing)
     }
 

@@ -3,6 +3,7 @@
 use bth::Scene;
 use bth::layout::RecordKind;
 use bth_compile::Silent;
+use bth_compile::coordinates::Boxes;
 use bth_compile::pipeline::{Options, Structure, compile};
 use bth_scenes::Model;
 
@@ -40,7 +41,10 @@ pub fn compiled(model: &Model, options: &Options) -> Scene {
 /// The model in every structure, the BVH first. Those with tetrahedra only when the worker program is there, and
 /// one tetrahedralization of the whole only for models that have one (`whole`).
 pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
-    let mut wanted = vec![("bvh".to_string(), options(Structure::Bvh, RecordKind::Link32, false))];
+    let bvh = options(Structure::Bvh, RecordKind::Link32, false);
+    let mut packed = bvh.clone();
+    packed.coordinates.boxes = Boxes::Bytes;
+    let mut wanted = vec![("bvh".to_string(), bvh), ("bvh of packed nodes".to_string(), packed)];
     if crate::worker().is_some() {
         for record in RecordKind::ALL {
             wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));
@@ -48,7 +52,10 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
                 wanted.push((format!("tets {}", record.name()), options(Structure::Tets, record, false)));
             }
         }
-        wanted.push(("bth with subtrees".into(), options(Structure::Bth, RecordKind::Link32, true)));
+        let mut with_subtrees = options(Structure::Bth, RecordKind::Link32, true);
+        wanted.push(("bth with subtrees".into(), with_subtrees.clone()));
+        with_subtrees.coordinates.boxes = Boxes::Bytes;
+        wanted.push(("bth with subtrees of packed nodes".into(), with_subtrees));
     }
     wanted.into_iter().map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
 }

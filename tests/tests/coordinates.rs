@@ -19,7 +19,7 @@ use std::path::Path;
 
 /// A compiled file.
 fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::Options) -> File {
-    options.coordinates = Options { bits: grid, max_error: None };
+    options.coordinates = Options { bits: grid, ..Options::default() };
     let (compiled, report) = compile(path, &options, &Silent).unwrap();
     assert_eq!(report.coordinates.map(|c| c.bits), grid.map(|b| b as u32));
     File::from_bytes(&compiled.bytes).unwrap()

@@ -7,7 +7,7 @@ import bth_container as c
 import bth_leaves
 from bth_container import NONE
 from bth_indices import TETS, child
-from bth_leaves import NODE
+from bth_leaves import NODE, PACKED
 from bth_tets import FACE_BIT
 
 
@@ -88,7 +88,7 @@ def _tree(view):
             continue
         kind, index = child(code)
         points = []
-        if kind == NODE:
+        if kind in (NODE, PACKED):
             lower, upper, codes = view.node(index)
             stack.extend((codes[i], [*boxes, (lower[i], upper[i])], leaf_row) for i in range(16))
         elif kind == TETS:

@@ -6,7 +6,7 @@ import struct
 import bth_container as c
 import bth_leaves
 from bth_container import NONE
-from bth_leaves import INDEXED, NODE, RAW
+from bth_leaves import INDEXED, NODE, PACKED, RAW
 from bth_tets import derive
 
 MAX_DEPTH = 96
@@ -16,7 +16,7 @@ F32_MAX = struct.unpack("<f", struct.pack("<I", 0x7F7FFFFF))[0]
 
 def child(code):
     """Kind and index of a child code; None where there is none."""
-    kind = {0: NODE, 4: INDEXED, 5: RAW, 6: TETS}.get(code >> 29)
+    kind = {0: NODE, 1: PACKED, 4: INDEXED, 5: RAW, 6: TETS}.get(code >> 29)
     return None if kind is None else (kind, code & (1 << 29) - 1)
 
 
@@ -115,7 +115,8 @@ def _tree(view):
         if code == NONE:
             continue
         found = child(code)
-        if found is None or (found[0] == TETS and in_subtree):
+        other = NODE if view.packed_nodes else PACKED
+        if found is None or found[0] == other or (found[0] == TETS and in_subtree):
             raise view.invalid("F105", f"child code {code:#x}", section, at)
         kind, index = found
         if kind == TETS:
@@ -134,12 +135,13 @@ def _tree(view):
         if not claimed.isdisjoint(block):
             raise view.invalid("F108", f"{kind} at half line {block.start}", section, at)
         claimed.update(block)
-        if kind == NODE:
+        if kind in (NODE, PACKED):
             if depth + 1 > min(view.depth, MAX_DEPTH):
                 raise view.invalid("F110", f"{depth + 1} nodes on a path", section, at)
             codes = _slots(view, index)
             for slot in reversed(range(16)):
-                stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, 64 * index + 384 + 4 * slot))
+                at = 64 * index + (96 if kind == PACKED else 384) + 4 * slot
+                stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, at))
         else:
             bth_leaves.check(view, kind, index)
     for half in range(halves):
@@ -157,7 +159,7 @@ def _slots(view, line):
     lower, upper, codes = view.node(line)
     used = codes.index(NONE) if NONE in codes else 16
     if used == 0:
-        raise view.invalid("F111", "no children", c.LINES, 64 * line + 384)
+        raise view.invalid("F111", "no children", c.LINES, 64 * line + (96 if view.packed_nodes else 384))
     for i in range(16):
         if i < used:
             if not is_box(lower[i], upper[i]):

@@ -92,6 +92,9 @@ pub struct SectionEntry {
 /// Bit of [`Header::required_features`]: an object stores the coordinates of its triangle leaves on a [`Grid`].
 pub const FEATURE_GRID: u64 = 1;
 
+/// Bit of [`Header::required_features`]: an object has nodes with boxes of bytes, [`PackedNode`].
+pub const FEATURE_PACKED_NODES: u64 = 2;
+
 /// Flag bit of [`SectionEntry::flags`]: unknown kinds with it are refused.
 pub const SECTION_REQUIRED: u32 = 1;
 
@@ -179,15 +182,18 @@ pub struct Object {
     pub dropped: u32,
     /// Wide nodes on the longest path from the root.
     pub depth: u32,
-    /// Bits of a coordinate of a triangle leaf in the lowest byte: 16, 21, or 0 for `f32`. Then per axis the exponent
-    /// field, as of an `f32`, of the power of two between neighbouring points of the [`Grid`]. All zero for `f32`, as
-    /// the following.
+    /// Bits of a coordinate of a triangle leaf in the lowest byte: 16, 21, or 0 for `f32`; and [`PACKED_NODES`]. Then per
+    /// axis the exponent field, as of an `f32`, of the power of two between neighbouring points of the [`Grid`]: zero for
+    /// `f32`, as the following.
     pub coordinates: u32,
     /// The grid's least point.
     pub grid_origin: [f32; 3],
     /// Greatest distance of a stored vertex from that of the source, object space.
     pub displacement: f32,
 }
+
+/// Bit of [`Object::coordinates`]: all nodes are [`PackedNode`]s; else none is.
+pub const PACKED_NODES: u32 = 1 << 7;
 
 /// Which record the `TETS` section holds (`Object::record`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -236,6 +242,8 @@ impl RecordKind {
 pub enum Child {
     /// Line of a [`WideNode`].
     Node(u32),
+    /// Line of a [`PackedNode`].
+    Packed(u32),
     /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`IndexedLeaf16`] or [`IndexedLeaf21`].
     Indexed(u32),
     /// Line of a [`RawLeaf`]; on a grid the half line of a [`RawLeaf16`] or [`RawLeaf21`].
@@ -247,6 +255,8 @@ pub enum Child {
 impl Child {
     /// Set in the codes of leaves.
     pub const LEAF_BIT: u32 = 1 << 31;
+    /// Of nodes, set in the codes of packed ones.
+    pub const PACKED_BIT: u32 = 1 << 29;
     /// Indices are below this.
     pub const INDEX_LIMIT: u32 = 1 << 29;
 
@@ -254,6 +264,7 @@ impl Child {
     pub const fn code(self) -> u32 {
         match self {
             Child::Node(i) => i,
+            Child::Packed(i) => Self::PACKED_BIT | i,
             Child::Indexed(i) => Self::LEAF_BIT | i,
             Child::Raw(i) => Self::LEAF_BIT | (1 << 29) | i,
             Child::Tets(i) => Self::LEAF_BIT | (2 << 29) | i,
@@ -265,6 +276,7 @@ impl Child {
         let index = code & (Self::INDEX_LIMIT - 1);
         match code >> 29 {
             0 => Some(Child::Node(index)),
+            1 => Some(Child::Packed(index)),
             4 => Some(Child::Indexed(index)),
             5 => Some(Child::Raw(index)),
             6 => Some(Child::Tets(index)),
@@ -285,6 +297,23 @@ pub struct WideNode {
     pub bounds: [[[f32; WIDTH]; 2]; 3],
     /// Child codes; those of nodes and triangle leaves exceed the own line.
     pub child: [u32; WIDTH],
+}
+
+/// A [`WideNode`] with boxes of bytes: 3 lines. An end is `origin + step * byte`, which takes no rounding: steps are powers
+/// of two, the origin is a multiple of the step, and no multiple exceeds 2^24. An empty slot has lower = 255, upper = 0.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub struct PackedNode {
+    /// As in [`WideNode`], in steps.
+    pub bounds: [[[u8; WIDTH]; 2]; 3],
+    /// As in [`WideNode`].
+    pub child: [u32; WIDTH],
+    /// Least point, object space.
+    pub origin: [f32; 3],
+    /// Between neighbouring points, per axis.
+    pub step: [f32; 3],
+    /// Zero.
+    pub reserved: [u32; 2],
 }
 
 /// Triangle leaf with shared vertices: 4 lines.
@@ -447,6 +476,7 @@ assert_layout! {
     Object 64 { lower 0, upper 12, root 24, record 28, triangles 32, dropped 36, depth 40, coordinates 44,
         grid_origin 48, displacement 60 }
     WideNode 448 { child 384 }
+    PackedNode 192 { child 96, origin 160, step 172, reserved 184 }
     IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }
     RawLeaf 640 { first 576, triangles 580 }
     TetLeaf 64 { upper 12, first_tet 24, first_vertex 32, first_face 40, first_hull 48, subtree 56, flags 60 }
@@ -461,6 +491,8 @@ assert_layout! {
 
 /// Lines that a [`WideNode`] takes.
 pub const NODE_LINES: usize = size_of::<WideNode>() / 64;
+/// Lines that a [`PackedNode`] takes.
+pub const PACKED_NODE_LINES: usize = size_of::<PackedNode>() / 64;
 /// Lines that an [`IndexedLeaf`] takes.
 pub const INDEXED_LINES: usize = size_of::<IndexedLeaf>() / 64;
 /// Lines that a [`RawLeaf`] takes.

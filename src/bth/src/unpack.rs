@@ -92,7 +92,45 @@ fn widened(reserved: [u32; 6]) -> [u32; 14] {
     out
 }
 
+impl PackedNode {
+    /// An end of a box.
+    #[inline(always)]
+    pub fn end(&self, axis: usize, upper: usize, slot: usize) -> f32 {
+        self.origin[axis] + self.step[axis] * f32::from(self.bounds[axis][upper][slot])
+    }
+
+    /// The same node of `f32`.
+    pub fn unpacked(&self) -> WideNode {
+        let mut bounds = [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3];
+        for slot in 0..WIDTH {
+            let ends = self.bounds.map(|ends| ends.map(|row| row[slot]));
+            if self.child[slot] == NONE && ends == [[255, 0]; 3] {
+                continue;
+            }
+            for axis in 0..3 {
+                bounds[axis][0][slot] = self.end(axis, 0, slot);
+                bounds[axis][1][slot] = self.end(axis, 1, slot);
+            }
+        }
+        WideNode { bounds, child: self.child }
+    }
+
+    /// Whether every end that a byte can stand for is an `f32`.
+    pub fn is_exact(&self) -> bool {
+        (0..3).all(|axis| is_exact(self.origin[axis], self.step[axis], 255))
+    }
+}
+
 impl<'a> ObjectView<'a> {
+    /// The node that a child leads to, unpacked if it is packed.
+    pub fn unpacked_node(&self, child: Child) -> Option<WideNode> {
+        match child {
+            Child::Node(line) => Some(*self.node(line)),
+            Child::Packed(line) => Some(self.packed_node(line).unpacked()),
+            Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
+        }
+    }
+
     /// A leaf on the grid, at a half line.
     #[inline(always)]
     fn packed<T: FromBytes + KnownLayout + Immutable>(&self, half_line: u32) -> &'a T {
@@ -146,6 +184,7 @@ impl<'a> ObjectView<'a> {
         let leaf = |index: u32| if self.grid.is_some() { u64::from(index) } else { 2 * u64::from(index) };
         match child {
             Child::Node(line) => Some((2 * u64::from(line), 2 * NODE_LINES)),
+            Child::Packed(line) => Some((2 * u64::from(line), 2 * PACKED_NODE_LINES)),
             Child::Indexed(index) => Some((leaf(index), indexed)),
             Child::Raw(index) => Some((leaf(index), raw)),
             Child::Tets(_) => None,

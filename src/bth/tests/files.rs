@@ -9,9 +9,11 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 16] = files![
+const VALID: [(&str, &[u8]); 18] = files![
     "grid-16",
     "grid-21",
+    "packed-nodes",
+    "packed-nodes-grid-16",
     "no-objects",
     "nothing-to-hit",
     "scene-empty",

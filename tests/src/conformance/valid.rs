@@ -14,9 +14,11 @@ pub fn valid() -> Vec<Case> {
         Case::new("nothing-to-hit", nothing_to_hit()),
         Case::new("triangle", triangle()),
         Case::new("triangle-bare", triangle_bare()),
-        Case::new("two-levels", two_levels(None)),
-        Case::new("grid-16", two_levels(Some(GridBits::B16))),
-        Case::new("grid-21", two_levels(Some(GridBits::B21))),
+        Case::new("two-levels", two_levels(None, false)),
+        Case::new("grid-16", two_levels(Some(GridBits::B16), false)),
+        Case::new("grid-21", two_levels(Some(GridBits::B21), false)),
+        Case::new("packed-nodes", two_levels(None, true)),
+        Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
         Case::new("two-objects", two_objects()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
@@ -128,8 +130,8 @@ fn triangle_bare() -> Vec<u8> {
 
 /// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
 /// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are on a
-/// grid, a little beside the source's positions.
-fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
+/// grid, a little beside the source's positions; boxes of nodes may be packed.
+fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     let mut positions = Vec::new();
     for y in 0..6 {
         for x in 0..5 {
@@ -179,12 +181,13 @@ fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
     let grid = bits.map(|bits| {
         let step = [8.0, 8.0, 16.0].map(|extent| extent / (1u32 << bits as u32) as f32);
         let grid = Grid { bits, origin: [0.0; 3], step };
-        pack(&mut wide, &grid).expect("a few lines");
         // So that who compares with the source has to round.
         let off = step.map(|s| 0.375 * s);
         positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| p[k] + off[k]));
         (grid, off.iter().map(|x| x * x).sum::<f32>().sqrt().next_up())
     });
+    let packed = pack(&mut wide, grid.as_ref().map(|(grid, _)| grid), packed_nodes).expect("a few lines");
+    assert_eq!(packed, packed_nodes);
     let normals = vec![[0.0, 0.0, 1.0]; positions.len()];
     let uvs: Vec<_> = positions.iter().map(|p| [p[0] / 4.0, p[1] / 5.0]).collect();
     let source = Source {
@@ -200,6 +203,7 @@ fn two_levels(bits: Option<GridBits>) -> Vec<u8> {
         triangles: 41,
         dropped: 1,
         grid,
+        packed_nodes,
         lines: &wide.lines,
         triangle_ids: &wide.triangle_ids,
         source: Some(source),
@@ -276,6 +280,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         triangles: 6,
         dropped: 1,
         grid: None,
+        packed_nodes: false,
         lines: &all,
         triangle_ids: &[4, 0, 1],
         record: Some(record),

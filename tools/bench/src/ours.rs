@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use bth::layout::{GridBits, RecordKind};
 use bth::rays::{Hit, Surface};
 use bth::{Scene, Test};
-use bth_compile::coordinates;
+use bth_compile::coordinates::{self, Boxes};
 use bth_compile::pipeline::{self, Options, Structure};
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,19 +22,22 @@ pub struct Kind {
     structure: Structure,
     record: RecordKind,
     bits: Option<GridBits>,
+    boxes: Boxes,
 }
 
-const LINK32: Kind = Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, bits: None };
+const LINK32: Kind =
+    Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, bits: None, boxes: Boxes::F32 };
 
 /// The structures. The default file comes first, then the plain BVH, which is also what finds the hits
 /// that secondary rays start from.
-pub const KINDS: [Kind; 6] = [
+pub const KINDS: [Kind; 7] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
     Kind { name: "tets link32", ..LINK32 },
     Kind { name: "tets tet32", record: RecordKind::Tet32, ..LINK32 },
     Kind { name: "tets tet20", record: RecordKind::Tet20, ..LINK32 },
     Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
+    Kind { name: "bvh 8-bit boxes", structure: Structure::Bvh, boxes: Boxes::Bytes, ..LINK32 },
 ];
 
 /// The default file.
@@ -78,7 +81,7 @@ impl Kind {
         Options {
             structure: self.structure,
             record: self.record,
-            coordinates: coordinates::Options { bits: self.bits, max_error: None },
+            coordinates: coordinates::Options { bits: self.bits, max_error: None, boxes: self.boxes },
             keep_subtrees: !self.is_tets(),
             ..Options::default()
         }

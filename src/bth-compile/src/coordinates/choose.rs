@@ -48,7 +48,24 @@ impl MaxError {
     }
 }
 
-/// Which coordinates triangle leaves store.
+/// How boxes of nodes are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Boxes {
+    /// As they are.
+    #[default]
+    F32,
+    /// Rounded outwards to bytes: nodes of three lines in place of seven.
+    Bytes,
+}
+
+impl Boxes {
+    fn is_f32(&self) -> bool {
+        *self == Boxes::F32
+    }
+}
+
+/// Which coordinates triangle leaves and nodes store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Options {
     /// So many bits. Without: `f32`, or if `max_error` is given the fewest that honour it.
@@ -56,6 +73,9 @@ pub struct Options {
     pub bits: Option<GridBits>,
     /// Greatest distance that a vertex may move.
     pub max_error: Option<MaxError>,
+    /// Boxes of nodes; they move no vertex, and no answer depends on them.
+    #[serde(skip_serializing_if = "Boxes::is_f32")]
+    pub boxes: Boxes,
 }
 
 fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result::Result<S::Ok, S::Error> {
@@ -236,7 +256,7 @@ mod tests {
         #[test]
         fn no_vertex_moves_farther_than_is_said(points in prop::collection::vec(prop::array::uniform3(number()), 1..40)) {
             for bits in GridBits::ALL {
-                let options = Options { bits: Some(bits), max_error: None };
+                let options = Options { bits: Some(bits), ..Options::default() };
                 let mut moved = mesh(points.clone());
                 let found = place(Path::new("a"), &mut moved, &options);
                 if points.iter().flatten().any(|x| x.abs() > 2f32.powi(110)) {
@@ -279,7 +299,7 @@ mod tests {
     fn the_fewest_bits_that_honour_a_bound_are_taken() {
         let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
         let bits = |max_error| {
-            let options = Options { bits: None, max_error: Some(max_error) };
+            let options = Options { max_error: Some(max_error), ..Options::default() };
             place(Path::new("a"), &mut mesh(points.clone()), &options).unwrap().map(|on| on.grid.bits)
         };
         assert_eq!(bits(MaxError::OfDiagonal(1e-4)), Some(GridBits::B16));
@@ -290,7 +310,11 @@ mod tests {
     #[test]
     fn too_few_bits_are_refused_with_what_would_do() {
         let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
-        let options = Options { bits: Some(GridBits::B16), max_error: Some(MaxError::Absolute(1e-6)) };
+        let options = Options {
+            bits: Some(GridBits::B16),
+            max_error: Some(MaxError::Absolute(1e-6)),
+            ..Options::default()
+        };
         let error = place(Path::new("a.ply"), &mut mesh(points), &options).unwrap_err().to_string();
         assert!(
             error.contains("BTH-I070") && error.contains("hint: 21 bits move vertices by at most"),

@@ -1,10 +1,11 @@
-//! Coordinates in fewer bits: vertices move to the points of a grid, once and before anything is built from them. So
+//! Coordinates and boxes in fewer bits. Coordinates: vertices move to the points of a grid, once and before anything is built from them. So
 //! what shares a vertex goes on sharing it, closed surfaces stay closed, and all that comes after is exact for the
 //! vertices as they are stored.
 
+mod boxes;
 mod choose;
 mod pack;
 
-pub use choose::{MaxError, Options, Report};
+pub use choose::{Boxes, MaxError, Options, Report};
 pub(crate) use choose::{OnGrid, place};
 pub use pack::pack;

@@ -1,5 +1,6 @@
-//! The lines of a wide BVH with its leaves on a grid, which makes them shorter.
+//! The lines of a wide BVH with its leaves on a grid, or boxes of nodes in bytes, which makes them shorter.
 
+use super::boxes::packed_node;
 use crate::bvh::Wide;
 use crate::error::{Error, Result};
 use bth::layout::*;
@@ -13,20 +14,28 @@ struct Block {
     half: u64,
 }
 
-/// Moves the blocks together, leaves shortened. Corners must lie on the grid.
+/// Moves the blocks together, leaves shortened where there is a grid, on which their corners must lie, and nodes if they are
+/// to be packed. Whether they are now: coordinates may be too great for steps of bytes.
 ///
 /// # Errors
 /// `BTH-L202` when a child code cannot address a leaf.
-pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
+pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bool> {
     let mut blocks = blocks(wide);
-    let [indexed, raw] = grid.bits.half_lines();
+    let nodes = pack_nodes.then(|| packed_nodes(wide, &blocks)).flatten();
+    if grid.is_none() && nodes.is_none() {
+        return Ok(false);
+    }
+    let [indexed, raw] = match grid {
+        Some(grid) => grid.bits.half_lines(),
+        None => [2 * INDEXED_LINES, 2 * RAW_LINES],
+    };
     let mut end = 0u64;
     for block in &mut blocks {
         let halves = match block.old {
             Child::Node(_) => {
                 // Nodes stay on whole lines.
                 end = end.next_multiple_of(2);
-                2 * NODE_LINES
+                2 * if nodes.is_some() { PACKED_NODE_LINES } else { NODE_LINES }
             }
             Child::Indexed(_) => indexed,
             _ => raw,
@@ -34,10 +43,12 @@ pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
         block.half = end;
         end += halves as u64;
     }
-    if end > u64::from(Child::INDEX_LIMIT) {
+    // Leaves on a grid are counted in half lines.
+    let unit = if grid.is_some() { 1 } else { 2 };
+    if end > unit * u64::from(Child::INDEX_LIMIT) {
         let message = format!(
-            "the BVH needs {end} half lines of 32 bytes; an object with a grid can have {}",
-            Child::INDEX_LIMIT
+            "the BVH needs {end} half lines of 32 bytes; an object can have {}",
+            unit * u64::from(Child::INDEX_LIMIT)
         );
         return Err(Error::Limit { code: "BTH-L202", message });
     }
@@ -48,22 +59,37 @@ pub fn pack(wide: &mut Wide, grid: &Grid) -> Result<()> {
         grid,
     };
     for block in &blocks {
-        let half = block.half as u32;
+        let (line, leaf) = ((block.half / 2) as u32, (block.half / unit) as u32);
         let (line, code) = match block.old {
-            Child::Node(line) => (line, Child::Node(half / 2).code()),
-            Child::Indexed(line) => (line, Child::Indexed(half).code()),
-            Child::Raw(line) => (line, Child::Raw(half).code()),
-            Child::Tets(_) => unreachable!("a tet leaf has no block"),
+            Child::Node(old) if nodes.is_some() => (old, Child::Packed(line).code()),
+            Child::Node(old) => (old, Child::Node(line).code()),
+            Child::Indexed(old) => (old, Child::Indexed(leaf).code()),
+            Child::Raw(old) => (old, Child::Raw(leaf).code()),
+            Child::Packed(_) | Child::Tets(_) => unreachable!("a block of the wide BVH"),
         };
         packed.code_at[line as usize] = code;
     }
+    let mut nodes = nodes.map(Vec::into_iter);
     for block in &blocks {
-        packed.write(block);
+        let node = match block.old {
+            Child::Node(_) => nodes.as_mut().and_then(Iterator::next),
+            _ => None,
+        };
+        packed.write(block, node);
     }
     wide.root = packed.code(wide.root);
     wide.subtrees = wide.subtrees.iter().map(|code| packed.code(*code)).collect();
     wide.lines = packed.lines;
-    Ok(())
+    Ok(nodes.is_some())
+}
+
+/// The nodes among the blocks with their boxes packed, children as before; nothing if one has none.
+fn packed_nodes(wide: &Wide, blocks: &[Block]) -> Option<Vec<PackedNode>> {
+    let node = |block: &Block| match block.old {
+        Child::Node(line) => Some(packed_node(read(&wide.lines, line))),
+        _ => None,
+    };
+    blocks.iter().filter_map(node).collect()
 }
 
 /// All blocks, in the order of their lines.
@@ -79,7 +105,7 @@ fn blocks(wide: &Wide) -> Vec<Block> {
             Some(old @ (Child::Indexed(line) | Child::Raw(line))) => {
                 found.push((line, Block { old, half: 0 }))
             }
-            Some(Child::Tets(_)) | None => {}
+            Some(Child::Packed(_) | Child::Tets(_)) | None => {}
         }
     }
     found.sort_unstable_by_key(|(line, _)| *line);
@@ -96,7 +122,7 @@ struct Packed<'a> {
     /// New child code of the block at each old line.
     code_at: Vec<u32>,
     lines: Vec<Line>,
-    grid: &'a Grid,
+    grid: Option<&'a Grid>,
 }
 
 impl Packed<'_> {
@@ -104,21 +130,37 @@ impl Packed<'_> {
     fn code(&self, old: u32) -> u32 {
         match Child::from_code(old) {
             Some(Child::Node(line) | Child::Indexed(line) | Child::Raw(line)) => self.code_at[line as usize],
-            Some(Child::Tets(_)) | None => old,
+            Some(Child::Packed(_) | Child::Tets(_)) | None => old,
         }
     }
 
-    fn write(&mut self, block: &Block) {
-        let (half, bits) = (block.half, self.grid.bits);
-        match block.old {
-            Child::Node(line) => {
+    fn write(&mut self, block: &Block, node: Option<PackedNode>) {
+        let half = block.half;
+        match (block.old, node) {
+            (Child::Node(_), Some(mut node)) => {
+                node.child = node.child.map(|code| self.code(code));
+                self.put(half, &node);
+            }
+            (Child::Node(line), None) => {
                 let mut node = *read::<WideNode>(self.old, line);
                 node.child = node.child.map(|code| self.code(code));
                 self.put(half, &node);
             }
+            (leaf, _) => match (leaf, self.grid) {
+                (leaf, Some(grid)) => self.write_on_grid(half, leaf, grid),
+                (Child::Indexed(line), None) => self.put(half, read::<IndexedLeaf>(self.old, line)),
+                (Child::Raw(line), None) => self.put(half, read::<RawLeaf>(self.old, line)),
+                _ => unreachable!("a block of the wide BVH"),
+            },
+        }
+    }
+
+    fn write_on_grid(&mut self, half: u64, leaf: Child, grid: &Grid) {
+        let bits = grid.bits;
+        match leaf {
             Child::Indexed(line) => {
                 let leaf = read::<IndexedLeaf>(self.old, line);
-                let (vertex, high) = self.split(&leaf.vertex);
+                let (vertex, high) = split(grid, &leaf.vertex);
                 let corner = leaf.corner.map(|row| std::array::from_fn(|i| row[i] | row[i + WIDTH / 2] << 4));
                 let (first, triangles, vertices) = (leaf.first, leaf.triangles as u8, leaf.vertices as u8);
                 match bits {
@@ -137,7 +179,7 @@ impl Packed<'_> {
             }
             Child::Raw(line) => {
                 let leaf = read::<RawLeaf>(self.old, line);
-                let rows = leaf.corner.each_ref().map(|rows| self.split(rows));
+                let rows = leaf.corner.each_ref().map(|rows| split(grid, rows));
                 let (corner, high) = (rows.map(|r| r.0), rows.map(|r| r.1));
                 let (first, triangles, reserved) = (leaf.first, leaf.triangles, [0; 6]);
                 match bits {
@@ -145,26 +187,26 @@ impl Packed<'_> {
                     GridBits::B21 => self.put(half, &RawLeaf21 { corner, high, first, triangles, reserved }),
                 }
             }
-            Child::Tets(_) => unreachable!("a tet leaf has no block"),
+            _ => unreachable!("a leaf of the wide BVH"),
         }
-    }
-
-    /// Low bits per axis, and the high bits of all three.
-    fn split(&self, rows: &[[f32; WIDTH]; 3]) -> ([[u16; WIDTH]; 3], [u16; WIDTH]) {
-        let mut high = [0u16; WIDTH];
-        let low = std::array::from_fn(|axis| {
-            std::array::from_fn(|i| {
-                let steps = self.grid.steps(axis, rows[axis][i]);
-                debug_assert!((0..=i64::from(self.grid.bits.most())).contains(&steps));
-                high[i] |= ((steps >> 16) as u16) << (5 * axis);
-                steps as u16
-            })
-        });
-        (low, high)
     }
 
     fn put<T: IntoBytes + Immutable>(&mut self, half: u64, block: &T) {
         let bytes = block.as_bytes();
         self.lines.as_mut_bytes()[half as usize * HALF_LINE..][..bytes.len()].copy_from_slice(bytes);
     }
+}
+
+/// Low bits per axis, and the high bits of all three.
+fn split(grid: &Grid, rows: &[[f32; WIDTH]; 3]) -> ([[u16; WIDTH]; 3], [u16; WIDTH]) {
+    let mut high = [0u16; WIDTH];
+    let low = std::array::from_fn(|axis| {
+        std::array::from_fn(|i| {
+            let steps = grid.steps(axis, rows[axis][i]);
+            debug_assert!((0..=i64::from(grid.bits.most())).contains(&steps));
+            high[i] |= ((steps >> 16) as u16) << (5 * axis);
+            steps as u16
+        })
+    });
+    (low, high)
 }

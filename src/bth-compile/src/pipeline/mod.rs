@@ -11,6 +11,7 @@ pub(crate) use kept::{tetgen, through};
 pub use options::{Options, Structure};
 
 use crate::cached::{self, Cache, Topology};
+use crate::coordinates::Boxes;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, coordinates, costs, marks, mesh, tets};
@@ -140,6 +141,7 @@ pub(crate) struct Object {
     on_grid: Option<coordinates::OnGrid>,
     tree: bvh::BinaryBvh,
     wide: bvh::Wide,
+    packed_nodes: bool,
     /// Absent without tet leaves.
     encoded: Option<tets::Encoded>,
     pub(crate) tet_leaves: u64,
@@ -223,15 +225,14 @@ fn object(
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
     let (mut wide, mut collapse) = bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor)?;
-    if let Some(on_grid) = &on_grid {
-        coordinates::pack(&mut wide, &on_grid.grid)?;
-        collapse.measure(&wide);
-    }
+    let grid = on_grid.as_ref().map(|on_grid| &on_grid.grid);
+    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
+    collapse.measure(&wide);
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
     let (tet_leaves, tet_triangles) =
         (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
-    Ok((Object { mesh, on_grid, tree, wide, encoded, tet_leaves, tet_triangles }, collapse))
+    Ok((Object { mesh, on_grid, tree, wide, packed_nodes, encoded, tet_leaves, tet_triangles }, collapse))
 }
 
 /// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes: for

@@ -38,6 +38,7 @@ pub(crate) fn parts<'a>(object: &'a Object, options: &Options) -> write::ObjectP
         parts.triangle_homes = &encoded.homes;
     }
     parts.grid = object.on_grid.as_ref().map(|on| (on.grid, on.displacement));
+    parts.packed_nodes = object.packed_nodes;
     let mut source = write::Source::default();
     if options.geometry {
         let positions = object.on_grid.as_ref().map_or(&mesh.positions, |on| &on.source);

@@ -164,10 +164,15 @@ impl<'a> FileBuilder<'a> {
     /// What the objects need.
     fn required_features(&self) -> u64 {
         let at = std::mem::offset_of!(Object, coordinates);
-        let on_grid = |((_, kind), section): (&(u32, u32), &Section<'_>)| {
-            *kind == kind::OBJECT && section.bytes.get(at..at + 4).is_some_and(|code| code != [0; 4])
-        };
-        if self.sections.iter().any(on_grid) { FEATURE_GRID } else { 0 }
+        let objects = self.sections.iter().filter(|((_, kind), _)| *kind == kind::OBJECT);
+        let codes = objects.filter_map(|(_, section)| {
+            let bytes = section.bytes.get(at..at + 4)?;
+            Some(u32::from_le_bytes(bytes.try_into().ok()?))
+        });
+        codes.fold(0, |features, code| {
+            let grid = if code & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
+            features | grid | if code & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }
+        })
     }
 
     fn table_end(&self) -> u64 {

@@ -20,6 +20,8 @@ pub struct ObjectParts<'a> {
     pub dropped: u32,
     /// Grid of the coordinates in triangle leaves, and the greatest distance that a vertex moved; `None` for `f32`.
     pub grid: Option<(Grid, f32)>,
+    /// Whether all nodes are packed; else none is.
+    pub packed_nodes: bool,
     /// Nodes and triangle leaves.
     pub lines: &'a [Line],
     /// Source id of each triangle in leaf order.
@@ -82,7 +84,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         triangles: parts.triangles,
         dropped: parts.dropped,
         depth,
-        coordinates,
+        coordinates: coordinates | if parts.packed_nodes { PACKED_NODES } else { 0 },
         grid_origin,
         displacement: parts.grid.map_or(0.0, |(_, displacement)| displacement),
     };
@@ -117,18 +119,21 @@ fn depth(parts: &ObjectParts) -> Result<u32> {
     let mut visits = 0;
     while let Some((code, above)) = stack.pop() {
         match Child::from_code(code) {
-            Some(Child::Node(line)) => {
-                let range = line as usize..line as usize + NODE_LINES;
-                let lines =
-                    parts.lines.get(range).ok_or_else(|| defect(format!("no node at line {line}")))?;
-                let node = WideNode::ref_from_bytes(lines.as_bytes()).expect("a node is whole lines");
+            Some(child @ (Child::Node(line) | Child::Packed(line))) => {
+                let missing = || defect(format!("no node at line {line}"));
+                let below = parts.lines.get(line as usize..).ok_or_else(missing)?.as_bytes();
+                let children = match child {
+                    Child::Packed(_) => PackedNode::ref_from_prefix(below).ok().map(|(node, _)| node.child),
+                    _ => WideNode::ref_from_prefix(below).ok().map(|(node, _)| node.child),
+                };
+                let children = children.ok_or_else(missing)?;
                 deepest = deepest.max(above + 1);
                 visits += 1;
                 // In a tree every node has lines of its own.
                 if visits > parts.lines.len() {
                     return Err(defect("the hierarchy is no tree".into()));
                 }
-                stack.extend(node.child.iter().map(|&c| (c, above + 1)));
+                stack.extend(children.iter().map(|&c| (c, above + 1)));
             }
             Some(Child::Tets(row)) => {
                 let leaf =

@@ -47,6 +47,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
             |code, expected: String, found: String| Err(Error::within(code, section, at, expected, found));
         let child = match Child::from_code(visit.code) {
             Some(Child::Tets(_)) if visit.in_subtree => None,
+            Some(Child::Node(_)) if view.has_packed_nodes() => None,
+            Some(Child::Packed(_)) if !view.has_packed_nodes() => None,
             child => child,
         };
         let Some(child) = child else {
@@ -101,7 +103,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         }
         let start = first * HALF_LINE as u64;
         match child {
-            Child::Node(line) => {
+            Child::Node(_) | Child::Packed(_) => {
                 let depth = visit.depth + 1;
                 if depth > view.header.depth.min(limits::MAX_DEPTH as u32) {
                     let expected = format!(
@@ -111,10 +113,17 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
                     );
                     return fail(Code::Depth, expected, depth.to_string());
                 }
-                let node = view.node(line);
-                slots(node, start)?;
+                if let Child::Packed(line) = child {
+                    packed(view.packed_node(line), start)?;
+                }
+                let node = view.unpacked_node(child).expect("a node");
+                let codes = match child {
+                    Child::Packed(_) => offset_of!(PackedNode, child),
+                    _ => offset_of!(WideNode, child),
+                };
+                slots(&node, start, codes)?;
                 for (i, &code) in node.child.iter().enumerate().rev() {
-                    let at = start + (offset_of!(WideNode, child) + 4 * i) as u64;
+                    let at = start + (codes + 4 * i) as u64;
                     let place = (kind::LINES, at);
                     stack.push(Visit {
                         code,
@@ -158,14 +167,39 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     leaves::ids(view)
 }
 
-/// Checks which slots of a node are used, and their boxes; `start` is the node's byte.
-fn slots(node: &WideNode, start: u64) -> Result<()> {
+/// Checks that the boxes of a packed node can be unpacked without rounding.
+fn packed(node: &PackedNode, start: u64) -> Result<()> {
+    let fail = |code, offset: usize, expected: &str, found: String| {
+        Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
+    };
+    if !node.step.iter().all(|step| step.is_normal() && *step > 0.0 && step.to_bits() << 9 == 0) {
+        let found = format!("{:?}", node.step);
+        return fail(Code::ChildBounds, offset_of!(PackedNode, step), "steps that are powers of two", found);
+    }
+    if !node.is_exact() {
+        let found = format!("{:?} and steps of {:?}", node.origin, node.step);
+        return fail(
+            Code::ChildBounds,
+            offset_of!(PackedNode, origin),
+            "an origin that makes every end an f32",
+            found,
+        );
+    }
+    if node.reserved != [0; 2] {
+        let found = format!("{:?}", node.reserved);
+        return fail(Code::Slots, offset_of!(PackedNode, reserved), "zeros", found);
+    }
+    Ok(())
+}
+
+/// Checks which slots of a node are used, and their boxes; `start` is the node's byte, `codes` where child codes lie in it.
+fn slots(node: &WideNode, start: u64, codes: usize) -> Result<()> {
     let used = node.child.iter().take_while(|c| **c != NONE).count();
     let fail = |code, offset: usize, expected: &str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if used == 0 {
-        return fail(Code::Slots, offset_of!(WideNode, child), "at least one child", "none".into());
+        return fail(Code::Slots, codes, "at least one child", "none".into());
     }
     for i in 0..WIDTH {
         let lower = [0, 1, 2].map(|a| node.bounds[a][0][i]);

@@ -231,8 +231,13 @@ impl File {
         };
         let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
         let grid = Grid::of(object).map_err(|what| wrong(expected, what.to_owned()))?;
-        if grid.is_some() && self.header().required_features & FEATURE_GRID == 0 {
+        let features = self.header().required_features;
+        if grid.is_some() && features & FEATURE_GRID == 0 {
             return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
+        }
+        if object.coordinates & PACKED_NODES != 0 && features & FEATURE_PACKED_NODES == 0 {
+            let found = format!("{:#x}", object.coordinates);
+            return Err(wrong("no packed nodes, as the header announces none", found));
         }
         Ok(grid)
     }

@@ -11,7 +11,7 @@ pub(super) const HEADER: usize = size_of::<Header>();
 /// Bytes of a section entry.
 const ENTRY: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
-const KNOWN_FEATURES: u64 = FEATURE_GRID;
+const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_PACKED_NODES;
 
 /// Whether hashes are compared. Not under fuzzing: no fuzzer guesses one, and none of the checks behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);

@@ -1,6 +1,6 @@
 //! Coordinates of triangle leaves in fewer bits: points of a grid, all of which are `f32` without rounding.
 
-use super::{Object, WIDTH, assert_layout};
+use super::{Object, PACKED_NODES, WIDTH, assert_layout};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Bytes in which leaves on a grid are addressed: half a [`super::Line`].
@@ -131,12 +131,13 @@ impl Grid {
     /// # Errors
     /// What is wrong with it, in words.
     pub fn of(object: &Object) -> Result<Option<Grid>, &'static str> {
-        if object.coordinates == 0 {
+        let coordinates = object.coordinates & !PACKED_NODES;
+        if coordinates == 0 {
             let numbers = object.grid_origin.iter().chain([&object.displacement]);
             let zero = numbers.into_iter().all(|x| x.to_bits() == 0);
             return if zero { Ok(None) } else { Err("a grid of coordinates that are f32") };
         }
-        let [bits, exponents @ ..] = object.coordinates.to_le_bytes();
+        let [bits, exponents @ ..] = coordinates.to_le_bytes();
         let bits = GridBits::ALL.into_iter().find(|b| *b as u32 == u32::from(bits));
         let bits = bits.ok_or("coordinates that are neither f32 nor of 16 or 21 bits")?;
         if !exponents.iter().all(|e| (1..=254).contains(e)) {
@@ -155,11 +156,7 @@ impl Grid {
 
     /// Whether every point of an axis is an `f32`.
     pub fn is_exact(&self, axis: usize) -> bool {
-        let step = f64::from(self.step[axis]);
-        let first = f64::from(self.origin[axis]) / step;
-        let last = first + f64::from(self.bits.most());
-        let multiples = first == first.trunc() && first.abs() <= EXACT && last <= EXACT;
-        multiples && last * step <= f64::from(f32::MAX)
+        is_exact(self.origin[axis], self.step[axis], self.bits.most())
     }
 
     /// The three fields of an [`Object`] that say where the grid is: `coordinates` and `grid_origin`.
@@ -211,6 +208,15 @@ impl Grid {
         }
         out
     }
+}
+
+/// Whether all points from an origin to `most` steps of a power of two behind it are `f32`.
+pub(crate) fn is_exact(origin: f32, step: f32, most: u32) -> bool {
+    let step = f64::from(step);
+    let first = f64::from(origin) / step;
+    let last = first + f64::from(most);
+    let multiples = first == first.trunc() && first.abs() <= EXACT && last <= EXACT;
+    multiples && last * step <= f64::from(f32::MAX)
 }
 
 /// Steps from low and high bits.

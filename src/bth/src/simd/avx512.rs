@@ -189,6 +189,7 @@ impl Simd for Avx512 {
         lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
         bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
         floats(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
+        numbers(a: __m512i) -> __m512 = _mm512_cvtepi32_ps(a);
     }
 
     #[inline(always)]

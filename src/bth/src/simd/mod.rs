@@ -98,6 +98,8 @@ pub(crate) trait Simd: Copy {
     fn bits(self, a: Self::F) -> Self::U;
     /// f32 lanes from their bits.
     fn floats(self, a: Self::U) -> Self::F;
+    /// f32 lanes of these values, which are below 2^24.
+    fn numbers(self, a: Self::U) -> Self::F;
 
     fn mask(self, bits: u32) -> Self::M;
     fn mask_bits(self, m: Self::M) -> u32;

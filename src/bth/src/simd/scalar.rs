@@ -271,6 +271,10 @@ impl Simd for Scalar {
     fn floats(self, a: U) -> F {
         a.map(f32::from_bits)
     }
+    #[inline(always)]
+    fn numbers(self, a: U) -> F {
+        a.map(|x| x as f32)
+    }
 
     #[inline(always)]
     fn mask(self, bits: u32) -> u32 {

@@ -115,6 +115,7 @@ impl Kernel for Everything<'_> {
             u(s.expand_u(x, mask, self.v)),
             u(s.bits(a)),
             f(s.floats(s.bits(a))),
+            f(s.numbers(s.load_bytes(&bytes))),
             m(mask),
             m(s.and(mask, other)),
             m(s.or(mask, other)),

@@ -5,7 +5,7 @@
 //! direction components, so a box that the ray meets is never lost. t is measured as **depth**: in units of the
 //! greatest component of the direction, so that it has the size of coordinates.
 
-use crate::layout::{Object, WIDTH, WideNode};
+use crate::layout::{Object, PackedNode, WIDTH, WideNode};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::line::Line;
@@ -94,13 +94,11 @@ impl Slabs {
     /// The children of a node whose boxes the ray may meet before `limit`, a bit each, and lower bounds of
     /// their t. Empty slots may be among them when coordinates are too great for f32.
     #[inline(always)]
-    pub(crate) fn children<S: Simd>(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
+    pub(crate) fn children<S: Simd, B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
         let (mut enter, mut leave) = (s.splat(self.first), s.splat(limit));
         for k in 0..3 {
             let reciprocal = s.splat(self.reciprocal[k]);
-            let (first, second) =
-                (row(&node.bounds[k], self.near[k]), row(&node.bounds[k], self.near[k] ^ FAR));
-            let (first, second) = (s.load(first), s.load(second));
+            let (first, second) = (node.ends(s, k, self.near[k]), node.ends(s, k, self.near[k] ^ FAR));
             enter = s.max(s.fma(first, reciprocal, s.splat(self.near_addend[k])), enter);
             leave = s.min(s.fma(second, reciprocal, s.splat(self.far_addend[k])), leave);
         }
@@ -108,9 +106,50 @@ impl Slabs {
     }
 }
 
+/// The boxes of a node's children, whatever they are stored as.
+pub(crate) trait Boxes {
+    /// The ends of an axis: the lower ones at 0, the upper ones at [`FAR`].
+    fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F;
+    /// One of them; the slot is taken modulo [`WIDTH`].
+    fn end(&self, axis: usize, at: u32, slot: usize) -> f32;
+    /// The codes of the children.
+    fn child(&self) -> &[u32; WIDTH];
+}
+
 /// One of the two rows of an axis: lower ends at 0, upper ends at [`FAR`].
 #[inline(always)]
-pub(crate) fn row(rows: &[[f32; WIDTH]; 2], at: u32) -> &[f32; WIDTH] {
+fn row<T>(rows: &[[T; WIDTH]; 2], at: u32) -> &[T; WIDTH] {
     let at = (at & FAR) as usize;
     rows.as_flattened()[at..at + WIDTH].try_into().expect("a row")
+}
+
+impl Boxes for WideNode {
+    #[inline(always)]
+    fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
+        s.load(row(&self.bounds[axis], at))
+    }
+    #[inline(always)]
+    fn end(&self, axis: usize, at: u32, slot: usize) -> f32 {
+        row(&self.bounds[axis], at)[slot % WIDTH]
+    }
+    #[inline(always)]
+    fn child(&self) -> &[u32; WIDTH] {
+        &self.child
+    }
+}
+
+impl Boxes for PackedNode {
+    #[inline(always)]
+    fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
+        let steps = s.numbers(s.load_bytes(row(&self.bounds[axis], at)));
+        s.fma(steps, s.splat(self.step[axis]), s.splat(self.origin[axis]))
+    }
+    #[inline(always)]
+    fn end(&self, axis: usize, at: u32, slot: usize) -> f32 {
+        self.end(axis, usize::from(at & FAR != 0), slot % WIDTH)
+    }
+    #[inline(always)]
+    fn child(&self) -> &[u32; WIDTH] {
+        &self.child
+    }
 }

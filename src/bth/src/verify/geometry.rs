@@ -63,8 +63,8 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
     while i < visits.len() {
         let (child, beside) = (visits[i].child, visits[i].beside);
         match child {
-            Child::Node(line) => {
-                let children = view.node(line).child.iter().enumerate();
+            Child::Node(_) | Child::Packed(_) => {
+                let children = view.any_node(child.code()).child().iter().enumerate();
                 visits.extend(children.filter_map(|(slot, &code)| visit(code, Some((i, slot)), beside)));
             }
             Child::Tets(row) => visits.extend(visit(view.tet_leaves[row as usize].subtree, None, Some(row))),
@@ -77,7 +77,7 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
     while let Some(mut visit) = visits.pop() {
         let start = view.half_lines(visit.child).map_or(0, |(first, _)| first * HALF_LINE as u64);
         match visit.child {
-            Child::Node(_) => {}
+            Child::Node(_) | Child::Packed(_) => {}
             Child::Tets(row) => {
                 let leaf = &view.tet_leaves[row as usize];
                 for face in leaf.first_face..leaf.first_face + leaf.faces {
@@ -122,14 +122,14 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
         }
         let content = visit.content;
         if let Some((parent, slot)) = visit.parent {
-            let Child::Node(line) = visits[parent].child else { unreachable!("only nodes have slots") };
-            let node = view.node(line);
+            let above = visits[parent].child;
+            let node = view.unpacked_node(above).expect("only nodes have slots");
             let slot_box = Bounds(
                 [0, 1, 2].map(|a| node.bounds[a][0][slot]),
                 [0, 1, 2].map(|a| node.bounds[a][1][slot]),
             );
             if !slot_box.contains(&content) {
-                let at = line as u64 * 64 + 4 * slot as u64;
+                let at = view.half_lines(above).map_or(0, |(first, _)| first * HALF_LINE as u64);
                 return Err(outside(kind::LINES, at, &slot_box, &content));
             }
             visits[parent].content.add(content.0);

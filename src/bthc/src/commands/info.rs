@@ -51,6 +51,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
         let h = view.header;
         Ok(json!({"lower": h.lower, "upper": h.upper, "triangles": h.triangles, "dropped": h.dropped,
             "depth": h.depth, "coordinates": view.grid.map_or(32, |grid| grid.bits as u32),
+            "boxes": if view.has_packed_nodes() { 8 } else { 32 },
             "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
@@ -103,6 +104,9 @@ fn summary(file: &File) -> Result<String, Failure> {
         if let Some(grid) = &view.grid {
             facts.row(["coordinates", &format!("{} bits", grid.bits as u32)]);
             facts.row(["vertices moved by at most", &view.header.displacement.to_string()]);
+        }
+        if view.has_packed_nodes() {
+            facts.row(["boxes of nodes", "8 bits"]);
         }
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);

@@ -3,7 +3,7 @@
 
 use super::flight::{Flight, Found};
 use super::stack::{BOTTOM, Place, Stacks};
-use crate::layout::{Child, NODE_LINES, NONE};
+use crate::layout::{Child, INDEXED_LINES, NODE_LINES, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -193,7 +193,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             for i in 0..lists.inner.take() {
                 let at = lists.inner.get(i);
                 let slot = &mut slots[at];
-                let node = self.object.node(self.stacks.code(slot.top));
+                let node = self.object.any_node(self.stacks.code(slot.top));
                 let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
                 slot.top = self.stacks.replaced(slot.top, count);
                 let code = self.stacks.code(slot.top);
@@ -286,7 +286,12 @@ fn enter_tets<Q: Query>(
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
     let first = object.place(code);
-    for i in 0..NODE_LINES {
+    for i in 0..INDEXED_LINES {
         s.prefetch(first.wrapping_add(i));
+    }
+    if !object.has_packed_nodes() {
+        for i in INDEXED_LINES..NODE_LINES {
+            s.prefetch(first.wrapping_add(i));
+        }
     }
 }

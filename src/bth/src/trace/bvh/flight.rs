@@ -1,8 +1,8 @@
 //! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
-use crate::layout::{WIDTH, WideNode};
-use crate::object::ObjectView;
+use crate::layout::WIDTH;
+use crate::object::{AnyNode, ObjectView};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::crossing::{Crossing, Estimate, estimate};
@@ -11,7 +11,7 @@ use crate::trace::prepare::{Aim, Frame};
 use crate::trace::query::{Named, Query};
 use crate::trace::quick::Test;
 use crate::trace::sight::{Block, Sight};
-use crate::trace::slabs::Slabs;
+use crate::trace::slabs::{Boxes, Slabs};
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less
@@ -94,11 +94,24 @@ impl<Q: Query> Flight<Q> {
     pub(crate) fn enter_node<S: Simd>(
         &self,
         s: S,
-        node: &WideNode,
+        node: AnyNode<'_>,
+        room: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+    ) -> usize {
+        match node {
+            AnyNode::Wide(node) => self.enter_boxes(s, node, room),
+            AnyNode::Packed(node) => self.enter_boxes(s, node, room),
+        }
+    }
+
+    #[inline(always)]
+    fn enter_boxes<S: Simd, B: Boxes>(
+        &self,
+        s: S,
+        node: &B,
         (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
-        let children = s.load_u(&node.child);
+        let children = s.load_u(node.child());
         if Q::ANY {
             s.compress(bits, children, codes)
         } else {
@@ -112,7 +125,20 @@ impl<Q: Query> Flight<Q> {
     pub(crate) fn nearest_child<S: Simd>(
         &self,
         s: S,
-        node: &WideNode,
+        node: AnyNode<'_>,
+        room: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+    ) -> Option<(u32, usize)> {
+        match node {
+            AnyNode::Wide(node) => self.nearest_of(s, node, room),
+            AnyNode::Packed(node) => self.nearest_of(s, node, room),
+        }
+    }
+
+    #[inline(always)]
+    fn nearest_of<S: Simd, B: Boxes>(
+        &self,
+        s: S,
+        node: &B,
         (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> Option<(u32, usize)> {
         let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
@@ -121,15 +147,15 @@ impl<Q: Query> Flight<Q> {
         }
         let first = bits.trailing_zeros() as usize;
         if bits & (bits - 1) == 0 {
-            return Some((node.child[first % WIDTH], 0));
+            return Some((node.child()[first % WIDTH], 0));
         }
-        let children = s.load_u(&node.child);
+        let children = s.load_u(node.child());
         if Q::ANY {
-            return Some((node.child[first % WIDTH], s.compress(bits & (bits - 1), children, codes)));
+            return Some((node.child()[first % WIDTH], s.compress(bits & (bits - 1), children, codes)));
         }
         let nearest = nearest_lane(s, bits, enter) % WIDTH;
         let others = bits & !(1 << nearest);
-        Some((node.child[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
+        Some((node.child()[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
     }
 
     /// Tests the triangles of a leaf.

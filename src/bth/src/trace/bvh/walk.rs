@@ -36,9 +36,9 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
     let mut top = stacks.start(0, code);
     loop {
         let found = match Child::from_code(code) {
-            Some(Child::Node(at)) => {
+            Some(Child::Node(_) | Child::Packed(_)) => {
                 count.node();
-                match flight.nearest_child(s, object.node(at), stacks.room(top)) {
+                match flight.nearest_child(s, object.any_node(code), stacks.room(top)) {
                     Some((nearest, others)) => {
                         code = nearest;
                         top = stacks.replaced(top, others + 1);

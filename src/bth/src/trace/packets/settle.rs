@@ -44,7 +44,7 @@ impl Candidate {
                 let leaf = object.raw(line, &mut raw);
                 Some((leaf.first + at as u32, corners.of(leaf, at)))
             }
-            Child::Node(_) | Child::Tets(_) => None,
+            Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,
         }
     }
 

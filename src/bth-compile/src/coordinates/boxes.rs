@@ -1,0 +1,136 @@
+//! Boxes of a node in bytes: no box becomes smaller, and none grows by more than a step on a side.
+
+use bth::layout::{NONE, PackedNode, WIDTH, WideNode};
+
+/// The greatest number of steps.
+const MOST: f64 = 255.0;
+
+/// The same node with packed boxes; nothing where coordinates are too great.
+pub(super) fn packed_node(node: &WideNode) -> Option<PackedNode> {
+    let mut packed = PackedNode {
+        bounds: [[[255; WIDTH], [0; WIDTH]]; 3],
+        child: node.child,
+        origin: [0.0; 3],
+        step: [1.0; 3],
+        reserved: [0; 2],
+    };
+    let used = node.child.iter().take_while(|code| **code != NONE).count();
+    for axis in 0..3 {
+        let [lower, upper] = node.bounds[axis].map(|row| row.map(f64::from));
+        let least = lower[..used].iter().copied().fold(f64::INFINITY, f64::min);
+        let greatest = upper[..used].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (origin, step) = steps(least, greatest)?;
+        (packed.origin[axis], packed.step[axis]) = (origin as f32, step as f32);
+        for slot in 0..used {
+            // Differences of ends that are much smaller than the origin are rounded: a step more makes good for it.
+            let mut first = ((lower[slot] - origin) / step).floor();
+            let mut last = ((upper[slot] - origin) / step).ceil();
+            first -= f64::from(u8::from(origin + first * step > lower[slot]));
+            last += f64::from(u8::from(origin + last * step < upper[slot]));
+            if !(0.0..=MOST).contains(&first) || !(0.0..=MOST).contains(&last) {
+                return None;
+            }
+            packed.bounds[axis][0][slot] = first as u8;
+            packed.bounds[axis][1][slot] = last as u8;
+        }
+    }
+    let holds = |slot: usize| {
+        (0..3).all(|axis| {
+            let [lower, upper] = node.bounds[axis].map(|row| row[slot]);
+            packed.end(axis, 0, slot) <= lower && upper <= packed.end(axis, 1, slot)
+        })
+    };
+    (packed.is_exact() && (0..used).all(holds)).then_some(packed)
+}
+
+/// Origin and step of an axis: the least power of two by which bytes reach from end to end and ends are `f32`.
+fn steps(least: f64, greatest: f64) -> Option<(f64, f64)> {
+    let size = least.abs().max(greatest.abs());
+    // No finer than what tells numbers of this size apart, and no finer than a normal f32.
+    let finest = (size / f64::from(1 << 23)).max((greatest - least) / MOST).max(f64::from(f32::MIN_POSITIVE));
+    let mut step = finest.log2().floor().exp2();
+    while step <= f64::from(f32::MAX) {
+        let origin = (least / step).floor() * step;
+        if step >= finest / 2.0
+            && ((greatest - origin) / step).ceil() <= MOST
+            && size / step <= f64::from(1 << 23)
+        {
+            return Some((origin, step));
+        }
+        step *= 2.0;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn node(boxes: &[[[f32; 2]; 3]]) -> WideNode {
+        let mut node =
+            WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
+        for (slot, ends) in boxes.iter().enumerate() {
+            node.child[slot] = slot as u32;
+            for axis in 0..3 {
+                node.bounds[axis][0][slot] = ends[axis][0].min(ends[axis][1]);
+                node.bounds[axis][1][slot] = ends[axis][0].max(ends[axis][1]);
+            }
+        }
+        node
+    }
+
+    fn check(node: &WideNode) -> Option<WideNode> {
+        let unpacked = packed_node(node)?.unpacked();
+        assert_eq!(unpacked.child, node.child);
+        for slot in 0..WIDTH {
+            for axis in 0..3 {
+                let [[a, b], [c, d]] = [&unpacked, node].map(|n| n.bounds[axis].map(|row| row[slot]));
+                assert!(a <= c && d <= b, "{axis} {slot}: {a} {b} around {c} {d}");
+                if node.child[slot] == NONE {
+                    assert_eq!((a, b), (f32::MAX, -f32::MAX));
+                }
+            }
+        }
+        Some(unpacked)
+    }
+
+    fn end() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            -1.0f32..1.0,
+            (-1.0f32..1.0).prop_map(|x| 1e7 + x),
+            Just(0.0),
+            Just(-0.0),
+            any::<u32>().prop_map(|bits| f32::from_bits(bits & 0x807f_ffff | 0x1000_0000)),
+            any::<f32>().prop_filter("finite", |x| x.abs() < 1e30),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn boxes_only_grow(boxes in prop::collection::vec([[end(), end()], [end(), end()], [end(), end()]], 1..=16)) {
+            prop_assert!(check(&node(&boxes)).is_some());
+        }
+    }
+
+    #[test]
+    fn boxes_grow_by_less_than_two_steps_of_a_power_of_two() {
+        let boxes: Vec<_> = (0..16).map(|i| [[i as f32 * 0.1, i as f32 * 0.1 + 0.07]; 3]).collect();
+        let (plain, packed) = (node(&boxes), check(&node(&boxes)).unwrap());
+        for axis in 0..3 {
+            for slot in 0..WIDTH {
+                // The width is 1.57: steps of 2^-7 reach over 255 of them.
+                assert!(plain.bounds[axis][0][slot] - packed.bounds[axis][0][slot] <= 0.0079);
+                assert!(packed.bounds[axis][1][slot] - plain.bounds[axis][1][slot] <= 0.0079);
+            }
+        }
+    }
+
+    #[test]
+    fn coordinates_of_any_size_are_packed_or_refused() {
+        for size in [0.0, f32::from_bits(1), 1e-40, f32::MIN_POSITIVE, 1e-30, 1.0, 1e30, 1e37] {
+            assert!(check(&node(&[[[-size, size]; 3], [[size, size]; 3]])).is_some(), "{size}");
+        }
+        assert!(check(&node(&[[[-f32::MAX, f32::MAX]; 3]])).is_none());
+    }
+}

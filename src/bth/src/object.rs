@@ -35,23 +35,6 @@ impl Records<'_> {
     }
 }
 
-/// A node with boxes of either kind.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum AnyNode<'a> {
-    Wide(&'a WideNode),
-    Packed(&'a PackedNode),
-}
-
-impl<'a> AnyNode<'a> {
-    /// The codes of the children.
-    pub(crate) fn child(&self) -> &'a [u32; WIDTH] {
-        match self {
-            AnyNode::Wide(node) => &node.child,
-            AnyNode::Packed(node) => &node.child,
-        }
-    }
-}
-
 /// The sections of one object. Sections that the file lacks are empty.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectView<'a> {
@@ -111,16 +94,6 @@ impl<'a> ObjectView<'a> {
     #[inline(always)]
     pub fn packed_node(&self, line: u32) -> &'a PackedNode {
         self.block(line, PACKED_NODE_LINES)
-    }
-    /// The node of a child code that leads to one; panics as [`Self::node`] does.
-    #[inline(always)]
-    pub(crate) fn any_node(&self, code: u32) -> AnyNode<'a> {
-        let line = code & (Child::INDEX_LIMIT - 1);
-        if code & Child::PACKED_BIT == 0 {
-            AnyNode::Wide(self.node(line))
-        } else {
-            AnyNode::Packed(self.packed_node(line))
-        }
     }
     /// The indexed leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]

@@ -179,7 +179,7 @@ impl Scene {
 
     /// As [`Self::nearest_batch`] without hints, by another test of triangles, each ray on its own and none in packets: to
     /// measure what exact answers cost. With `Test::Exact` the answers are those of [`Self::nearest_batch`]; with the others
-    /// they are not exact and depend on the instruction set. In scenes and files of several objects every test is exact.
+    /// they are not exact and depend on the instruction set. In scenes, files of several objects and of packed nodes every test is exact.
     ///
     /// # Panics
     /// If the slices differ in length.

@@ -3,6 +3,7 @@
 
 use super::Scratch;
 use super::bvh::batch::{BatchWalk, Waiting};
+use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::bvh::walk::TetOutcome;
 use super::choice::{self, LEAST_RAYS, Way};
 use super::hinted::Hinted;
@@ -50,12 +51,13 @@ pub(crate) fn nearest_batch_by(
     ) {
         let waiting = Waiting { order: None, queries: None, walked: None };
         let mut sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
-        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
+        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, sink: &mut sink });
     }
     if object.header.root == NONE {
         return;
     }
     match test {
+        _ if object.has_packed_nodes() => nearest_batch(object, rays, None, 0, scratch, hits),
         Test::Exact => through::<Nearest>(object, rays, scratch, hits),
         Test::Watertight => through::<Quick<Watertight>>(object, rays, scratch, hits),
         Test::Fast => through::<Quick<Fast>>(object, rays, scratch, hits),
@@ -151,7 +153,7 @@ fn trace_one_way<Q: Query>(
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
         let waiting = Waiting { order, queries: None, walked: None };
-        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink: &mut sink });
+        through_bvh(object, rays, waiting, scratch, &mut sink);
         scratch.packets.rest = rest;
     }
 }
@@ -210,7 +212,7 @@ fn trace_hinted<Q: Query>(
     });
     if !order.is_empty() {
         let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
-        Isa::chosen().run(ThroughBvh { object, rays, waiting, scratch, sink });
+        through_bvh(object, rays, waiting, scratch, sink);
     }
 }
 
@@ -269,8 +271,24 @@ impl<Q: Query> Kernel for Together<'_, '_, Q> {
     }
 }
 
-/// Rays through the BVH, each on its own, as a kernel.
-struct ThroughBvh<'a, 'b, Q: Query> {
+/// Rays through the BVH, each on its own.
+fn through_bvh<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    waiting: Waiting<'_, Q>,
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_, Q>,
+) {
+    if object.has_packed_nodes() {
+        Isa::chosen().run(ThroughBvh { nodes: Packed, object, rays, waiting, scratch, sink });
+    } else {
+        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, sink });
+    }
+}
+
+/// As [`through_bvh`], as a kernel.
+struct ThroughBvh<'a, 'b, N, Q: Query> {
+    nodes: N,
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     waiting: Waiting<'a, Q>,
@@ -278,7 +296,7 @@ struct ThroughBvh<'a, 'b, Q: Query> {
     sink: &'a mut Sink<'b, Q>,
 }
 
-impl<Q: Query> Kernel for ThroughBvh<'_, '_, Q> {
+impl<N: Nodes, Q: Query> Kernel for ThroughBvh<'_, '_, N, Q> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
@@ -286,6 +304,8 @@ impl<Q: Query> Kernel for ThroughBvh<'_, '_, Q> {
         let stacks = &mut self.scratch.stacks;
         let done = |ray: usize, query: &Q| sink.query(ray, query);
         let walk = BatchWalk { object, rays, waiting, stacks, done };
-        walk.run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
+        walk.run(s, self.nodes, |leaf, ray, query| {
+            enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
+        });
     }
 }

@@ -3,6 +3,7 @@
 use super::Scratch;
 use super::bvh;
 use super::bvh::flight::Flight;
+use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::prepare::Frame;
 use super::query::{Count, Query};
 use super::tets::{Start, enter_tets, start_in_tets};
@@ -53,8 +54,21 @@ fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) -> Q::Answer {
     if single.object.header.root == NONE {
         return single.query().answer(single.object.triangle_ids, single.instance);
     }
-    Isa::chosen().run(&mut single)
+    if single.object.has_packed_nodes() {
+        return through_packed_nodes(&mut single);
+    }
+    Isa::chosen().run(Among(Wide, &mut single))
 }
+
+/// Apart, so that the way to the common kernel stays short.
+#[cold]
+#[inline(never)]
+fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) -> Q::Answer {
+    Isa::chosen().run(Among(Packed, single))
+}
+
+/// A ray among nodes of a kind.
+struct Among<N, T>(N, T);
 
 struct Single<'a, Q, C> {
     object: &'a ObjectView<'a>,
@@ -76,28 +90,30 @@ impl<Q: Query, C> Single<'_, Q, C> {
 
 // By reference, and the query is made, and its answer worked out, within the kernel: copies of what was just written word by
 // word stall.
-impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
+impl<N: Nodes, Q: Query, C: Count> Kernel for Among<N, &mut Single<'_, Q, C>> {
     type Output = Q::Answer;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
-        let (object, ray) = (self.object, self.ray);
-        let mut flight = Flight::vacant(self.query());
+        let Among(nodes, single) = self;
+        let (object, ray) = (single.object, single.ray);
+        let mut flight = Flight::vacant(single.query());
         if flight.aim_at(object, &Frame::new(object.header), ray) {
-            if self.start.is_some() {
+            if single.start.is_some() {
                 flight.take_over();
             }
-            self.scratch.stacks.reserve(object, 1);
+            single.scratch.stacks.reserve(object, 1);
             bvh::walk::walk(
                 s,
+                nodes,
                 object,
                 ray,
-                self.start.map_or(NONE, |(_, walked)| walked),
+                single.start.map_or(NONE, |(_, walked)| walked),
                 &mut flight,
-                &mut self.scratch.stacks,
-                self.count,
+                &mut single.scratch.stacks,
+                single.count,
                 |leaf, query, count| enter_tets(object, leaf, ray, query, count),
             );
         }
-        flight.query().answer(object.triangle_ids, self.instance)
+        flight.query().answer(object.triangle_ids, single.instance)
     }
 }

@@ -110,15 +110,13 @@ impl Slabs {
 pub(crate) trait Boxes {
     /// The ends of an axis: the lower ones at 0, the upper ones at [`FAR`].
     fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F;
-    /// One of them; the slot is taken modulo [`WIDTH`].
-    fn end(&self, axis: usize, at: u32, slot: usize) -> f32;
     /// The codes of the children.
     fn child(&self) -> &[u32; WIDTH];
 }
 
 /// One of the two rows of an axis: lower ends at 0, upper ends at [`FAR`].
 #[inline(always)]
-fn row<T>(rows: &[[T; WIDTH]; 2], at: u32) -> &[T; WIDTH] {
+pub(crate) fn row<T>(rows: &[[T; WIDTH]; 2], at: u32) -> &[T; WIDTH] {
     let at = (at & FAR) as usize;
     rows.as_flattened()[at..at + WIDTH].try_into().expect("a row")
 }
@@ -127,10 +125,6 @@ impl Boxes for WideNode {
     #[inline(always)]
     fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
         s.load(row(&self.bounds[axis], at))
-    }
-    #[inline(always)]
-    fn end(&self, axis: usize, at: u32, slot: usize) -> f32 {
-        row(&self.bounds[axis], at)[slot % WIDTH]
     }
     #[inline(always)]
     fn child(&self) -> &[u32; WIDTH] {
@@ -143,10 +137,6 @@ impl Boxes for PackedNode {
     fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
         let steps = s.numbers(s.load_bytes(row(&self.bounds[axis], at)));
         s.fma(steps, s.splat(self.step[axis]), s.splat(self.origin[axis]))
-    }
-    #[inline(always)]
-    fn end(&self, axis: usize, at: u32, slot: usize) -> f32 {
-        self.end(axis, usize::from(at & FAR != 0), slot % WIDTH)
     }
     #[inline(always)]
     fn child(&self) -> &[u32; WIDTH] {

@@ -64,7 +64,8 @@ fn tree(view: &ObjectView, seen: &mut Seen) -> Result<()> {
         let (child, beside) = (visits[i].child, visits[i].beside);
         match child {
             Child::Node(_) | Child::Packed(_) => {
-                let children = view.any_node(child.code()).child().iter().enumerate();
+                let node = view.unpacked_node(child).expect("a node");
+                let children = node.child.iter().enumerate();
                 visits.extend(children.filter_map(|(slot, &code)| visit(code, Some((i, slot)), beside)));
             }
             Child::Tets(row) => visits.extend(visit(view.tet_leaves[row as usize].subtree, None, Some(row))),

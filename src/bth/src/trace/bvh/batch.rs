@@ -2,8 +2,9 @@
 //! with the work of the others.
 
 use super::flight::{Flight, Found};
+use super::nodes::Nodes;
 use super::stack::{BOTTOM, Place, Stacks};
-use crate::layout::{Child, INDEXED_LINES, NODE_LINES, NONE};
+use crate::layout::{Child, INDEXED_LINES, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -110,7 +111,12 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
     /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
     /// the query has what it wants.
     #[inline(always)]
-    pub(crate) fn run<S: Simd>(mut self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
+    pub(crate) fn run<S: Simd, N: Nodes>(
+        mut self,
+        s: S,
+        nodes: N,
+        mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool,
+    ) {
         self.stacks.reserve(self.object, IN_FLIGHT);
         let root = root(self.object);
         let mut supply = Supply {
@@ -131,7 +137,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
             }
         }
         loop {
-            self.inner_steps(s, &mut slots, &mut lists);
+            self.inner_steps(s, nodes, &mut slots, &mut lists);
             if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
                 return;
             }
@@ -180,7 +186,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                     Found::Enough => self.stacks.bottom(at),
                 };
                 let code = self.stacks.code(slot.top);
-                prefetch(s, self.object, code);
+                prefetch(s, nodes, self.object, code);
                 lists.sort(at, code);
             }
         }
@@ -188,16 +194,22 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
 
     /// Steps through inner nodes until few rays stand before one.
     #[inline(always)]
-    fn inner_steps<S: Simd>(&mut self, s: S, slots: &mut [Slot<Q>; IN_FLIGHT], lists: &mut Lists) {
+    fn inner_steps<S: Simd, N: Nodes>(
+        &mut self,
+        s: S,
+        nodes: N,
+        slots: &mut [Slot<Q>; IN_FLIGHT],
+        lists: &mut Lists,
+    ) {
         while lists.inner.len > 0 {
             for i in 0..lists.inner.take() {
                 let at = lists.inner.get(i);
                 let slot = &mut slots[at];
-                let node = self.object.any_node(self.stacks.code(slot.top));
+                let node = N::node(self.object, self.stacks.code(slot.top));
                 let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
                 slot.top = self.stacks.replaced(slot.top, count);
                 let code = self.stacks.code(slot.top);
-                prefetch(s, self.object, code);
+                prefetch(s, nodes, self.object, code);
                 lists.sort(at, code);
             }
             if lists.inner.len < ENOUGH && lists.leaf.len + lists.bottom.len > 0 {
@@ -284,14 +296,9 @@ fn enter_tets<Q: Query>(
 
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
-fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
+fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
     let first = object.place(code);
-    for i in 0..INDEXED_LINES {
+    for i in 0..N::LINES.max(INDEXED_LINES) {
         s.prefetch(first.wrapping_add(i));
-    }
-    if !object.has_packed_nodes() {
-        for i in INDEXED_LINES..NODE_LINES {
-            s.prefetch(first.wrapping_add(i));
-        }
     }
 }

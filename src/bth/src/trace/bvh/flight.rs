@@ -2,7 +2,7 @@
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
 use crate::layout::WIDTH;
-use crate::object::{AnyNode, ObjectView};
+use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::crossing::{Crossing, Estimate, estimate};
@@ -91,20 +91,7 @@ impl<Q: Query> Flight<Q> {
 
     /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
     #[inline(always)]
-    pub(crate) fn enter_node<S: Simd>(
-        &self,
-        s: S,
-        node: AnyNode<'_>,
-        room: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
-    ) -> usize {
-        match node {
-            AnyNode::Wide(node) => self.enter_boxes(s, node, room),
-            AnyNode::Packed(node) => self.enter_boxes(s, node, room),
-        }
-    }
-
-    #[inline(always)]
-    fn enter_boxes<S: Simd, B: Boxes>(
+    pub(crate) fn enter_node<S: Simd, B: Boxes>(
         &self,
         s: S,
         node: &B,
@@ -122,20 +109,7 @@ impl<Q: Query> Flight<Q> {
     /// The child of a node to enter next, of those that the ray may meet, and how many others there are: those are written,
     /// the nearest last. Which is next is found beside the sorting of the others, not after it.
     #[inline(always)]
-    pub(crate) fn nearest_child<S: Simd>(
-        &self,
-        s: S,
-        node: AnyNode<'_>,
-        room: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
-    ) -> Option<(u32, usize)> {
-        match node {
-            AnyNode::Wide(node) => self.nearest_of(s, node, room),
-            AnyNode::Packed(node) => self.nearest_of(s, node, room),
-        }
-    }
-
-    #[inline(always)]
-    fn nearest_of<S: Simd, B: Boxes>(
+    pub(crate) fn nearest_child<S: Simd, B: Boxes>(
         &self,
         s: S,
         node: &B,

@@ -2,5 +2,6 @@
 
 pub(crate) mod batch;
 pub(crate) mod flight;
+pub(crate) mod nodes;
 pub(crate) mod stack;
 pub(crate) mod walk;

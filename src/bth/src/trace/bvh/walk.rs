@@ -1,6 +1,7 @@
 //! The walk of one ray through the wide BVH.
 
 use super::flight::{Flight, Found};
+use super::nodes::Nodes;
 use super::stack::Stacks;
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
@@ -20,8 +21,9 @@ pub(crate) enum TetOutcome {
 /// Walks from the root. Tet leaves without a subtree are handed to `tets` with their row; `walked` is left out.
 #[inline(always)]
 #[expect(clippy::too_many_arguments)]
-pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
+pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     s: S,
+    _nodes: N,
     object: &ObjectView<'_>,
     ray: &Ray,
     walked: u32,
@@ -36,9 +38,9 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
     let mut top = stacks.start(0, code);
     loop {
         let found = match Child::from_code(code) {
-            Some(Child::Node(_) | Child::Packed(_)) => {
+            Some(child) if N::is(child) => {
                 count.node();
-                match flight.nearest_child(s, object.any_node(code), stacks.room(top)) {
+                match flight.nearest_child(s, N::node(object, code), stacks.room(top)) {
                     Some((nearest, others)) => {
                         code = nearest;
                         top = stacks.replaced(top, others + 1);
@@ -71,7 +73,7 @@ pub(crate) fn walk<S: Simd, Q: Query, C: Count>(
                 let outcome = tets(row, flight.query(), count);
                 if outcome == TetOutcome::Done { Found::Enough } else { flight.settled(Found::Nothing) }
             }
-            Some(Child::Tets(_)) | None => Found::Nothing,
+            Some(Child::Tets(_) | Child::Node(_) | Child::Packed(_)) | None => Found::Nothing,
         };
         top = top.below();
         match found {

@@ -2,9 +2,10 @@
 
 use super::coherence::Span;
 use super::group::Group;
+use crate::layout::{WIDTH, WideNode};
 use crate::simd::Simd;
 use crate::trace::prepare::Frame;
-use crate::trace::slabs::{Boxes, FAR, PAD};
+use crate::trace::slabs::{self, PAD};
 
 /// A set that contains every point at which rays of a packet can hit something.
 pub(crate) trait Hull<S: Simd> {
@@ -12,12 +13,12 @@ pub(crate) trait Hull<S: Simd> {
     const MIXED: bool;
     /// The children of a node that it may meet before a depth, a bit each, and lower bounds of the depth at
     /// which any of the rays enters them.
-    fn children<B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F);
+    fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
     /// For sixteen points, given as rows of x, y and z, the sides on which they lie outside, a bit each. A
     /// triangle whose corners all have a bit in common is missed by all rays.
     fn sides(&self, s: S, rows: [S::F; 3]) -> S::U;
     /// The corners of a child's box, as [`Group::meets`] wants them.
-    fn corners<B: Boxes>(&self, node: &B, slot: usize) -> [[f32; 3]; 2];
+    fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
 }
 
 /// Rays into one octant: interval arithmetic over their origins and directions (Wald, Boulos and Shirley, "Ray Tracing
@@ -111,7 +112,7 @@ impl<S: Simd> Beam<S> {
             beam.reciprocal[k] = [s.splat(reciprocal[0]), s.splat(reciprocal[1])];
             beam.near_addend[k] = s.splat(addend[0]);
             beam.far_addend[k] = s.splat(addend[1]);
-            beam.near[k] = if span.direction[k][0] < 0.0 { FAR } else { 0 };
+            beam.near[k] = if span.direction[k][0] < 0.0 { slabs::FAR } else { 0 };
         }
         let mut first = Ends::none(s);
         for group in groups {
@@ -143,12 +144,12 @@ impl<S: Simd> Hull<S> for Beam<S> {
     const MIXED: bool = false;
 
     #[inline(always)]
-    fn children<B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
             let [least, greatest] = self.reciprocal[k];
-            let near = s.sub(node.ends(s, k, self.near[k]), self.center[k]);
-            let far = s.sub(node.ends(s, k, self.near[k] ^ FAR), self.center[k]);
+            let near = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k])), self.center[k]);
+            let far = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)), self.center[k]);
             let (a, b) =
                 (s.fma(near, least, self.near_addend[k]), s.fma(near, greatest, self.near_addend[k]));
             enter = s.max(s.min(a, b), enter);
@@ -175,11 +176,11 @@ impl<S: Simd> Hull<S> for Beam<S> {
     }
 
     #[inline(always)]
-    fn corners<B: Boxes>(&self, node: &B, slot: usize) -> [[f32; 3]; 2] {
+    fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2] {
         let mut out = [[0.0; 3]; 2];
         for k in 0..3 {
-            out[0][k] = node.end(k, self.near[k], slot);
-            out[1][k] = node.end(k, self.near[k] ^ FAR, slot);
+            out[0][k] = slabs::row(&node.bounds[k], self.near[k])[slot % WIDTH];
+            out[1][k] = slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)[slot % WIDTH];
         }
         out
     }
@@ -205,11 +206,11 @@ impl<S: Simd> Hull<S> for SegmentBox<S> {
     const MIXED: bool = true;
 
     #[inline(always)]
-    fn children<B: Boxes>(&self, s: S, node: &B, _limit: f32) -> (u32, S::F) {
+    fn children(&self, s: S, node: &WideNode, _limit: f32) -> (u32, S::F) {
         let mut bits = 0xffff;
         for k in 0..3 {
-            bits &= s.mask_bits(s.le(node.ends(s, k, 0), self.upper[k]));
-            bits &= s.mask_bits(s.le(self.lower[k], node.ends(s, k, FAR)));
+            bits &= s.mask_bits(s.le(s.load(&node.bounds[k][0]), self.upper[k]));
+            bits &= s.mask_bits(s.le(self.lower[k], s.load(&node.bounds[k][1])));
         }
         (bits, s.splat(f32::NEG_INFINITY))
     }
@@ -226,11 +227,11 @@ impl<S: Simd> Hull<S> for SegmentBox<S> {
     }
 
     #[inline(always)]
-    fn corners<B: Boxes>(&self, node: &B, slot: usize) -> [[f32; 3]; 2] {
+    fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2] {
         let mut out = [[0.0; 3]; 2];
         for k in 0..3 {
-            out[0][k] = node.end(k, 0, slot);
-            out[1][k] = node.end(k, FAR, slot);
+            out[0][k] = node.bounds[k][0][slot % WIDTH];
+            out[1][k] = node.bounds[k][1][slot % WIDTH];
         }
         out
     }

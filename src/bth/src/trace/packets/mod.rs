@@ -67,8 +67,11 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     to: &mut impl Deliver<Q>,
 ) -> PacketCount {
     let mut count = PacketCount::default();
-    // Where tetrahedra have no subtree beside them, rays go alone.
-    if rays.len() < FEWEST || object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE) {
+    // Where tetrahedra have no subtree beside them, and through packed nodes, rays go alone.
+    if rays.len() < FEWEST
+        || object.has_packed_nodes()
+        || object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE)
+    {
         return count;
     }
     let frame = Frame::new(object.header);

@@ -8,9 +8,9 @@
 use super::group::{Crossings, Group};
 use super::hull::Hull;
 use super::leaf::{Leaf, Points, Rays, no_points};
-use crate::layout::{Child, INDEXED_LINES, NODE_LINES, NONE, WIDTH};
+use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
 use crate::limits::MAX_DEPTH;
-use crate::object::{AnyNode, ObjectView};
+use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
@@ -94,11 +94,8 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             steps += 1;
             used += mask.count_ones();
             match Child::from_code(code) {
-                Some(Child::Node(_) | Child::Packed(_)) => {
-                    let (bits, keys) = match object.any_node(code) {
-                        AnyNode::Wide(node) => hull.children(s, node, limit),
-                        AnyNode::Packed(node) => hull.children(s, node, limit),
-                    };
+                Some(Child::Node(line)) => {
+                    let (bits, keys) = hull.children(s, object.node(line), limit);
                     let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
                     let count = if Q::ANY {
                         s.compress(bits, slots, &mut slot)
@@ -108,7 +105,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                     let room: &mut [Entry; WIDTH] =
                         stack[top..].first_chunk_mut().expect("as many levels as the header says");
                     for i in 0..count {
-                        room[i % WIDTH] = Entry { rays: mask, parent: code, slot: slot[i], key: key[i] };
+                        room[i % WIDTH] = Entry { rays: mask, parent: line, slot: slot[i], key: key[i] };
                     }
                     top += count;
                 }
@@ -133,6 +130,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                     }
                     continue;
                 }
+                Some(Child::Packed(_)) => return Use::Refused,
                 None => {}
             }
             if rays.alive == 0 {
@@ -148,13 +146,10 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 if mask == 0 || (!Q::ANY && entry.key > limit + limit.abs() * KEY_SLACK) {
                     continue;
                 }
-                let (node, slot) = (object.any_node(entry.parent), entry.slot as usize % WIDTH);
-                code = node.child()[slot];
+                let (node, slot) = (object.node(entry.parent), entry.slot as usize % WIDTH);
+                code = node.child[slot];
                 prefetch(s, object, code);
-                let corners = match node {
-                    AnyNode::Wide(node) => hull.corners(node, slot),
-                    AnyNode::Packed(node) => hull.corners(node, slot),
-                };
+                let corners = hull.corners(node, slot);
                 let mut meets = 0;
                 for (i, group) in groups.iter().enumerate() {
                     if mask >> (i * LANES) & 0xffff != 0 {
@@ -240,12 +235,7 @@ fn farthest_limit<S: Simd>(s: S, groups: &[Group<S>]) -> f32 {
 #[inline(always)]
 fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
     let first = object.place(code);
-    for i in 0..INDEXED_LINES {
+    for i in 0..NODE_LINES {
         s.prefetch(first.wrapping_add(i));
-    }
-    if !object.has_packed_nodes() {
-        for i in INDEXED_LINES..NODE_LINES {
-            s.prefetch(first.wrapping_add(i));
-        }
     }
 }

@@ -1,0 +1,51 @@
+//! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
+
+use crate::layout::{Child, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
+use crate::object::ObjectView;
+use crate::trace::slabs::Boxes;
+
+/// A kind of nodes.
+pub(crate) trait Nodes: Copy {
+    /// A node.
+    type Node: Boxes;
+    /// Lines of one.
+    const LINES: usize;
+    /// Whether a child is one.
+    fn is(child: Child) -> bool;
+    /// The node that the code of a child leads to.
+    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a Self::Node;
+}
+
+/// [`WideNode`]s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wide;
+
+/// [`PackedNode`]s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Packed;
+
+impl Nodes for Wide {
+    type Node = WideNode;
+    const LINES: usize = NODE_LINES;
+    #[inline(always)]
+    fn is(child: Child) -> bool {
+        matches!(child, Child::Node(_))
+    }
+    #[inline(always)]
+    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a WideNode {
+        object.node(code)
+    }
+}
+
+impl Nodes for Packed {
+    type Node = PackedNode;
+    const LINES: usize = PACKED_NODE_LINES;
+    #[inline(always)]
+    fn is(child: Child) -> bool {
+        matches!(child, Child::Packed(_))
+    }
+    #[inline(always)]
+    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a PackedNode {
+        object.packed_node(code & !Child::PACKED_BIT)
+    }
+}

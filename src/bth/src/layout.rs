@@ -4,11 +4,15 @@
 //! All numbers are little-endian. Structures have no padding and no pointers:
 //! what refers to something else is an index, and [`NONE`] is no index.
 
+mod bvh;
 mod grid;
 mod scene;
+mod tets;
 
+pub use bvh::*;
 pub use grid::*;
 pub use scene::*;
+pub use tets::*;
 
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -159,11 +163,6 @@ pub mod kind {
     }
 }
 
-/// 64 bytes: the unit in which nodes and leaves are addressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C, align(64))]
-pub struct Line(pub [u32; 16]);
-
 /// An object: one geometry in its own space.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
@@ -195,305 +194,10 @@ pub struct Object {
 /// Bit of [`Object::coordinates`]: all nodes are [`PackedNode`]s; else none is.
 pub const PACKED_NODES: u32 = 1 << 7;
 
-/// Which record the `TETS` section holds (`Object::record`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u32)]
-pub enum RecordKind {
-    /// [`Link32`].
-    Link32 = 1,
-    /// [`Tet32`].
-    Tet32 = 2,
-    /// [`Tet20`].
-    Tet20 = 3,
-    /// [`Tet16`].
-    Tet16 = 4,
-}
-
-impl RecordKind {
-    /// All of them, in order of their codes.
-    pub const ALL: [RecordKind; 4] = [Self::Link32, Self::Tet32, Self::Tet20, Self::Tet16];
-
-    /// The kind with this code.
-    pub fn from_code(code: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|k| *k as u32 == code)
-    }
-    /// Bytes of a record.
-    pub const fn stride(self) -> usize {
-        match self {
-            Self::Link32 | Self::Tet32 => 32,
-            Self::Tet20 => 20,
-            Self::Tet16 => 16,
-        }
-    }
-    /// Lower-case name, as on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Link32 => "link32",
-            Self::Tet32 => "tet32",
-            Self::Tet20 => "tet20",
-            Self::Tet16 => "tet16",
-        }
-    }
-}
-
-/// Where a child code leads. Codes are `u32`: bit 31 set for leaves, bits 30..29
-/// the kind of leaf, the rest an index; `NONE` is an empty slot.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Child {
-    /// Line of a [`WideNode`].
-    Node(u32),
-    /// Line of a [`PackedNode`].
-    Packed(u32),
-    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`IndexedLeaf16`] or [`IndexedLeaf21`].
-    Indexed(u32),
-    /// Line of a [`RawLeaf`]; on a grid the half line of a [`RawLeaf16`] or [`RawLeaf21`].
-    Raw(u32),
-    /// Row of `TET_LEAVES`.
-    Tets(u32),
-}
-
-impl Child {
-    /// Set in the codes of leaves.
-    pub const LEAF_BIT: u32 = 1 << 31;
-    /// Of nodes, set in the codes of packed ones.
-    pub const PACKED_BIT: u32 = 1 << 29;
-    /// Indices are below this.
-    pub const INDEX_LIMIT: u32 = 1 << 29;
-
-    /// The code of this child.
-    pub const fn code(self) -> u32 {
-        match self {
-            Child::Node(i) => i,
-            Child::Packed(i) => Self::PACKED_BIT | i,
-            Child::Indexed(i) => Self::LEAF_BIT | i,
-            Child::Raw(i) => Self::LEAF_BIT | (1 << 29) | i,
-            Child::Tets(i) => Self::LEAF_BIT | (2 << 29) | i,
-        }
-    }
-    /// The child that a code stands for; `None` for `NONE` and unassigned codes.
-    #[inline(always)]
-    pub const fn from_code(code: u32) -> Option<Self> {
-        let index = code & (Self::INDEX_LIMIT - 1);
-        match code >> 29 {
-            0 => Some(Child::Node(index)),
-            1 => Some(Child::Packed(index)),
-            4 => Some(Child::Indexed(index)),
-            5 => Some(Child::Raw(index)),
-            6 => Some(Child::Tets(index)),
-            _ => None,
-        }
-    }
-}
-
-/// Children of a wide node, triangles and vertices of a leaf: at most 16.
-pub const WIDTH: usize = 16;
-
-/// Inner node of the wide BVH: 7 lines. Slots are filled from 0; an empty slot has
-/// lower = `f32::MAX`, upper = `-f32::MAX` and child `NONE`.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct WideNode {
-    /// Per axis: lower ends, then upper ends of the children's boxes, object space.
-    pub bounds: [[[f32; WIDTH]; 2]; 3],
-    /// Child codes; those of nodes and triangle leaves exceed the own line.
-    pub child: [u32; WIDTH],
-}
-
-/// A [`WideNode`] with boxes of bytes: 3 lines. An end is `origin + step * byte`, which takes no rounding: steps are powers
-/// of two, the origin is a multiple of the step, and no multiple exceeds 2^24. An empty slot has lower = 255, upper = 0.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct PackedNode {
-    /// As in [`WideNode`], in steps.
-    pub bounds: [[[u8; WIDTH]; 2]; 3],
-    /// As in [`WideNode`].
-    pub child: [u32; WIDTH],
-    /// Least point, object space.
-    pub origin: [f32; 3],
-    /// Between neighbouring points, per axis.
-    pub step: [f32; 3],
-    /// Zero.
-    pub reserved: [u32; 2],
-}
-
-/// Triangle leaf with shared vertices: 4 lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct IndexedLeaf {
-    /// x, y and z rows; unused slots repeat vertex 0.
-    pub vertex: [[f32; WIDTH]; 3],
-    /// First, second and third vertex of each triangle, in source orientation; unused slots 0.
-    pub corner: [[u8; WIDTH]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Vertices in use, 1 to 16.
-    pub vertices: u32,
-    /// Zero.
-    pub reserved: u32,
-}
-
-/// Triangle leaf without sharing: 10 lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct RawLeaf {
-    /// `[corner][axis][triangle]`; unused slots repeat triangle 0.
-    pub corner: [[[f32; WIDTH]; 3]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Zero.
-    pub reserved: [u32; 14],
-}
-
-/// A node of the BVH that is a constrained tetrahedralization of its triangles within a box.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct TetLeaf {
-    /// The box that the tetrahedra fill, object space.
-    pub lower: [f32; 3],
-    /// Upper end of the box.
-    pub upper: [f32; 3],
-    /// First row of `TETS`. The ranges of successive leaves follow each other, here and below.
-    pub first_tet: u32,
-    /// Number of tetrahedra.
-    pub tets: u32,
-    /// First row of `TET_VERTICES`.
-    pub first_vertex: u32,
-    /// Number of vertices.
-    pub vertices: u32,
-    /// First row of `TET_FACES`.
-    pub first_face: u32,
-    /// Number of constrained faces.
-    pub faces: u32,
-    /// First row of `HULL_FACES`.
-    pub first_hull: u32,
-    /// Number of hull faces.
-    pub hulls: u32,
-    /// Child code of a BVH over the same triangles, for rays without a hint and where it proves faster; `NONE` when pruned.
-    pub subtree: u32,
-    /// Zero.
-    pub flags: u32,
-}
-
-/// Position of a vertex of a tetrahedron, object space.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct TetVertex {
-    /// x, y, z.
-    pub position: [f32; 3],
-    /// Zero.
-    pub reserved: u32,
-}
-
-/// A constrained face: a triangle of the source, whole, between two tetrahedra.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct TetFace {
-    /// Vertices (rows of `TET_VERTICES`) in source order.
-    pub vertex: [u32; 3],
-    /// Id in the source.
-    pub triangle: u32,
-    /// The tetrahedron on the side that (v1-v0)x(v2-v0) points to, then the one behind.
-    pub tet: [u32; 2],
-    /// The vertex of each of them that is not of this face.
-    pub opposite: [u32; 2],
-}
-
-/// A face of the hull: where rays enter a tet leaf from outside.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct HullFace {
-    /// Vertices; (v1-v0)x(v2-v0) points inwards, to `opposite`.
-    pub vertex: [u32; 3],
-    /// The tetrahedron inside.
-    pub tet: u32,
-    /// Its fourth vertex.
-    pub opposite: u32,
-}
-
-/// What lies behind a face of a tetrahedron, as a `u32`: below 2^31 the row of the
-/// neighbour in `TETS`, else `FACE_BIT` and a row of `TET_FACES`; `NONE` outside the hull.
-pub const FACE_BIT: u32 = 1 << 31;
-
-/// Four links in ascending order of the vertex that the link's face is opposite to.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Link32 {
-    /// The links.
-    pub link: [Link; 4],
-}
-
-/// A link of [`Link32`]. Behind a constrained face `opposite` is the vertex beyond it too; behind the hull it is `NONE`.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Link {
-    /// What lies behind the face.
-    pub next: u32,
-    /// The vertex of the next tetrahedron that is not of the face.
-    pub opposite: u32,
-}
-
-/// The paper's record of 32 bytes (Aman et al. 2021, arXiv 2103.02309).
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet32 {
-    /// The three lowest vertices, ascending.
-    pub vertex: [u32; 3],
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// Links, in ascending order of the opposite vertex.
-    pub next: [u32; 4],
-}
-
-/// The paper's record of 20 bytes.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet20 {
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// Links, in ascending order of the opposite vertex.
-    pub next: [u32; 4],
-}
-
-/// The paper's record of 16 bytes.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct Tet16 {
-    /// Exclusive or of all four vertices.
-    pub xor: u32,
-    /// The first three links, each exclusive-or'ed with the fourth.
-    pub next: [u32; 3],
-}
-
 assert_layout! {
     Header 128 { writer_version 16, file_length 24, section_offset 32, section_count 40,
         required_features 48, optional_features 56, content_id 64, table_hash 96, header_hash 112 }
     SectionEntry 64 { kind 0, flags 4, object 8, alignment 12, offset 16, length 24, stride 32, count 40, hash 48 }
-    Line 64 {}
     Object 64 { lower 0, upper 12, root 24, record 28, triangles 32, dropped 36, depth 40, coordinates 44,
         grid_origin 48, displacement 60 }
-    WideNode 448 { child 384 }
-    PackedNode 192 { child 96, origin 160, step 172, reserved 184 }
-    IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }
-    RawLeaf 640 { first 576, triangles 580 }
-    TetLeaf 64 { upper 12, first_tet 24, first_vertex 32, first_face 40, first_hull 48, subtree 56, flags 60 }
-    TetVertex 16 { reserved 12 }
-    TetFace 32 { triangle 12, tet 16, opposite 24 }
-    HullFace 20 { tet 12, opposite 16 }
-    Link32 32 {}
-    Tet32 32 { xor 12, next 16 }
-    Tet20 20 { next 4 }
-    Tet16 16 { next 4 }
 }
-
-/// Lines that a [`WideNode`] takes.
-pub const NODE_LINES: usize = size_of::<WideNode>() / 64;
-/// Lines that a [`PackedNode`] takes.
-pub const PACKED_NODE_LINES: usize = size_of::<PackedNode>() / 64;
-/// Lines that an [`IndexedLeaf`] takes.
-pub const INDEXED_LINES: usize = size_of::<IndexedLeaf>() / 64;
-/// Lines that a [`RawLeaf`] takes.
-pub const RAW_LINES: usize = size_of::<RawLeaf>() / 64;

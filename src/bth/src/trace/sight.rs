@@ -216,8 +216,13 @@ impl Sight {
         limit: f32,
     ) -> Candidates {
         let corners = block.project(s, self);
-        let weighed = weigh(s, corners, s.splat(self.floor), s.splat(first), s.splat(limit));
+        let sides = sides(s, &corners, s.splat(self.floor));
         let valid = (1 << block.triangles().min(WIDTH as u32)) - 1;
+        // Most leaves that a ray enters have no triangle that it could meet: then depths do not matter.
+        if valid & !s.mask_bits(sides.missed) == 0 {
+            return Candidates { maybe: 0, sure: 0 };
+        }
+        let weighed = sides.weigh(s, &corners, s.splat(first), s.splat(limit));
         let maybe = valid & !s.mask_bits(weighed.out);
         let in_range =
             s.and(s.le(s.splat(self.first), weighed.nearest), s.le(weighed.farthest, s.splat(self.last)));
@@ -246,10 +251,27 @@ pub(crate) fn error<S: Simd>(s: S, size: S::F, greatest_depth: S::F, floor: S::F
     s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), size), floor)
 }
 
+/// On which sides of triangles lines pass.
+#[derive(Clone, Copy)]
+struct Sides<S: Simd> {
+    weight: [S::F; 3],
+    /// Bound of their error.
+    error: S::F,
+    shallow: S::F,
+    deep: S::F,
+    greatest_depth: S::F,
+    missed: S::M,
+    certain: S::M,
+}
+
 /// Weighs triangles for hits between two depths; see the top of this file.
 #[inline(always)]
 pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, floor: S::F, first: S::F, limit: S::F) -> Weighed<S> {
-    let [a, b, c] = corners;
+    sides(s, &corners, floor).weigh(s, &corners, first, limit)
+}
+
+#[inline(always)]
+fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, floor: S::F) -> Sides<S> {
     let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
     let size = s.max(s.max(size(s, a), size(s, b)), size(s, c));
     let shallow = s.min(s.min(a[2], b[2]), c[2]);
@@ -262,19 +284,27 @@ pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, floor: S::F, first: S::F
     // By what is certain, so that NaN stays a candidate.
     let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
     let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
+    Sides { weight, error, shallow, deep, greatest_depth, missed, certain }
+}
 
-    let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
-    // Shares, and not the sum of products by the sum of weights: those of a small triangle would underflow.
-    let inverse = s.div(s.splat(1.0), sum);
-    let share = [s.mul(weight[0], inverse), s.mul(weight[1], inverse), s.mul(weight[2], inverse)];
-    let range = s.sub(deep, shallow);
-    // Where |sum| <= 6e this exceeds the range, and is cut to it.
-    let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
-    let shift = s.min(shift, range);
-    let depth = s.fma(share[2], c[2], s.fma(share[1], b[2], s.mul(share[0], a[2])));
-    let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
-    let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
-    let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
-    let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));
-    Weighed { out: s.or(out, missed), certain, nearest, farthest }
+impl<S: Simd> Sides<S> {
+    /// Where the lines hit, between two depths.
+    #[inline(always)]
+    fn weigh(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> Weighed<S> {
+        let Sides { weight, error, shallow, deep, greatest_depth, missed, certain } = self;
+        let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
+        // Shares, and not the sum of products by the sum of weights: those of a small triangle would underflow.
+        let inverse = s.div(s.splat(1.0), sum);
+        let share = [s.mul(weight[0], inverse), s.mul(weight[1], inverse), s.mul(weight[2], inverse)];
+        let range = s.sub(deep, shallow);
+        // Where |sum| <= 6e this exceeds the range, and is cut to it.
+        let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
+        let shift = s.min(shift, range);
+        let depth = s.fma(share[2], c[2], s.fma(share[1], b[2], s.mul(share[0], a[2])));
+        let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+        let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
+        let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
+        let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));
+        Weighed { out: s.or(out, missed), certain, nearest, farthest }
+    }
 }

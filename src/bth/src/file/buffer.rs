@@ -28,6 +28,7 @@ pub(super) struct Owned {
 enum Memory {
     Lines(Vec<Line>),
     /// Anonymous pages, large ones where the system has them; and the first byte in use.
+    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux is asked for large pages"))]
     Pages(MmapMut, usize),
 }
 

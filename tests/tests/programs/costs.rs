@@ -35,6 +35,49 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
 }
 
 #[test]
+fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() {
+    let folder = folder(&[("ball.obj", &sphere(24))]);
+    let compile = |more: &[&str]| {
+        let args = ["compile", "ball.obj", "-o", "out.bth", "--no-cache", "--min-tet-triangles", "64"];
+        bthc(folder.path(), &[&args[..], more].concat()).expect(0)
+    };
+    let file = |more: &[&str]| compile(&[&["--json"], more].concat()).json()["report"]["file"].clone();
+    let each = |file: &serde_json::Value| file["resident_bytes_per_triangle"].as_f64().unwrap();
+    let plain = each(&file(&["--structure", "bvh"]));
+    for select in ["best", "paper"] {
+        for more in
+            [&["--c-tet", "0.001"][..], &["--c-tet", "0.001", "--subtrees", "prune", "--probe", "off"]]
+        {
+            let with = |limit: f64| {
+                let limit = limit.to_string();
+                file(&[&["--select", select, "--max-bytes-per-triangle", &limit], more].concat())
+            };
+            let all = file(&[&["--select", select], more].concat());
+            if all["tet_leaves"] == 0 {
+                println!("skipped: tetrahedra need the worker bth-tetgen");
+                return;
+            }
+            let mut some = 0;
+            for share in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99] {
+                let limit = plain + share * (each(&all) - plain);
+                let limited = with(limit);
+                assert!(each(&limited) <= limit, "{select} {more:?}: {limited:#} beyond {limit}");
+                some += u32::from(limited["tet_leaves"].as_u64() > Some(0));
+            }
+            assert!(some > 2, "{select} {more:?}: nothing is tetrahedralized within most limits");
+            // The file says what it was made with; all else is the same.
+            let mut generous = with(1e4);
+            generous["bytes"] = all["bytes"].clone();
+            assert_eq!(generous, all);
+        }
+    }
+    let run = compile(&["--max-bytes-per-triangle", "20"]);
+    let figure = format!("{plain:.1} bytes a triangle");
+    assert!(run.stderr.contains("warning") && run.stderr.contains(&figure), "{run:?}");
+    assert!(!compile(&["--max-bytes-per-triangle", "1e4"]).stderr.contains("warning"));
+}
+
+#[test]
 fn a_profile_decides_by_its_content_alone() {
     let folder = folder(&[("ball.obj", &sphere(12)), ("bad.json", "{}")]);
     let args = ["compile", "ball.obj", "--profile"];

@@ -2,6 +2,7 @@
 
 use super::bottom_up::Candidates;
 use super::gains::{Gain, Sampled, sample};
+use super::least_useful::{Weighed, least_useful};
 use super::options::{Choice, Decision, Options, Report, Select, Verdict};
 use super::prices::Prices;
 use super::subtree_sums::subtree_sums;
@@ -14,13 +15,22 @@ use crate::monitor::Monitor;
 use bth::layout::RecordKind;
 use std::time::Instant;
 
-/// How the tetrahedra will be stored.
+/// How the tetrahedra will be stored, and beside what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storage {
     /// Their record.
     pub record: RecordKind,
     /// Whether a BVH stays beside them.
     pub keep_subtrees: bool,
+    /// Bytes of the object without tetrahedra, where they are known; else some are assumed. Of use to the limit on bytes.
+    pub plain_bytes: Option<u64>,
+}
+
+impl Storage {
+    /// Bytes of an object of so many triangles without tetrahedra.
+    fn plain_bytes(&self, triangles: usize) -> f64 {
+        self.plain_bytes.map_or(BVH_BYTES * triangles as f64, |bytes| bytes as f64)
+    }
 }
 
 /// Chooses nodes to tetrahedralize.
@@ -42,9 +52,15 @@ pub fn choose(
         return Err(Error::Internal { code: "BTH-X030", message });
     }
     let prices = Prices::new(options, storage.record, storage.keep_subtrees);
+    let limits = Limits::new(mesh.triangles.len(), options, &prices, storage);
     let (mut choice, cost_bvh, mut cost_with_tets) = match &options.select {
-        Select::Paper => top_down::choose(bvh, marks, options, &prices, monitor)?,
-        Select::Best => best(mesh, bvh, marks, options, &prices, monitor)?,
+        Select::Paper => {
+            let (mut choice, cost, with) =
+                top_down::choose(bvh, marks, options, &prices, |n| limits.allow(n), monitor)?;
+            let lost = refuse_beyond(&mut choice, &limits);
+            (choice, cost, with + lost)
+        }
+        Select::Best => best(mesh, bvh, marks, options, &prices, &limits, monitor)?,
         Select::Nodes(nodes) => (Choice { chosen: nodes.clone(), verdicts: Vec::new() }, 0.0, 0.0),
     };
     if !choice.chosen.is_empty() && cost_bvh - cost_with_tets < options.minimum_gain * cost_bvh {
@@ -70,6 +86,63 @@ pub fn choose(
     Ok((choice, report))
 }
 
+/// What tetrahedra may take.
+struct Limits<'a> {
+    prices: &'a Prices<'a>,
+    /// Bytes and seconds.
+    most: [Option<f64>; 2],
+    /// Bytes of the BVH that a triangle of a node no longer takes.
+    pruned: f64,
+}
+
+impl<'a> Limits<'a> {
+    fn new(triangles: usize, options: &Options, prices: &'a Prices<'a>, storage: Storage) -> Self {
+        let count = triangles as f64;
+        let plain = storage.plain_bytes(triangles);
+        // Triangles have homes as soon as there is any tet leaf.
+        let homes = size_of::<u32>() as f64 * count;
+        let bytes = options.max_bytes_per_triangle.map(|most| (most * count - plain - homes).max(0.0));
+        let pruned = if storage.keep_subtrees { 0.0 } else { plain / count.max(1.0) };
+        Limits { prices, most: [bytes, options.budget], pruned }
+    }
+
+    /// Bytes and seconds that the tetrahedra of a node are expected to take, both above zero.
+    fn takes(&self, triangles: u32) -> [f64; 2] {
+        let bytes = self.prices.bytes(triangles);
+        let net = bytes - self.pruned * f64::from(triangles);
+        [net.max(LEAST_SHARE * bytes), self.prices.seconds(triangles)]
+    }
+
+    /// Whether a node alone is within them.
+    fn allow(&self, triangles: u32) -> bool {
+        let takes = self.takes(triangles);
+        self.most.iter().zip(takes).all(|(most, takes)| most.is_none_or(|most| takes <= most))
+    }
+}
+
+/// Least share of a node's tetrahedra that counts where they take the place of its BVH.
+const LEAST_SHARE: f64 = 0.1;
+
+/// Refuses the chosen nodes of least gain for what they take until the others are within the limits; returns the gain
+/// that is lost.
+fn refuse_beyond(choice: &mut Choice, limits: &Limits<'_>) -> f64 {
+    let mut lost = 0.0;
+    for kind in 0..2 {
+        let Some(most) = limits.most[kind] else { continue };
+        let verdicts = choice.verdicts.iter_mut().filter(|v| v.decision == Decision::Chosen);
+        let mut chosen: Vec<&mut Verdict> = verdicts.collect();
+        let weigh = |v: &&mut Verdict| Weighed { gain: v.gain, takes: limits.takes(v.count)[kind] };
+        let items: Vec<Weighed> = chosen.iter().map(weigh).collect();
+        let over = items.iter().map(|item| item.takes).sum::<f64>() - most;
+        for k in least_useful(&items, over) {
+            chosen[k].decision = Decision::RefusedLimit;
+            lost += chosen[k].gain;
+        }
+        choice.chosen = chosen.iter().filter(|v| v.decision == Decision::Chosen).map(|v| v.node).collect();
+    }
+    lost
+}
+
 /// The choice of greatest gain, with the cost of a ray before and after.
 fn best(
     mesh: &Mesh,
@@ -77,6 +150,7 @@ fn best(
     marks: &Marks,
     options: &Options,
     prices: &Prices<'_>,
+    limits: &Limits<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, f64, f64)> {
     let top = nodes_from(bvh, options.minimum_triangles);
@@ -99,18 +173,13 @@ fn best(
     let sums = subtree_sums(bvh);
     let gains = sampled.gains(bvh, &sums, &nodes, options, prices, weights);
     let count = |i: u32| bvh.nodes[i as usize].count;
-    let takes: Vec<[f64; 2]> =
-        nodes.iter().map(|&i| [prices.bytes(count(i)), prices.seconds(count(i))]).collect();
+    let takes: Vec<[f64; 2]> = nodes.iter().map(|&i| limits.takes(count(i))).collect();
     let candidates = Candidates { bvh, nodes: &nodes, gains: &gains, takes: &takes };
-    let bytes = options.max_bytes_per_triangle.map(|most| {
-        // What the BVH takes is known only when it is made; some 36 bytes a triangle.
-        ((most - BVH_BYTES) * bvh.order.len() as f64).max(0.0)
-    });
-    let rows = candidates.best([bytes, options.budget]);
+    let rows = candidates.best(limits.most);
     let chosen: Vec<u32> = rows.iter().map(|&k| nodes[k]).collect();
     let saved: f64 = rows.iter().map(|&k| gains[k].saved).sum();
 
-    let limited = bytes.is_some() || options.budget.is_some();
+    let limited = limits.most.iter().any(Option::is_some);
     let mut verdicts: Vec<Verdict> = Vec::with_capacity(top.len());
     let mut skip_to = 0;
     for &i in top.iter() {
@@ -130,7 +199,7 @@ fn best(
     Ok((Choice { chosen, verdicts }, sampled.cost_bvh, sampled.cost_bvh - saved))
 }
 
-/// Bytes of the BVH for a triangle of a mesh.
+/// Bytes of the BVH for a triangle of a mesh, where they are not known.
 const BVH_BYTES: f64 = 36.0;
 
 /// The nodes of at least so many triangles, and those children of them that have fewer; ascending.

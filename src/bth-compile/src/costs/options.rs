@@ -75,7 +75,8 @@ pub struct Options {
     /// Least saving for which any node is chosen, as a share of the cost of the model's BVH: tet leaves
     /// take several times the memory, and a few small ones in a large scene save next to nothing.
     pub minimum_gain: f64,
-    /// Bytes that traversal may read, for each triangle of the model.
+    /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are estimated before
+    /// tetrahedra are built; what is over the limit then is left out.
     pub max_bytes_per_triangle: Option<f64>,
     /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by the clock, so
     /// that the same nodes are chosen on every machine.

@@ -9,8 +9,8 @@ use crate::monitor::Silent;
 use crate::tets::{Behind, TetMesh};
 use bth::layout::RecordKind;
 
-const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true };
-const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false };
+const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true, plain_bytes: None };
+const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false, plain_bytes: None };
 
 fn paper() -> Options {
     Options { select: Select::Paper, minimum_gain: 0.0, ..Options::default() }

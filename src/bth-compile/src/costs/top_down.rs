@@ -23,12 +23,13 @@ pub(super) struct PaperCosts {
 
 /// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if
 /// `C_tet N_avg` (the paper's equation 2), and here the cost of getting in, is below the cost of
-/// its BVH, and else its children are examined.
+/// its BVH, and else its children are examined; also when its triangles alone do not fit the limits.
 pub(super) fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,
     options: &Options,
     prices: &Prices<'_>,
+    fits: impl Fn(u32) -> bool,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, f64, f64)> {
     let paper = PaperCosts { estimator: options.estimator, visit: options.profile.bvh.outside };
@@ -54,6 +55,8 @@ pub(super) fn choose(
             Decision::Unsuitable
         } else if node.count > options.maximum_triangles {
             Decision::RefusedLarge
+        } else if cost_tet < cost_bvh && !fits(node.count) {
+            Decision::RefusedLimit
         } else if cost_tet < cost_bvh {
             Decision::Chosen
         } else {

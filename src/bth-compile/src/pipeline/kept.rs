@@ -1,10 +1,11 @@
 //! A compilation by way of the cache.
 
-use super::{Clock, Options, Report, Structure, compile_model};
+use super::{Clock, Options, Report, Structure, compile_model, over, say};
 use crate::cached::{self, Cache, Miss, SourceDigest};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use bth_cache::{Key, Record};
+use serde::Deserialize;
 use serde_json::Value;
 use std::path::Path;
 
@@ -75,10 +76,13 @@ pub fn compile_cached(
 ) -> Result<Outcome<Report>> {
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
-    through(cache, key.as_ref(), needed, monitor, || {
+    let outcome = through(cache, key.as_ref(), needed, monitor, || {
         let (compiled, report) = compile_model(source, &digest, options, cache, monitor, clock)?;
         Ok((compiled.bytes, report, true))
-    })
+    })?;
+    let file = super::FileReport::deserialize(&outcome.report["file"]).ok();
+    say(file.and_then(|file| over(&file, options)), monitor);
+    Ok(outcome)
 }
 
 /// Hashes a model; its key, if it may be kept.

@@ -1,6 +1,7 @@
 //! The compiler: calls the stages in order.
 
 mod kept;
+mod limit;
 mod options;
 pub(crate) mod parts;
 pub(crate) mod provenance;
@@ -8,6 +9,8 @@ mod structure;
 
 pub use kept::{Foreseen, Outcome, compile_cached, foresee};
 pub(crate) use kept::{tetgen, through};
+pub use limit::storage;
+pub(crate) use limit::{over, say};
 pub use options::{Options, Structure};
 
 use crate::cached::{self, Cache, Topology};
@@ -15,7 +18,7 @@ use crate::coordinates::Boxes;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, coordinates, costs, marks, mesh, tets};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 
@@ -64,7 +67,7 @@ pub struct StageTime {
 }
 
 /// Size of the compiled file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FileReport {
     /// Bytes of the file.
     pub bytes: u64,
@@ -85,7 +88,9 @@ pub struct FileReport {
 pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
     let mut clock = Clock::default();
     let digest = clock.time("hash", || cached::SourceDigest::of(source))?;
-    compile_model(source, &digest, options, &Cache::none(), monitor, clock)
+    let (compiled, report) = compile_model(source, &digest, options, &Cache::none(), monitor, clock)?;
+    say(over(&report.file, options), monitor);
+    Ok((compiled, report))
 }
 
 /// Compiles a model whose files have been hashed.
@@ -199,12 +204,21 @@ pub(crate) fn build(
                 || marks::mark(&mesh, &tree, monitor),
             )
         })?;
-        let (chosen, costs_report) =
-            clock.time("costs", || structure::choose(source, &mesh, &tree, &marks, options, monitor))?;
-        let (built, tets_report) = clock
-            .time("tets", || tets::build_cached(&mesh, &tree, &chosen, &options.tets, cache, monitor))?;
+        let (choice, costs_report) = clock.time("costs", || {
+            let storage = limit::storage_on(&mesh, on_grid.as_ref(), &tree, options, monitor)?;
+            structure::choose(source, &mesh, &tree, &marks, options, storage, monitor)
+        })?;
+        let (built, tets_report) = clock.time("tets", || {
+            tets::build_cached(&mesh, &tree, &choice.chosen, &options.tets, cache, monitor)
+        })?;
         structure::check_built(source, &tree, &built, options)?;
         (meshes, probe) = clock.time("probe", || structure::probe(&mesh, &tree, built, options, monitor))?;
+        let made = limit::Made { mesh: &mesh, on_grid: on_grid.as_ref(), tree: &tree, options };
+        if let Some(most) =
+            options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
+        {
+            meshes = clock.time("limit", || made.within(most, meshes, &choice, probe.as_mut(), monitor))?;
+        }
         reports = (Some(marks_report), costs_report, Some(tets_report));
     }
     let (object, collapse) =
@@ -223,16 +237,37 @@ fn object(
     monitor: &dyn Monitor,
 ) -> Result<(Object, bvh::CollapseReport)> {
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
-    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
-    let (mut wide, mut collapse) = bvh::collapse(&mesh, &tree, &cut, &collapse_options, monitor)?;
-    let grid = on_grid.as_ref().map(|on_grid| &on_grid.grid);
-    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
-    collapse.measure(&wide);
+    let Joined { wide, packed_nodes, collapse } =
+        wide(&mesh, on_grid.as_ref(), &tree, &cut, options, monitor)?;
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
     let (tet_leaves, tet_triangles) =
         (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
     Ok((Object { mesh, on_grid, tree, wide, packed_nodes, encoded, tet_leaves, tet_triangles }, collapse))
+}
+
+/// A wide BVH as it will be stored.
+struct Joined {
+    wide: bvh::Wide,
+    packed_nodes: bool,
+    collapse: bvh::CollapseReport,
+}
+
+/// The wide BVH over a tree, tet leaves in place of nodes.
+fn wide(
+    mesh: &mesh::Mesh,
+    on_grid: Option<&coordinates::OnGrid>,
+    tree: &bvh::BinaryBvh,
+    cut: &[u32],
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<Joined> {
+    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
+    let (mut wide, mut collapse) = bvh::collapse(mesh, tree, cut, &collapse_options, monitor)?;
+    let grid = on_grid.map(|on_grid| &on_grid.grid);
+    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
+    collapse.measure(&wide);
+    Ok(Joined { wide, packed_nodes, collapse })
 }
 
 /// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes: for

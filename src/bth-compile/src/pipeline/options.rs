@@ -64,8 +64,8 @@ impl Default for Options {
 }
 
 impl Options {
-    /// How tetrahedra will be stored.
+    /// How tetrahedra will be stored; what the BVH takes is not known.
     pub fn storage(&self) -> costs::Storage {
-        costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees }
+        costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }
     }
 }

@@ -13,11 +13,12 @@ pub(super) fn choose(
     tree: &bvh::BinaryBvh,
     marks: &marks::Marks,
     options: &Options,
+    storage: costs::Storage,
     monitor: &dyn Monitor,
-) -> Result<(Vec<u32>, Option<costs::Report>)> {
+) -> Result<(costs::Choice, Option<costs::Report>)> {
     match (options.structure, marks.suitable.first()) {
-        (Structure::Bvh, _) | (Structure::Tets, None) => Ok((Vec::new(), None)),
-        (Structure::Tets, Some(true)) => Ok((vec![0], None)),
+        (Structure::Bvh, _) | (Structure::Tets, None) => Ok((costs::Choice::default(), None)),
+        (Structure::Tets, Some(true)) => Ok((costs::Choice { chosen: vec![0], verdicts: Vec::new() }, None)),
         (Structure::Tets, Some(false)) => {
             let contacts = marks::bad_pairs(mesh, tree, monitor)?;
             let message = format!(
@@ -33,9 +34,8 @@ pub(super) fn choose(
             ))
         }
         (Structure::Bth, _) => {
-            let (choice, report) =
-                costs::choose(mesh, tree, marks, &options.costs, options.storage(), monitor)?;
-            Ok((choice.chosen, Some(report)))
+            let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, storage, monitor)?;
+            Ok((choice, Some(report)))
         }
     }
 }

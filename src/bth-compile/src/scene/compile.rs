@@ -11,7 +11,7 @@ use crate::tets::WorkerStatus;
 use crate::write::{self, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
 use bth_scene::Manifest;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -80,7 +80,9 @@ pub fn compile(
         Context { options, cache: &Cache::none(), tetgen: None, keys: None, monitor, weights: None };
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, folder, &mut clock)?;
-    build(manifest, &plan, name, &context, clock)
+    let (compiled, report) = build(manifest, &plan, name, &context, clock)?;
+    pipeline::say(over(&report.objects, options), monitor);
+    Ok((compiled, report))
 }
 
 /// Where a scene is.
@@ -117,10 +119,29 @@ pub fn compile_cached(
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, place.folder, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
-    pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
+    let outcome = pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
         let (compiled, report) = build(manifest, &plan, place.name, &context, clock)?;
         Ok((compiled.bytes, report, keep.whole))
-    })
+    })?;
+    let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
+    pipeline::say(over(&objects, options), monitor);
+    Ok(outcome)
+}
+
+/// Which objects are over the limit on bytes, in words; `None` if none are.
+fn over(objects: &[ObjectReport], options: &Options) -> Option<String> {
+    let most = options.costs.max_bytes_per_triangle?;
+    let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
+    let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
+    let worst = over.iter().max_by(|a, b| each(a).total_cmp(&each(b)))?;
+    Some(format!(
+        "{} of {} objects take more bytes a triangle than the limit of {most} allows, even without tetrahedra; the most \
+         takes {}: {:.1}",
+        over.len(),
+        objects.len(),
+        worst.names.first().map_or("an object", String::as_str),
+        each(worst)
+    ))
 }
 
 /// Compiles part `shard.0` of `shard.1` (from 1) of a scene's objects into the cache; how many there are in this part.
@@ -258,15 +279,15 @@ fn build(
         _ => None,
     };
     let provenance = provenance::of_scene(&objects.sources, tetgen, options)?;
-    let (bytes, resident_bytes) = clock.time("file", || {
+    let bytes = clock.time("file", || {
         let mut builder = FileBuilder::new();
-        let resident = objects.write(&mut builder)?;
+        objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
         builder.provenance(provenance)?;
         builder.check_limits()?;
         let bytes = builder.finish();
         check(&objects, &parts, &bytes, name)?;
-        Ok::<_, Error>((bytes, resident))
+        Ok::<_, Error>(bytes)
     })?;
 
     let triangles = |object: u32| objects.reports[object as usize].triangles;
@@ -285,7 +306,7 @@ fn build(
         triangles: objects.reports.iter().map(|o| o.triangles).sum(),
         instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
         bytes: bytes.len() as u64,
-        resident_bytes,
+        resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),
         objects: objects.reports,
     };

@@ -34,6 +34,9 @@ pub struct ObjectReport {
     pub tet_leaves: u64,
     /// Triangles in tet leaves.
     pub tet_triangles: u64,
+    /// Bytes of its sections that tracing reads.
+    #[serde(default)]
+    pub resident_bytes: u64,
     /// Whether it was taken from a compiled file as it is.
     pub copied: bool,
 }
@@ -105,6 +108,9 @@ pub(super) fn build(
         places[number] = Some((stored, built.facts.object));
     }
     (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
+    for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
+        report.resident_bytes = stored.resident_bytes();
+    }
     for (row, object) in manifest.objects.iter().enumerate() {
         if let Some(number) = objects.number[row] {
             objects.reports[number as usize].names.push(object.name.clone());
@@ -208,9 +214,8 @@ impl Objects {
         }
     }
 
-    /// Adds the sections of all objects; returns how many bytes of them tracing reads.
-    pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<u64> {
-        let mut resident = 0;
+    /// Adds the sections of all objects.
+    pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
             for section in stored.sections() {
                 let (e, number) = (section.entry, number as u32);
@@ -218,10 +223,9 @@ impl Objects {
                     true => builder.hashed_section(e.kind, number, e.stride, section.bytes.into(), e.hash)?,
                     false => builder.section(e.kind, number, e.stride, section.bytes)?,
                 };
-                resident += if e.kind <= kind::TRIANGLE_HOMES { e.length } else { 0 };
             }
         }
-        Ok(resident)
+        Ok(())
     }
 
     /// Adds the OBJECT rows only: all that placing instances needs.
@@ -240,5 +244,10 @@ impl Stored {
     fn sections(&self) -> impl Iterator<Item = bth::file::SectionView<'_>> {
         let known = |e: &bth::layout::SectionEntry| bth::file::kind_stride(e.kind).is_some();
         self.file.sections().filter(move |s| s.entry.object == self.object && known(s.entry))
+    }
+
+    /// Bytes of those that tracing reads.
+    fn resident_bytes(&self) -> u64 {
+        self.sections().map(|s| s.entry).filter(|e| e.kind <= kind::TRIANGLE_HOMES).map(|e| e.length).sum()
     }
 }

@@ -76,6 +76,18 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
     to
 }
 
+/// Bytes of the sections that a mesh adds to, but for the homes of the triangles, which are one for each triangle
+/// of the source.
+pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
+    let hulls = mesh.behind.iter().flatten().filter(|behind| **behind == Behind::Hull).count();
+    let bytes = mesh.tets.len() * kind.stride()
+        + mesh.vertices.len() * size_of::<TetVertex>()
+        + mesh.faces.len() * size_of::<TetFace>()
+        + hulls * size_of::<HullFace>()
+        + size_of::<TetLeaf>();
+    bytes as u64
+}
+
 /// First rows of a leaf.
 struct Base {
     tet: u32,

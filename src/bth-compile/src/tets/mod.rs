@@ -20,7 +20,7 @@ mod report;
 mod worker;
 
 pub use build::{build, build_cached};
-pub use encode::{Encoded, encode};
+pub use encode::{Encoded, encode, encoded_bytes};
 pub use options::Options;
 pub(crate) use pool::version;
 pub use report::{NodeReport, Outcome, Report, WorkerStatus};

@@ -134,7 +134,8 @@ pub(crate) struct Selection {
     /// on every machine.
     #[arg(long, value_name = "PROFILE", default_value = "default")]
     pub(crate) profile: PathBuf,
-    /// Bytes that tracing may read for each triangle, the BVH included; what saves least for its size stays BVH.
+    /// Most bytes that tracing may read for each triangle of an object, the BVH included; what saves least for its size
+    /// stays BVH. A BVH that is larger by itself is a warning.
     #[arg(long, value_name = "BYTES", value_parser = positive)]
     pub(crate) max_bytes_per_triangle: Option<f64>,
     /// Seconds of one thread for tetrahedralization, as the profile estimates them; what saves least for its time

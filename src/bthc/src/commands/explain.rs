@@ -21,7 +21,8 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         let (mesh, _) = mesh::import(&args.model, Keep::None, &progress)?;
         let (tree, _) = bvh::build(&mesh, &options.bvh, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
-        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, options.storage(), &progress)?;
+        let storage = pipeline::storage(&mesh, &tree, &options, &progress)?;
+        let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, storage, &progress)?;
         Ok(((mesh, tree), chosen))
     })??;
     let (mut measured, mut brightest) = (None, None);

@@ -39,7 +39,7 @@ pub struct Row {
     pub structure: String,
     /// Seconds to construct it on one thread.
     pub construction: f64,
-    /// Milliseconds to render the far and the close view on all threads.
+    /// Milliseconds to render the far and the close view: CPU time of all threads over their number.
     pub milliseconds: [f64; 2],
     /// Pixels that hit where the exact answer misses, or the other way round.
     pub differ: [usize; 2],

@@ -11,8 +11,8 @@ fn row(cells: &[&str]) -> Vec<String> {
 /// The page below its head.
 pub fn markdown(record: &PaperRecord) -> String {
     let mut text = String::from(
-        "Camera rays only, 16×16 tiles, all threads, wall clock, least of the rounds; construction on one thread. The first six \
-         rows are the paper's structures with one scalar traversal: a binary BVH as in pbrt with up to four triangles a leaf (BVH), \
+        "Camera rays only, 16×16 tiles, all threads, least of the rounds; CPU time of all threads over their number, which is the time \
+         on the wall clock of a machine that does nothing else. Construction on one thread, wall clock. The first six rows are the paper's structures with one scalar traversal: a binary BVH as in pbrt with up to four triangles a leaf (BVH), \
          the same with tetrahedralizations where the paper's rule takes them (BTH), the whole model tetrahedralized (Tet), and a k-d \
          tree. The others are our files in our SIMD traversal. Paper: the figures of its Tables 1 and 2, on another machine with six \
          cores and from other cameras, some on other versions of a model; only ratios can be compared.\n\n",

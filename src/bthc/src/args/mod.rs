@@ -143,7 +143,7 @@ pub(crate) struct Calibrate {
     #[arg(short, long, value_name = "FILE", default_value = "bth-profile.json")]
     pub(crate) output: PathBuf,
     /// Rounds of which the fastest counts.
-    #[arg(long, default_value_t = 15, value_name = "N", value_parser = rounds)]
+    #[arg(long, default_value_t = 30, value_name = "N", value_parser = rounds)]
     pub(crate) rounds: usize,
     /// Print the profile as one JSON object on standard output, too.
     #[arg(long)]

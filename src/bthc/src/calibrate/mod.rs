@@ -7,4 +7,4 @@ mod fit;
 mod subject;
 
 pub(crate) use fit::{Measured, fit};
-pub(crate) use subject::Subject;
+pub(crate) use subject::{Subject, measure};

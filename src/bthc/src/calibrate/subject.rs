@@ -9,11 +9,20 @@ use bth_compile::mesh::Mesh;
 use bth_compile::pipeline::{self, Options, Structure};
 use bth_compile::tets::WorkerStatus;
 use bth_compile::{Error, Monitor, bvh, tets};
+use std::time::Instant;
 
-/// Rays of each kind.
-const RAYS: usize = 16384;
+/// Rays of each kind to a small model: they and the model stay in the caches nearest to the core however the system places
+/// their pages.
+const RAYS: usize = 4096;
+/// The same to a large one.
+const RAYS_TO_LARGE: usize = 16384;
 /// Rays whose steps are counted.
 const COUNTED: usize = 4096;
+
+/// Triangles of the largest small model.
+const SMALL: usize = 20_000;
+/// So many times small models are tetrahedralized again.
+const AGAIN: usize = 16;
 
 /// Rays of one kind and their mean steps.
 struct Kind {
@@ -49,7 +58,7 @@ pub(crate) struct Times {
     pub(crate) nothing: f64,
     /// Lines from outside.
     pub(crate) outside: Timed,
-    /// Bounces that end at a triangle and that don't, each in two halves of few steps and of many.
+    /// Bounces that end at a triangle and that don't, of each those of few steps and of many.
     pub(crate) bounces: [Timed; 4],
     /// Short rays from surfaces.
     pub(crate) short: Timed,
@@ -57,7 +66,7 @@ pub(crate) struct Times {
     pub(crate) wide: [f64; 2],
     /// Bytes of the tetrahedra and vertices, by record.
     pub(crate) bytes: [f64; 4],
-    /// Tetrahedralization, microseconds a triangle.
+    /// Tetrahedralization, microseconds a triangle; of a small model the mean of several.
     pub(crate) tetrahedralize: f64,
 }
 
@@ -97,20 +106,31 @@ impl Subject {
             }
             .into());
         };
+        let mut seconds: f64 = report.nodes.iter().map(|n| n.seconds).sum();
+        let small = mesh.triangles.len() <= SMALL;
+        if small {
+            let (before, start) = (worker_seconds(), Instant::now());
+            for _ in 0..AGAIN {
+                tets::build(mesh, &tree, &[0], &options.tets, monitor)?;
+            }
+            let spent = before.and_then(|before| Some(worker_seconds()? - before));
+            seconds = spent.unwrap_or(start.elapsed().as_secs_f64()) / AGAIN as f64;
+        }
         let scene = |built: &[(u32, tets::TetMesh)], record: RecordKind| -> Result<Scene, Failure> {
             let options = Options { record, geometry: false, ..options.clone() };
             Ok(bth::from_bytes(&pipeline::assemble(mesh, &tree, built, &options, monitor)?.bytes)?)
         };
         let plain = scene(&[], RecordKind::Link32)?;
         let root = &tree.nodes[0];
-        let lines = costs::outside(root.lower, root.upper, RAYS, 11);
+        let count = if small { RAYS } else { RAYS_TO_LARGE };
+        let lines = costs::outside(root.lower, root.upper, count, 11);
         // Away from the model: the other half of each line.
         let away = |ray: &SampleRay| SampleRay { direction: ray.direction.map(|x| -x), ..*ray };
         let nothing: Vec<SampleRay> = lines.iter().map(away).collect();
-        let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 4 * RAYS, 12);
+        let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 6 * count, 12);
         let (bounce, mut short): (Vec<SampleRay>, Vec<SampleRay>) =
             surface.into_iter().partition(|ray| ray.tmax.is_infinite());
-        short.truncate(RAYS);
+        short.truncate(count);
         let walker = TetWalker::new(tets);
         let bounces = parts(&walker, &bounce);
         let kind = |samples: &[SampleRay]| {
@@ -133,8 +153,7 @@ impl Subject {
             wide: wide(&plain, &lines[..lines.len().min(COUNTED)]),
             bytes: RecordKind::ALL
                 .map(|record| (tets.tets.len() * record.stride() + tets.vertices.len() * 16) as f64),
-            tetrahedralize: 1e6 * report.nodes.iter().map(|n| n.seconds).sum::<f64>()
-                / mesh.triangles.len().max(1) as f64,
+            tetrahedralize: 1e6 * seconds / mesh.triangles.len().max(1) as f64,
             bvh: plain,
             tets: RecordKind::ALL.iter().map(|r| scene(&built, *r)).collect::<Result<_, _>>()?,
             nothing: Rays::new(&nothing),
@@ -144,20 +163,27 @@ impl Subject {
         })
     }
 
-    /// Times all kinds of rays through all structures; `None` when it was stopped.
-    pub(crate) fn measure(&self, rounds: usize, stop: impl Fn() -> bool) -> Option<Times> {
-        let bounces = self.bounces.iter().map(|kind| (kind, Way::Nearest));
-        let others = [(&self.outside, Way::Nearest), (&self.short, Way::Any)];
-        let kinds: Vec<(&Kind, Way)> = others.into_iter().chain(bounces).collect();
+    /// What is timed: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
+    fn runs(&self) -> Vec<Run<'_>> {
         let mut runs: Vec<Run<'_>> = vec![(&self.bvh, &self.nothing, Way::Nearest)];
-        for (kind, way) in &kinds {
-            runs.push((&self.bvh, &kind.rays, *way));
-            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, *way)));
+        for (kind, way) in self.kinds() {
+            runs.push((&self.bvh, &kind.rays, way));
+            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, way)));
             runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, Way::Single)));
         }
-        let times = nanoseconds(&runs, rounds, stop)?;
+        runs
+    }
+
+    fn kinds(&self) -> impl Iterator<Item = (&Kind, Way)> {
+        let bounces = self.bounces.iter().map(|kind| (kind, Way::Nearest));
+        [(&self.outside, Way::Nearest), (&self.short, Way::Any)].into_iter().chain(bounces)
+    }
+
+    /// Takes the times of [`Self::runs`] apart.
+    fn times(&self, times: &[f64]) -> Times {
+        let kinds: Vec<&Kind> = self.kinds().map(|(kind, _)| kind).collect();
         let timed = |row: usize| {
-            let (first, kind) = (1 + 9 * row, kinds[row].0);
+            let (first, kind) = (1 + 9 * row, kinds[row]);
             Timed {
                 bvh: times[first],
                 visits: kind.visits,
@@ -167,7 +193,7 @@ impl Subject {
                 hits: kind.hits,
             }
         };
-        Some(Times {
+        Times {
             nothing: times[0],
             outside: timed(0),
             short: timed(1),
@@ -175,11 +201,35 @@ impl Subject {
             wide: self.wide,
             bytes: self.bytes,
             tetrahedralize: self.tetrahedralize,
-        })
+        }
     }
 }
 
-/// Rays that end at a triangle and rays that don't, each in halves of few steps and of many, in their order.
+/// Times all kinds of rays through all structures of all models in turn, so that a busy minute of the machine does not fall
+/// on one model; `None` when it was stopped.
+pub(crate) fn measure(subjects: &[Subject], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<Times>> {
+    let runs: Vec<Vec<Run<'_>>> = subjects.iter().map(Subject::runs).collect();
+    let mut times = nanoseconds(&runs.concat(), rounds, stop)?.into_iter();
+    let each = subjects.iter().zip(&runs);
+    Some(
+        each.map(|(subject, runs)| subject.times(&times.by_ref().take(runs.len()).collect::<Vec<_>>()))
+            .collect(),
+    )
+}
+
+/// CPU seconds of the processes that this one has waited for, where the system says: what other jobs take is left out.
+fn worker_seconds() -> Option<f64> {
+    /// Of all systems that have this file.
+    const TICKS_A_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // After the name, which may hold anything: cutime and cstime are the 14th and 15th.
+    let (_, fields) = stat.rsplit_once(')')?;
+    let ticks = fields.split_whitespace().skip(13).take(2).map(|field| field.parse::<f64>().ok());
+    Some(ticks.sum::<Option<f64>>()? / TICKS_A_SECOND)
+}
+
+/// Rays that end at a triangle and rays that don't, of each the third of fewest steps and that of most, in their order: what
+/// lies between says little of what a step costs.
 fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
     let mut parts = [const { Vec::new() }; 4];
     for hit in [true, false] {
@@ -190,9 +240,12 @@ fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
             .collect();
         let mut steps: Vec<u32> = walked.iter().map(|w| w.0).collect();
         steps.sort_unstable();
-        let median = steps.get(steps.len() / 2).copied().unwrap_or(0);
+        let third = |k: usize| steps.get(k * steps.len() / 3).copied().unwrap_or(0);
+        let (few, many) = (third(1), third(2));
         for (steps, ray) in walked {
-            parts[2 * usize::from(hit) + usize::from(steps > median)].push(ray);
+            if steps <= few || steps > many {
+                parts[2 * usize::from(hit) + usize::from(steps > many)].push(ray);
+            }
         }
     }
     parts

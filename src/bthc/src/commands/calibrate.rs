@@ -1,7 +1,7 @@
 //! `bthc calibrate`: what tracing costs on this machine.
 
 use crate::args::Calibrate;
-use crate::calibrate::{Measured, Subject, fit};
+use crate::calibrate::{Measured, Subject, fit, measure};
 use crate::failure::Failure;
 use crate::measure::{Rays, Way, nanoseconds};
 use crate::output;
@@ -14,8 +14,8 @@ use bth_compile::{Error, Monitor, bvh, costs, write};
 use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
 
-/// Faces of the synthetic models: tetrahedra of a few hundred kilobytes, and of many times the caches.
-const SMALL: u32 = 6_000;
+/// Faces of the synthetic models: tetrahedra of a quarter of a megabyte, and of many times the caches.
+const SMALL: u32 = 2_400;
 const LARGE: u32 = 220_000;
 /// Bytes between those of small and large tetrahedra: where models of the user are put.
 const BETWEEN: f64 = 6e6;
@@ -31,10 +31,12 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         let (mesh, _) = mesh::import(path, Keep::None, &progress)?;
         models.push((path.display().to_string(), mesh));
     }
-    for (name, mesh) in &models {
-        let subject = Subject::new(name, mesh, &progress)?;
-        progress.stage("measure", None);
-        let times = subject.measure(args.rounds, || progress.cancelled()).ok_or(Error::Cancelled)?;
+    let subjects = models
+        .iter()
+        .map(|(name, mesh)| Subject::new(name, mesh, &progress))
+        .collect::<Result<Vec<_>, _>>()?;
+    progress.stage("measure", None);
+    for times in measure(&subjects, args.rounds, || progress.cancelled()).ok_or(Error::Cancelled)? {
         let kind = if times.bytes[0] < BETWEEN { &mut measured.small } else { &mut measured.large };
         kind.push(times);
     }
@@ -78,7 +80,7 @@ fn leaf(rounds: usize, progress: &Progress) -> Result<f64, Failure> {
     let file = pipeline::assemble(&mesh, &tree, &[], &Options::default(), progress)?;
     let scene = bth::from_bytes(&file.bytes)?;
     let root = &tree.nodes[0];
-    let rays = Rays::new(&costs::outside(root.lower, root.upper, 16384, 13));
+    let rays = Rays::new(&costs::outside(root.lower, root.upper, 4096, 13));
     let runs = [(&scene, &rays, Way::Nearest)];
     let times = nanoseconds(&runs, rounds, || progress.cancelled()).ok_or(Error::Cancelled)?;
     Ok(times[0])

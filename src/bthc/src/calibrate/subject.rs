@@ -24,7 +24,11 @@ const SMALL: usize = 20_000;
 /// So many times small models are tetrahedralized again.
 const AGAIN: usize = 16;
 
+/// Times that models and rays get new places in memory in the course of the rounds: what shares a set of the cache is luck.
+const PLACES: usize = 3;
+
 /// Rays of one kind and their mean steps.
+#[derive(Clone)]
 struct Kind {
     rays: Rays,
     /// Entered nodes of the binary BVH, and tetrahedra.
@@ -72,8 +76,8 @@ pub(crate) struct Times {
 
 /// A model in all structures.
 pub(crate) struct Subject {
-    bvh: Scene,
-    tets: Vec<Scene>,
+    /// The BVH, then the tetrahedra in each record.
+    files: Vec<Vec<u8>>,
     nothing: Rays,
     outside: Kind,
     bounces: [Kind; 4],
@@ -116,11 +120,15 @@ impl Subject {
             let spent = before.and_then(|before| Some(worker_seconds()? - before));
             seconds = spent.unwrap_or(start.elapsed().as_secs_f64()) / AGAIN as f64;
         }
-        let scene = |built: &[(u32, tets::TetMesh)], record: RecordKind| -> Result<Scene, Failure> {
+        let file = |built: &[(u32, tets::TetMesh)], record: RecordKind| {
             let options = Options { record, geometry: false, ..options.clone() };
-            Ok(bth::from_bytes(&pipeline::assemble(mesh, &tree, built, &options, monitor)?.bytes)?)
+            pipeline::assemble(mesh, &tree, built, &options, monitor).map(|compiled| compiled.bytes)
         };
-        let plain = scene(&[], RecordKind::Link32)?;
+        let mut files = vec![file(&[], RecordKind::Link32)?];
+        for record in RecordKind::ALL {
+            files.push(file(&built, record)?);
+        }
+        let plain = bth::from_bytes(&files[0])?;
         let root = &tree.nodes[0];
         let count = if small { RAYS } else { RAYS_TO_LARGE };
         let lines = costs::outside(root.lower, root.upper, count, 11);
@@ -154,8 +162,7 @@ impl Subject {
             bytes: RecordKind::ALL
                 .map(|record| (tets.tets.len() * record.stride() + tets.vertices.len() * 16) as f64),
             tetrahedralize: 1e6 * seconds / mesh.triangles.len().max(1) as f64,
-            bvh: plain,
-            tets: RecordKind::ALL.iter().map(|r| scene(&built, *r)).collect::<Result<_, _>>()?,
+            files,
             nothing: Rays::new(&nothing),
             bounces: bounces.each_ref().map(|rays| kind(rays)),
             short: kind(&short),
@@ -163,15 +170,11 @@ impl Subject {
         })
     }
 
-    /// What is timed: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
-    fn runs(&self) -> Vec<Run<'_>> {
-        let mut runs: Vec<Run<'_>> = vec![(&self.bvh, &self.nothing, Way::Nearest)];
-        for (kind, way) in self.kinds() {
-            runs.push((&self.bvh, &kind.rays, way));
-            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, way)));
-            runs.extend(self.tets.iter().map(|scene| (scene, &kind.rays, Way::Single)));
-        }
-        runs
+    /// The scenes and the rays, in new places in memory.
+    fn placed(&self) -> Result<Placed, Failure> {
+        let scenes = self.files.iter().map(|file| bth::from_bytes(file)).collect::<Result<_, _>>()?;
+        let kinds = self.kinds().map(|(kind, way)| (kind.rays.clone(), way)).collect();
+        Ok(Placed { scenes, nothing: self.nothing.clone(), kinds })
     }
 
     fn kinds(&self) -> impl Iterator<Item = (&Kind, Way)> {
@@ -205,16 +208,53 @@ impl Subject {
     }
 }
 
+/// A model and its rays where they are timed.
+struct Placed {
+    scenes: Vec<Scene>,
+    nothing: Rays,
+    kinds: Vec<(Rays, Way)>,
+}
+
+impl Placed {
+    /// What is timed: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
+    fn runs(&self) -> Vec<Run<'_>> {
+        let (bvh, tets) = (&self.scenes[0], &self.scenes[1..]);
+        let mut runs: Vec<Run<'_>> = vec![(bvh, &self.nothing, Way::Nearest)];
+        for (rays, way) in &self.kinds {
+            runs.push((bvh, rays, *way));
+            runs.extend(tets.iter().map(|scene| (scene, rays, *way)));
+            runs.extend(tets.iter().map(|scene| (scene, rays, Way::Single)));
+        }
+        runs
+    }
+}
+
 /// Times all kinds of rays through all structures of all models in turn, so that a busy minute of the machine does not fall
-/// on one model; `None` when it was stopped.
-pub(crate) fn measure(subjects: &[Subject], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<Times>> {
-    let runs: Vec<Vec<Run<'_>>> = subjects.iter().map(Subject::runs).collect();
-    let mut times = nanoseconds(&runs.concat(), rounds, stop)?.into_iter();
-    let each = subjects.iter().zip(&runs);
-    Some(
-        each.map(|(subject, runs)| subject.times(&times.by_ref().take(runs.len()).collect::<Vec<_>>()))
-            .collect(),
-    )
+/// on one model; and nanoseconds of a ray of another run beside them.
+///
+/// # Errors
+/// If it was stopped.
+pub(crate) fn measure(
+    subjects: &[Subject],
+    beside: Run<'_>,
+    rounds: usize,
+    stop: impl Fn() -> bool,
+) -> Result<(Vec<Times>, f64), Failure> {
+    let mut least: Vec<f64> = Vec::new();
+    let mut before = Vec::new();
+    for _ in 0..PLACES {
+        // What was there before is kept until now, or the new would take its place.
+        let placed = subjects.iter().map(Subject::placed).collect::<Result<Vec<_>, _>>()?;
+        let mut runs = vec![beside];
+        runs.extend(placed.iter().flat_map(Placed::runs));
+        let times = nanoseconds(&runs, rounds.div_ceil(PLACES), &stop).ok_or(Error::Cancelled)?;
+        least.resize(times.len(), f64::INFINITY);
+        least.iter_mut().zip(times).for_each(|(least, time)| *least = least.min(time));
+        drop(std::mem::replace(&mut before, placed));
+    }
+    let each = least[1..].chunks(least[1..].len() / subjects.len().max(1));
+    let times = subjects.iter().zip(each).map(|(subject, times)| subject.times(times)).collect();
+    Ok((times, least[0]))
 }
 
 /// CPU seconds of the processes that this one has waited for, where the system says: what other jobs take is left out.

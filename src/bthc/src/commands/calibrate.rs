@@ -3,14 +3,15 @@
 use crate::args::Calibrate;
 use crate::calibrate::{Measured, Subject, fit, measure};
 use crate::failure::Failure;
-use crate::measure::{Rays, Way, nanoseconds};
+use crate::measure::{Rays, Way};
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes};
+use bth::Scene;
 use bth_compile::costs::Profile;
 use bth_compile::mesh::{self, Keep, Mesh};
 use bth_compile::pipeline::{self, Options};
-use bth_compile::{Error, Monitor, bvh, costs, write};
+use bth_compile::{Monitor, bvh, costs, write};
 use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
 
@@ -36,11 +37,14 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         .map(|(name, mesh)| Subject::new(name, mesh, &progress))
         .collect::<Result<Vec<_>, _>>()?;
     progress.stage("measure", None);
-    for times in measure(&subjects, args.rounds, || progress.cancelled()).ok_or(Error::Cancelled)? {
+    let (scene, rays) = leaf(&progress)?;
+    let beside = (&scene, &rays, Way::Nearest);
+    let (all, leaf) = measure(&subjects, beside, args.rounds, || progress.cancelled())?;
+    measured.leaf = leaf;
+    for times in all {
         let kind = if times.bytes[0] < BETWEEN { &mut measured.small } else { &mut measured.large };
         kind.push(times);
     }
-    measured.leaf = leaf(args.rounds, &progress)?;
     drop(progress);
 
     let isa = bth::Isa::chosen();
@@ -63,8 +67,8 @@ fn of(model: Model) -> Mesh {
     Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() }
 }
 
-/// Nanoseconds of a ray into a BVH that is a single leaf: a fan of eight triangles.
-fn leaf(rounds: usize, progress: &Progress) -> Result<f64, Failure> {
+/// A BVH that is a single leaf, a fan of eight triangles, and rays into it.
+fn leaf(progress: &Progress) -> Result<(Scene, Rays), Failure> {
     let rim = |i: u32| {
         [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-1.0, 0.0], [-1.0, -1.0], [0.0, -1.0], [1.0, -1.0]]
             [i as usize]
@@ -81,9 +85,7 @@ fn leaf(rounds: usize, progress: &Progress) -> Result<f64, Failure> {
     let scene = bth::from_bytes(&file.bytes)?;
     let root = &tree.nodes[0];
     let rays = Rays::new(&costs::outside(root.lower, root.upper, 4096, 13));
-    let runs = [(&scene, &rays, Way::Nearest)];
-    let times = nanoseconds(&runs, rounds, || progress.cancelled()).ok_or(Error::Cancelled)?;
-    Ok(times[0])
+    Ok((scene, rays))
 }
 
 fn table(profile: &Profile) -> String {

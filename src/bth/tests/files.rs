@@ -100,7 +100,7 @@ fn every_valid_file_opens_verifies_and_is_traced() {
 fn big_endian_machines_get_the_documented_error() {
     for (name, bytes) in VALID {
         let error = bth::File::from_bytes(bytes).unwrap_err();
-        assert_eq!(error.code.as_str(), "BTH-O002", "{name}");
+        assert_eq!(error.code().as_str(), "BTH-O002", "{name}");
         assert!(error.to_string().contains("big-endian"), "{error}");
         assert!(bth::from_bytes(bytes).is_err());
     }

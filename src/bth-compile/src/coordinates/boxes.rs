@@ -48,7 +48,8 @@ fn steps(least: f64, greatest: f64) -> Option<(f64, f64)> {
     let size = least.abs().max(greatest.abs());
     // No finer than what tells numbers of this size apart, and no finer than a normal f32.
     let finest = (size / f64::from(1 << 23)).max((greatest - least) / MOST).max(f64::from(f32::MIN_POSITIVE));
-    let mut step = finest.log2().floor().exp2();
+    // The power of two below it, bit for bit the same on every machine.
+    let mut step = f64::from_bits(finest.to_bits() & 0x7ff << 52);
     while step <= f64::from(f32::MAX) {
         let origin = (least / step).floor() * step;
         if step >= finest / 2.0
@@ -72,9 +73,9 @@ mod tests {
             WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
         for (slot, ends) in boxes.iter().enumerate() {
             node.child[slot] = slot as u32;
-            for axis in 0..3 {
-                node.bounds[axis][0][slot] = ends[axis][0].min(ends[axis][1]);
-                node.bounds[axis][1][slot] = ends[axis][0].max(ends[axis][1]);
+            for (rows, [a, b]) in node.bounds.iter_mut().zip(ends) {
+                rows[0][slot] = a.min(*b);
+                rows[1][slot] = a.max(*b);
             }
         }
         node

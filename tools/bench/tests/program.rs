@@ -120,7 +120,7 @@ fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
                 tracer["aimed"][kind].as_u64().unwrap() + tracer["ordinary"][kind].as_u64().unwrap()
             });
             let name = tracer["name"].as_str().unwrap();
-            let f32_decides = ["bvh test watertight", "bvh test fast"].contains(&name);
+            let f32_decides = ["bvh test watertight", "bvh test fast", "bvh test moeller"].contains(&name);
             let exact = !f32_decides && ["bvh", "bth"].contains(&tracer["group"].as_str().unwrap());
             // Rays exactly at vertices are lost by those that are not exact: were none, nothing would be measured.
             assert_eq!(exact, defects == [0; 4], "{tracer}");

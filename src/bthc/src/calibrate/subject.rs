@@ -182,7 +182,7 @@ impl Subject {
         [(&self.outside, Way::Nearest), (&self.short, Way::Any)].into_iter().chain(bounces)
     }
 
-    /// Takes the times of [`Self::runs`] apart.
+    /// Takes the times of `runs` apart.
     fn times(&self, times: &[f64]) -> Times {
         let kinds: Vec<&Kind> = self.kinds().map(|(kind, _)| kind).collect();
         let timed = |row: usize| {

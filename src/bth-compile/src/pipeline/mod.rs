@@ -239,6 +239,9 @@ fn object(
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
     let Joined { wide, packed_nodes, collapse } =
         wide(&mesh, on_grid.as_ref(), &tree, &cut, options, monitor)?;
+    if options.coordinates.boxes == Boxes::Bytes && !packed_nodes {
+        monitor.warn("boxes of nodes stay f32: coordinates are too great for steps of bytes");
+    }
     let encoded = (!meshes.is_empty())
         .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
     let (tet_leaves, tet_triangles) =

@@ -54,21 +54,8 @@ fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) -> Q::Answer {
     if single.object.header.root == NONE {
         return single.query().answer(single.object.triangle_ids, single.instance);
     }
-    if single.object.has_packed_nodes() {
-        return through_packed_nodes(&mut single);
-    }
-    Isa::chosen().run(Among(Wide, &mut single))
+    Isa::chosen().run(&mut single)
 }
-
-/// Apart, so that the way to the common kernel stays short.
-#[cold]
-#[inline(never)]
-fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) -> Q::Answer {
-    Isa::chosen().run(Among(Packed, single))
-}
-
-/// A ray among nodes of a kind.
-struct Among<N, T>(N, T);
 
 struct Single<'a, Q, C> {
     object: &'a ObjectView<'a>,
@@ -90,30 +77,57 @@ impl<Q: Query, C> Single<'_, Q, C> {
 
 // By reference, and the query is made, and its answer worked out, within the kernel: copies of what was just written word by
 // word stall.
-impl<N: Nodes, Q: Query, C: Count> Kernel for Among<N, &mut Single<'_, Q, C>> {
+impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
     type Output = Q::Answer;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
-        let Among(nodes, single) = self;
-        let (object, ray) = (single.object, single.ray);
-        let mut flight = Flight::vacant(single.query());
+        if self.object.has_packed_nodes() {
+            return through_packed_nodes(self);
+        }
+        self.walk(s, Wide)
+    }
+}
+
+/// Apart, so that the common kernel stays short.
+#[cold]
+#[inline(never)]
+fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) -> Q::Answer {
+    Isa::chosen().run(AmongPacked(single))
+}
+
+/// A ray among packed nodes, as a kernel.
+struct AmongPacked<'a, T>(&'a mut T);
+
+impl<Q: Query, C: Count> Kernel for AmongPacked<'_, Single<'_, Q, C>> {
+    type Output = Q::Answer;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Q::Answer {
+        self.0.walk(s, Packed)
+    }
+}
+
+impl<Q: Query, C: Count> Single<'_, Q, C> {
+    #[inline(always)]
+    fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) -> Q::Answer {
+        let (object, ray) = (self.object, self.ray);
+        let mut flight = Flight::vacant(self.query());
         if flight.aim_at(object, &Frame::new(object.header), ray) {
-            if single.start.is_some() {
+            if self.start.is_some() {
                 flight.take_over();
             }
-            single.scratch.stacks.reserve(object, 1);
+            self.scratch.stacks.reserve(object, 1);
             bvh::walk::walk(
                 s,
                 nodes,
                 object,
                 ray,
-                single.start.map_or(NONE, |(_, walked)| walked),
+                self.start.map_or(NONE, |(_, walked)| walked),
                 &mut flight,
-                &mut single.scratch.stacks,
-                single.count,
+                &mut self.scratch.stacks,
+                self.count,
                 |leaf, query, count| enter_tets(object, leaf, ray, query, count),
             );
         }
-        flight.query().answer(object.triangle_ids, single.instance)
+        flight.query().answer(object.triangle_ids, self.instance)
     }
 }

@@ -52,10 +52,8 @@ fn steps(least: f64, greatest: f64) -> Option<(f64, f64)> {
     let mut step = f64::from_bits(finest.to_bits() & 0x7ff << 52);
     while step <= f64::from(f32::MAX) {
         let origin = (least / step).floor() * step;
-        if step >= finest / 2.0
-            && ((greatest - origin) / step).ceil() <= MOST
-            && size / step <= f64::from(1 << 23)
-        {
+        // Multiples of the step: the sum is exact, where the difference of the ends would be rounded.
+        if greatest <= origin + MOST * step && size / step <= f64::from(1 << 23) {
             return Some((origin, step));
         }
         step *= 2.0;
@@ -112,6 +110,13 @@ mod tests {
         fn boxes_only_grow(boxes in prop::collection::vec([[end(), end()], [end(), end()], [end(), end()]], 1..=16)) {
             prop_assert!(check(&node(&boxes)).is_some());
         }
+    }
+
+    #[test]
+    fn ends_far_apart_in_size_are_packed() {
+        // Their difference rounds to 255 steps of 2^78 and is a little more.
+        let far = -255.0 * 2.0f32.powi(78);
+        assert!(check(&node(&[[[far, 1e7], [0.0, 0.0], [0.0, 0.0]]])).is_some());
     }
 
     #[test]

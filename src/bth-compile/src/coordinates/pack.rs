@@ -20,6 +20,9 @@ struct Block {
 /// # Errors
 /// `BTH-L202` when a child code cannot address a leaf.
 pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bool> {
+    if grid.is_none() && !pack_nodes {
+        return Ok(false);
+    }
     let mut blocks = blocks(wide);
     let nodes = pack_nodes.then(|| packed_nodes(wide, &blocks)).flatten();
     if grid.is_none() && nodes.is_none() {

@@ -178,6 +178,8 @@ impl Simd for Avx2 {
         min(a: F, b: F) -> F = _mm256_min_ps(a, b);
         max(a: F, b: F) -> F = _mm256_max_ps(a, b);
         abs(a: F) -> F = _mm256_andnot_ps(_mm256_set1_ps(-0.0), a);
+        max_abs(a: F, b: F) -> F =
+            _mm256_max_ps(_mm256_andnot_ps(_mm256_set1_ps(-0.0), a), _mm256_andnot_ps(_mm256_set1_ps(-0.0), b));
         lt(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b));
         le(a: F, b: F) -> M = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b));
         select(m: M, a: F, b: F) -> F = _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m));

@@ -172,6 +172,8 @@ impl Simd for Avx512 {
         min(a: __m512, b: __m512) -> __m512 = _mm512_min_ps(a, b);
         max(a: __m512, b: __m512) -> __m512 = _mm512_max_ps(a, b);
         abs(a: __m512) -> __m512 = _mm512_abs_ps(a);
+        // The greater in magnitude, without its sign.
+        max_abs(a: __m512, b: __m512) -> __m512 = _mm512_range_ps::<0b1011>(a, b);
         lt(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
         le(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
         select(m: u16, a: __m512, b: __m512) -> __m512 = _mm512_mask_mov_ps(b, m, a);

@@ -55,6 +55,8 @@ pub(crate) trait Simd: Copy {
     /// The greater; `b` where either is NaN.
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     fn abs(self, a: Self::F) -> Self::F;
+    /// The greater of |a| and |b|; which of them is open where either is NaN.
+    fn max_abs(self, a: Self::F, b: Self::F) -> Self::F;
     /// a < b; false for NaN.
     fn lt(self, a: Self::F, b: Self::F) -> Self::M;
     /// a <= b; false for NaN.

@@ -162,6 +162,10 @@ impl Simd for Scalar {
         a.map(f32::abs)
     }
     #[inline(always)]
+    fn max_abs(self, a: F, b: F) -> F {
+        self.max(self.abs(a), self.abs(b))
+    }
+    #[inline(always)]
     fn lt(self, a: F, b: F) -> u32 {
         compare(|i| a[i] < b[i])
     }

@@ -92,6 +92,7 @@ impl Kernel for Everything<'_> {
             f(s.min(a, b)),
             f(s.max(a, b)),
             f(s.abs(a)),
+            f(s.max_abs(s.sub(s.splat(1.0), s.load(&ordered)), s.load(&ordered))),
             m(other),
             m(s.le(a, b)),
             f(s.select(other, a, b)),

@@ -302,8 +302,7 @@ impl<N: Nodes, Q: Query> Kernel for ThroughBvh<'_, '_, N, Q> {
     fn run<S: Simd>(self, s: S) {
         let (object, rays, waiting, sink) = (self.object, self.rays, self.waiting, self.sink);
         let stacks = &mut self.scratch.stacks;
-        let done = |ray: usize, query: &Q| sink.query(ray, query);
-        let walk = BatchWalk { object, rays, waiting, stacks, done };
+        let walk = BatchWalk { object, rays, waiting, stacks, to: sink };
         walk.run(s, self.nodes, |leaf, ray, query| {
             enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
         });

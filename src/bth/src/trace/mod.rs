@@ -4,8 +4,10 @@
 
 mod batch;
 mod bvh;
+mod candidate;
 mod choice;
 mod crossing;
+mod crossings;
 mod hinted;
 mod line;
 mod packets;

@@ -3,7 +3,7 @@
 //! To the bounds that [`Slabs`] and [`Sight`] demand, though not to the same bits as their own constructors, which
 //! compute in f64. Rays that f32 can't prepare so are left to those.
 
-use super::sight::Sight;
+use super::sight::{self, Sight};
 use super::slabs::{self, Slabs};
 use crate::layout::Object;
 use crate::rays::Ray;
@@ -115,7 +115,7 @@ impl Aim {
         slabs.first = first - slack(first);
         slabs.last = limit + slack(limit);
         sight.axis = [x as u32, y as u32, z as u32];
-        sight.floor = f32::MIN_POSITIVE;
+        [sight.error_slope, sight.error_floor] = sight::errors(reach);
         sight.origin = [o[x], o[y]];
         sight.shear = [d[x] * inverse, d[y] * inverse];
         sight.forward = forward;
@@ -247,7 +247,8 @@ pub(crate) fn rows<S: Simd>(s: S, frame: &Frame, field: [S::F; 8]) -> ([S::F; 2 
     aim[16] = s.floats(s.select_u(backward, last, next));
     aim[17] = s.floats(s.select_u(backward, next, last));
     aim[18] = s.floats(z);
-    aim[19] = s.splat(f32::MIN_POSITIVE);
+    aim[28] = s.mul(reach, s.splat(sight::ERROR_SLOPE));
+    aim[19] = s.fma(aim[28], aim[28], s.splat(f32::MIN_POSITIVE));
     aim[20] = origin[0];
     aim[21] = origin[1];
     aim[22] = s.mul(shear[0], inverse);

@@ -4,7 +4,7 @@
 use super::crossing::Crossing;
 use super::line::Line;
 use super::prepare::{Aim, Frame, Prepared};
-use super::sight::{Candidates, Sight};
+use super::sight::Sight;
 use super::slabs::Slabs;
 use crate::layout::{IndexedLeaf, NONE, Object, WIDTH, WideNode};
 use crate::rays::Ray;
@@ -38,17 +38,31 @@ impl Single {
     }
 }
 
+/// What is known of the triangle.
+struct Found {
+    maybe: u32,
+    sure: u32,
+    /// Between which depths it is hit.
+    depth: [f32; 2],
+}
+
 /// Children and candidates as a kernel.
 struct Look<'a>(&'a Aim, &'a Single);
 
 impl Kernel for Look<'_> {
-    type Output = (u32, Candidates);
+    type Output = (u32, Found);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
         let Look(Aim { slabs, sight }, Single { node, leaf, .. }) = self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
-        (children.fold(0, |m, i| m | 1 << i), sight.candidates(s, leaf, slabs.first, slabs.last))
+        let candidates = sight.candidates(s, leaf, slabs.first, slabs.last);
+        let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
+        s.store(candidates.nearest, &mut nearest);
+        s.store(candidates.farthest, &mut farthest);
+        let found =
+            Found { maybe: candidates.maybe, sure: candidates.sure, depth: [nearest[0], farthest[0]] };
+        (children.fold(0, |m, i| m | 1 << i), found)
     }
 }
 
@@ -142,6 +156,14 @@ fn nothing_is_lost_that_the_line_crosses_and_sure_hits_are_hits() {
                     assert!(!hit || children == 1, "the box is lost: {}", context());
                     assert!(!hit || found.maybe == 1, "the triangle is lost: {}", context());
                     assert!(hit || found.sure == 0, "sure of what is no hit: {}", context());
+                    let depth = crossing.map_or(0.0, |c| c.t * f64::from(aim.slabs.scale));
+                    let [near, far] = found.depth.map(f64::from);
+                    let within = near <= depth && depth <= far;
+                    assert!(
+                        found.sure == 0 || within,
+                        "its depth is not {depth}: {near} to {far}, {}",
+                        context()
+                    );
                     assert!(children <= 1 && found.maybe <= 1, "what is empty is never entered");
                     missed += u32::from(children == 0);
                     sure += u32::from(found.sure != 0);

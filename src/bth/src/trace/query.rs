@@ -59,6 +59,8 @@ pub(crate) trait Query: Copy {
     const ANY: bool;
     /// How triangles of leaves are decided.
     const TEST: Test = Test::Exact;
+    /// Whether only the last of several hits, each nearer than the one before, need be computed.
+    const DEFERS: bool = false;
     /// What the caller gets.
     type Answer;
     /// `ids` are those of the object, in leaf order.
@@ -115,6 +117,7 @@ impl Nearest {
 
 impl Query for Nearest {
     const ANY: bool = false;
+    const DEFERS: bool = true;
     type Answer = Hit;
     fn answer(&self, ids: &[u32], instance: u32) -> Hit {
         if self.triangle == NONE {

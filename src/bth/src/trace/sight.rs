@@ -4,11 +4,13 @@
 //! triangle that `Line::crossing` could accept remains a candidate, and what is called sure is accepted by it
 //! without doubt; the rest is for f64 to decide. So the lanes of an instruction set never show in an answer.
 //!
-//! **Error of a weight.** u = 2^-24, and for the corners of one triangle M >= |x| + |y| as projected, r >= M + |depth|,
-//! which bounds their coordinates seen from the ray's origin. Differences are off by ur, the shear by a factor 1±2u,
-//! its product and the last sum by ur each at most (|shear| <= 1): sheared coordinates are off by less than
+//! **Error of a weight.** u = 2^-24, and for the corners of one triangle M >= |x| + |y| as projected, r their greatest
+//! coordinate seen from the ray's origin. Differences are off by ur, the shear by a factor 1±2u, its product by as much and
+//! by what the depth is off (|shear| <= 1), the last sum by 2ur: sheared coordinates are off by less than
 //! δ = 8ur. A cross product of two is off by 2δM + 2δ² from its points and 3uM² <= δM from its own roundings,
-//! together below 4δ(M + δ). Products below the least normal number add at most that.
+//! together below 4δ(M + δ). Products below the least normal number add at most that. For r serves the corner of the
+//! object's box that is farthest from the origin, so that 8δ and 4δ² are numbers of the ray; for M twice the greatest |x| or |y|.
+//! (Packets have no such numbers and take M + |depth| for r.)
 //!
 //! **Error of a depth.** Moving three weights by e each moves the depth by at most 3e·range/(|sum| - 3e), range
 //! being that of the corners' depths, and never out of it; the depth's own roundings stay below 8u of the
@@ -25,6 +27,8 @@ const _: () = assert!(WIDTH == LANES);
 
 /// 8 roundings of f32: bounds the error of a sheared coordinate relative to the ray's reach.
 pub(crate) const PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
+/// A little more than eight times that, for the roundings of what is made of it.
+pub(crate) const ERROR_SLOPE: f32 = 8.01 * PROJECTION_ERROR as f32;
 /// Farther coordinates could overflow the products of weights and depths: all triangles are candidates then.
 const FARTHEST: f64 = (1u64 << 40) as f64;
 /// Slack of depths, relative to the greatest: their roundings, with some to spare.
@@ -36,8 +40,8 @@ const DEPTH_SLACK: f32 = 16.0 / (1 << 24) as f32;
 pub(crate) struct Sight {
     /// The two axes of the projection and the one along the ray.
     pub(crate) axis: [u32; 3],
-    /// What underflow adds to the error of a weight; infinite where products may overflow.
-    pub(crate) floor: f32,
+    /// Bound of the error of a weight of points at the line; infinite where products may overflow.
+    pub(crate) error_floor: f32,
     /// Along the axes of the plane.
     pub(crate) origin: [f32; 2],
     pub(crate) shear: [f32; 2],
@@ -49,16 +53,21 @@ pub(crate) struct Sight {
     pub(crate) first: f32,
     /// to this.
     pub(crate) last: f32,
-    pub(crate) reserved: [u32; 4],
+    /// What the bound grows by with the greatest |x| or |y| of the points.
+    pub(crate) error_slope: f32,
+    pub(crate) reserved: [u32; 3],
 }
 
 /// Triangles of a leaf that the ray may hit, a bit each.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Candidates {
+#[derive(Clone, Copy)]
+pub(crate) struct Candidates<S: Simd> {
     /// Those that are not certainly missed.
     pub(crate) maybe: u32,
     /// Of these, those that are certainly hit, within the ray's range.
     pub(crate) sure: u32,
+    /// Between which depths they are hit, if they are.
+    pub(crate) nearest: S::F,
+    pub(crate) farthest: S::F,
 }
 
 /// Projected corners, sixteen triangles: `[corner][x, y, depth]`.
@@ -89,6 +98,12 @@ fn pick<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3]
 #[inline(always)]
 pub(crate) fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
     s.fnma(p[1], q[0], s.mul(p[0], q[1]))
+}
+
+/// The greatest |x| or |y|.
+#[inline(always)]
+fn greatest_coordinate<S: Simd>(s: S, [a, b, c]: &Corners<S>) -> S::F {
+    s.max(s.max(s.max_abs(a[0], a[1]), s.max_abs(b[0], b[1])), s.max_abs(c[0], c[1]))
 }
 
 /// |x| + |y|.
@@ -184,16 +199,19 @@ impl Sight {
         let reach = line.reach_of_box(object.lower, object.upper);
         let [first, last] = slabs.certain_range(ray);
         let forward = 1f32.copysign(line.direction[line.axis[2]] as f32);
+        let [error_slope, error_floor] =
+            if reach < FARTHEST { errors(reach as f32) } else { [0.0, f32::INFINITY] };
         Sight {
             axis: line.axis.map(|k| k as u32),
-            floor: if reach < FARTHEST { f32::MIN_POSITIVE } else { f32::INFINITY },
+            error_floor,
             origin: [ray.origin[line.axis[0]], ray.origin[line.axis[1]]],
             shear: line.shear.map(|s| s as f32 * forward),
             forward,
             start: -forward * ray.origin[line.axis[2]],
             first,
             last,
-            reserved: [0; 4],
+            error_slope,
+            reserved: [0; 3],
         }
     }
 
@@ -214,19 +232,22 @@ impl Sight {
         block: &B,
         first: f32,
         limit: f32,
-    ) -> Candidates {
+    ) -> Candidates<S> {
         let corners = block.project(s, self);
-        let sides = sides(s, &corners, s.splat(self.floor));
+        let greatest = greatest_coordinate(s, &corners);
+        let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
+        let sides = sides(s, &corners, error);
         let valid = (1 << block.triangles().min(WIDTH as u32)) - 1;
         // Most leaves that a ray enters have no triangle that it could meet: then depths do not matter.
         if valid & !s.mask_bits(sides.missed) == 0 {
-            return Candidates { maybe: 0, sure: 0 };
+            return Candidates { maybe: 0, sure: 0, nearest: error, farthest: error };
         }
         let weighed = sides.weigh(s, &corners, s.splat(first), s.splat(limit));
         let maybe = valid & !s.mask_bits(weighed.out);
         let in_range =
             s.and(s.le(s.splat(self.first), weighed.nearest), s.le(weighed.farthest, s.splat(self.last)));
-        Candidates { maybe, sure: maybe & s.mask_bits(s.and(weighed.certain, in_range)) }
+        let sure = maybe & s.mask_bits(s.and(weighed.certain, in_range));
+        Candidates { maybe, sure, nearest: weighed.nearest, farthest: weighed.farthest }
     }
 }
 
@@ -240,6 +261,13 @@ pub(crate) struct Weighed<S: Simd> {
     /// Bounds of the depth of a hit.
     pub(crate) nearest: S::F,
     pub(crate) farthest: S::F,
+}
+
+/// What [`Sight`] says of errors, for points up to this far from the origin.
+#[inline(always)]
+pub(crate) fn errors(reach: f32) -> [f32; 2] {
+    let slope = reach * ERROR_SLOPE;
+    [slope, slope * slope + f32::MIN_POSITIVE]
 }
 
 /// Bound of the error of weights, from the greatest size and depth of projected corners.
@@ -257,41 +285,35 @@ struct Sides<S: Simd> {
     weight: [S::F; 3],
     /// Bound of their error.
     error: S::F,
-    shallow: S::F,
-    deep: S::F,
-    greatest_depth: S::F,
     missed: S::M,
     certain: S::M,
 }
 
-/// Weighs triangles for hits between two depths; see the top of this file.
+/// Weighs triangles for hits between two depths, given a bound of the error of weights; see the top of this file.
 #[inline(always)]
-pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, floor: S::F, first: S::F, limit: S::F) -> Weighed<S> {
-    sides(s, &corners, floor).weigh(s, &corners, first, limit)
+pub(crate) fn weigh<S: Simd>(s: S, corners: Corners<S>, error: S::F, first: S::F, limit: S::F) -> Weighed<S> {
+    sides(s, &corners, error).weigh(s, &corners, first, limit)
 }
 
 #[inline(always)]
-fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, floor: S::F) -> Sides<S> {
+fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
     let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
-    let size = s.max(s.max(size(s, a), size(s, b)), size(s, c));
-    let shallow = s.min(s.min(a[2], b[2]), c[2]);
-    let deep = s.max(s.max(a[2], b[2]), c[2]);
-    let greatest_depth = s.max(s.abs(shallow), s.abs(deep));
-    let error = error(s, size, greatest_depth, floor);
     let minus_error = s.sub(s.splat(0.0), error);
     let least = s.min(s.min(weight[0], weight[1]), weight[2]);
     let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
     // By what is certain, so that NaN stays a candidate.
     let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
     let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
-    Sides { weight, error, shallow, deep, greatest_depth, missed, certain }
+    Sides { weight, error, missed, certain }
 }
 
 impl<S: Simd> Sides<S> {
     /// Where the lines hit, between two depths.
     #[inline(always)]
     fn weigh(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> Weighed<S> {
-        let Sides { weight, error, shallow, deep, greatest_depth, missed, certain } = self;
+        let Sides { weight, error, missed, certain } = self;
+        let shallow = s.min(s.min(a[2], b[2]), c[2]);
+        let deep = s.max(s.max(a[2], b[2]), c[2]);
         let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
         // Shares, and not the sum of products by the sum of weights: those of a small triangle would underflow.
         let inverse = s.div(s.splat(1.0), sum);
@@ -301,7 +323,7 @@ impl<S: Simd> Sides<S> {
         let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
         let shift = s.min(shift, range);
         let depth = s.fma(share[2], c[2], s.fma(share[1], b[2], s.mul(share[0], a[2])));
-        let slack = s.fma(greatest_depth, s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+        let slack = s.fma(s.max_abs(shallow, deep), s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
         let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
         let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
         let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));

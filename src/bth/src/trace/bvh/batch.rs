@@ -2,6 +2,7 @@
 //! with the work of the others.
 
 use super::flight::{Flight, Found};
+use super::landing::Landing;
 use super::nodes::Nodes;
 use super::stack::{BOTTOM, Place, Stacks};
 use crate::layout::{Child, INDEXED_LINES, NONE};
@@ -9,7 +10,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::prepare::{Frame, Prepared};
-use crate::trace::query::Query;
+use crate::trace::query::{Deliver, Query};
 
 /// Rays on their way at once.
 const IN_FLIGHT: usize = 32;
@@ -88,8 +89,8 @@ pub(crate) struct BatchWalk<'a, Q, D> {
     pub(crate) rays: &'a [Ray],
     pub(crate) waiting: Waiting<'a, Q>,
     pub(crate) stacks: &'a mut Stacks,
-    /// Takes the place of a ray in the batch, and its query as it ended.
-    pub(crate) done: D,
+    /// Where answers go.
+    pub(crate) to: &'a mut D,
 }
 
 /// The next rays, sixteen at a time.
@@ -107,7 +108,7 @@ struct Supply {
     before: usize,
 }
 
-impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
+impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
     /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
     /// the query has what it wants.
     #[inline(always)]
@@ -130,6 +131,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
         };
         let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
         let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: Place::NOWHERE }; IN_FLIGHT];
+        let mut landing = Landing::new();
         let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
         for (i, slot) in slots.iter_mut().enumerate() {
             if self.launch(s, &mut supply, i, slot) {
@@ -139,7 +141,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
         loop {
             self.inner_steps(s, nodes, &mut slots, &mut lists);
             if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
-                return;
+                return landing.clear(s, self.object, self.rays, self.to);
             }
             for i in 0..lists.bottom.take() {
                 let at = lists.bottom.get(i);
@@ -150,7 +152,7 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                     lists.sort(at, self.stacks.code(slot.top));
                     continue;
                 }
-                (self.done)(slot.ray, slot.flight.query());
+                landing.land(s, self.object, self.rays, (slot.ray, &mut slot.flight), self.to);
                 if self.launch(s, &mut supply, at, &mut slots[at]) {
                     lists.sort(at, root);
                 }
@@ -160,12 +162,15 @@ impl<Q: Query, D: FnMut(usize, &Q)> BatchWalk<'_, Q, D> {
                 let slot = &mut slots[at];
                 let ray = &self.rays[slot.ray];
                 let (mut indexed, mut raw) = (None, None);
-                let found = match Child::from_code(self.stacks.code(slot.top)) {
+                let code = self.stacks.code(slot.top);
+                let found = match Child::from_code(code) {
                     Some(Child::Indexed(line)) => {
-                        slot.flight.enter_leaf(s, self.object, ray, self.object.indexed(line, &mut indexed))
+                        let leaf = self.object.indexed(line, &mut indexed);
+                        slot.flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
                     }
                     Some(Child::Raw(line)) => {
-                        slot.flight.enter_leaf(s, self.object, ray, self.object.raw(line, &mut raw))
+                        let leaf = self.object.raw(line, &mut raw);
+                        slot.flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
                     }
                     Some(Child::Tets(row)) => {
                         if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
@@ -290,6 +295,7 @@ fn enter_tets<Q: Query>(
         stacks.set_code(slot.top, subtree);
         return Found::Again;
     }
+    slot.flight.settle(object, ray);
     let done = tets(row, ray, slot.flight.query());
     if done { Found::Enough } else { slot.flight.settled(Found::Nothing) }
 }

@@ -5,12 +5,13 @@ use crate::layout::WIDTH;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
+use crate::trace::candidate::{Candidate, open, settle};
 use crate::trace::crossing::{Crossing, Estimate, estimate};
 use crate::trace::line::Line;
 use crate::trace::prepare::{Aim, Frame};
 use crate::trace::query::{Named, Query};
 use crate::trace::quick::Test;
-use crate::trace::sight::{Block, Sight};
+use crate::trace::sight::{Block, Candidates, Sight};
 use crate::trace::slabs::{Boxes, Slabs};
 use zerocopy::FromZeros;
 
@@ -25,6 +26,11 @@ pub(crate) struct Flight<Q> {
     aim: Aim,
     /// Nothing whose depth certainly exceeds this matters.
     limit: f32,
+    /// Lower bound of the depth of the nearest hit so far.
+    nearest: f32,
+    /// The nearest hit so far, if it is certain but where it is has still to be computed. Most rays come upon several hits,
+    /// each nearer than the last, and only the last is worth f64.
+    waiting: Candidate,
     query: Q,
 }
 
@@ -45,7 +51,7 @@ impl<Q: Query> Flight<Q> {
     #[inline(always)]
     pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
         let hits = self.aim.set(frame, ray) || self.aim_in_f64(object, ray);
-        self.limit = self.aim.slabs.last;
+        self.start();
         hits
     }
 
@@ -62,15 +68,24 @@ impl<Q: Query> Flight<Q> {
 
     /// A place for a ray.
     pub(crate) fn vacant(query: Q) -> Self {
-        Flight { aim: Aim::new_zeroed(), limit: 0.0, query }
+        Flight { aim: Aim::new_zeroed(), limit: 0.0, nearest: f32::INFINITY, waiting: Candidate::NONE, query }
     }
 
     /// Takes in a ray that has been prepared.
     #[inline(always)]
     pub(crate) fn launch(&mut self, aim: &Aim, query: Q) {
         self.aim = *aim;
-        self.limit = aim.slabs.last;
         self.query = query;
+        self.start();
+    }
+
+    /// Nothing has been found yet.
+    #[inline(always)]
+    fn start(&mut self) {
+        self.limit = self.aim.slabs.last;
+        if Q::DEFERS {
+            (self.nearest, self.waiting) = (f32::INFINITY, Candidate::NONE);
+        }
     }
 
     #[inline(always)]
@@ -80,7 +95,35 @@ impl<Q: Query> Flight<Q> {
 
     /// Takes over what the query has found meanwhile.
     pub(crate) fn take_over(&mut self) {
-        self.limit = self.aim.slabs.limit(self.query.limit());
+        let limit = self.query.limit();
+        self.limit = self.aim.slabs.limit(limit);
+        if Q::DEFERS
+            && let Some(t) = self.query.found()
+        {
+            // As far below as the limit lies above.
+            self.nearest = (((2.0 * t - limit) * f64::from(self.aim.slabs.scale)) as f32).next_down();
+        }
+    }
+
+    /// What waits to be computed.
+    #[inline(always)]
+    pub(crate) fn waiting(&self) -> Candidate {
+        self.waiting
+    }
+
+    /// The axes of the projection.
+    #[inline(always)]
+    pub(crate) fn axis(&self) -> [u32; 3] {
+        self.aim.sight.axis
+    }
+
+    /// Computes what waits.
+    #[inline(always)]
+    pub(crate) fn settle(&mut self, object: &ObjectView<'_>, ray: &Ray) {
+        if Q::DEFERS && self.waiting != Candidate::NONE {
+            let waiting = std::mem::replace(&mut self.waiting, Candidate::NONE);
+            settle(object, ray, self.aim.sight.axis, [waiting, Candidate::NONE], &mut self.query);
+        }
     }
 
     /// Keys of the stack beyond this are of no interest any more.
@@ -132,14 +175,14 @@ impl<Q: Query> Flight<Q> {
         Some((node.child()[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
     }
 
-    /// Tests the triangles of a leaf.
+    /// Tests the triangles of a leaf with this code.
     #[inline(always)]
-    pub(crate) fn enter_leaf<S: Simd, B: Block>(
+    pub(crate) fn enter_leaf<S: Simd, B: Block, const DEFER: bool>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
         ray: &Ray,
-        block: &B,
+        (block, code): (&B, u32),
     ) -> Found {
         if Q::TEST != Test::Exact {
             return self.enter_leaf_quickly(s, object, ray, block);
@@ -152,7 +195,47 @@ impl<Q: Query> Flight<Q> {
             self.query.accept();
             return Found::Enough;
         }
+        if DEFER && Q::DEFERS {
+            return self.defer(s, object, ray, (block, code), found);
+        }
         self.decide(s, object, ray, block, found.maybe)
+    }
+
+    /// Notes the nearest hit of a leaf if that is certain, and nearer than all before; else decides.
+    #[inline(always)]
+    fn defer<S: Simd, B: Block>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        ray: &Ray,
+        (block, code): (&B, u32),
+        found: Candidates<S>,
+    ) -> Found {
+        let Candidates { mut maybe, sure, nearest, farthest } = found;
+        if maybe & (maybe - 1) != 0 && sure != 0 {
+            let least = s.least(s.select(s.mask(sure), farthest, s.splat(f32::MAX)));
+            maybe &= s.mask_bits(s.le(nearest, s.splat(least)));
+        }
+        if maybe & (maybe - 1) == 0 && maybe & sure != 0 {
+            let (mut near, mut far) = ([0.0; WIDTH], [0.0; WIDTH]);
+            s.store(nearest, &mut near);
+            s.store(farthest, &mut far);
+            let triangle = maybe.trailing_zeros() as usize % WIDTH;
+            if far[triangle] < self.nearest {
+                let place = (block.first() as usize).wrapping_add(triangle);
+                s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
+                self.waiting = Candidate { leaf: code, triangle: triangle as u32 };
+                self.nearest = near[triangle];
+                let nearer = far[triangle] < self.limit;
+                if nearer {
+                    self.limit = far[triangle];
+                    return Found::Nearer;
+                }
+                return Found::Nothing;
+            }
+        }
+        self.settle(object, ray);
+        self.decide(s, object, ray, block, maybe)
     }
 
     /// As [`Self::enter_leaf`], as f32 sees the triangles.
@@ -231,11 +314,4 @@ fn nearest_lane<S: Simd>(s: S, bits: u32, key: S::F) -> usize {
     let key = s.or_u(s.and_u(s.bits(key), s.splat_u(!low)), s.load_u(&LANE));
     let key = s.select(s.mask(bits), s.floats(key), s.splat(f32::MAX));
     (s.least(key).to_bits() & low) as usize
-}
-
-/// What f64 leaves open.
-#[cold]
-#[inline(never)]
-pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
-    Line::new(ray)?.crossing(corners)
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod batch;
 pub(crate) mod flight;
+pub(crate) mod landing;
 pub(crate) mod nodes;
 pub(crate) mod stack;
 pub(crate) mod walk;

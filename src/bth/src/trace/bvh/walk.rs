@@ -54,14 +54,14 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                 let leaf = object.indexed(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf(s, object, ray, leaf)
+                flight.enter_leaf::<S, _, false>(s, object, ray, (leaf, code))
             }
             Some(Child::Raw(at)) => {
                 let mut room = None;
                 let leaf = object.raw(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf(s, object, ray, leaf)
+                flight.enter_leaf::<S, _, false>(s, object, ray, (leaf, code))
             }
             Some(Child::Tets(row)) if row != walked => {
                 let subtree = object.tet_leaves[row as usize].subtree;

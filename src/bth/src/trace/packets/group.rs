@@ -7,9 +7,8 @@
 use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::crossing::weigh;
+use crate::trace::crossings::{Crossings, Projected};
 use crate::trace::prepare::{self, Aim, Frame};
-use crate::trace::query::reported;
 use crate::trace::sight::Block;
 use std::mem::offset_of;
 
@@ -50,35 +49,6 @@ pub(crate) struct Group<S: Simd> {
     /// its place in leaf order and corners (`[corner][axis]`).
     place: S::U,
     corner: [[S::F; 3]; 3],
-}
-
-/// Sixteen of a number.
-type Many = [f32; LANES];
-
-/// What f64 makes of the triangles that wait to be computed.
-#[derive(Clone, Copy)]
-pub(crate) struct Crossings {
-    /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
-    /// else the triangles would have been decided upon at once.)
-    pub(crate) certain: u32,
-    /// Lanes that must be looked at one by one.
-    pub(crate) open: u32,
-    /// In leaf order.
-    pub(crate) place: [u32; LANES],
-    pub(crate) t: Many,
-    pub(crate) u: Many,
-    pub(crate) v: Many,
-}
-
-impl Crossings {
-    pub(crate) const NONE: Crossings = Crossings {
-        certain: 0,
-        open: 0,
-        place: [0; LANES],
-        t: [0.0; LANES],
-        u: [0.0; LANES],
-        v: [0.0; LANES],
-    };
 }
 
 /// Place of a field of [`Aim`] among its floats.
@@ -212,8 +182,7 @@ impl<S: Simd> Group<S> {
     /// Computes where rays cross the triangles that wait to be computed.
     #[inline(always)]
     pub(crate) fn cross(&self, s: S, crossings: &mut Crossings) {
-        let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        let mut corner = [[[0.0; LANES]; 3]; 3];
+        let Projected { mut origin, mut direction, mut corner } = Projected::NONE;
         let (o, d) = (self.turn(s, self.origin), self.turn(s, self.direction));
         for k in 0..3 {
             s.store(o[k], &mut origin[k]);
@@ -225,25 +194,9 @@ impl<S: Simd> Group<S> {
                 s.store(along[k], &mut corner[c][k]);
             }
         }
-        let (mut certain, mut missed) = ([0; LANES], [0; LANES]);
         s.store_u(self.place, &mut crossings.place);
-        // Without branches, so that it is compiled to vectors.
-        for i in 0..LANES {
-            let at = |rows: &[Many; 3]| [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()];
-            let corners = [at(&corner[0]), at(&corner[1]), at(&corner[2])];
-            let weighed = weigh(at(&origin), at(&direction), corners);
-            let verdict = weighed.verdict();
-            let [_, b, c] = weighed.weight;
-            certain[i] = u32::from(verdict.crossed);
-            missed[i] = u32::from(verdict.missed);
-            crossings.t[i] = reported(weighed.t);
-            crossings.u[i] = reported(b / verdict.sum);
-            crossings.v[i] = reported(c / verdict.sum);
-        }
         let some = s.mask_bits(s.lt_u(self.leaf, s.splat_u(NONE)));
-        let bits = |flags: &[u32; LANES]| s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(flags)));
-        crossings.certain = bits(&certain) & some;
-        crossings.open = some & !crossings.certain & !bits(&missed);
+        crossings.compute(s, some, &Projected { origin, direction, corner });
     }
 
     /// A point as the rays see it: its place in the plane of projection, and its depth.

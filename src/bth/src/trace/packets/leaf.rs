@@ -5,11 +5,11 @@
 
 use super::group::Group;
 use super::hull::Hull;
-use super::settle::{Candidate, Settled, settle};
 use crate::layout::{IndexedLeaf, RawLeaf, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::candidate::{Candidate, Settled, settle};
 use crate::trace::query::Query;
 use crate::trace::sight::{self, Block};
 
@@ -177,7 +177,10 @@ impl<Q: Query> Rays<'_, Q> {
             if active & !missed == 0 {
                 continue;
             }
-            let weighed = sight::weigh(s, [a, b, c], floor, group.first, group.limit);
+            let size = s.max(s.max(sight::size(s, a), sight::size(s, b)), sight::size(s, c));
+            let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
+            let error = sight::error(s, size, depth, floor);
+            let weighed = sight::weigh(s, [a, b, c], error, group.first, group.limit);
             let maybe = active & !s.mask_bits(weighed.out);
             let in_range =
                 s.and(s.le(group.certain[0], weighed.nearest), s.le(weighed.farthest, group.certain[1]));

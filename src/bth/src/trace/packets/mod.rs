@@ -5,7 +5,6 @@ pub(crate) mod group;
 pub(crate) mod hull;
 pub(crate) mod leaf;
 pub(crate) mod packet;
-pub(crate) mod settle;
 #[cfg(test)]
 mod tests;
 

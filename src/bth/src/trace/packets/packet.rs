@@ -5,7 +5,7 @@
 //! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
 //! be computed at the end; what is not certain is decided at once ([`super::settle`]).
 
-use super::group::{Crossings, Group};
+use super::group::Group;
 use super::hull::Hull;
 use super::leaf::{Leaf, Points, Rays, no_points};
 use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
@@ -14,6 +14,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
+use crate::trace::crossings::Crossings;
 use crate::trace::query::{Deliver, Query};
 
 /// Groups of sixteen rays in a packet.

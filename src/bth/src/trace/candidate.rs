@@ -1,15 +1,15 @@
-//! Candidates of a packet's rays, as f64 and exact arithmetic see them.
+//! A triangle that f32 says may be hit, and what f64 and exact arithmetic say of it later.
 
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
-use crate::trace::bvh::flight::open;
 use crate::trace::crossing::{Crossing, Estimate, estimate};
+use crate::trace::line::Line;
 use crate::trace::query::{Named, Query};
 use crate::trace::sight::Block;
 
 /// A triangle that a ray may hit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
     /// Code of its leaf, or `NONE`.
     pub(crate) leaf: u32,
@@ -30,19 +30,23 @@ impl Candidate {
     /// None at all.
     pub(crate) const NONE: Candidate = Candidate { leaf: NONE, triangle: 0 };
 
-    /// Its place, and its corners, through `corners`.
+    /// Its place, and what a reader makes of it.
     #[inline(always)]
-    fn read<C>(&self, object: &ObjectView<'_>, corners: impl Corners<Output = C>) -> Option<(u32, C)> {
+    pub(crate) fn read<C>(
+        &self,
+        object: &ObjectView<'_>,
+        reader: impl Reader<Output = C>,
+    ) -> Option<(u32, C)> {
         let at = self.triangle as usize;
         let (mut indexed, mut raw) = (None, None);
         match Child::from_code(self.leaf)? {
             Child::Indexed(line) => {
                 let leaf = object.indexed(line, &mut indexed);
-                Some((leaf.first + at as u32, corners.of(leaf, at)))
+                Some((leaf.first + at as u32, reader.read(leaf, at)))
             }
             Child::Raw(line) => {
                 let leaf = object.raw(line, &mut raw);
-                Some((leaf.first + at as u32, corners.of(leaf, at)))
+                Some((leaf.first + at as u32, reader.read(leaf, at)))
             }
             Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,
         }
@@ -56,29 +60,29 @@ impl Candidate {
     }
 }
 
-/// A way to read the corners of a triangle.
-trait Corners {
+/// What reads a triangle of a leaf.
+pub(crate) trait Reader {
     type Output;
-    fn of<B: Block>(&self, block: &B, triangle: usize) -> Self::Output;
+    fn read<B: Block>(self, block: &B, triangle: usize) -> Self::Output;
 }
 
-/// Along these axes.
+/// Its corners, along these axes.
 struct Along([u32; 3]);
 
-impl Corners for Along {
+impl Reader for Along {
     type Output = [[f64; 3]; 3];
     #[inline(always)]
-    fn of<B: Block>(&self, block: &B, triangle: usize) -> [[f64; 3]; 3] {
+    fn read<B: Block>(self, block: &B, triangle: usize) -> [[f64; 3]; 3] {
         block.corners_along(self.0, triangle)
     }
 }
 
-/// As they are.
+/// Its corners as they are.
 struct AsStored;
 
-impl Corners for AsStored {
+impl Reader for AsStored {
     type Output = [[f32; 3]; 3];
-    fn of<B: Block>(&self, block: &B, triangle: usize) -> [[f32; 3]; 3] {
+    fn read<B: Block>(self, block: &B, triangle: usize) -> [[f32; 3]; 3] {
         block.corners(triangle)
     }
 }
@@ -119,4 +123,11 @@ pub(crate) fn settle<Q: Query>(
     let limit = query.limit();
     // As far below as the limit lies above.
     query.found().map_or(Settled::Nothing, |t| Settled::Found([2.0 * t - limit, limit]))
+}
+
+/// What f64 leaves open.
+#[cold]
+#[inline(never)]
+pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+    Line::new(ray)?.crossing(corners)
 }

@@ -5,7 +5,7 @@ use super::World;
 use super::affine::ObjectRay;
 use super::placed::Placed;
 use super::visits::{Visit, Visits};
-use super::walk::Walk;
+use super::walk::Walks;
 use crate::file::File;
 use crate::layout::NONE;
 use crate::object::ObjectView;
@@ -52,8 +52,8 @@ impl Round<'_> {
 #[derive(Default)]
 struct Ways {
     /// Of each ray of a chunk.
-    walks: Vec<Walk>,
-    /// The rays that go on.
+    walks: Walks,
+    /// Those of the chunk that go on, by number.
     active: Vec<u32>,
     visits: Visits,
 }
@@ -62,13 +62,30 @@ thread_local! {
     static WAYS: RefCell<Ways> = RefCell::default();
 }
 
+/// Starts the rays of a chunk.
+struct Start<'a> {
+    world: &'a World,
+    rays: &'a [Ray],
+    walks: &'a mut Walks,
+    active: &'a mut Vec<u32>,
+}
+
+impl Kernel for Start<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        self.walks.start(s, &self.world.top, self.rays, self.active);
+    }
+}
+
 /// Takes each ray that is under way to its next instance; those that have come to their end are under way no more.
 struct Advance<'a, Q> {
     round: &'a Round<'a>,
     query: &'a Q,
-    /// The ray of the first walk.
+    /// The first ray of the chunk.
     first: usize,
-    walks: &'a mut [Walk],
+    walks: &'a mut Walks,
     active: &'a mut Vec<u32>,
     visits: &'a mut Visits,
 }
@@ -78,24 +95,13 @@ impl<Q: Query> Kernel for Advance<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let world = self.round.world;
-        let mut kept = 0;
-        for at in 0..self.active.len() {
-            let i = self.active[at];
-            let ray = i as usize;
-            let Some(tmax) = self.query.tmax(ray) else { continue };
-            let walk = &mut self.walks[ray - self.first];
-            let mut next = walk.next(s, &world.top, tmax);
-            // There it has been.
-            if next.is_some() && next == world.start_of(self.round.from, ray) {
-                next = walk.next(s, &world.top, tmax);
-            }
-            let Some(instance) = next else { continue };
-            self.visits.all.push(world.visit(ray, instance));
-            self.active[kept] = i;
-            kept += 1;
-        }
-        self.active.truncate(kept);
+        let Advance { round, query, first, walks, active, visits } = self;
+        let world = round.world;
+        let tmax = |number: usize| query.tmax(first + number);
+        // There it has been.
+        let skip = |number: usize| world.start_of(round.from, first + number);
+        let arrive = |number: usize, instance| visits.all.push(world.visit(first + number, instance));
+        walks.advance(s, &world.top, active, (tmax, skip), arrive);
     }
 }
 
@@ -133,15 +139,13 @@ impl World {
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             let Ways { walks, active, visits } = &mut ways;
-            walks.resize_with(walks.len().max(end - first), Walk::default);
-            active.clear();
             visits.all.clear();
+            isa.run(Start { world: self, rays: &rays[first..end], walks, active });
             // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
-            for i in first..end {
-                if walks[i - first].start(&rays[i], &self.top) {
-                    active.push(i as u32);
-                    visits.all.extend(self.start_of(from, i).map(|instance| self.visit(i, instance)));
-                }
+            if from.is_some() {
+                let starts = active.iter().map(|&number| first + number as usize);
+                let starts = starts.filter_map(|ray| Some((ray, self.start_of(from, ray)?)));
+                visits.all.extend(starts.map(|(ray, instance)| self.visit(ray, instance)));
             }
             self.trace(&round, query, visits);
             while !active.is_empty() {

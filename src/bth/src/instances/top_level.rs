@@ -25,6 +25,8 @@ pub(crate) struct TopLevel {
     pub(crate) reach: f32,
     /// Greatest of the instances'.
     pub(crate) looseness: f32,
+    /// Levels of nodes.
+    pub(crate) depth: u32,
 }
 
 /// An instance while building. Boxes are stored with the lower end negated: the union is then a maximum.
@@ -100,6 +102,8 @@ impl Run {
 #[derive(Clone, Copy, Debug)]
 struct Task {
     node: u32,
+    /// 1 for the root.
+    level: u32,
     run: Run,
 }
 
@@ -109,7 +113,7 @@ impl TopLevel {
         // Rarely more than one node for seven instances.
         self.nodes.clear();
         self.nodes.reserve_exact(placed.len() / 7 + 1);
-        (self.extent, self.looseness) = (0.0, 0.0);
+        (self.extent, self.looseness, self.depth) = (0.0, 0.0, 0);
         for place in placed.iter().flatten() {
             self.looseness = self.looseness.max(place.looseness);
             let ends = place.lower.iter().chain(&place.upper);
@@ -131,8 +135,9 @@ impl TopLevel {
             return;
         }
         self.nodes.push(EMPTY);
-        let mut tasks = vec![Task { node: 0, run: Run::of(0, &items) }];
-        while let Some(Task { node, run }) = tasks.pop() {
+        let mut tasks = vec![Task { node: 0, level: 1, run: Run::of(0, &items) }];
+        while let Some(Task { node, level, run }) = tasks.pop() {
+            self.depth = self.depth.max(level);
             let items = &mut items[..];
             if run.len() <= WIDTH as u32 {
                 for (slot, item) in items[run.first as usize..run.end as usize].iter().enumerate() {
@@ -146,7 +151,7 @@ impl TopLevel {
                 let child = self.nodes.len() as u32;
                 self.nodes.push(EMPTY);
                 self.put(node, slot, child, &run.bounds);
-                tasks.push(Task { node: child, run: *run });
+                tasks.push(Task { node: child, level: level + 1, run: *run });
             }
         }
     }
@@ -158,6 +163,11 @@ impl TopLevel {
             node.bounds[k][0][slot] = -bounds.0[k];
             node.bounds[k][1][slot] = bounds.0[3 + k];
         }
+    }
+
+    /// Greatest coordinate of the boxes as they are built.
+    pub(crate) fn farthest(&self) -> f32 {
+        (self.extent + self.looseness * self.reach).next_up().next_up()
     }
 
     /// Bytes on the heap.

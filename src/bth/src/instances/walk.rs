@@ -1,129 +1,216 @@
-//! The way of one ray through the top level: instance by instance, nearest boxes first.
+//! The ways of many rays through the top level: instance by instance, nearest boxes first.
+//!
+//! All rays take a step each in turn, so that none waits for another's, and rest where they come to an instance.
 
 use super::top_level::{INSTANCE, TopLevel};
-use crate::layout::{NONE, WIDTH, WideNode};
+use crate::layout::NONE;
 use crate::rays::Ray;
-use crate::simd::Simd;
-use crate::trace::KEY_SLACK;
+use crate::simd::{LANES, Simd};
+use crate::trace::{BOTTOM, Frame, KEY_SLACK, Place, Prepared, Slabs, Stacks};
 
-/// Pad of a plane relative to the greatest coordinate in play. Half covers the roundings of the slab test
-/// (reciprocal, product, addend and sum: at most 4 · 2^-24), half the raising of small components.
-const PAD: f64 = 1.0 / (1 << 20) as f64;
-/// Components below this (of a greatest one in [1, 2)) are raised to it.
-const LEAST_COMPONENT: f64 = 1.0 / (1 << 22) as f64;
-/// Beyond this, products could overflow f32: every box is visited instead.
-const LARGEST_COORDINATE: f64 = 1e30;
+/// Rays that take turns: few enough that what they need stays in the innermost cache.
+const BLOCK: usize = 64;
 
-/// A ray on its way. Boxes are met by the slab test of Kay and Kajiya (1986) as one multiplication and one
-/// addition per plane, conservatively; t is scaled by a power of two.
+/// Rays on their way, by number.
 #[derive(Debug, Default)]
-pub(crate) struct Walk {
-    near: [usize; 3],
-    reciprocal: [f32; 3],
-    near_addend: [f32; 3],
-    far_addend: [f32; 3],
-    scale: f64,
-    tmin: f32,
-    /// Children that wait, the nearest on top: their codes,
-    codes: Vec<u32>,
-    /// and lower bounds of t (scaled), but for the slack of [`KEY_SLACK`].
-    keys: Vec<f32>,
-    /// How many wait. Beyond them both vectors have room for the children of a node.
-    waiting: usize,
+pub(super) struct Walks {
+    ways: Vec<Way>,
+    /// A stack each.
+    stacks: Stacks,
 }
 
-impl Walk {
-    /// Starts a ray; false when it hits nothing for want of a line or of instances.
-    pub(crate) fn start(&mut self, ray: &Ray, top: &TopLevel) -> bool {
-        let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
-        let greatest = direction.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-        let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
-        if top.nodes.is_empty() || !finite || greatest == 0.0 {
-            return false;
+/// A ray on its way.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    /// Its slopes. Depths are t in units of the greatest component of the direction.
+    slabs: Slabs,
+    /// Nothing whose depth exceeds this matters.
+    limit: f32,
+    /// The top of its stack.
+    top: Place,
+}
+
+/// The slopes of a ray, prepared in f64; for rays from so far away that boxes must be widened for them.
+fn slabs_from_afar(ray: &Ray, top: &TopLevel) -> Option<Slabs> {
+    Slabs::widened(ray, top.farthest(), |start| {
+        if start > f64::from(top.reach) { f64::from(top.looseness) * start } else { 0.0 }
+    })
+}
+
+/// The depth beyond which nothing matters where no t matters that, rounded to f32, exceeds `tmax`.
+#[inline(always)]
+fn limit(slabs: &Slabs, tmax: f32) -> f32 {
+    const SLACK: f64 = 1.0 / (1 << 22) as f64;
+    let tmax = f64::from(tmax);
+    slabs.limit(tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1)))
+}
+
+impl Walks {
+    /// Starts rays; `active` is filled with the numbers of those that may hit something.
+    #[inline(always)]
+    pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], active: &mut Vec<u32>) {
+        active.clear();
+        if top.nodes.is_empty() {
+            return;
         }
-        // Exact: the exponent of a finite non-zero f32 is that of a normal f64.
-        self.scale = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
-        let start = origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let padded = f64::from(top.extent) + f64::from(top.looseness) * f64::from(top.reach);
-        let extent = padded + start;
-        let mut pad = PAD * extent;
-        if start > f64::from(top.reach) {
-            pad += f64::from(top.looseness) * start;
+        self.stacks.reserve_for(top.depth as usize, rays.len());
+        let nowhere = Way { slabs: Slabs::NONE, limit: 0.0, top: Place::NOWHERE };
+        if self.ways.len() < rays.len() {
+            self.ways.resize(rays.len(), nowhere);
         }
-        // A number even for a tmin of -infinity: lanes are written into the low bits of keys, which would make NaN of that.
-        self.tmin = ((f64::from(ray.tmin) * self.scale) as f32).next_down().max(-f32::MAX);
-        (self.reciprocal, self.near_addend) = ([0.0; 3], [f32::NEG_INFINITY; 3]);
-        self.far_addend = [f32::INFINITY; 3];
-        // A power of two: exact.
-        let unit = 1.0 / self.scale;
-        for k in 0..3 {
-            let d = direction[k] * unit;
-            let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
-            self.near[k] = usize::from(d.is_sign_negative());
-            if extent + pad < LARGEST_COORDINATE {
-                self.reciprocal[k] = r as f32;
-                self.near_addend[k] = (-origin[k] * r - pad * r.abs()) as f32;
-                self.far_addend[k] = (-origin[k] * r + pad * r.abs()) as f32;
+        let frame = Frame::around(top.farthest());
+        let mut prepared = Prepared::new();
+        let mut at = [0; LANES];
+        for first in (0..rays.len()).step_by(LANES) {
+            let count = LANES.min(rays.len() - first);
+            for lane in 0..count {
+                at[lane] = (first + lane) as u32;
+            }
+            prepared.fill(s, &frame, rays, &at, count);
+            for lane in 0..count {
+                let number = first + lane;
+                let ray = &rays[number];
+                let [x, y, z] = ray.origin;
+                let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
+                let way = &mut self.ways[number];
+                match prepared.aim(lane).filter(|_| is_near) {
+                    Some(aim) => way.slabs = aim.slabs,
+                    None => match slabs_from_afar(ray, top) {
+                        Some(slabs) => way.slabs = slabs,
+                        None => continue,
+                    },
+                }
+                way.limit = f32::INFINITY;
+                way.top = self.stacks.start(number, 0);
+                active.push(number as u32);
             }
         }
-        self.waiting = 0;
-        self.make_room();
-        (self.codes[0], self.keys[0]) = (0, -f32::MAX);
-        self.waiting = 1;
-        true
     }
 
-    /// Makes room for the children of a node.
+    /// Takes rays on to the next instance whose box they may meet at a t that, rounded to f32, is at most that which
+    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. A ray
+    /// passes by the instance that `skip` gives. `arrive` takes numbers and instances in the order of `active`.
     #[inline(always)]
-    fn make_room(&mut self) {
-        if self.codes.len() < self.waiting + WIDTH {
-            let len = (self.waiting + WIDTH).next_multiple_of(4 * WIDTH);
-            self.codes.resize(len, NONE);
-            self.keys.resize(len, 0.0);
-        }
-    }
-
-    /// The next instance whose box the ray may meet at a t that, rounded to f32, is at most `tmax`; `None` at the
-    /// end of the way.
-    #[inline(always)]
-    pub(crate) fn next<S: Simd>(&mut self, s: S, top: &TopLevel, tmax: f32) -> Option<u32> {
-        const SLACK: f64 = 1.0 / (1 << 22) as f64;
-        let tmax = f64::from(tmax);
-        let limit =
-            (((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * self.scale) as f32).next_up();
-        let key_limit = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
-        while self.waiting > 0 {
-            self.waiting -= 1;
-            let (key, code) = (self.keys[self.waiting], self.codes[self.waiting]);
-            if key > key_limit {
-                continue;
+    pub(super) fn advance<S: Simd>(
+        &mut self,
+        s: S,
+        top: &TopLevel,
+        active: &mut Vec<u32>,
+        (tmax, skip): (impl Fn(usize) -> Option<f32>, impl Fn(usize) -> Option<u32>),
+        mut arrive: impl FnMut(usize, u32),
+    ) {
+        let mut kept = 0;
+        let mut block = Block::new();
+        for first in (0..active.len()).step_by(BLOCK) {
+            let end = (first + BLOCK).min(active.len());
+            block.inner.len = 0;
+            for (place, &number) in active[first..end].iter().enumerate() {
+                let ray = number as usize;
+                block.skip[place] = skip(ray).map_or(NONE, |instance| INSTANCE | instance);
+                let code = match tmax(ray) {
+                    Some(tmax) => self.resume(s, ray, tmax),
+                    None => BOTTOM,
+                };
+                block.sort(place, code);
             }
-            if code & INSTANCE != 0 {
-                return Some(code & !INSTANCE);
+            let numbers = &active[first..end];
+            while block.inner.len > 0 {
+                for i in 0..block.inner.take() {
+                    let place = block.inner.get(i);
+                    let ray = numbers[place] as usize;
+                    let code = self.step(s, top, ray);
+                    block.sort(place, code);
+                }
             }
-            self.open(s, &top.nodes[code as usize], limit);
+            for place in 0..end - first {
+                let code = block.code[place];
+                if code != BOTTOM {
+                    let number = active[first + place];
+                    let way = &mut self.ways[number as usize];
+                    way.top = way.top.below();
+                    arrive(number as usize, code & !INSTANCE);
+                    active[kept] = number;
+                    kept += 1;
+                }
+            }
         }
-        None
+        active.truncate(kept);
     }
 
-    /// Puts the children of a node that the ray may meet onto the stack.
+    /// Drops what a ray need not visit any more; returns the code on top of its stack.
     #[inline(always)]
-    fn open<S: Simd>(&mut self, s: S, node: &WideNode, limit: f32) {
-        let (mut enter, mut leave) = (s.splat(self.tmin), s.splat(limit));
-        for k in 0..3 {
-            let reciprocal = s.splat(self.reciprocal[k]);
-            let near = s.load(&node.bounds[k][self.near[k]]);
-            let far = s.load(&node.bounds[k][1 - self.near[k]]);
-            enter = s.max(s.fma(near, reciprocal, s.splat(self.near_addend[k])), enter);
-            leave = s.min(s.fma(far, reciprocal, s.splat(self.far_addend[k])), leave);
+    fn resume<S: Simd>(&mut self, s: S, ray: usize, tmax: f32) -> u32 {
+        let way = &mut self.ways[ray];
+        let limit = limit(&way.slabs, tmax);
+        if limit < way.limit {
+            way.limit = limit;
+            let keys = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
+            way.top = self.stacks.keep_up_to(s, ray, way.top, keys);
         }
-        let child = s.load_u(&node.child);
-        let met = s.and_not(s.le(enter, leave), s.eq_u(child, s.splat_u(NONE)));
-        let bits = s.mask_bits(met);
-        self.make_room();
-        let room = self.waiting..self.waiting + WIDTH;
-        let codes = (&mut self.codes[room.clone()]).try_into().expect("room for a node's children");
-        let keys = (&mut self.keys[room]).try_into().expect("room for a node's children");
-        self.waiting += s.compress_far_to_near(bits, enter, child, codes, keys);
+        self.stacks.code(way.top)
+    }
+
+    /// Takes what is on top of a ray's stack off it, and puts the children on it if that is a node; returns the code on top then.
+    #[inline(always)]
+    fn step<S: Simd>(&mut self, s: S, top: &TopLevel, ray: usize) -> u32 {
+        let way = &mut self.ways[ray];
+        let code = self.stacks.code(way.top);
+        way.top = if code & INSTANCE != 0 {
+            way.top.below()
+        } else {
+            let node = &top.nodes[code as usize];
+            let (bits, enter) = way.slabs.children(s, node, way.limit);
+            let child = s.load_u(&node.child);
+            // Where coordinates are too great for f32 all boxes are met, those of no child too.
+            let some = bits & s.mask_bits(s.lt_u(child, s.splat_u(BOTTOM)));
+            let (codes, keys) = self.stacks.room(way.top);
+            let count = s.compress_far_to_near(some, enter, child, codes, keys);
+            self.stacks.replaced(way.top, count)
+        };
+        self.stacks.code(way.top)
+    }
+}
+
+/// Rays of a block, by place within.
+struct Block {
+    /// Those that are not yet where they rest.
+    inner: List,
+    /// Code at which a ray rests: of an instance, or [`BOTTOM`].
+    code: [u32; BLOCK],
+    /// Code of the instance that it passes by, or `NONE`.
+    skip: [u32; BLOCK],
+}
+
+/// Places within a block.
+struct List {
+    place: [u8; 2 * BLOCK],
+    len: u8,
+}
+
+impl List {
+    #[inline(always)]
+    fn get(&self, i: u8) -> usize {
+        usize::from(self.place[usize::from(i) % (2 * BLOCK)]) % BLOCK
+    }
+    /// Empties the list, whose entries can still be read if at most as many are added as were read.
+    #[inline(always)]
+    fn take(&mut self) -> u8 {
+        std::mem::replace(&mut self.len, 0)
+    }
+}
+
+impl Block {
+    fn new() -> Self {
+        let inner = List { place: [0; 2 * BLOCK], len: 0 };
+        Block { inner, code: [BOTTOM; BLOCK], skip: [NONE; BLOCK] }
+    }
+
+    /// Notes the code on top of a ray's stack. Without a branch.
+    #[inline(always)]
+    fn sort(&mut self, place: usize, code: u32) {
+        self.code[place] = code;
+        self.inner.place[usize::from(self.inner.len) % (2 * BLOCK)] = place as u8;
+        let goes_on = code & INSTANCE == 0 || code == self.skip[place];
+        self.inner.len += u8::from(goes_on);
     }
 }

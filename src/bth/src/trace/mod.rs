@@ -23,13 +23,15 @@ mod tets;
 
 pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by};
 pub(crate) use bvh::flight::KEY_SLACK;
+pub(crate) use bvh::stack::{BOTTOM, Place, Stacks};
 pub use hinted::Hinted;
+pub(crate) use prepare::{Frame, Prepared};
 pub use query::Steps;
 pub use quick::Test;
+pub(crate) use slabs::Slabs;
 
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
-use bvh::stack::Stacks;
 use choice::Choices;
 use packets::PacketScratch;
 use query::{Any, Nearest};

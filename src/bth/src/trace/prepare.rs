@@ -37,6 +37,11 @@ impl Frame {
         Frame { lower: object.lower, upper: object.upper, farthest }
     }
 
+    /// The frame of boxes whose coordinates do not exceed this.
+    pub(crate) fn around(farthest: f32) -> Frame {
+        Frame { lower: [-farthest; 3], upper: [farthest; 3], farthest }
+    }
+
     /// The greatest coordinate in play for origins whose coordinates do not exceed this, seen from any of them.
     #[inline(always)]
     pub(crate) fn extent(&self, farthest_origin: f32) -> f32 {

@@ -45,22 +45,35 @@ pub(crate) struct Slabs {
 }
 
 impl Slabs {
+    /// Slopes of no ray.
+    pub(crate) const NONE: Slabs = Slabs {
+        reciprocal: [0.0; 3],
+        scale: 0.0,
+        near_addend: [f32::NEG_INFINITY; 3],
+        first: 0.0,
+        far_addend: [f32::INFINITY; 3],
+        last: 0.0,
+        near: [0; 3],
+        reserved: 0,
+    };
+
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> Slabs {
-        let depth = line.direction[line.axis[2]].abs();
         let corners = object.lower.iter().chain(&object.upper);
-        let farthest = corners.fold(0.0, |m: f64, &x| m.max(f64::from(x).abs()));
-        let extent = farthest + line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let pad = PAD * extent;
-        let mut slabs = Slabs {
-            reciprocal: [0.0; 3],
-            scale: depth as f32,
-            near_addend: [f32::NEG_INFINITY; 3],
-            first: 0.0,
-            far_addend: [f32::INFINITY; 3],
-            last: 0.0,
-            near: [0; 3],
-            reserved: 0,
-        };
+        Slabs::of(ray, line, corners.fold(0.0, |m: f64, &x| m.max(f64::from(x).abs())), |_| 0.0)
+    }
+
+    /// For boxes whose coordinates do not exceed `farthest`, widened by what `more` makes of the greatest coordinate of the
+    /// origin. None for a ray without a line.
+    pub(crate) fn widened(ray: &Ray, farthest: f32, more: impl Fn(f64) -> f64) -> Option<Slabs> {
+        Some(Slabs::of(ray, &Line::new(ray)?, farthest.into(), more))
+    }
+
+    fn of(ray: &Ray, line: &Line, farthest: f64, more: impl Fn(f64) -> f64) -> Slabs {
+        let depth = line.direction[line.axis[2]].abs();
+        let start = line.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let extent = farthest + start;
+        let pad = PAD * extent + more(start);
+        let mut slabs = Slabs { scale: depth as f32, ..Slabs::NONE };
         // A number even where every box is entered at this depth: lanes are written into the low bits of keys, which would
         // make NaN of an infinity.
         slabs.first = ((f64::from(ray.tmin) * depth) as f32).next_down().max(-f32::MAX);
@@ -69,7 +82,7 @@ impl Slabs {
             let d = line.direction[k] / depth;
             let r = 1.0 / d.abs().max(LEAST_COMPONENT).copysign(d);
             slabs.near[k] = if d.is_sign_negative() { FAR } else { 0 };
-            if (SMALLEST_EXTENT..LARGEST_COORDINATE).contains(&extent) {
+            if SMALLEST_EXTENT <= extent && extent + pad < LARGEST_COORDINATE {
                 slabs.reciprocal[k] = r as f32;
                 slabs.near_addend[k] = (-line.origin[k] * r - pad * r.abs()) as f32;
                 slabs.far_addend[k] = (-line.origin[k] * r + pad * r.abs()) as f32;

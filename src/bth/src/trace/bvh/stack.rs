@@ -42,7 +42,11 @@ impl Place {
 impl Stacks {
     /// Makes room for this many stacks, at least one, for rays through an object.
     pub(crate) fn reserve(&mut self, object: &ObjectView<'_>, count: usize) {
-        let depth = (object.header.depth as usize).min(MAX_DEPTH);
+        self.reserve_for((object.header.depth as usize).min(MAX_DEPTH), count);
+    }
+
+    /// As [`Self::reserve`], for a BVH of so many levels of nodes.
+    pub(crate) fn reserve_for(&mut self, depth: usize, count: usize) {
         // At every level all children but the one entered wait; whole vectors are written at the top. An odd
         // number of cache lines keeps the tops of the stacks out of each other's cache sets.
         let entries = 2 + depth * (WIDTH - 1) + LANES;

@@ -3,6 +3,7 @@
 
 use super::World;
 use super::affine::ObjectRay;
+use super::packets::Packets;
 use super::placed::Placed;
 use super::visits::{Visit, Visits};
 use super::walk::Walks;
@@ -51,9 +52,11 @@ impl Round<'_> {
 /// Rays under way, whose memory a thread keeps.
 #[derive(Default)]
 struct Ways {
-    /// Of each ray of a chunk.
+    /// Of the rays of a chunk that go together,
+    packets: Packets,
+    /// and of the others.
     walks: Walks,
-    /// Those of the chunk that go on, by number.
+    /// The others that go on, by number within the chunk.
     active: Vec<u32>,
     visits: Visits,
 }
@@ -66,8 +69,7 @@ thread_local! {
 struct Start<'a> {
     world: &'a World,
     rays: &'a [Ray],
-    walks: &'a mut Walks,
-    active: &'a mut Vec<u32>,
+    ways: &'a mut Ways,
 }
 
 impl Kernel for Start<'_> {
@@ -75,7 +77,9 @@ impl Kernel for Start<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        self.walks.start(s, &self.world.top, self.rays, self.active);
+        let (top, Ways { packets, walks, active, .. }) = (&self.world.top, self.ways);
+        packets.start(s, top, self.rays, active);
+        walks.start(s, top, self.rays, active);
     }
 }
 
@@ -85,9 +89,7 @@ struct Advance<'a, Q> {
     query: &'a Q,
     /// The first ray of the chunk.
     first: usize,
-    walks: &'a mut Walks,
-    active: &'a mut Vec<u32>,
-    visits: &'a mut Visits,
+    ways: &'a mut Ways,
 }
 
 impl<Q: Query> Kernel for Advance<'_, Q> {
@@ -95,12 +97,13 @@ impl<Q: Query> Kernel for Advance<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Advance { round, query, first, walks, active, visits } = self;
+        let Advance { round, query, first, ways: Ways { packets, walks, active, visits } } = self;
         let world = round.world;
         let tmax = |number: usize| query.tmax(first + number);
         // There it has been.
         let skip = |number: usize| world.start_of(round.from, first + number);
-        let arrive = |number: usize, instance| visits.all.push(world.visit(first + number, instance));
+        let mut arrive = |number: usize, instance| visits.all.push(world.visit(first + number, instance));
+        packets.advance(&round.rays[first..], tmax, &mut arrive);
         walks.advance(s, &world.top, active, (tmax, skip), arrive);
     }
 }
@@ -138,19 +141,18 @@ impl World {
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
-            let Ways { walks, active, visits } = &mut ways;
-            visits.all.clear();
-            isa.run(Start { world: self, rays: &rays[first..end], walks, active });
+            ways.visits.all.clear();
+            isa.run(Start { world: self, rays: &rays[first..end], ways: &mut ways });
             // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
             if from.is_some() {
-                let starts = active.iter().map(|&number| first + number as usize);
+                let starts = ways.active.iter().map(|&number| first + number as usize);
                 let starts = starts.filter_map(|ray| Some((ray, self.start_of(from, ray)?)));
-                visits.all.extend(starts.map(|(ray, instance)| self.visit(ray, instance)));
+                ways.visits.all.extend(starts.map(|(ray, instance)| self.visit(ray, instance)));
             }
-            self.trace(&round, query, visits);
-            while !active.is_empty() {
-                isa.run(Advance { round: &round, query, first, walks, active, visits });
-                self.trace(&round, query, visits);
+            self.trace(&round, query, &mut ways.visits);
+            while !ways.active.is_empty() || !ways.packets.is_empty() {
+                isa.run(Advance { round: &round, query, first, ways: &mut ways });
+                self.trace(&round, query, &mut ways.visits);
             }
         }
         WAYS.set(ways);

@@ -37,21 +37,21 @@ fn slabs_from_afar(ray: &Ray, top: &TopLevel) -> Option<Slabs> {
     })
 }
 
-/// The depth beyond which nothing matters where no t matters that, rounded to f32, exceeds `tmax`.
+/// The depth beyond which nothing matters where no t matters that, rounded to f32, exceeds `tmax`; `scale` is the depth
+/// of t = 1.
 #[inline(always)]
-fn limit(slabs: &Slabs, tmax: f32) -> f32 {
+pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
     const SLACK: f64 = 1.0 / (1 << 22) as f64;
     let tmax = f64::from(tmax);
-    slabs.limit(tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1)))
+    (((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * f64::from(scale)) as f32).next_up()
 }
 
 impl Walks {
-    /// Starts rays; `active` is filled with the numbers of those that may hit something.
+    /// Starts the rays of these numbers; those remain that may hit something.
     #[inline(always)]
     pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], active: &mut Vec<u32>) {
-        active.clear();
-        if top.nodes.is_empty() {
-            return;
+        if top.nodes.is_empty() || active.is_empty() {
+            return active.clear();
         }
         self.stacks.reserve_for(top.depth as usize, rays.len());
         let nowhere = Way { slabs: Slabs::NONE, limit: 0.0, top: Place::NOWHERE };
@@ -61,14 +61,13 @@ impl Walks {
         let frame = Frame::around(top.farthest());
         let mut prepared = Prepared::new();
         let mut at = [0; LANES];
-        for first in (0..rays.len()).step_by(LANES) {
-            let count = LANES.min(rays.len() - first);
-            for lane in 0..count {
-                at[lane] = (first + lane) as u32;
-            }
+        let mut kept = 0;
+        for first in (0..active.len()).step_by(LANES) {
+            let count = LANES.min(active.len() - first);
+            at[..count].copy_from_slice(&active[first..first + count]);
             prepared.fill(s, &frame, rays, &at, count);
             for lane in 0..count {
-                let number = first + lane;
+                let number = at[lane] as usize;
                 let ray = &rays[number];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
@@ -82,9 +81,11 @@ impl Walks {
                 }
                 way.limit = f32::INFINITY;
                 way.top = self.stacks.start(number, 0);
-                active.push(number as u32);
+                active[kept] = at[lane];
+                kept += 1;
             }
         }
+        active.truncate(kept);
     }
 
     /// Takes rays on to the next instance whose box they may meet at a t that, rounded to f32, is at most that which
@@ -141,7 +142,7 @@ impl Walks {
     #[inline(always)]
     fn resume<S: Simd>(&mut self, s: S, ray: usize, tmax: f32) -> u32 {
         let way = &mut self.ways[ray];
-        let limit = limit(&way.slabs, tmax);
+        let limit = limit(way.slabs.scale, tmax);
         if limit < way.limit {
             way.limit = limit;
             let keys = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);

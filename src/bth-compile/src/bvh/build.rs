@@ -30,23 +30,27 @@ pub enum Quality {
     Best,
 }
 
-/// What a [`Quality`] stands for.
-struct Effort {
-    bins: usize,
+/// What a [`Quality`] stands for. Measurements vary it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effort {
+    /// Bins per axis, at most 32.
+    pub bins: usize,
     /// Nodes of at most this many triangles are split by a full sweep.
-    sweep_count: usize,
+    pub sweep_count: usize,
     /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short
     /// passes win more than a long one (measured on rooms and a car).
-    reinsertion: &'static [f64],
+    pub reinsertion: Vec<f64>,
 }
 
 impl Quality {
-    fn effort(self) -> Effort {
-        match self {
-            Quality::Fast => Effort { bins: 16, sweep_count: 8, reinsertion: &[] },
-            Quality::Balanced => Effort { bins: 32, sweep_count: 64, reinsertion: &[0.05, 0.1] },
-            Quality::Best => Effort { bins: 32, sweep_count: 1 << 14, reinsertion: &[0.1, 0.5, 0.5] },
-        }
+    /// What it stands for.
+    pub fn effort(self) -> Effort {
+        let (bins, sweep_count, reinsertion): (_, _, &[f64]) = match self {
+            Quality::Fast => (16, 8, &[]),
+            Quality::Balanced => (32, 64, &[0.05, 0.1]),
+            Quality::Best => (32, 1 << 14, &[0.1, 0.5, 0.5]),
+        };
+        Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() }
     }
 }
 
@@ -124,6 +128,14 @@ impl Split {
 /// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
 /// [`Error::Limit`] beyond `bth::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
 pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
+    build_with(mesh, &options.quality.effort(), monitor)
+}
+
+/// As [`build`], with any effort.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
     let start = Instant::now();
     check_mesh(mesh)?;
     let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
@@ -144,29 +156,43 @@ pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(B
     }
 
     monitor.stage("build", Some(references.len() as u64));
-    let effort = options.quality.effort();
     let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
     let mut nodes = vec![blank; 2 * references.len() - 1];
-    let builder = Builder { effort: &effort, monitor };
+    let builder = Builder { effort, monitor };
     builder.subtree(&mut references, &mut nodes, Place::ROOT, &mut sweep_split::Scratch::default())?;
     let order = references.iter().map(|r| r.id).collect();
     drop(references);
     let mut bvh = BinaryBvh { nodes, order };
     report.visits.push(visits(&bvh));
 
-    if !effort.reinsertion.is_empty() && bvh.nodes.len() > 3 {
-        monitor.stage("reinsertion", None);
-        let mut tree = LinkedTree::new(&bvh);
-        for &share in effort.reinsertion {
-            report.moved.push(reinsertion::pass(&mut tree, share, monitor)?);
-            report.visits.push(tree.visits());
-        }
-        bvh = tree.into_preorder(bvh);
-    }
+    bvh = reinsert(bvh, &effort.reinsertion, &mut report, monitor)?;
     report.nodes = bvh.nodes.len() as u64;
     report.levels = levels(&bvh);
     report.seconds = start.elapsed().as_secs_f64();
     Ok((bvh, report))
+}
+
+/// Moves subtrees to better places, in passes that each try a share of the nodes. Boxes of leaves stay as they are.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn reinsert(
+    mut bvh: BinaryBvh,
+    passes: &[f64],
+    report: &mut Report,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    if passes.is_empty() || bvh.nodes.len() <= 3 {
+        return Ok(bvh);
+    }
+    monitor.stage("reinsertion", None);
+    let mut tree = LinkedTree::new(&bvh);
+    for &share in passes {
+        report.moved.push(reinsertion::pass(&mut tree, share, monitor)?);
+        report.visits.push(tree.visits());
+    }
+    bvh = tree.into_preorder(bvh);
+    Ok(bvh)
 }
 
 fn check_mesh(mesh: &Mesh) -> Result<()> {
@@ -312,7 +338,7 @@ fn split_by_id(references: &mut [Reference]) -> usize {
 }
 
 /// See [`Report::visits`].
-fn visits(bvh: &BinaryBvh) -> f64 {
+pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     bvh.nodes.iter().map(area).sum::<f64>() / area(&bvh.nodes[0])
 }

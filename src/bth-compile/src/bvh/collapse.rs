@@ -1,7 +1,7 @@
 //! The wide BVH: from plan to lines.
 
 use super::bounds::Bounds;
-use super::plan::{Costs, Decision, Planner, Role, children};
+use super::plan::{Costs, Decision, Plan, Planner, Role, children};
 use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
@@ -18,6 +18,8 @@ pub struct CollapseOptions {
     pub keep_subtrees: bool,
     /// Costs that the tree is chosen by.
     pub costs: Costs,
+    /// Which trees are made.
+    pub plan: Plan,
 }
 
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
@@ -97,12 +99,20 @@ pub fn collapse(
     if bvh.nodes.is_empty() {
         return Ok((wide, report));
     }
-    let planner = Planner::new(mesh, bvh, options.costs, options.keep_subtrees, monitor);
+    let planner = Planner::new(mesh, bvh, options.costs, options.plan, options.keep_subtrees, monitor);
     let (decisions, cost) = planner.run(cut)?;
     report.cost = f64::from(cost);
     let root_area = Bounds::of_node(&bvh.nodes[0]).half_area();
-    let mut writer =
-        Writer { mesh, bvh, cut, decisions: &decisions, monitor, wide: &mut wide, report: &mut report };
+    let mut writer = Writer {
+        mesh,
+        bvh,
+        cut,
+        decisions: &decisions,
+        plan: options.plan,
+        monitor,
+        wide: &mut wide,
+        report: &mut report,
+    };
     let (root, tets) = writer.tree(0, 0, true)?;
     if options.keep_subtrees {
         for (at, level) in tets {
@@ -183,6 +193,7 @@ struct Writer<'a> {
     bvh: &'a BinaryBvh,
     cut: &'a [u32],
     decisions: &'a [Decision],
+    plan: Plan,
     monitor: &'a dyn Monitor,
     wide: &'a mut Wide,
     report: &'a mut CollapseReport,
@@ -216,7 +227,9 @@ impl Writer<'_> {
             slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
             let first = slots.len();
             slots.extend(
-                children(self.bvh, self.decisions, at).into_iter().map(|node| Slot { node, code: NONE }),
+                children(self.bvh, self.decisions, at, self.plan.children)
+                    .into_iter()
+                    .map(|node| Slot { node, code: NONE }),
             );
             inner.push(Inner { first, count: slots.len() - first });
             self.wide.depth = self.wide.depth.max(level + 1);

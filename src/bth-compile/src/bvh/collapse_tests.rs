@@ -1,16 +1,28 @@
 use super::super::samples::{Random, clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
-use super::super::{Options, Quality, build};
+use super::super::{Options, Plan, Quality, Rule, build};
 use super::*;
 use crate::monitor::Silent;
+use bth::layout::{IndexedLeaf, RawLeaf, WideNode};
 use proptest::prelude::*;
+use zerocopy::{FromBytes, IntoBytes};
 
 fn built(mesh: &Mesh, quality: Quality) -> BinaryBvh {
     build(mesh, &Options { quality }, &Silent).expect("builds").0
 }
 
 fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool) -> (Wide, CollapseReport) {
-    let options = CollapseOptions { keep_subtrees, ..CollapseOptions::default() };
+    collapsed_by(mesh, bvh, cut, keep_subtrees, Plan::default())
+}
+
+fn collapsed_by(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    cut: &[u32],
+    keep_subtrees: bool,
+    plan: Plan,
+) -> (Wide, CollapseReport) {
+    let options = CollapseOptions { keep_subtrees, plan, ..CollapseOptions::default() };
     let (wide, report) = collapse(mesh, bvh, cut, &options, &Silent).expect("collapses");
     validate_wide(mesh, bvh, cut, keep_subtrees, &wide);
     assert_eq!(report.tet_leaves as usize, cut.len());
@@ -108,6 +120,57 @@ fn the_lines_are_the_same_at_any_number_of_threads() {
     assert!(one == at(2) && one == at(5));
 }
 
+/// Most children of a node and most triangles of a leaf that there are.
+fn largest(wide: &Wide) -> (usize, u32) {
+    let (mut children, mut triangles) = (0, 0);
+    let mut pending = vec![wide.root];
+    while let Some(code) = pending.pop() {
+        let at = |line: u32| wide.lines[line as usize..].as_bytes();
+        match Child::from_code(code) {
+            Some(Child::Node(line)) => {
+                let node = WideNode::ref_from_prefix(at(line)).expect("a node").0;
+                children = children.max(node.child.iter().filter(|code| **code != NONE).count());
+                pending.extend(node.child);
+            }
+            Some(Child::Indexed(line)) => {
+                triangles =
+                    triangles.max(IndexedLeaf::ref_from_prefix(at(line)).expect("a leaf").0.triangles);
+            }
+            Some(Child::Raw(line)) => {
+                triangles = triangles.max(RawLeaf::ref_from_prefix(at(line)).expect("a leaf").0.triangles);
+            }
+            _ => {}
+        }
+    }
+    (children, triangles)
+}
+
+#[test]
+fn plans_keep_their_limits_and_the_greedy_one_costs_more() {
+    for (mesh, seed) in
+        [(grid(40, 9.0, 6), 1), (soup(2000, 7), 2), (clutter(1500, &[0.0, 1.0, 2.0, 5.0], 8), 3)]
+    {
+        let bvh = built(&mesh, Quality::Fast);
+        let cut = random_cut(&bvh, 150, &mut Random(seed));
+        for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
+            let cost = [Rule::Least, Rule::Largest].map(|rule| {
+                let plan = Plan { rule, children, triangles };
+                for keep in [false, true] {
+                    collapsed_by(&mesh, &bvh, &cut, keep, plan);
+                }
+                let (wide, report) = collapsed_by(&mesh, &bvh, &[], false, plan);
+                let most = largest(&wide);
+                assert!(most.0 <= children && most.1 as usize <= triangles, "{plan:?}: {most:?}");
+                report.cost
+            });
+            assert!(cost[0] <= cost[1] * (1.0 + 1e-5), "{children} {triangles}: {cost:?}");
+        }
+    }
+    let (children, triangles) =
+        largest(&collapsed(&grid(40, 9.0, 6), &built(&grid(40, 9.0, 6), Quality::Fast), &[], false).0);
+    assert!(children == 16 && triangles > 8, "no limit but that of the format: {children} {triangles}");
+}
+
 /// Least cost of a subtree in at most `slots` slots, straight from the definition.
 fn cost_by_definition(mesh: &Mesh, bvh: &BinaryBvh, planner: &Planner, at: u32, slots: usize) -> f64 {
     let node = &bvh.nodes[at as usize];
@@ -149,9 +212,9 @@ fn the_plan_has_the_least_cost_by_definition() {
     for costs in tables {
         for mesh in [soup(4, 1), soup(5, 2), grid(1, 0.5, 3), clutter(6, &[0.0, 1.0, 0.25], 4)] {
             let bvh = built(&mesh, Quality::Best);
-            let options = CollapseOptions { keep_subtrees: false, costs };
+            let options = CollapseOptions { costs, ..CollapseOptions::default() };
             let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-            let planner = Planner::new(&mesh, &bvh, costs, false, &Silent);
+            let planner = Planner::new(&mesh, &bvh, costs, Plan::default(), false, &Silent);
             let least = cost_by_definition(&mesh, &bvh, &planner, 0, 1);
             assert!((report.cost - least).abs() <= 1e-5 * least, "{} {least}", report.cost);
         }
@@ -164,9 +227,9 @@ fn the_written_tree_costs_what_the_plan_says() {
     let costs = Costs { node: 1.3, indexed: [0.9, 0.0], raw: [0.9, 0.0], line: 0.03 };
     for mesh in [soup(3000, 1), grid(60, 4.0, 2), clutter(3000, &[0.0, 1.0, 2.0, 4.0, 8.0, 9.0], 3)] {
         let bvh = built(&mesh, Quality::Balanced);
-        let options = CollapseOptions { keep_subtrees: false, costs };
+        let options = CollapseOptions { costs, ..CollapseOptions::default() };
         let (wide, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-        let line = f64::from(Planner::new(&mesh, &bvh, costs, false, &Silent).line);
+        let line = f64::from(Planner::new(&mesh, &bvh, costs, Plan::default(), false, &Silent).line);
         let cost = 1.3 * report.node_visits + 0.9 * report.leaf_visits + line * wide.lines.len() as f64;
         assert!((report.cost - cost).abs() <= 1e-3 * cost, "{} {cost}", report.cost);
     }

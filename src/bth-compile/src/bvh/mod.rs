@@ -7,6 +7,7 @@ mod binned_split;
 mod bounds;
 mod build;
 mod collapse;
+mod greedy;
 mod linked_tree;
 mod plan;
 mod reinsertion;
@@ -18,9 +19,9 @@ mod samples;
 #[cfg(test)]
 mod validate;
 
-pub use build::{MAX_LEVELS, Options, Quality, Report, build};
+pub use build::{Effort, MAX_LEVELS, Options, Quality, Report, build, build_with, reinsert, visits};
 pub use collapse::{CollapseOptions, CollapseReport, Wide, collapse};
-pub use plan::Costs;
+pub use plan::{Costs, Plan, Rule};
 
 /// Node of a [`BinaryBvh`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
 
 use super::bounds::Bounds;
-use super::{BinaryBvh, Node};
+use super::{BinaryBvh, Node, greedy};
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::monitor::Monitor;
@@ -34,6 +34,32 @@ impl Default for Costs {
     }
 }
 
+/// Which wide trees are made. Measurements vary it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// How the tree is chosen.
+    pub rule: Rule,
+    /// Most children of a wide node, 2 to 16.
+    pub children: usize,
+    /// Most triangles of a leaf, 1 to 16.
+    pub triangles: usize,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Plan { rule: Rule::Least, children: WIDTH, triangles: WIDTH }
+    }
+}
+
+/// How a wide tree is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// Of least cost, by dynamic programming.
+    Least,
+    /// From the top, opening the child of the largest area while there is room; leaves as large as they can be.
+    Largest,
+}
+
 /// What a node is when it takes one slot of a wide node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
@@ -54,8 +80,16 @@ impl Decision {
         (self.0 >> (4 * (slots % WIDTH)) & 15) as usize
     }
 
-    fn set_share(&mut self, slots: usize, left: usize) {
+    pub(super) fn set_share(&mut self, slots: usize, left: usize) {
         self.0 |= (left as u64) << (4 * (slots % WIDTH));
+    }
+
+    pub(super) fn set_role(&mut self, role: Role) {
+        self.0 |= role as u64 * 16;
+    }
+
+    pub(super) fn set_cut(&mut self) {
+        self.0 |= Self::CUT;
     }
 
     pub(super) fn role(self) -> Role {
@@ -82,13 +116,13 @@ struct Summary {
 
 /// Ascending vertex indices.
 #[derive(Clone, Copy)]
-struct Vertices {
+pub(super) struct Vertices {
     index: [u32; WIDTH],
     count: usize,
 }
 
 impl Vertices {
-    fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
+    pub(super) fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
         triangle.sort_unstable();
         let mut vertices = Vertices { index: [0; WIDTH], count: 0 };
         for v in triangle {
@@ -101,7 +135,7 @@ impl Vertices {
     }
 
     /// The union, if it fits.
-    fn join(&self, other: &Vertices) -> Option<Vertices> {
+    pub(super) fn join(&self, other: &Vertices) -> Option<Vertices> {
         let mut joined = Vertices { index: [0; WIDTH], count: 0 };
         let (a, b) = (&self.index[..self.count], &other.index[..other.count]);
         let (mut i, mut j) = (0, 0);
@@ -125,6 +159,7 @@ pub(super) struct Planner<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) bvh: &'a BinaryBvh,
     pub(super) costs: Costs,
+    pub(super) plan: Plan,
     /// Whether what lies below cut nodes is planned, too.
     pub(super) below_cut: bool,
     pub(super) monitor: &'a dyn Monitor,
@@ -142,20 +177,30 @@ impl<'a> Planner<'a> {
         mesh: &'a Mesh,
         bvh: &'a BinaryBvh,
         costs: Costs,
+        plan: Plan,
         below_cut: bool,
         monitor: &'a dyn Monitor,
     ) -> Self {
         let inverse_area = 1.0 / Bounds::of_node(&bvh.nodes[0]).half_area();
         let visits = bvh.nodes.iter().map(|n| Bounds::of_node(n).half_area()).sum::<f64>() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
-        Planner { mesh, bvh, costs, below_cut, monitor, inverse_area, line }
+        Planner { mesh, bvh, costs, plan, below_cut, monitor, inverse_area, line }
     }
 
     /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these, ascending.
     pub(super) fn run(&self, cut: &[u32]) -> Result<(Vec<Decision>, f32)> {
         let mut decisions = vec![Decision::default(); self.bvh.nodes.len()];
+        if self.plan.rule == Rule::Largest {
+            let cost = greedy::decide(self, cut, &mut decisions)?;
+            return Ok((decisions, cost));
+        }
         let summary = self.subtree(0, cut, &mut decisions)?;
         Ok((decisions, summary.cost[1]))
+    }
+
+    /// How likely a ray through the root meets the node.
+    pub(super) fn area(&self, node: &Node) -> f32 {
+        (Bounds::of_node(node).half_area() * self.inverse_area) as f32
     }
 
     fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
@@ -166,18 +211,18 @@ impl<'a> Planner<'a> {
         if self.below_cut {
             self.plain(at, node, &[], decisions)?;
         }
-        decisions[0].0 |= Decision::CUT;
+        decisions[0].set_cut();
         // Cut or not is not ours to weigh, and the slot's own cost is the same everywhere.
         Ok(Summary { cost: [0.0; WIDTH], vertices: None })
     }
 
     /// A node that is not cut.
     fn plain(&self, at: u32, node: &Node, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
-        let area = (Bounds::of_node(node).half_area() * self.inverse_area) as f32;
+        let area = self.area(node);
         if node.is_leaf() {
             let triangle = self.bvh.order[node.first as usize];
             let vertices = Vertices::of_triangle(self.mesh.triangles[triangle as usize]);
-            decisions[0].0 = Role::Indexed as u64 * 16;
+            decisions[0].set_role(Role::Indexed);
             let cost =
                 area * (self.costs.indexed[0] + self.costs.indexed[1]) + self.line * INDEXED_LINES as f32;
             return Ok(Summary { cost: [cost; WIDTH], vertices: Some(vertices) });
@@ -208,12 +253,12 @@ impl<'a> Planner<'a> {
             }
             best
         };
-        let (children, share) = distribute(WIDTH);
+        let (children, share) = distribute(self.plan.children);
         decision.set_share(WIDTH, share);
         let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
         let mut role = (area * self.costs.node + self.line * NODE_LINES as f32 + children, Role::Node);
         // A subtree with a cut node has no vertices and at least one cut.
-        if node.count as usize <= WIDTH && cut.is_empty() {
+        if node.count as usize <= self.plan.triangles && cut.is_empty() {
             if let (Some(a), Some(b)) = (&left.vertices, &right.vertices) {
                 summary.vertices = a.join(b);
             }
@@ -229,9 +274,9 @@ impl<'a> Planner<'a> {
                 role = (raw, Role::Raw);
             }
         }
-        decision.0 |= role.1 as u64 * 16;
+        decision.set_role(role.1);
         summary.cost[1] = role.0;
-        for slots in 2..WIDTH {
+        for slots in 2..self.plan.children.min(WIDTH) {
             let (cost, share) = distribute(slots);
             summary.cost[slots] = summary.cost[slots - 1];
             if cost < summary.cost[slots] {
@@ -243,12 +288,12 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The children, as nodes of the binary BVH, of a node that is a wide node.
-pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32) -> Vec<u32> {
-    let mut children = Vec::with_capacity(WIDTH);
+/// The children, as nodes of the binary BVH, of a node that is a wide node of at most so many.
+pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32, most: usize) -> Vec<u32> {
+    let mut children = Vec::with_capacity(most);
     let share = decisions[at as usize].share(WIDTH);
     gather(bvh, decisions, at + 1, share, &mut children);
-    gather(bvh, decisions, bvh.nodes[at as usize].right, WIDTH - share, &mut children);
+    gather(bvh, decisions, bvh.nodes[at as usize].right, most - share, &mut children);
     children
 }
 

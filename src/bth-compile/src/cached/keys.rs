@@ -155,6 +155,9 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
         ("collapse version", COLLAPSE.to_owned()),
         ("file version", format!("{FILE}.{}", bth::layout::WRITER_VERSION)),
     ];
+    if options.collapse.plan != Default::default() {
+        all.push(("plan", format!("{:?}", options.collapse.plan)));
+    }
     if options.coordinates != Default::default() {
         all.extend([
             ("coordinates", text(&options.coordinates)),

@@ -31,6 +31,8 @@ pub enum Command {
     Costs(Costs),
     /// The paper's tables on our models.
     Paper(Paper),
+    /// What each step of the BVH builder is worth.
+    Quality(Quality),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),
     /// One start in a process of its own; `load` calls this.
@@ -251,6 +253,32 @@ pub struct Paper {
     #[arg(long, value_name = "NAME")]
     pub isa: Option<String>,
     /// Small pictures: whether it works, not how fast it is.
+    #[arg(long)]
+    pub quick: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub output: Output,
+}
+
+/// `quality`.
+#[derive(Debug, Args)]
+pub struct Quality {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 60_000, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the fastest counts.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Only these ray sets.
+    #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub sets: Names,
+    /// Vector instructions of our kernels; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    /// Small pictures and one round: whether it works, not how fast it is.
     #[arg(long)]
     pub quick: bool,
     #[command(flatten)]

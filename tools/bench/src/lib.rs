@@ -1,6 +1,6 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `accuracy`, `load`, `stress`, `costs`, `paper` and `scenes` are
+//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `accuracy`, `load`, `stress`, `costs`, `paper`, `quality` and `scenes` are
 //! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
 #![warn(missing_docs)]
 
@@ -19,6 +19,7 @@ pub mod ours;
 pub mod output;
 pub mod paper;
 pub mod progress;
+pub mod quality;
 pub mod rays;
 pub mod rivals;
 pub mod rounds;

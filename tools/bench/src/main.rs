@@ -1,7 +1,7 @@
 //! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
 
 use bth_bench::args::{Arguments, Command};
-use bth_bench::{accuracy, costs, load, output, paper, scenes, speed, stress};
+use bth_bench::{accuracy, costs, load, output, paper, quality, scenes, speed, stress};
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -14,6 +14,7 @@ fn main() -> ExitCode {
         Command::Stress(arguments) => stress::run(&arguments),
         Command::Costs(arguments) => costs::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),
+        Command::Quality(arguments) => quality::run(&arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
     };

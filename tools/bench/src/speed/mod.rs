@@ -159,13 +159,13 @@ fn measure_set(set: &RaySet, expected: &Answers, contenders: &[Contender], round
 }
 
 /// The exact answers to a set.
-enum Answers {
+pub(crate) enum Answers {
     Nearest(Vec<Hit>),
     Any(Vec<bool>),
 }
 
 impl Answers {
-    fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
+    pub(crate) fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
         if set.any {
             let mut found = vec![false; set.rays.len()];
             scene.any_batch(&set.rays, None, &mut found);
@@ -178,7 +178,7 @@ impl Answers {
     }
 
     /// How many answers differ: of ours in any bit, of rivals in whether something is hit.
-    fn differ(&self, ours: bool, hits: &[Hit], found: &[bool]) -> usize {
+    pub(crate) fn differ(&self, ours: bool, hits: &[Hit], found: &[bool]) -> usize {
         let bits = |h: &Hit| -> ([u32; 3], Surface) { ([h.t, h.u, h.v].map(f32::to_bits), h.surface) };
         match self {
             Answers::Any(expected) => expected.iter().zip(found).filter(|(a, b)| a != b).count(),

@@ -1,0 +1,187 @@
+//! What each step of the BVH builder is worth: binning, sweep, reinsertion, collapse, the order of blocks, and
+//! what files are not made with because it does not pay: spatial splits, narrower nodes, smaller leaves.
+
+mod bins;
+mod boxes;
+mod order;
+pub mod record;
+mod spatial;
+mod tables;
+mod variations;
+
+pub use record::{ModelRecord, QualityRecord, Row};
+pub use tables::markdown;
+
+use crate::args::Quality;
+use crate::clock::Clock;
+use crate::model::Model;
+use crate::output::{Head, Record};
+use crate::progress::Progress;
+use crate::rays::{self, Finder, RaySet};
+use crate::speed::Answers;
+use crate::{isa, ours};
+use anyhow::{Result, bail, ensure};
+use bth::Scene;
+use bth::rays::{Hit, Surface};
+use serde_json::json;
+use std::collections::BTreeMap;
+use variations::Built;
+
+/// Smaller sets are not timed: that would measure the clock.
+const FEWEST: usize = 1024;
+/// Pixels of the cameras; a quick run has fewer.
+const SIZE: (u32, u32) = (1024, 576);
+const QUICK_SIZE: (u32, u32) = (128, 72);
+/// Bounces whose steps are counted, at most.
+const COUNTED: usize = 10_000;
+
+/// Measures, prints and writes the record.
+///
+/// # Errors
+/// If an option or model cannot be used or a file cannot be written, and, when all is written, if a variation gave
+/// another answer than the others.
+pub fn run(arguments: &Quality) -> Result<()> {
+    if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
+        bail!("--set {name}: there are {}", rays::NAMES.join(", "));
+    }
+    let record = measure(arguments)?;
+    Record {
+        head: &record.head,
+        title: "What steps of the BVH builder are worth",
+        body: markdown(&record),
+        json: serde_json::to_value(&record)?,
+        charts: Vec::new(),
+    }
+    .write(&arguments.output)?;
+    let rows = record.models.iter().flat_map(|m| m.rows.iter().map(move |r| (m, r)));
+    let wrong: Vec<String> =
+        rows.filter(|(_, r)| r.differ > 0).map(|(m, r)| format!("{} on {}", r.name, m.name)).collect();
+    ensure!(wrong.is_empty(), "answers differ: {}", wrong.join(", "));
+    Ok(())
+}
+
+/// Measures all models.
+///
+/// # Errors
+/// If a model cannot be used.
+pub fn measure(arguments: &Quality) -> Result<QualityRecord> {
+    let isa = isa::select(arguments.isa.as_deref())?;
+    let rounds = if arguments.quick { 1 } else { arguments.rounds };
+    let options = json!({
+        "rays": arguments.rays,
+        "rounds": rounds,
+        "quick": arguments.quick,
+        "rays_per_batch": ours::BATCH,
+    });
+    let mut record = QualityRecord { head: Head::now("bvh-quality", isa, options), models: Vec::new() };
+    let progress = Progress::new();
+    for which in &arguments.models.models {
+        record.models.push(measure_model(which, arguments, rounds, &progress)?);
+    }
+    Ok(record)
+}
+
+fn measure_model(
+    which: &str,
+    arguments: &Quality,
+    rounds: usize,
+    progress: &Progress,
+) -> Result<ModelRecord> {
+    let model = Model::load(which)?;
+    let mut built = Vec::new();
+    for variation in variations::all() {
+        progress.say(format!("{}: building {}", model.name, variation.name));
+        built.push((variation.name, variation.build(&model.mesh)?));
+    }
+    progress.say(format!("{}: making rays", model.name));
+    let plain = bth::from_bytes(&built[0].1.bytes)?;
+    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
+    let (view, mut sets) = rays::sets(&Finder::new(&model, &plain), &options);
+    let bounces = sets.iter().find(|s| s.name == "diffuse").map_or(Vec::new(), |s| s.rays.clone());
+    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
+
+    let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&plain, s)).collect();
+    let mut rows = Vec::new();
+    for (name, built) in &built {
+        let scene = bth::from_bytes(&built.bytes)?;
+        let mut row = row(name, built, &scene, model.triangles());
+        row.steps = steps(&scene, &bounces);
+        row.differ = sets.iter().zip(&expected).map(|(set, expected)| differ(&scene, set, expected)).sum();
+        rows.push(row);
+    }
+    progress.say(format!("{}: tracing", model.name));
+    let mut times = vec![vec![Vec::new(); sets.len()]; built.len()];
+    for round in 0..rounds {
+        for i in (0..built.len()).map(|i| (i + round) % built.len()) {
+            // Opened anew, so that luck with pages of memory differs from round to round.
+            let scene = bth::from_bytes(&built[i].1.bytes)?;
+            for (set, times) in sets.iter().zip(&mut times[i]) {
+                times.push(1e9 * time(&scene, set) / set.rays.len() as f64);
+            }
+        }
+    }
+    for (row, times) in rows.iter_mut().zip(times) {
+        // The least: what else the machine does can only add to a time.
+        let least = |times: Vec<f64>| times.into_iter().min_by(f64::total_cmp);
+        row.nanoseconds =
+            sets.iter().zip(times).filter_map(|(set, times)| Some((set.name, least(times)?))).collect();
+    }
+    Ok(ModelRecord { name: model.name.clone(), triangles: model.triangles(), view, rows })
+}
+
+/// What is known without tracing.
+fn row(name: &str, built: &Built, scene: &Scene, triangles: usize) -> Row {
+    let collapse = &built.collapse;
+    let leaves = (collapse.indexed_leaves + collapse.raw_leaves).max(1);
+    Row {
+        name: name.to_owned(),
+        seconds: built.seconds,
+        visits: built.visits,
+        wide_visits: [collapse.node_visits, collapse.leaf_visits],
+        children: collapse.children as f64 / collapse.nodes.max(1) as f64,
+        triangles: (collapse.indexed_triangles + collapse.raw_triangles) as f64 / leaves as f64,
+        references: built.references,
+        bytes: scene.resident_bytes() as f64 / triangles as f64,
+        steps: [0.0; 2],
+        nanoseconds: BTreeMap::new(),
+        differ: 0,
+    }
+}
+
+/// Nodes and leaves that a ray visits, on average.
+fn steps(scene: &Scene, rays: &[bth::rays::Ray]) -> [f64; 2] {
+    let step = rays.len().div_ceil(COUNTED).max(1);
+    let mut sum = bth::Steps::default();
+    let mut count = 0;
+    for ray in rays.iter().step_by(step) {
+        sum += scene.nearest_counted(ray, Surface::NONE).1;
+        count += 1;
+    }
+    [sum.nodes, sum.leaves].map(|n| f64::from(n) / f64::from(count.max(1)))
+}
+
+/// How many answers to a set differ.
+fn differ(scene: &Scene, set: &RaySet, expected: &Answers) -> usize {
+    let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
+    trace(scene, set, &mut hits, &mut found);
+    expected.differ(true, &hits, &found)
+}
+
+/// CPU seconds of a set, traced once before.
+fn time(scene: &Scene, set: &RaySet) -> f64 {
+    let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
+    trace(scene, set, &mut hits, &mut found);
+    Clock::ThreadCpu.time(|| trace(scene, set, &mut hits, &mut found))
+}
+
+fn trace(scene: &Scene, set: &RaySet, hits: &mut [Hit], found: &mut [bool]) {
+    for first in (0..set.rays.len()).step_by(ours::BATCH) {
+        let part = first..set.rays.len().min(first + ours::BATCH);
+        if set.any {
+            scene.any_batch(&set.rays[part.clone()], None, &mut found[part]);
+        } else {
+            scene.nearest_batch(&set.rays[part.clone()], None, &mut hits[part]);
+        }
+    }
+}

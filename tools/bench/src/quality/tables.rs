@@ -1,0 +1,95 @@
+//! The page of `quality`.
+
+use super::record::{ModelRecord, QualityRecord};
+use crate::markdown::{count, table, two_decimals};
+
+fn row(cells: &[&str]) -> Vec<String> {
+    cells.iter().map(|c| (*c).to_owned()).collect()
+}
+
+fn three_decimals(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |v| format!("{v:.3}"))
+}
+
+/// The page below its head.
+pub fn markdown(record: &QualityRecord) -> String {
+    let mut text = String::from(
+        "Each row is built as files are, but for the one thing that it names; `the same again` is built as files are, too, and shows \
+         what chance makes of a time. Batches without hints on one thread, CPU time, the fastest of interleaved rounds.\n\n\
+         ## Over the first row, geometric means over the models\n\n\
+         Times below 1 are faster. SAH: wide nodes and leaves that a random line through the box meets.\n\n",
+    );
+    let sets = record.sets();
+    let mut head = row(&["", "SAH", "B/tri", "building"]);
+    head.extend(sets.iter().map(|s| (*s).to_owned()));
+    head.push("all".to_owned());
+    let names = record.models.first().map_or(&[][..], |m| &m.rows[..]);
+    let rows: Vec<Vec<String>> = names
+        .iter()
+        .enumerate()
+        .map(|(i, r)| {
+            let mut cells = vec![
+                r.name.clone(),
+                three_decimals(record.ratio(i, |r| Some(r.wide_visits[0] + r.wide_visits[1]))),
+                two_decimals(record.ratio(i, |r| Some(r.bytes))),
+                two_decimals(record.ratio(i, |r| Some(r.seconds))),
+            ];
+            let set = |set: &&str| three_decimals(record.ratio(i, |r| r.nanoseconds.get(*set).copied()));
+            cells.extend(sets.iter().map(set));
+            cells.push(three_decimals(record.time_ratio(i)));
+            cells
+        })
+        .collect();
+    text.push_str(&table(&head, &rows));
+    record.models.iter().for_each(|m| text.push_str(&page(m, &sets)));
+    text
+}
+
+fn page(model: &ModelRecord, sets: &[&str]) -> String {
+    let seen =
+        serde_json::to_value(model.view).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+    let mut text = format!(
+        "\n## {} ({} triangles, seen from {seen})\n\nBuilding in CPU seconds; visits as SAH has them, then nodes and leaves of a bounce; sets in ns a ray.\n\n",
+        model.name,
+        count(model.triangles as u64)
+    );
+    let mut head = row(&[
+        "",
+        "building",
+        "binary visits",
+        "node visits",
+        "leaf visits",
+        "children",
+        "triangles",
+        "references",
+        "B/tri",
+        "nodes",
+        "leaves",
+    ]);
+    head.extend(sets.iter().map(|s| (*s).to_owned()));
+    let rows: Vec<Vec<String>> = model
+        .rows
+        .iter()
+        .map(|r| {
+            let mut cells = vec![
+                r.name.clone(),
+                format!("{:.2}", r.seconds),
+                format!("{:.2}", r.visits),
+                format!("{:.3}", r.wide_visits[0]),
+                format!("{:.3}", r.wide_visits[1]),
+                format!("{:.1}", r.children),
+                format!("{:.1}", r.triangles),
+                format!("{:.3}", r.references),
+                format!("{:.1}", r.bytes),
+                format!("{:.2}", r.steps[0]),
+                format!("{:.2}", r.steps[1]),
+            ];
+            cells.extend(
+                sets.iter().map(|s| r.nanoseconds.get(s).map_or("-".to_owned(), |ns| format!("{ns:.1}"))),
+            );
+            cells
+        })
+        .collect();
+    text.push_str(&table(&head, &rows));
+    text
+}

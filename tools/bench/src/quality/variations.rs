@@ -1,0 +1,127 @@
+//! What is varied, one step of the builder at a time.
+
+use super::order::{Order, reordered};
+use super::spatial;
+use crate::clock::Clock;
+use anyhow::Result;
+use bth_compile::Silent;
+use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Effort, Plan, Quality, Rule};
+use bth_compile::mesh::Mesh;
+use bth_compile::write::{self, FileBuilder, ObjectParts};
+use std::collections::HashSet;
+
+/// How the binary BVH is made.
+enum Tree {
+    Built(Effort),
+    /// With spatial splits (exponent of the cost), then reinsertion as in files.
+    Spatial(f64),
+}
+
+/// A way to build.
+pub(super) struct Variation {
+    pub(super) name: &'static str,
+    tree: Tree,
+    plan: Plan,
+    order: Order,
+}
+
+/// The name of what files are made with, which all else is compared with.
+pub(super) const AS_IN_FILES: &str = "as in files";
+
+/// All variations.
+pub(super) fn all() -> Vec<Variation> {
+    let effort = Quality::Balanced.effort();
+    let built = |effort: Effort| Variation {
+        name: "",
+        tree: Tree::Built(effort),
+        plan: Plan::default(),
+        order: Order::DepthFirst,
+    };
+    let with = |bins, sweep_count, reinsertion: &[f64]| {
+        built(Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() })
+    };
+    let planned = |rule, children, triangles| Variation {
+        plan: Plan { rule, children, triangles },
+        ..built(Quality::Balanced.effort())
+    };
+    let ordered = |order| Variation { order, ..built(Quality::Balanced.effort()) };
+    let spatial = |exponent| Variation { tree: Tree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
+    let sweep = effort.sweep_count;
+    let named = |name, variation| Variation { name, ..variation };
+    vec![
+        named(AS_IN_FILES, built(effort)),
+        named("the same again", built(Quality::Balanced.effort())),
+        named("16 bins", with(16, 0, &[])),
+        named("32 bins", with(32, 0, &[])),
+        named("32 bins, sweep of small nodes", with(32, sweep, &[])),
+        named("full sweep", with(32, usize::MAX, &[])),
+        named("one pass of reinsertion", with(32, sweep, &[0.05])),
+        named("`best`", built(Quality::Best.effort())),
+        named("greedy collapse", planned(Rule::Largest, 16, 16)),
+        named("leaves beside nodes", ordered(Order::LeavesBesideNodes)),
+        named("breadth first", ordered(Order::BreadthFirst)),
+        named("random order", ordered(Order::Random)),
+        named("spatial splits", spatial(1.0)),
+        named("spatial splits, n^0.4", spatial(0.4)),
+        named("8 children", planned(Rule::Least, 8, 16)),
+        named("8 triangles", planned(Rule::Least, 16, 8)),
+        named("8 children, 8 triangles", planned(Rule::Least, 8, 8)),
+    ]
+}
+
+/// A file, and how it came about.
+pub(super) struct Built {
+    pub(super) bytes: Vec<u8>,
+    pub(super) collapse: CollapseReport,
+    /// Nodes of the binary BVH that a random line through the box meets.
+    pub(super) visits: f64,
+    /// References in leaves over triangles.
+    pub(super) references: f64,
+    /// CPU seconds of building and collapsing, on one thread.
+    pub(super) seconds: f64,
+}
+
+impl Variation {
+    /// Builds so.
+    pub(super) fn build(&self, mesh: &Mesh) -> Result<Built> {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        let mut made = None;
+        let clock = Clock::ThreadCpu;
+        let seconds = one.install(|| clock.time(|| made = Some(self.make(mesh))));
+        let (tree, wide, collapse) = made.expect("the work was done")?;
+        let wide = reordered(&wide, self.order);
+        let distinct: HashSet<u32> = tree.order.iter().copied().collect();
+        let parts = ObjectParts {
+            bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
+            root: wide.root,
+            triangles: mesh.triangles.len() as u32,
+            dropped: (mesh.triangles.len() - distinct.len()) as u32,
+            lines: &wide.lines,
+            triangle_ids: &wide.triangle_ids,
+            ..ObjectParts::default()
+        };
+        let mut file = FileBuilder::new();
+        write::object(&mut file, 0, &parts)?;
+        Ok(Built {
+            bytes: file.finish(),
+            visits: bvh::visits(&tree),
+            references: tree.order.len() as f64 / distinct.len().max(1) as f64,
+            collapse,
+            seconds,
+        })
+    }
+
+    fn make(&self, mesh: &Mesh) -> Result<(bvh::BinaryBvh, bvh::Wide, CollapseReport)> {
+        let tree = match &self.tree {
+            Tree::Built(effort) => bvh::build_with(mesh, effort, &Silent)?.0,
+            Tree::Spatial(exponent) => {
+                let tree = spatial::build(mesh, *exponent);
+                let passes = Quality::Balanced.effort().reinsertion;
+                bvh::reinsert(tree, &passes, &mut bvh::Report::default(), &Silent)?
+            }
+        };
+        let options = CollapseOptions { plan: self.plan, ..CollapseOptions::default() };
+        let (wide, report) = bvh::collapse(mesh, &tree, &[], &options, &Silent)?;
+        Ok((tree, wide, report))
+    }
+}

@@ -77,6 +77,30 @@ fn load_measures_our_files_where_embree_is_missing() {
 }
 
 #[test]
+fn every_variation_of_the_builder_gives_the_same_answers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("quality.json");
+    let done = bench(&["quality", "hall:1500", "--quick", "--json", path.to_str().unwrap()]);
+    assert!(done.status.success(), "{}", String::from_utf8(done.stderr).unwrap());
+    let record = json(&path);
+    let rows = record["models"][0]["rows"].as_array().unwrap();
+    let row = |name: &str| rows.iter().find(|r| r["name"] == name).expect(name);
+    let number = |name: &str, key: &str| row(name)[key].as_f64().unwrap();
+    for row in rows {
+        assert_eq!(row["differ"], 0, "{row}");
+        assert!(row["nanoseconds"]["primary"].as_f64().unwrap() > 0.0, "{row}");
+    }
+    assert!(number("spatial splits", "references") > 1.0, "some triangles are in several leaves");
+    assert!(number("8 children", "children") <= 8.0 && number("8 triangles", "triangles") <= 8.0);
+    let plain = row("as in files");
+    for same in ["the same again", "leaves beside nodes", "breadth first", "random order"] {
+        for key in ["wide_visits", "bytes", "steps"] {
+            assert_eq!(row(same)[key], plain[key], "{same}: {key}");
+        }
+    }
+}
+
+#[test]
 fn misspelled_names_are_refused_before_anything_is_measured() {
     for (option, name) in [("--tracer", "embre"), ("--set", "primarily"), ("--isa", "avx1024")] {
         let done = bench(&["speed", "torus-knot", option, name]);

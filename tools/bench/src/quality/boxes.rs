@@ -108,6 +108,32 @@ mod tests {
     use bth_tests::rng::Rng;
 
     #[test]
+    fn crossings_are_rounded_outwards() {
+        let mut rng = Rng(4);
+        let mut inexact = 0;
+        for _ in 0..20_000 {
+            let mut whole = || rng.below(8192) as f32 - 4096.0;
+            let (a, b) = ([whole(), whole(), 0.0], [whole(), whole(), 0.0]);
+            let plane = whole();
+            if !(a[0] < plane && plane < b[0]) {
+                continue;
+            }
+            let found = crossing(&a, &b, 0, plane);
+            let [a, b] = [a, b].map(|p| p.map(f64::from));
+            // y - a.y = rise / run; no product or difference below takes more than 53 bits.
+            let (rise, run) = ((f64::from(plane) - a[0]) * (b[1] - a[1]), b[0] - a[0]);
+            let above_a = |y: f32| (f64::from(y) - a[1]) * run;
+            assert!(
+                above_a(found.lower[1]) <= rise && rise <= above_a(found.upper[1]),
+                "{a:?} {b:?} {plane}"
+            );
+            assert!(found.upper[1] <= found.lower[1].next_up().next_up(), "tight: {found:?}");
+            inexact += usize::from(found.lower[1] < found.upper[1]);
+        }
+        assert!(inexact > 1000, "{inexact}");
+    }
+
+    #[test]
     fn every_point_of_a_triangle_lies_in_one_of_its_parts() {
         let mut rng = Rng(5);
         for case in 0..3000 {

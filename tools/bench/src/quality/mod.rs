@@ -32,7 +32,8 @@ const FEWEST: usize = 1024;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
 const QUICK_SIZE: (u32, u32) = (128, 72);
-/// Bounces whose steps are counted, at most.
+/// Sets of which steps are counted, and rays of them, at most.
+const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
 const COUNTED: usize = 10_000;
 
 /// Measures, prints and writes the record.
@@ -98,7 +99,7 @@ fn measure_model(
     let size = if arguments.quick { QUICK_SIZE } else { SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &plain), &options);
-    let bounces = sets.iter().find(|s| s.name == "diffuse").map_or(Vec::new(), |s| s.rays.clone());
+    let counted: Vec<RaySet> = sets.iter().filter(|s| STEPS_OF.contains(&s.name)).cloned().collect();
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
 
     let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&plain, s)).collect();
@@ -106,7 +107,7 @@ fn measure_model(
     for (name, built) in &built {
         let scene = bth::from_bytes(&built.bytes)?;
         let mut row = row(name, built, &scene, model.triangles());
-        row.steps = steps(&scene, &bounces);
+        row.steps = counted.iter().map(|set| (set.name, steps(&scene, &set.rays))).collect();
         row.differ = sets.iter().zip(&expected).map(|(set, expected)| differ(&scene, set, expected)).sum();
         rows.push(row);
     }
@@ -143,7 +144,7 @@ fn row(name: &str, built: &Built, scene: &Scene, triangles: usize) -> Row {
         triangles: (collapse.indexed_triangles + collapse.raw_triangles) as f64 / leaves as f64,
         references: built.references,
         bytes: scene.resident_bytes() as f64 / triangles as f64,
-        steps: [0.0; 2],
+        steps: BTreeMap::new(),
         nanoseconds: BTreeMap::new(),
         differ: 0,
     }

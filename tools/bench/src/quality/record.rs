@@ -48,8 +48,8 @@ pub struct Row {
     pub references: f64,
     /// Bytes that tracing reads, for each triangle.
     pub bytes: f64,
-    /// Nodes and leaves that a bounce visits, traced on its own.
-    pub steps: [f64; 2],
+    /// Nodes and leaves that a camera ray and a bounce visit, each traced on its own.
+    pub steps: BTreeMap<&'static str, [f64; 2]>,
     /// Nanoseconds a ray of each set, in batches, without hints.
     pub nanoseconds: BTreeMap<&'static str, f64>,
     /// Answers that differ from those of the first row in any bit.

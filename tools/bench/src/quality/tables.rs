@@ -1,5 +1,6 @@
 //! The page of `quality`.
 
+use super::STEPS_OF;
 use super::record::{ModelRecord, QualityRecord};
 use crate::markdown::{count, table, two_decimals};
 
@@ -49,7 +50,7 @@ fn page(model: &ModelRecord, sets: &[&str]) -> String {
     let seen =
         serde_json::to_value(model.view).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
     let mut text = format!(
-        "\n## {} ({} triangles, seen from {seen})\n\nBuilding in CPU seconds; visits as SAH has them, then nodes and leaves of a bounce; sets in ns a ray.\n\n",
+        "\n## {} ({} triangles, seen from {seen})\n\nBuilding in CPU seconds; visits as SAH has them, then nodes and leaves of a camera ray and of a bounce; sets in ns a ray.\n\n",
         model.name,
         count(model.triangles as u64)
     );
@@ -63,8 +64,8 @@ fn page(model: &ModelRecord, sets: &[&str]) -> String {
         "triangles",
         "references",
         "B/tri",
-        "nodes",
-        "leaves",
+        "camera",
+        "bounce",
     ]);
     head.extend(sets.iter().map(|s| (*s).to_owned()));
     let rows: Vec<Vec<String>> = model
@@ -81,9 +82,10 @@ fn page(model: &ModelRecord, sets: &[&str]) -> String {
                 format!("{:.1}", r.triangles),
                 format!("{:.3}", r.references),
                 format!("{:.1}", r.bytes),
-                format!("{:.2}", r.steps[0]),
-                format!("{:.2}", r.steps[1]),
             ];
+            cells.extend(STEPS_OF.map(|set| {
+                r.steps.get(set).map_or("-".to_owned(), |[nodes, leaves]| format!("{nodes:.2} + {leaves:.2}"))
+            }));
             cells.extend(
                 sets.iter().map(|s| r.nanoseconds.get(s).map_or("-".to_owned(), |ns| format!("{ns:.1}"))),
             );

@@ -5,7 +5,7 @@ use super::spatial;
 use crate::clock::Clock;
 use anyhow::Result;
 use bth_compile::Silent;
-use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Effort, Plan, Quality, Rule};
+use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Costs, Effort, Plan, Quality, Rule};
 use bth_compile::mesh::Mesh;
 use bth_compile::write::{self, FileBuilder, ObjectParts};
 use std::collections::HashSet;
@@ -22,6 +22,7 @@ pub(super) struct Variation {
     pub(super) name: &'static str,
     tree: Tree,
     plan: Plan,
+    costs: Costs,
     order: Order,
 }
 
@@ -35,6 +36,7 @@ pub(super) fn all() -> Vec<Variation> {
         name: "",
         tree: Tree::Built(effort),
         plan: Plan::default(),
+        costs: Costs::default(),
         order: Order::DepthFirst,
     };
     let with = |bins, sweep_count, reinsertion: &[f64]| {
@@ -44,6 +46,9 @@ pub(super) fn all() -> Vec<Variation> {
         plan: Plan { rule, children, triangles },
         ..built(Quality::Balanced.effort())
     };
+    let costs = Costs::default();
+    let priced = |costs| Variation { costs, ..built(Quality::Balanced.effort()) };
+    let leaves = |by| priced(Costs { indexed: costs.indexed.map(|c| by * c), ..costs });
     let ordered = |order| Variation { order, ..built(Quality::Balanced.effort()) };
     let spatial = |exponent| Variation { tree: Tree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
     let sweep = effort.sweep_count;
@@ -58,6 +63,9 @@ pub(super) fn all() -> Vec<Variation> {
         named("one pass of reinsertion", with(32, sweep, &[0.05])),
         named("`best`", built(Quality::Best.effort())),
         named("greedy collapse", planned(Rule::Largest, 16, 16)),
+        named("lines for nothing", priced(Costs { line: 0.0, ..costs })),
+        named("leaves at 0.7 of their cost", leaves(0.7)),
+        named("leaves at 1.3 of their cost", leaves(1.3)),
         named("leaves beside nodes", ordered(Order::LeavesBesideNodes)),
         named("breadth first", ordered(Order::BreadthFirst)),
         named("random order", ordered(Order::Random)),
@@ -120,7 +128,7 @@ impl Variation {
                 bvh::reinsert(tree, &passes, &mut bvh::Report::default(), &Silent)?
             }
         };
-        let options = CollapseOptions { plan: self.plan, ..CollapseOptions::default() };
+        let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };
         let (wide, report) = bvh::collapse(mesh, &tree, &[], &options, &Silent)?;
         Ok((tree, wide, report))
     }

@@ -2,6 +2,9 @@
 //!
 //! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to better places.
 //! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
+//!
+//! What each step is worth, `bth-bench quality` measures. Spatial splits are not made: nodes of 16 children take
+//! the few large triangles that overlap much into one leaf near the root, and splitting them won nothing.
 
 mod binned_split;
 mod bounds;

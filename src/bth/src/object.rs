@@ -85,6 +85,17 @@ impl<'a> ObjectView<'a> {
     pub fn node(&self, line: u32) -> &'a WideNode {
         self.block(line, NODE_LINES)
     }
+    /// The root, if it is a node and not a leaf, and is there: files that are not checked may lack it.
+    pub(crate) fn root(&self) -> Option<WideNode> {
+        let mut root = Child::from_code(self.header.root)?;
+        if let Child::Tets(row) = root {
+            root = Child::from_code(self.tet_leaves.get(row as usize)?.subtree)?;
+        }
+        let (Child::Node(line) | Child::Packed(line)) = root else { return None };
+        let lines = if matches!(root, Child::Node(_)) { NODE_LINES } else { PACKED_NODE_LINES };
+        self.lines.get(line as usize..)?.get(..lines)?;
+        self.unpacked_node(root)
+    }
     /// Whether all nodes are packed; else none is.
     #[inline(always)]
     pub fn has_packed_nodes(&self) -> bool {

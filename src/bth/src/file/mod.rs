@@ -162,6 +162,11 @@ impl File {
         self.view(object).copied()
     }
 
+    /// Whether what is not in memory yet is read from the file when it is used.
+    pub(crate) fn is_mapped(&self) -> bool {
+        matches!(self.buffer, Buffer::Mapped(_))
+    }
+
     /// As [`Self::object`], made only once.
     #[allow(unsafe_code)]
     pub(crate) fn view(&self, object: u32) -> Result<&ObjectView<'_>> {

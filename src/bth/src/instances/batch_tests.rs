@@ -1,6 +1,7 @@
 //! Batches through instances against all instances one after another.
 
 use super::super::affine::Affine;
+use super::super::placed::Parts;
 use super::*;
 use crate::testing::Rng;
 
@@ -35,7 +36,12 @@ fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Affine>) {
     let transforms: Vec<Affine> = (0..count).map(|_| transform(rng, spread)).collect();
     let place = |transform: &Affine, number: u64| {
         let number = (number % u64::from(file.object_count())) as u32;
-        Placed::new(transform, number, file.object_header(number)).ok()
+        // Of every other one as closely as can be.
+        let parts = match number % 2 {
+            0 => Parts::of(&file.object(number).unwrap()),
+            _ => Parts::whole(file.object_header(number)),
+        };
+        Placed::new(transform, number, file.object_header(number), &parts).ok()
     };
     let placed = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
     (World::of_places(placed, file.object_count()), transforms)

@@ -66,8 +66,8 @@ impl Walks {
             let count = LANES.min(active.len() - first);
             at[..count].copy_from_slice(&active[first..first + count]);
             prepared.fill(s, &frame, rays, &at, count);
-            for lane in 0..count {
-                let number = at[lane] as usize;
+            for (lane, &number) in at[..count].iter().enumerate() {
+                let number = number as usize;
                 let ray = &rays[number];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;

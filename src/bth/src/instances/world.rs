@@ -2,7 +2,7 @@
 
 #[cfg(test)]
 use super::SceneView;
-use super::placed::{Misplaced, Placed};
+use super::placed::{Misplaced, Parts, Placed};
 use super::pose::Pose;
 use super::top_level::TopLevel;
 use crate::error::{Code, Error, Result};
@@ -106,7 +106,13 @@ impl World {
                 continue;
             }
             let world = self.pose.world(&view, instance.node);
-            let place = Placed::new(&world, instance.object, object).map_err(|why| {
+            // Only what is in memory already: to read the root of every object would cost more than it brings.
+            let touched = self.touched[instance.object as usize].load(Ordering::Relaxed);
+            let parts = match file.view(instance.object) {
+                Ok(view) if touched || !file.is_mapped() => Parts::of(view),
+                _ => Parts::whole(object),
+            };
+            let place = Placed::new(&world, instance.object, object, &parts).map_err(|why| {
                 let (code, expected, found) = match why {
                     Misplaced::Singular => {
                         (Code::Singular, "a transform that can be inverted", "one that cannot")

@@ -156,9 +156,10 @@ mod tests {
             for (i, corner) in (0..parts.count).flat_map(|i| (0..8).map(move |corner| (i, corner))) {
                 let end = |k: usize| f64::from(parts.ends[k][corner >> k & 1][i]);
                 let point = world.apply([end(0), end(1), end(2)]);
-                for k in 0..3 {
-                    assert!(f64::from(placed.lower[k]) <= point[k] && point[k] <= f64::from(placed.upper[k]));
-                }
+                let holds = |k: usize| {
+                    f64::from(placed.lower[k]) <= point[k] && point[k] <= f64::from(placed.upper[k])
+                };
+                assert!((0..3).all(holds), "round {round}, part {i}: {point:?}, {placed:?}");
             }
             let whole = Placed::new(&world, 0, &object, &Parts::whole(&object)).unwrap();
             for k in 0..3 {

@@ -67,8 +67,10 @@ thread_local! {
 
 /// Starts the rays of a chunk.
 struct Start<'a> {
-    world: &'a World,
-    rays: &'a [Ray],
+    round: &'a Round<'a>,
+    /// The rays of the chunk: from this one on, so many.
+    first: usize,
+    count: usize,
     ways: &'a mut Ways,
 }
 
@@ -77,9 +79,11 @@ impl Kernel for Start<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let (top, Ways { packets, walks, active, .. }) = (&self.world.top, self.ways);
-        packets.start(s, top, self.rays, active);
-        walks.start(s, top, self.rays, active);
+        let Start { round, first, count, ways: Ways { packets, walks, active, .. } } = self;
+        let (top, rays) = (&round.world.top, &round.rays[first..first + count]);
+        packets.start(s, top, rays, active);
+        // Where it starts it will have been.
+        walks.start(s, top, rays, active, |number| round.world.start_of(round.from, first + number));
     }
 }
 
@@ -100,11 +104,11 @@ impl<Q: Query> Kernel for Advance<'_, Q> {
         let Advance { round, query, first, ways: Ways { packets, walks, active, visits } } = self;
         let world = round.world;
         let tmax = |number: usize| query.tmax(first + number);
-        // There it has been.
-        let skip = |number: usize| world.start_of(round.from, first + number);
-        let mut arrive = |number: usize, instance| visits.all.push(world.visit(first + number, instance));
+        let mut arrive = |number: usize, instance| {
+            visits.all.push(Visit { ray: (first + number) as u32, instance });
+        };
         packets.advance(&round.rays[first..], tmax, &mut arrive);
-        walks.advance(s, &world.top, active, (tmax, skip), arrive);
+        walks.advance(s, &world.top, active, tmax, arrive);
     }
 }
 
@@ -142,12 +146,12 @@ impl World {
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             ways.visits.all.clear();
-            isa.run(Start { world: self, rays: &rays[first..end], ways: &mut ways });
+            isa.run(Start { round: &round, first, count: end - first, ways: &mut ways });
             // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
             if from.is_some() {
                 let starts = ways.active.iter().map(|&number| first + number as usize);
                 let starts = starts.filter_map(|ray| Some((ray, self.start_of(from, ray)?)));
-                ways.visits.all.extend(starts.map(|(ray, instance)| self.visit(ray, instance)));
+                ways.visits.all.extend(starts.map(|(ray, instance)| Visit { ray: ray as u32, instance }));
             }
             self.trace(&round, query, &mut ways.visits);
             while !ways.active.is_empty() || !ways.packets.is_empty() {
@@ -164,10 +168,6 @@ impl World {
         self.placed.get(instance as usize)?.is_some().then_some(instance)
     }
 
-    fn visit(&self, ray: usize, instance: u32) -> Visit {
-        Visit { object: self.placed_at(instance).object(), ray: ray as u32, instance }
-    }
-
     /// The place of an instance that the top level holds.
     fn placed_at(&self, instance: u32) -> &Placed {
         self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
@@ -176,21 +176,31 @@ impl World {
     fn trace(&self, round: &Round<'_>, query: &mut impl Query, visits: &mut Visits) {
         // In the space of one instance neighbours stay neighbours, and take the same way.
         visits.sort(self.placed.len());
-        let mut trace = |visits: &[Visit]| {
-            self.touch(visits[0].object);
-            let object = round.file.view(visits[0].object).expect("checked when opened");
+        let mut trace = |object: u32, visits: &[Visit]| {
+            self.touch(object);
+            let object = round.file.view(object).expect("checked when opened");
             query.trace(round, object, visits);
         };
-        visits.few.clear();
-        for same in visits.sorted.chunk_by(|a, b| a.instance == b.instance) {
+        let Visits { sorted, few, gathered, .. } = &mut *visits;
+        few.clear();
+        let mut first = 0;
+        for same in sorted.chunk_by(|a, b| a.instance == b.instance) {
+            let (object, end) = (self.placed_at(same[0].instance).object(), first + same.len());
             if same.len() >= PACKET {
-                trace(same);
+                trace(object, same);
             } else {
-                visits.few.extend_from_slice(same);
+                few.push([object, first as u32, end as u32]);
             }
+            first = end;
         }
-        visits.few.sort_by_key(|v| v.object);
-        visits.few.chunk_by(|a, b| a.object == b.object).for_each(trace);
+        few.sort_unstable();
+        for runs in few.chunk_by(|a, b| a[0] == b[0]) {
+            gathered.clear();
+            for &[_, first, end] in runs {
+                gathered.extend_from_slice(&sorted[first as usize..end as usize]);
+            }
+            trace(runs[0][0], gathered);
+        }
         visits.all.clear();
     }
 }
@@ -212,15 +222,14 @@ impl Batch {
         self.rays.clear();
         self.from.clear();
     }
-    fn push(&mut self, visit: Visit, ray: ObjectRay, from: u32) {
+    fn push(&mut self, visit: Visit, ray: ObjectRay, from: Option<u32>) {
         self.visits.push((visit, ray.t_scale));
         self.rays.push(ray.ray);
-        self.from.push(from);
+        self.from.extend(from);
     }
-    /// The triangles that rays start on, if that is of use: only in tetrahedra it is.
-    fn hints(&self, object: &ObjectView<'_>) -> Option<&[u32]> {
-        let some = !object.tet_leaves.is_empty() && self.from.iter().any(|from| *from != NONE);
-        some.then_some(&self.from)
+    /// The triangles that rays start on, if they were asked for and there are some.
+    fn hints(&self) -> Option<&[u32]> {
+        self.from.iter().any(|from| *from != NONE).then_some(&self.from)
     }
 }
 
@@ -264,16 +273,18 @@ impl Query for Nearest<'_> {
             return;
         }
         self.batch.clear();
+        // Only in tetrahedra are they of use.
+        let hinted = round.from.is_some() && !object.tet_leaves.is_empty();
         for &visit in visits {
             let i = visit.ray as usize;
             let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
-            self.batch.push(visit, ray, round.hint(i, visit.instance));
+            self.batch.push(visit, ray, hinted.then(|| round.hint(i, visit.instance)));
         }
         let mut hits = std::mem::take(&mut self.batch.hits);
         hits.clear();
         hits.resize(visits.len(), Hit::MISS);
         let batch = &self.batch;
-        trace::nearest_batch(object, &batch.rays, batch.hints(object), 0, self.scratch, &mut hits);
+        trace::nearest_batch(object, &batch.rays, batch.hints(), 0, self.scratch, &mut hits);
         for (&(visit, scale), hit) in batch.visits.iter().zip(&mut hits) {
             if hit.is_hit() {
                 hit.surface.instance = visit.instance;
@@ -306,16 +317,18 @@ impl Query for Any<'_> {
             return;
         }
         self.batch.clear();
+        // Only in tetrahedra are they of use.
+        let hinted = round.from.is_some() && !object.tet_leaves.is_empty();
         for &visit in visits {
             let i = visit.ray as usize;
             let ray = round.object_ray(visit, self.rays[i].tmax);
-            self.batch.push(visit, ray, round.hint(i, visit.instance));
+            self.batch.push(visit, ray, hinted.then(|| round.hint(i, visit.instance)));
         }
         let mut found = std::mem::take(&mut self.batch.found);
         found.clear();
         found.resize(visits.len(), false);
         let batch = &self.batch;
-        trace::any_batch(object, &batch.rays, batch.hints(object), self.scratch, &mut found);
+        trace::any_batch(object, &batch.rays, batch.hints(), self.scratch, &mut found);
         for ((visit, _), found) in batch.visits.iter().zip(&found) {
             self.found[visit.ray as usize] |= *found;
         }

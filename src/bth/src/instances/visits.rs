@@ -3,7 +3,6 @@
 /// A ray that is to be traced through an instance in this round.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Visit {
-    pub(super) object: u32,
     pub(super) ray: u32,
     pub(super) instance: u32,
 }
@@ -15,8 +14,10 @@ pub(super) struct Visits {
     pub(super) all: Vec<Visit>,
     /// By instance.
     pub(super) sorted: Vec<Visit>,
-    /// Those through instances that few rays visit.
-    pub(super) few: Vec<Visit>,
+    /// Runs of `sorted` through instances that few rays visit, with the object: that, first, end.
+    pub(super) few: Vec<[u32; 3]>,
+    /// Those runs, one after the other.
+    pub(super) gathered: Vec<Visit>,
     /// Where those of each instance go.
     place: Vec<u32>,
 }
@@ -40,7 +41,7 @@ impl Visits {
         for count in &mut *place {
             next += std::mem::replace(count, next);
         }
-        sorted.resize(all.len(), Visit { object: 0, ray: 0, instance: 0 });
+        sorted.resize(all.len(), Visit { ray: 0, instance: 0 });
         for visit in all {
             let at = &mut place[visit.instance as usize];
             sorted[*at as usize] = *visit;

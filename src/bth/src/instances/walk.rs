@@ -26,6 +26,8 @@ struct Way {
     slabs: Slabs,
     /// Nothing whose depth exceeds this matters.
     limit: f32,
+    /// Code of the instance that it passes by, or `NONE`.
+    skip: u32,
     /// The top of its stack.
     top: Place,
 }
@@ -47,14 +49,22 @@ pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
 }
 
 impl Walks {
-    /// Starts the rays of these numbers; those remain that may hit something.
+    /// Starts the rays of these numbers; those remain that may hit something. A ray will pass by the instance that `skip` gives
+    /// for its number.
     #[inline(always)]
-    pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], active: &mut Vec<u32>) {
+    pub(super) fn start<S: Simd>(
+        &mut self,
+        s: S,
+        top: &TopLevel,
+        rays: &[Ray],
+        active: &mut Vec<u32>,
+        skip: impl Fn(usize) -> Option<u32>,
+    ) {
         if top.nodes.is_empty() || active.is_empty() {
             return active.clear();
         }
         self.stacks.reserve_for(top.depth as usize, rays.len());
-        let nowhere = Way { slabs: Slabs::NONE, limit: 0.0, top: Place::NOWHERE };
+        let nowhere = Way { slabs: Slabs::NONE, limit: 0.0, skip: NONE, top: Place::NOWHERE };
         if self.ways.len() < rays.len() {
             self.ways.resize(rays.len(), nowhere);
         }
@@ -80,6 +90,7 @@ impl Walks {
                     },
                 }
                 way.limit = f32::INFINITY;
+                way.skip = skip(number).map_or(NONE, |instance| INSTANCE | instance);
                 way.top = self.stacks.start(number, 0);
                 active[kept] = at[lane];
                 kept += 1;
@@ -89,15 +100,15 @@ impl Walks {
     }
 
     /// Takes rays on to the next instance whose box they may meet at a t that, rounded to f32, is at most that which
-    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. A ray
-    /// passes by the instance that `skip` gives. `arrive` takes numbers and instances in the order of `active`.
+    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. `arrive`
+    /// takes numbers and instances in the order of `active`.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
         s: S,
         top: &TopLevel,
         active: &mut Vec<u32>,
-        (tmax, skip): (impl Fn(usize) -> Option<f32>, impl Fn(usize) -> Option<u32>),
+        tmax: impl Fn(usize) -> Option<f32>,
         mut arrive: impl FnMut(usize, u32),
     ) {
         let mut kept = 0;
@@ -107,12 +118,11 @@ impl Walks {
             block.inner.len = 0;
             for (place, &number) in active[first..end].iter().enumerate() {
                 let ray = number as usize;
-                block.skip[place] = skip(ray).map_or(NONE, |instance| INSTANCE | instance);
                 let code = match tmax(ray) {
                     Some(tmax) => self.resume(s, ray, tmax),
                     None => BOTTOM,
                 };
-                block.sort(place, code);
+                block.sort(place, code, self.ways[ray].skip);
             }
             let numbers = &active[first..end];
             while block.inner.len > 0 {
@@ -120,7 +130,7 @@ impl Walks {
                     let place = block.inner.get(i);
                     let ray = numbers[place] as usize;
                     let code = self.step(s, top, ray);
-                    block.sort(place, code);
+                    block.sort(place, code, self.ways[ray].skip);
                 }
             }
             for place in 0..end - first {
@@ -178,8 +188,6 @@ struct Block {
     inner: List,
     /// Code at which a ray rests: of an instance, or [`BOTTOM`].
     code: [u32; BLOCK],
-    /// Code of the instance that it passes by, or `NONE`.
-    skip: [u32; BLOCK],
 }
 
 /// Places within a block.
@@ -203,15 +211,15 @@ impl List {
 impl Block {
     fn new() -> Self {
         let inner = List { place: [0; 2 * BLOCK], len: 0 };
-        Block { inner, code: [BOTTOM; BLOCK], skip: [NONE; BLOCK] }
+        Block { inner, code: [BOTTOM; BLOCK] }
     }
 
-    /// Notes the code on top of a ray's stack. Without a branch.
+    /// Notes the code on top of the stack of a ray that passes by the instance with the code `skip`. Without a branch.
     #[inline(always)]
-    fn sort(&mut self, place: usize, code: u32) {
+    fn sort(&mut self, place: usize, code: u32, skip: u32) {
         self.code[place] = code;
         self.inner.place[usize::from(self.inner.len) % (2 * BLOCK)] = place as u8;
-        let goes_on = code & INSTANCE == 0 || code == self.skip[place];
+        let goes_on = code & INSTANCE == 0 || code == skip;
         self.inner.len += u8::from(goes_on);
     }
 }

@@ -1,4 +1,5 @@
-//! Rays through the wide BVH: many at once ([`batch`]) or one ([`walk`]), by the same steps ([`flight`]).
+//! Rays through the wide BVH: many at once ([`batch`]) or one ([`walk`]), by the same steps ([`flight`]); where many end
+//! is computed together ([`landing`]).
 
 pub(crate) mod batch;
 pub(crate) mod flight;

@@ -3,7 +3,7 @@
 //! A node's sixteen children are tested against what all the rays together can meet ([`super::hull`]), and those that
 //! remain against the rays, sixteen at a time. f32 lanes leave out what certainly does not matter, as everywhere;
 //! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
-//! be computed at the end; what is not certain is decided at once ([`super::settle`]).
+//! be computed at the end; what is not certain is decided at once ([`crate::trace::candidate`]).
 
 use super::group::Group;
 use super::hull::Hull;

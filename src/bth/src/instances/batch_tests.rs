@@ -140,3 +140,50 @@ fn rays_without_a_line_hit_nothing() {
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
     }
 }
+
+/// Rays that go nearly the same way, from close together.
+fn bundle(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
+    let transform = &transforms[rng.below(transforms.len() as u64) as usize];
+    let target = transform.apply([0.3, 0.3, 0.0]);
+    let away = [0.5, 3.0, 30.0, 1e5][rng.below(4) as usize];
+    let from = [(); 3].map(|()| (0.2 + unit(rng).abs()) * away * [1.0, -1.0][rng.below(2) as usize]);
+    let (spread, apart) = ([0.0, 0.01, 0.05][rng.below(3) as usize], [0.0, 0.1][rng.below(2) as usize]);
+    let scale = [1.0, 1e-3, 1e3, 1e-20][rng.below(4) as usize];
+    let tmax = [f64::INFINITY, 1.0 / scale][rng.below(2) as usize] as f32;
+    (0..count)
+        .map(|_| {
+            let origin = [0, 1, 2].map(|k| (target[k] + from[k] + unit(rng) * apart * away * 0.1) as f32);
+            let direction = [0, 1, 2].map(|k| ((-from[k] + unit(rng) * spread * away) * scale) as f32);
+            Ray { origin, tmin: 0.0, direction, tmax }
+        })
+        .collect()
+}
+
+#[test]
+fn packets_through_the_top_level_change_no_answer() {
+    let mut rng = Rng(23);
+    let (mut in_packets, mut all, mut hits_seen, mut refused) = (0, 0, 0, 0);
+    for round in 0..200 {
+        let file = File::from_bytes(FILES[round % 2]).unwrap();
+        let count = [1, 7, 17, 40, 150][round % 5];
+        let (world, transforms) = world(&file, &mut rng, count);
+        let rays = bundle(&mut rng, &transforms, [33, 64, 100][round % 3]);
+        let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+        world.nearest(&file, &rays, None, &mut hits);
+        world.any(&file, &rays, None, &mut found);
+        for (i, ray) in rays.iter().enumerate() {
+            let expected = brute(&world, &file, ray);
+            assert_eq!(hits[i], expected, "round {round}, ray {i}: {ray:?}");
+            assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
+            hits_seen += usize::from(expected.is_hit());
+        }
+        let mut ways = Ways::default();
+        let start = Round { world: &world, file: &file, rays: &rays, from: None };
+        Isa::chosen().run(Start { round: &start, first: 0, count: rays.len(), ways: &mut ways });
+        in_packets += usize::from(!ways.packets.is_empty());
+        refused += usize::from(ways.packets.is_empty() && count == 150);
+        all += rays.len();
+    }
+    assert!(in_packets > 60, "{in_packets} of 200 rounds in packets");
+    assert!(hits_seen > all / 5 && refused > 2, "{hits_seen} of {all} hit, {refused} refused");
+}

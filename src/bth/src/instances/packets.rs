@@ -8,7 +8,7 @@ use super::walk::limit;
 use crate::layout::WIDTH;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::{BOTTOM, Beam, Frame, Group, Hull, PACKET, Span, is_same_octant};
+use crate::trace::{BOTTOM, Beam, Frame, Group, Guard, Hull, PACKET, Span, is_same_octant};
 
 /// Groups of sixteen rays in a packet.
 const GROUPS: usize = PACKET / LANES;
@@ -44,6 +44,19 @@ struct Packet {
 pub(super) struct Packets {
     items: Vec<Item>,
     packets: Vec<Packet>,
+    /// After a packet that met too many instances, the next few runs of rays are not tried.
+    guard: Guard,
+}
+
+/// What became of a run of rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Listed {
+    /// All instances that it may meet are listed.
+    All,
+    /// The rays do not go together.
+    Apart,
+    /// There are too many.
+    TooMany,
 }
 
 impl Packets {
@@ -63,11 +76,15 @@ impl Packets {
         for (i, own) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
-            let listed = own.len() >= FEWEST && is_same_octant(&own[0], &own[own.len() - 1]) && {
+            let mut listed = Listed::Apart;
+            if own.len() >= FEWEST && is_same_octant(&own[0], &own[own.len() - 1]) && self.guard.is_open() {
                 let groups = groups.get_or_insert_with(|| [Group::vacant(s); GROUPS]);
-                self.list(s, top, &frame, groups, own)
-            };
-            if listed {
+                listed = self.list(s, top, &frame, groups, own);
+                if listed != Listed::Apart {
+                    self.guard.learn(listed == Listed::All);
+                }
+            }
+            if listed == Listed::All {
                 self.packets.push(Packet { first, next: begin, end: self.items.len() as u32 });
             } else {
                 self.items.truncate(begin as usize);
@@ -76,7 +93,7 @@ impl Packets {
         }
     }
 
-    /// Lists the instances that rays may meet; false where they are better traced alone.
+    /// Lists the instances that rays may meet.
     #[inline(always)]
     fn list<S: Simd>(
         &mut self,
@@ -85,16 +102,16 @@ impl Packets {
         frame: &Frame,
         groups: &mut [Group<S>; GROUPS],
         rays: &[Ray],
-    ) -> bool {
+    ) -> Listed {
         let span = Span::of(s, rays);
         if top.nodes.is_empty() || !span.is_coherent() || span.farthest_origin() > top.reach {
-            return false;
+            return Listed::Apart;
         }
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
             if !group.prepare(s, frame, &rays[i * LANES..end]) {
-                return false;
+                return Listed::Apart;
             }
         }
         let beam = Beam::new(s, frame, &span, groups);
@@ -126,12 +143,12 @@ impl Packets {
                 }
                 if code & INSTANCE != 0 {
                     if self.items.len() - begin == MOST_INSTANCES {
-                        return false;
+                        return Listed::TooMany;
                     }
                     self.items.push(Item { depth: depths[slot], instance: code & !INSTANCE, rays });
                 } else {
                     if count == MOST_NODES {
-                        return false;
+                        return Listed::TooMany;
                     }
                     waiting[count] = code;
                     count += 1;
@@ -139,7 +156,7 @@ impl Packets {
             }
         }
         self.items[begin..].sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
-        true
+        Listed::All
     }
 
     /// Takes packets on to the next instance that any of their rays may meet at a t that, rounded to f32, is at most that

@@ -25,7 +25,7 @@ pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by};
 pub(crate) use bvh::flight::KEY_SLACK;
 pub(crate) use bvh::stack::{BOTTOM, Place, Stacks};
 pub use hinted::Hinted;
-pub(crate) use packets::coherence::{Span, is_same_octant};
+pub(crate) use packets::coherence::{Guard, Span, is_same_octant};
 pub(crate) use packets::group::Group;
 pub(crate) use packets::hull::{Beam, Hull};
 pub(crate) use packets::packet::PACKET;

@@ -171,6 +171,12 @@ pub(crate) struct Guard {
     back: u32,
 }
 
+impl Default for Guard {
+    fn default() -> Self {
+        Guard::new()
+    }
+}
+
 impl Guard {
     const MOST: u32 = 64;
 

@@ -105,7 +105,7 @@ impl Scene {
             let object = self.object(instance).header;
             return (object.root != crate::layout::NONE).then_some((object.lower, object.upper));
         };
-        world.placed[instance as usize].as_ref().map(|placed| (placed.lower, placed.upper))
+        world.bounds(self.file(), instance)
     }
 
     /// Objects that rays have been traced in since the scene was opened; all of them in files without a scene.

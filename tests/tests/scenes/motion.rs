@@ -44,6 +44,37 @@ fn a_frame_does_not_depend_on_those_before() {
     assert!(different > 8);
 }
 
+/// Cameras are framed by them, so parts of a sequence that are rendered apart would not fit together else.
+#[test]
+fn bounds_of_instances_depend_on_neither_rays_nor_mapping() {
+    let (folder, options) = (models(), crate::support::options());
+    let (compiled, _) = bth_compile::scene::compile(
+        &varied(),
+        folder.path(),
+        std::path::Path::new("x"),
+        &options,
+        &bth_compile::Silent,
+    )
+    .unwrap();
+    let path = folder.path().join("scene.bth");
+    std::fs::write(&path, &compiled.bytes).unwrap();
+    let mut read = bth::open(&path).unwrap();
+    // SAFETY: nobody writes to the file.
+    #[allow(unsafe_code)]
+    let mut mapped = unsafe { bth::map(&path) }.unwrap();
+    let bounds = |scene: &bth::Scene| -> Vec<_> {
+        (0..scene.instance_count()).map(|i| scene.instance_bounds(i)).collect()
+    };
+    let rays = rays(500);
+    for frame in [0, 12, 30, 12] {
+        let fresh = mapped.set_frame(frame).map(|_| bounds(&mapped)).unwrap();
+        read.set_frame(frame).unwrap();
+        assert_eq!(bounds(&read), fresh, "frame {frame}");
+        assert!(hits(&read, &rays) == hits(&mapped, &rays), "frame {frame}");
+    }
+    assert!(mapped.touched_objects() > 0 && bounds(&read).iter().flatten().count() > 1);
+}
+
 #[test]
 fn only_what_moved_is_placed_anew() {
     let folder = models();

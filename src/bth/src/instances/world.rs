@@ -137,6 +137,17 @@ impl World {
         Ok(update)
     }
 
+    /// World box of an instance, from its object's own box: whatever rays have touched, it is the same. `None` when it cannot be
+    /// seen.
+    pub(crate) fn bounds(&self, file: &File, instance: u32) -> Option<([f32; 3], [f32; 3])> {
+        self.placed[instance as usize].as_ref()?;
+        let view = file.scene().expect("checked when the scene was opened");
+        let instance = view.instances[instance as usize];
+        let (world, object) = (self.pose.world(&view, instance.node), file.object_header(instance.object));
+        let placed = Placed::new(&world, instance.object, object, &Parts::whole(object)).ok()?;
+        Some((placed.lower, placed.upper))
+    }
+
     /// From a node's space to the world, rows of four; whether the node can be seen.
     pub(crate) fn node(&self, file: &File, node: u32) -> ([[f64; 4]; 3], bool) {
         let view = file.scene().expect("checked when the scene was opened");

@@ -13,14 +13,26 @@
 #undef terminatetetgen
 
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <exception>
+#include <fcntl.h>
 #include <limits>
 #include <new>
+#include <unistd.h>
 
 __attribute__((visibility("default"), used)) void terminatetetgen(tetgenmesh *, int x) { throw x; }
 
 extern "C" {
+
+// TetGen writes files where it stands, for some switches and some failures. Here they go nowhere: the program's definition
+// precedes the library's, so the worker needs no folder that somebody would have to remove when it is killed.
+__attribute__((visibility("default"), used)) FILE *fopen(const char *, const char *mode) {
+  const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+  FILE *file = null < 0 ? nullptr : fdopen(null, mode);
+  if (!file && null >= 0) close(null);
+  return file;
+}
 
 struct bth_result {
   tetgenio *out;

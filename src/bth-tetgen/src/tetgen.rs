@@ -104,3 +104,20 @@ pub(crate) fn tetrahedralize(job: &Job) -> Result<Tetrahedra, (Failure, String)>
     }
     Ok(Tetrahedra { points: points.to_vec(), tets: tets.iter().map(|t| t.map(|i| i as u32)).collect() })
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn files_that_tetgen_would_write_go_nowhere() {
+        let path = std::env::temp_dir().join(format!("bth-tetgen-{}", std::process::id()));
+        let name = std::ffi::CString::new(path.as_os_str().as_encoded_bytes()).unwrap();
+        // SAFETY: both strings end with NUL and the file is not used after it was closed.
+        let written = unsafe {
+            let file = libc::fopen(name.as_ptr(), c"w".as_ptr());
+            assert!(!file.is_null());
+            assert!(libc::fputs(c"text".as_ptr(), file) >= 0);
+            libc::fclose(file) == 0
+        };
+        assert!(written && !path.exists());
+    }
+}

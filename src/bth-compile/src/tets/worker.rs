@@ -37,8 +37,6 @@ pub(super) struct Worker {
     requests: Option<Sender<Vec<u8>>>,
     replies: Receiver<std::result::Result<Reply, ProtocolError>>,
     talker: Option<JoinHandle<()>>,
-    /// Working directory of the process: TetGen writes files there at times.
-    _folder: tempfile::TempDir,
 }
 
 impl Worker {
@@ -50,13 +48,14 @@ impl Worker {
         let fail = |what: &str, error: &dyn std::fmt::Display| {
             Ok(Err(Trouble::Start(format!("{}: {what}: {error}", setup.program.display()))))
         };
-        let folder = match tempfile::Builder::new().prefix("bth-tetgen-").tempdir() {
-            Ok(folder) => folder,
-            Err(error) => return fail("no temporary folder", &error),
-        };
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
-        command.current_dir(folder.path()).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+        // Its TetGen opens no files; one that did would leave them where others look after them.
+        command
+            .current_dir(std::env::temp_dir())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null());
         // An interrupt from the terminal is for the compiler, which then ends its workers.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
@@ -81,14 +80,8 @@ impl Worker {
                 }
             }
         });
-        let mut worker = Self {
-            child,
-            tetgen: String::new(),
-            requests: Some(requests),
-            replies,
-            talker: Some(talker),
-            _folder: folder,
-        };
+        let mut worker =
+            Self { child, tetgen: String::new(), requests: Some(requests), replies, talker: Some(talker) };
         Ok(match worker.wait(START, monitor)? {
             Ok(Reply::Hello { protocol: PROTOCOL, tetgen }) => {
                 worker.tetgen = tetgen;

@@ -9,14 +9,14 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// Runs the jobs, `at_once` of them at a time as long as they need no more than `memory` bytes together by the
 /// `estimate`; one is run in any case. Results are in the order of the jobs.
 ///
-/// `start` makes what the jobs of one thread have in common, such as a pool.
-pub fn run<J: Send, S, T: Send>(
+/// `within` is given what each thread does and does that, in surroundings of its own, such as a pool.
+pub fn run<J: Send, T: Send>(
     jobs: Vec<J>,
     at_once: usize,
     memory: u64,
     estimate: impl Fn(&J) -> u64 + Sync,
-    start: impl Fn() -> S + Sync,
-    work: impl Fn(&mut S, J) -> T + Sync,
+    within: impl Fn(&(dyn Fn() + Sync)) + Sync,
+    work: impl Fn(J) -> T + Sync,
 ) -> Vec<T> {
     let memory = Memory::new(memory);
     let next = AtomicUsize::new(0);
@@ -25,23 +25,22 @@ pub fn run<J: Send, S, T: Send>(
         jobs.into_iter().map(|job| Mutex::new((Some(job), None))).collect();
     let lock = |place: usize| Some(places.get(place)?.lock().unwrap_or_else(PoisonError::into_inner));
     let worker = || {
-        let mut state = start();
         loop {
             let place = next.fetch_add(1, Ordering::Relaxed);
             let Some(mut taken) = lock(place) else { break };
             let Some(job) = taken.0.take() else { break };
             drop(taken);
             let _share = memory.take(estimate(&job));
-            let done = work(&mut state, job);
+            let done = work(job);
             if let Some(mut taken) = lock(place) {
                 taken.1 = Some(done);
             }
         }
     };
     if at_once == 1 {
-        worker();
+        within(&worker);
     } else {
-        std::thread::scope(|scope| (0..at_once).for_each(|_| drop(scope.spawn(worker))));
+        std::thread::scope(|scope| (0..at_once).for_each(|_| drop(scope.spawn(|| within(&worker)))));
     }
     let result =
         |place: Mutex<(Option<J>, Option<T>)>| place.into_inner().unwrap_or_else(PoisonError::into_inner).1;
@@ -89,7 +88,7 @@ mod tests {
     fn memory_is_shared_and_one_job_always_runs() {
         let (now, most) = (AtomicU64::new(0), AtomicU64::new(0));
         let jobs = vec![40, 60, 30, 500, 70, 20, 100, 10];
-        let work = |_: &mut (), bytes: u64| {
+        let work = |bytes: u64| {
             let sum = now.fetch_add(bytes, Ordering::SeqCst) + bytes;
             if bytes == 500 {
                 assert_eq!(sum, 500, "alone");
@@ -100,7 +99,7 @@ mod tests {
             now.fetch_sub(bytes, Ordering::SeqCst);
             bytes
         };
-        assert_eq!(run(jobs.clone(), 8, 100, |bytes| *bytes, || (), work), jobs);
+        assert_eq!(run(jobs.clone(), 8, 100, |bytes| *bytes, |worker| worker(), work), jobs);
         assert!(most.load(Ordering::SeqCst) <= 100);
     }
 
@@ -108,11 +107,14 @@ mod tests {
     fn results_are_in_order_however_many_run_at_once() {
         for at_once in [0, 1, 3, 100] {
             let started = AtomicUsize::new(0);
-            let start = || started.fetch_add(1, Ordering::Relaxed);
-            let squares = run((0..20u64).collect(), at_once, u64::MAX, |_| 1, start, |_, n| n * n);
+            let within = |worker: &(dyn Fn() + Sync)| {
+                started.fetch_add(1, Ordering::Relaxed);
+                worker();
+            };
+            let squares = run((0..20u64).collect(), at_once, u64::MAX, |_| 1, within, |n| n * n);
             assert_eq!(squares, (0..20).map(|n| n * n).collect::<Vec<_>>());
             assert_eq!(started.into_inner(), at_once.clamp(1, 20));
         }
-        assert!(run(Vec::<u8>::new(), 4, 0, |_| 0, || (), |(), n| n).is_empty());
+        assert!(run(Vec::<u8>::new(), 4, 0, |_| 0, |worker| worker(), |n| n).is_empty());
     }
 }

@@ -33,8 +33,11 @@ pub(super) fn at_once<J: Send, T: Send>(
     };
     let memory = context.options.objects_memory;
     let items = items.into_iter().enumerate().collect();
-    let done =
-        jobs::run(items, threads, memory, |(_, item)| estimate(item), || alone(threads), |_, item| one(item));
+    let within = |worker: &(dyn Fn() + Sync)| match alone(threads) {
+        Some(pool) => pool.install(worker),
+        None => worker(),
+    };
+    let done = jobs::run(items, threads, memory, |(_, item)| estimate(item), within, one);
     let results = done.into_iter().filter_map(|(times, result)| {
         clock.add(times);
         result
@@ -42,10 +45,10 @@ pub(super) fn at_once<J: Send, T: Send>(
     results.collect()
 }
 
-/// A pool of this thread only: what runs here takes no other. In the pool of all, an item that waits for another process
+/// A pool of one thread: what runs there takes no other. In the pool of all, an item that waits for another process
 /// could hold up one that it waits for.
 fn alone(threads: usize) -> Option<rayon::ThreadPool> {
-    let pool = || rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(1).build();
     // Without one the work goes to the global pool, which only takes more threads.
     (threads > 1).then(pool)?.ok()
 }

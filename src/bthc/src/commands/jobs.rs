@@ -44,8 +44,8 @@ pub(super) fn run<T: Send>(args: &Compile, all: &[Job], work: impl Fn(&Job, usiz
         at_once,
         memory(args),
         |job| estimate(job),
-        || (),
-        |(), job| work(job, share),
+        |worker| worker(),
+        |job| work(job, share),
     )
 }
 

@@ -5,6 +5,8 @@ use std::io::Read;
 
 /// Bytes beyond which several threads hash together.
 const PARALLEL: usize = 1 << 20;
+/// Bytes that there is room for at first: many files have fewer.
+const FIRST: usize = 1 << 16;
 
 /// A BLAKE3 hash.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -24,21 +26,14 @@ impl Digest {
     /// Those of the reader.
     pub fn of_reader(mut reader: impl Read) -> std::io::Result<(Self, u64)> {
         let mut hasher = blake3::Hasher::new();
-        let mut buffer = vec![0; PARALLEL];
+        let mut buffer = Vec::with_capacity(FIRST);
         let mut total = 0;
         loop {
-            let mut filled = 0;
-            while filled < buffer.len() {
-                match reader.read(&mut buffer[filled..]) {
-                    Ok(0) => break,
-                    Ok(n) => filled += n,
-                    Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-                    Err(e) => return Err(e),
-                }
-            }
-            update(&mut hasher, &buffer[..filled]);
+            buffer.clear();
+            let filled = reader.by_ref().take(PARALLEL as u64).read_to_end(&mut buffer)?;
+            update(&mut hasher, &buffer);
             total += filled as u64;
-            if filled < buffer.len() {
+            if filled < PARALLEL {
                 return Ok((Self(*hasher.finalize().as_bytes()), total));
             }
         }

@@ -21,6 +21,21 @@ pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
+    replace_file(path, |file| {
+        let mut out = BufWriter::with_capacity(1 << 20, file);
+        write(&mut out)?;
+        out.flush()
+    })
+}
+
+/// As [`replace`], for who writes in large pieces or lets the system copy.
+///
+/// # Errors
+/// As [`replace`].
+pub fn replace_file(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     let name =
         path.file_name().ok_or_else(|| IoError::new(ErrorKind::InvalidInput, "not the name of a file"))?;
     // Renaming over a device or a folder would not do what is meant.
@@ -36,10 +51,8 @@ pub fn replace(
     prefix.push(".");
     remove_stale(folder, &prefix);
 
-    let (file, named) = create(folder, &prefix, 0o666)?;
-    let mut out = BufWriter::with_capacity(1 << 20, file);
-    write(&mut out)?;
-    let file = out.into_inner().map_err(|e| e.into_error())?;
+    let (mut file, named) = create(folder, &prefix, 0o666)?;
+    write(&mut file)?;
     file.sync_all()?;
     let named = match named {
         Some(named) => named,

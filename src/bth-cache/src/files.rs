@@ -1,7 +1,12 @@
 //! Where things lie in the folder of a store.
 
 use crate::Digest;
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// Least age of a time of use that is renewed.
+const FRESH: Duration = Duration::from_secs(1);
 
 /// The folders of a store.
 #[derive(Clone, Debug)]
@@ -88,4 +93,13 @@ pub(crate) fn named(path: &Path) -> Option<Digest> {
 /// Removes a file; whether it is gone by our doing. Read-only files need no more rights than others, but on Windows.
 pub(crate) fn remove(path: &Path) -> bool {
     std::fs::remove_file(path).is_ok()
+}
+
+/// Renews the time of use; a store of others, which cannot be written, is read all the same.
+pub(crate) fn touch(path: &Path) {
+    let Ok(file) = File::open(path) else { return };
+    let used = file.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
+    if used.is_none_or(|age| age > FRESH) {
+        let _ = file.set_modified(SystemTime::now());
+    }
 }

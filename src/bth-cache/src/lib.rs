@@ -22,6 +22,7 @@ mod key;
 mod last;
 mod locate;
 mod lock;
+mod opened;
 mod record;
 mod remote;
 #[cfg(feature = "s3")]
@@ -31,12 +32,13 @@ mod store;
 mod survey;
 mod tally;
 
-pub use atomic::replace;
+pub use atomic::{replace, replace_file};
 pub use digest::Digest;
 pub use evict::Evicted;
 pub use key::Key;
 pub use locate::{DEFAULT_CAP, folder, parse_bytes};
 pub use lock::WorkLock;
+pub use opened::Opened;
 pub use record::Record;
 pub use remote::{Folder, Remote};
 #[cfg(feature = "s3")]

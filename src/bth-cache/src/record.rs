@@ -10,7 +10,7 @@ pub struct Record {
     /// The key.
     #[serde(flatten)]
     pub key: Key,
-    /// BLAKE3 of the content.
+    /// BLAKE3 of the content; of one that is not kept, what names it as surely.
     pub blob: Digest,
     /// Bytes of the content.
     pub bytes: u64,

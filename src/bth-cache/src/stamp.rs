@@ -2,19 +2,19 @@
 //! that it is unchanged.
 
 use crate::files::Files;
+use crate::opened::State;
 use crate::record::{seal, unseal};
-use crate::{Digest, Store};
+use crate::{Digest, Opened, Store};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Smaller files are read: that costs no more than keeping a stamp.
 const LARGE: u64 = 4 << 20;
 /// No file system of today counts time in longer steps than this, but for those that count seconds.
 const STEP: Duration = Duration::from_millis(20);
 
-/// A file as it was left: which file, and when it was last changed. The system sets the time of change on every change of
-/// content, name or attributes, and nobody else can.
+/// A file as it was left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Stamp {
     device: u64,
@@ -31,11 +31,17 @@ impl Store {
         (Stamp::of(path, stamp.blob) == Some(stamp)).then_some(stamp.blob)
     }
 
+    /// As [`Store::stamped`], of a file that has been opened by that path: others may have replaced it since.
+    pub fn stamped_opened(&self, path: &Path, opened: &Opened) -> Option<Digest> {
+        let stamp = read(&self.files, path)?;
+        (Stamp::from_state(opened.state(), stamp.blob) == Some(stamp)).then_some(stamp.blob)
+    }
+
     /// Notes the content of a large file that was written just now.
     pub fn stamp(&self, path: &Path, blob: Digest) {
         let Some(stamp) = Stamp::of(path, blob).filter(|s| s.bytes >= LARGE) else { return };
         // A change within the same step of the clock would have the same time; this makes later ones have a later one.
-        std::thread::sleep(STEP);
+        std::thread::sleep(STEP.saturating_sub(stamp.age()));
         if Stamp::of(path, blob) != Some(stamp) {
             return;
         }
@@ -57,19 +63,21 @@ fn read(files: &Files, path: &Path) -> Option<Stamp> {
 }
 
 impl Stamp {
-    #[cfg(unix)]
     fn of(path: &Path, blob: Digest) -> Option<Self> {
-        use std::os::unix::fs::MetadataExt;
-        let m = std::fs::metadata(path).ok()?;
-        // File systems that count whole seconds are too coarse.
-        let fine = m.ctime_nsec() != 0;
-        let changed = (m.ctime(), m.ctime_nsec());
-        fine.then(|| Self { device: m.dev(), inode: m.ino(), bytes: m.len(), changed, blob })
+        Self::from_state(State::of(&std::fs::metadata(path).ok()?), blob)
     }
 
-    #[cfg(not(unix))]
-    fn of(_: &Path, _: Digest) -> Option<Self> {
-        None
+    fn from_state(State { device, inode, bytes, changed }: State, blob: Digest) -> Option<Self> {
+        // File systems that count whole seconds are too coarse, and elsewhere times can be set at will.
+        (cfg!(unix) && changed.1 != 0).then_some(Self { device, inode, bytes, changed, blob })
+    }
+
+    /// Time since the change by the clock of this machine; none if the file's machine has another.
+    fn age(&self) -> Duration {
+        let (seconds, nanos) = self.changed;
+        let changed =
+            UNIX_EPOCH + Duration::new(seconds.try_into().unwrap_or(0), nanos.try_into().unwrap_or(0));
+        SystemTime::now().duration_since(changed).unwrap_or_default()
     }
 }
 
@@ -88,10 +96,13 @@ mod tests {
         assert_eq!(store.stamped(&path), None);
         store.stamp(&path, digest);
         assert_eq!(store.stamped(&path), Some(digest));
+        let opened = Opened::open(&path).unwrap();
+        assert_eq!(store.stamped_opened(&path, &opened), Some(digest));
         let modified = std::fs::metadata(&path).unwrap().modified().unwrap();
         std::fs::write(&path, vec![8u8; LARGE as usize]).unwrap();
         std::fs::File::options().write(true).open(&path).unwrap().set_modified(modified).unwrap();
         assert_eq!(store.stamped(&path), None);
+        assert_eq!(store.stamped_opened(&path, &Opened::open(&path).unwrap()), None);
         std::fs::write(&path, b"small").unwrap();
         store.stamp(&path, Digest::of(b"small"));
         assert_eq!(store.stamped(&path), None, "small files are read");

@@ -2,7 +2,7 @@
 
 use crate::atomic::write_once;
 use crate::evict::{Evicted, evict};
-use crate::files::{Files, named, remove};
+use crate::files::{Files, named, remove, touch};
 use crate::lock::{WorkLock, same_file};
 use crate::{Digest, Key, Record, Remote, Tally, last};
 use serde_json::Value;
@@ -11,10 +11,8 @@ use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
-/// Least age of a time of use that is renewed.
-const FRESH: Duration = Duration::from_secs(1);
 /// Share of the cap that a process writes before it looks whether something must go.
 const SHARE: u64 = 64;
 /// Longest time for which no process looks.
@@ -186,17 +184,38 @@ impl Store {
     /// # Errors
     /// When it cannot be written; the store is then as it was.
     pub fn put(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
-        let record = record(key, bytes, true, report);
-        self.put_content(&record, bytes)?;
-        self.put_record(record)
+        let (record, text) = self.put_both(key, bytes, report)?;
+        self.share(&name("blobs", &record.blob), bytes, false);
+        self.share(&name("keys", &key.id()), text.as_bytes(), true);
+        Ok(record)
     }
 
-    /// Keeps only what the content of a key is called, for contents that are quickly made from others.
+    /// As [`Store::put`], but not in the shared store: for what is of use on this machine only.
     ///
     /// # Errors
     /// As [`Store::put`].
-    pub fn put_name(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
-        self.put_record(record(key, bytes, false, report))
+    pub fn put_here(&self, key: &Key, bytes: &[u8], report: Value) -> Result<Record> {
+        self.put_both(key, bytes, report).map(|(record, _)| record)
+    }
+
+    /// Keeps only what the content of a key is called and how many bytes it has, for contents that are quickly made from
+    /// others. `blob` is its hash, or what names it as surely.
+    ///
+    /// # Errors
+    /// As [`Store::put`].
+    pub fn put_name(&self, key: &Key, blob: Digest, bytes: u64, report: Value) -> Result<Record> {
+        let record = Record { key: key.clone(), blob, bytes, whole: false, report };
+        let text = self.put_record(&record)?;
+        self.share(&name("keys", &key.id()), text.as_bytes(), true);
+        Ok(record)
+    }
+
+    fn put_both(&self, key: &Key, bytes: &[u8], report: Value) -> Result<(Record, String)> {
+        let (blob, length) = (Digest::of(bytes), bytes.len() as u64);
+        let record = Record { key: key.clone(), blob, bytes: length, whole: true, report };
+        self.put_content(&record, bytes)?;
+        let text = self.put_record(&record)?;
+        Ok((record, text))
     }
 
     fn put_content(&self, record: &Record, bytes: &[u8]) -> Result<()> {
@@ -212,12 +231,12 @@ impl Store {
             tally.stored += 1;
             tally.stored_bytes += record.bytes;
         }
-        self.share(&name("blobs", &record.blob), bytes, false);
         self.written(record.bytes);
         Ok(())
     }
 
-    fn put_record(&self, record: Record) -> Result<Record> {
+    /// Writes a record; its text.
+    fn put_record(&self, record: &Record) -> Result<String> {
         let (id, text) = (record.key.id(), record.to_text()?);
         let path = self.files.key(&id);
         if !self.write(&path, text.as_bytes())? {
@@ -225,9 +244,8 @@ impl Store {
             remove(&path);
             self.write(&path, text.as_bytes())?;
         }
-        self.share(&name("keys", &id), text.as_bytes(), true);
         self.written(text.len() as u64);
-        Ok(record)
+        Ok(text)
     }
 
     /// Evicts when this process has written much.
@@ -249,9 +267,9 @@ impl Store {
         }
     }
 
-    /// Counts a hit.
-    pub fn count_hit(&self, key: &Key) {
-        lock(&self.tally).hit(key.stage());
+    /// Counts hits of a stage.
+    pub fn count_hits(&self, stage: &str, hits: u64) {
+        lock(&self.tally).hit(stage, hits);
     }
 
     /// Why a key is not there: what differs from the last key of the same source. `source` may be a path: only a
@@ -370,21 +388,8 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn record(key: &Key, bytes: &[u8], whole: bool, report: Value) -> Record {
-    Record { key: key.clone(), blob: Digest::of(bytes), bytes: bytes.len() as u64, whole, report }
-}
-
 /// As [`Files`] have it, with slashes on all systems.
 fn name(kind: &str, digest: &Digest) -> String {
     let hex = digest.hex();
     format!("{kind}/{}/{hex}", &hex[..2])
-}
-
-/// Renews the time of use; a store of others, which cannot be written, is read all the same.
-fn touch(path: &Path) {
-    let Ok(file) = File::open(path) else { return };
-    let used = file.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
-    if used.is_none_or(|age| age > FRESH) {
-        let _ = file.set_modified(SystemTime::now());
-    }
 }

@@ -33,8 +33,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub(crate) fn hit(&mut self, stage: &str) {
-        *self.hits.entry(stage.to_owned()).or_default() += 1;
+    pub(crate) fn hit(&mut self, stage: &str, hits: u64) {
+        *self.hits.entry(stage.to_owned()).or_default() += hits;
     }
 
     pub(crate) fn miss(&mut self, stage: &str, reasons: &[String]) {
@@ -110,7 +110,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let files = Files::open(folder.path()).unwrap();
         let mut one = Tally { stored: 1, ..Tally::default() };
-        one.hit("bvh");
+        one.hit("bvh", 1);
         one.miss("tets", &["quality: fast -> best".to_owned(), "source".to_owned()]);
         let mut expected = Tally::default();
         for round in 0..1000 {

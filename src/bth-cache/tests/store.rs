@@ -158,7 +158,8 @@ fn the_size_is_kept_without_being_asked() {
 fn names_without_contents_go_with_contents_of_their_age() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path(), LARGE).unwrap();
-    let record = store.put_name(&key("scene"), b"put together from others", json!(null)).unwrap();
+    let record =
+        store.put_name(&key("scene"), Digest::of(b"put together from others"), 24, json!(null)).unwrap();
     put(&store, "a", 1000);
     assert!(!store.holds(&record) && store.read(&record).is_none());
     store.evict(LARGE);

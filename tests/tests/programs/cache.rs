@@ -12,7 +12,7 @@ pub(crate) fn cached(folder: &Path, args: &[&str]) -> Run {
 }
 
 /// What a compilation found in the cache, by stage, and what it missed, as `stage part`.
-fn found(json: &Value) -> (Vec<String>, Vec<String>) {
+pub(crate) fn found(json: &Value) -> (Vec<String>, Vec<String>) {
     let hits = json["cache"]["hits"].as_object().unwrap();
     let text = |v: &Value| v.as_str().unwrap().to_owned();
     let misses = json["cache"]["misses"].as_array().unwrap().iter();
@@ -20,7 +20,7 @@ fn found(json: &Value) -> (Vec<String>, Vec<String>) {
     (hits.iter().map(|(stage, n)| format!("{stage} {n}")).collect(), misses.collect())
 }
 
-fn compile(folder: &Path, args: &[&str]) -> Value {
+pub(crate) fn compile(folder: &Path, args: &[&str]) -> Value {
     let all = [&["compile", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5"], args].concat();
     cached(folder, &all).expect(0).json()
 }

@@ -10,6 +10,7 @@ mod inspect;
 mod interrupt;
 mod pipelines;
 mod play;
+mod previous;
 #[cfg(unix)]
 mod recipes;
 mod scenes;

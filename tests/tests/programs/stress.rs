@@ -42,6 +42,8 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
             expected.insert((input.as_str(), i), std::fs::read(path.join("expected.bth")).unwrap());
         }
     }
+    let temporary = &path.join("temporary");
+    std::fs::create_dir(temporary).unwrap();
     let end = Instant::now() + Duration::from_secs_f64(seconds());
     let (inputs, options, expected) = (&inputs, &options, &expected);
     let (kills, whole) = std::thread::scope(|scope| {
@@ -58,6 +60,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
                         ["compile", input, "-o", &output, "-q", "--cache-size", "400k", "--threads", "1"];
                     let mut command = command("bthc", path, &[&args, options[choice]].concat());
                     command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", path.join("cache"));
+                    command.env("TMPDIR", temporary);
                     let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
                     if rng.below(2) == 0 {
                         std::thread::sleep(Duration::from_millis(rng.below(60)));
@@ -76,7 +79,10 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
                             options[choice]
                         );
                     }
-                    let _ = std::fs::remove_file(path.join(&output));
+                    // What stays is what the next may take unchanged objects from.
+                    if rng.below(2) == 0 {
+                        let _ = std::fs::remove_file(path.join(&output));
+                    }
                 }
                 (kills, whole)
             }
@@ -87,6 +93,12 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
     });
     println!("{whole} compilations ended, {kills} were killed");
     assert!(kills > 0 && whole > 0);
+    assert_eq!(
+        files(temporary),
+        [""; 0],
+        "killed compilers and their workers leave nothing, not even folders"
+    );
+    assert_eq!(std::fs::read_dir(temporary).unwrap().count(), 0);
     let partial = |name: &String| name.ends_with(".bth-part");
     let left = || files(&path.join("cache")).into_iter().filter(partial).collect::<Vec<_>>();
     // None where files can be written without a name.

@@ -22,6 +22,7 @@ const COSTS: &str = "3";
 const TETS: &str = "1";
 const COLLAPSE: &str = "1";
 const FILE: &str = "2";
+const OUTLINE: &str = "1";
 
 /// A mesh read from a model. The extension decides in which format the file is read, if it is a known one.
 pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, keep: Keep) -> Key {
@@ -139,6 +140,16 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, t
         .with("objects", objects.finish().hex())
         .with_all(components(options, tetgen))
         .with("mesh version", MESH)
+        .with("bthc", env!("CARGO_PKG_VERSION"))
+}
+
+/// What is in the file of a scene, by what names the file.
+pub(crate) fn outline(named: &Digest, options: &Options, tetgen: &str) -> Key {
+    Key::new("outline")
+        .with("file", named.hex())
+        .with_all(components(options, tetgen))
+        .with("mesh version", MESH)
+        .with("outline version", OUTLINE)
         .with("bthc", env!("CARGO_PKG_VERSION"))
 }
 

@@ -11,17 +11,19 @@ mod rows;
 mod sources;
 mod tree;
 
-pub(crate) use keys::{ObjectKeys, bvh, extension, file, geometry, marks, mesh, scene, tets_of_node};
+pub(crate) use keys::{
+    ObjectKeys, bvh, extension, file, geometry, marks, mesh, outline, scene, tets_of_node,
+};
 pub use log::{Log, Miss};
 pub(crate) use results::MeshFacts;
+pub(crate) use rows::{Parts, Rows};
 pub use sources::{SourceDigest, files};
 pub(crate) use tree::Topology;
 
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::tets;
-use bth_cache::{Key, Record, Store, WorkLock};
-use rows::{Parts, Rows};
+use bth_cache::{Digest, Key, Record, Store, WorkLock};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -141,11 +143,17 @@ impl<'a> Cache<'a> {
     pub(crate) fn put_name(
         &self,
         key: &Key,
-        bytes: &[u8],
+        (blob, bytes): (Digest, u64),
         report: &serde_json::Value,
         monitor: &dyn Monitor,
     ) -> Option<Record> {
-        self.say(key, "", self.store?.put_name(key, bytes, report.clone()), monitor)
+        self.say(key, "", self.store?.put_name(key, blob, bytes, report.clone()), monitor)
+    }
+
+    /// Keeps a content that is of use on this machine only, and of which no miss is ever explained.
+    pub(crate) fn keep_here(&self, key: &Key, bytes: &[u8], monitor: &dyn Monitor) {
+        let Some(store) = self.store else { return };
+        self.warn_of(store.put_here(key, bytes, serde_json::Value::Null), monitor);
     }
 
     fn say(
@@ -157,6 +165,12 @@ impl<'a> Cache<'a> {
     ) -> Option<Record> {
         let store = self.store?;
         store.note_last(key, &self.subject_of(part));
+        self.warn_of(kept, monitor)
+    }
+
+    /// Passes on what was kept; says so, once, when something could not be.
+    fn warn_of(&self, kept: std::io::Result<Record>, monitor: &dyn Monitor) -> Option<Record> {
+        let store = self.store?;
         notes(store, monitor);
         match kept {
             Ok(record) => Some(record),
@@ -205,13 +219,20 @@ impl<'a> Cache<'a> {
     /// Counts a hit.
     pub(crate) fn hit(&self, key: &Key, part: &str) {
         if let Some(store) = self.store {
-            store.count_hit(key);
             // Of a scene's thousand objects only those that were built are noted.
             if part.is_empty() {
                 store.note_last(key, &self.subject_of(part));
             }
         }
-        *self.lock_log().hits.entry(key.stage().to_owned()).or_default() += 1;
+        self.hits(key.stage(), 1);
+    }
+
+    /// Counts hits of a stage.
+    pub(crate) fn hits(&self, stage: &str, hits: u64) {
+        if let Some(store) = self.store.filter(|_| hits > 0) {
+            store.count_hits(stage, hits);
+            *self.lock_log().hits.entry(stage.to_owned()).or_default() += hits;
+        }
     }
 
     /// Counts a miss, and says what differs.

@@ -4,16 +4,18 @@ use super::{Clock, Options, Report, Structure, compile_model, over, say};
 use crate::cached::{self, Cache, Miss, SourceDigest};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
+use crate::write::Content;
 use bth_cache::{Key, Record};
 use serde::Deserialize;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// What came of a compilation.
 #[derive(Debug)]
 pub struct Outcome<R> {
     /// The compiled file; absent when the cache has it and it was not needed.
-    pub bytes: Option<Vec<u8>>,
+    pub content: Option<Content>,
     /// What the stages did, if they did anything.
     pub built: Option<R>,
     /// The record of the compiled file, if it is kept.
@@ -78,7 +80,7 @@ pub fn compile_cached(
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
     let outcome = through(cache, key.as_ref(), needed, monitor, || {
         let (compiled, report) = compile_model(source, &digest, options, cache, monitor, clock)?;
-        Ok((compiled.bytes, report, true))
+        Ok((compiled.bytes.into(), report, true))
     })?;
     let file = super::FileReport::deserialize(&outcome.report["file"]).ok();
     say(file.and_then(|file| over(&file, options)), monitor);
@@ -123,7 +125,7 @@ pub(crate) fn through<R: serde::Serialize>(
     key: Option<&Key>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
-    build: impl FnOnce() -> Result<(Vec<u8>, R, bool)>,
+    build: impl FnOnce() -> Result<(Content, R, bool)>,
 ) -> Result<Outcome<R>> {
     let _working = match key {
         Some(key) => {
@@ -141,16 +143,26 @@ pub(crate) fn through<R: serde::Serialize>(
         }
         None => None,
     };
-    let (bytes, built, keep) = build()?;
+    let (content, built, keep) = build()?;
     let report = serde_json::to_value(&built).map_err(|e| Error::Internal {
         code: "BTH-X081",
         message: format!("the report cannot be written: {e}"),
     })?;
-    let record = key.and_then(|key| match keep {
-        true => cache.put(key, "", &bytes, &report, monitor),
-        false => cache.put_name(key, &bytes, &report, monitor),
-    });
-    Ok(Outcome { bytes: Some(bytes), built: Some(built), record, report })
+    let record = match (key, keep) {
+        (Some(key), true) => cache.put(key, "", &joined(&content)?, &report, monitor),
+        (Some(key), false) => cache.put_name(key, (content.name(), content.length()), &report, monitor),
+        (None, _) => None,
+    };
+    Ok(Outcome { content: Some(content), built: Some(built), record, report })
+}
+
+/// All bytes of a file that was put together.
+pub(crate) fn joined(content: &Content) -> Result<Cow<'_, [u8]>> {
+    content.bytes().map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: "the file that was there".into(),
+        message: format!("cannot read: {e}"),
+    })
 }
 
 fn kept<R>(
@@ -160,8 +172,8 @@ fn kept<R>(
     monitor: &dyn Monitor,
 ) -> Option<Outcome<R>> {
     let record = cache.find(key, monitor)?;
-    let bytes = if needed(&record) { Some(cache.read(&record, monitor)?) } else { None };
+    let content = if needed(&record) { Some(cache.read(&record, monitor)?.into()) } else { None };
     cache.hit(key, "");
     cache.store()?.touch(&record);
-    Some(Outcome { bytes, built: None, report: record.report.clone(), record: Some(record) })
+    Some(Outcome { content, built: None, report: record.report.clone(), record: Some(record) })
 }

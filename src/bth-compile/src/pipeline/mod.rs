@@ -8,7 +8,7 @@ pub(crate) mod provenance;
 mod structure;
 
 pub use kept::{Foreseen, Outcome, compile_cached, foresee};
-pub(crate) use kept::{tetgen, through};
+pub(crate) use kept::{joined, tetgen, through};
 pub use limit::storage;
 pub(crate) use limit::{over, say};
 pub use options::{Options, Structure};

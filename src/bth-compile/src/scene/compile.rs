@@ -1,6 +1,8 @@
 //! A manifest into a file: objects that may be seen, then the scene.
 
 use super::objects::{self, ObjectReport, Objects};
+use super::outline::Outline;
+use super::previous::{self, Previous};
 use super::{encode, meshes, sources, visible, weights};
 use crate::cached::{self, Cache, ObjectKeys};
 use crate::costs;
@@ -8,7 +10,7 @@ use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
 use crate::pipeline::{self, Clock, Compiled, Foreseen, Options, Outcome, StageTime, Structure, provenance};
 use crate::tets::WorkerStatus;
-use crate::write::{self, FileBuilder, SceneParts};
+use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
 use bth_scene::Manifest;
 use serde::{Deserialize, Serialize};
@@ -63,6 +65,8 @@ pub(super) struct Context<'a> {
     pub(super) monitor: &'a dyn Monitor,
     /// The scene's rays for each object of the file, if they count.
     pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
+    /// What an earlier compilation left where this one will write.
+    pub(super) previous: Option<Arc<Previous>>,
 }
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` stands for the scene in messages.
@@ -76,13 +80,13 @@ pub fn compile(
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
-    let context =
-        Context { options, cache: &Cache::none(), tetgen: None, keys: None, monitor, weights: None };
+    let cache = Cache::none();
+    let context = Context::of(options, &cache, None, monitor);
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, folder, &mut clock)?;
-    let (compiled, report) = build(manifest, &plan, name, &context, clock)?;
+    let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
     pipeline::say(over(&report.objects, options), monitor);
-    Ok((compiled, report))
+    Ok((Compiled { bytes: pipeline::joined(&content)?.into_owned() }, report))
 }
 
 /// Where a scene is.
@@ -101,6 +105,8 @@ pub struct Keep<'a> {
     pub whole: bool,
     /// Whether the bytes of a file that is kept are needed.
     pub needed: &'a dyn Fn(&Record) -> bool,
+    /// Where the file will be written: if the last one is still there, what has not changed is taken from it.
+    pub target: Option<&'a Path>,
 }
 
 /// Compiles a scene, or takes what was made of the same content before.
@@ -115,13 +121,19 @@ pub fn compile_cached(
     keep: Keep<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Outcome<SceneReport>> {
-    let context = Context::new(options, cache, monitor)?;
+    let mut context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, place.folder, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
     let outcome = pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
-        let (compiled, report) = build(manifest, &plan, place.name, &context, clock)?;
-        Ok((compiled.bytes, report, keep.whole))
+        // With the scene's rays an object depends on all others.
+        let target = keep.target.filter(|_| !options.costs.for_scene);
+        context.previous = target.and_then(|path| Previous::open(path, &context)).map(Arc::new);
+        let (content, report, outline) = build(manifest, &plan, place.name, &context, clock)?;
+        if target.is_some() {
+            previous::keep(&content.name(), &outline, &context);
+        }
+        Ok((content, report, keep.whole))
     })?;
     let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
     pipeline::say(over(&objects, options), monitor);
@@ -215,12 +227,12 @@ impl<'a> Context<'a> {
         monitor: &'a dyn Monitor,
     ) -> Self {
         let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Self { options, cache, tetgen, keys, monitor, weights: None }
+        Self { options, cache, tetgen, keys, monitor, weights: None, previous: None }
     }
 
     /// With somebody else who watches.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, ref weights, .. } = *self;
+        let Self { options, cache, ref tetgen, ref keys, ref weights, ref previous, .. } = *self;
         Context {
             options,
             cache,
@@ -228,6 +240,7 @@ impl<'a> Context<'a> {
             keys: keys.clone(),
             monitor,
             weights: weights.clone(),
+            previous: previous.clone(),
         }
     }
 }
@@ -260,7 +273,7 @@ fn build(
     name: &Path,
     context: &Context<'_>,
     mut clock: Clock,
-) -> Result<(Compiled, SceneReport)> {
+) -> Result<(Content, SceneReport, Outline)> {
     let options = context.options;
     let weighed;
     let context = match options.costs.for_scene && options.structure == Structure::Bth {
@@ -279,15 +292,15 @@ fn build(
         _ => None,
     };
     let provenance = provenance::of_scene(&objects.sources, tetgen, options)?;
-    let bytes = clock.time("file", || {
+    let (content, outline) = clock.time("file", || {
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
         builder.provenance(provenance)?;
         builder.check_limits()?;
-        let bytes = builder.finish();
-        check(&objects, &parts, &bytes, name)?;
-        Ok::<_, Error>(bytes)
+        let (content, table) = builder.content();
+        check(&objects, &parts, &content, name)?;
+        Ok::<_, Error>((content, objects.outline_of(&table)))
     })?;
 
     let triangles = |object: u32| objects.reports[object as usize].triangles;
@@ -305,23 +318,23 @@ fn build(
         rate: manifest.frames.rate,
         triangles: objects.reports.iter().map(|o| o.triangles).sum(),
         instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
-        bytes: bytes.len() as u64,
+        bytes: content.length(),
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),
         objects: objects.reports,
     };
-    Ok((Compiled { bytes }, report))
+    Ok((content, report, outline))
 }
 
 /// Checks what was put together as a reader will, without looking at the objects again: their sections have been checked
 /// one by one.
-fn check(objects: &Objects, parts: &SceneParts, bytes: &[u8], name: &Path) -> Result<()> {
+fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
     let mut outline = FileBuilder::new();
     objects.outline(&mut outline)?;
     write::scene(&mut outline, parts)?;
     let first_frame = |bytes: &[u8]| bth::File::from_bytes(bytes)?.check_first_frame();
     // Places in messages are those in the whole file.
-    let whole = |error| first_frame(bytes).err().unwrap_or(error);
+    let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
     first_frame(&outline.finish()).map_err(|e| refused(name, &whole(e)))
 }
 
@@ -339,8 +352,8 @@ fn rays(
         Options { structure: Structure::Bvh, geometry: true, costs, coordinates, ..context.options.clone() };
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
-    let (compiled, _) = build(manifest, plan, name, &plain, Clock::default())?;
-    let mut scene = bth::from_bytes(&compiled.bytes).map_err(|e| refused(name, &e))?;
+    let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;
+    let mut scene = bth::from_bytes(&pipeline::joined(&content)?).map_err(|e| refused(name, &e))?;
     Ok(weights::weights(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 

@@ -8,7 +8,10 @@ mod import_tracks;
 mod meshes;
 mod object;
 mod objects;
+mod outline;
+mod previous;
 mod sources;
+mod stored;
 mod visible;
 mod weights;
 

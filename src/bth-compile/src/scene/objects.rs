@@ -4,19 +4,23 @@ use super::at_once::at_once;
 use super::compile::Context;
 use super::meshes::{self, Found};
 use super::object::{self, Built};
+use super::outline::{Hash, ObjectRow, Outline, PartRow, SectionRow};
+use super::previous::Previous;
 use super::sources::File;
+use super::stored::Stored;
 use crate::cached::MeshFacts;
 use crate::error::{Error, Place, Result};
 use crate::pipeline::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
-use bth::layout::kind;
+use bth::layout::{self, SectionEntry, kind};
 use bth_cache::Digest;
 use bth_scene::Manifest;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
+use zerocopy::IntoBytes;
 
 /// Objects with more triangles keep all threads busy by themselves, and are compiled one after another.
 const LARGE: u64 = 1 << 17;
@@ -52,14 +56,8 @@ pub(super) struct Objects {
     pub(super) sources: Vec<(String, String)>,
     /// What became of the worker, where one was needed.
     pub(super) worker: Option<tets::WorkerStatus>,
-}
-
-/// The sections of an object, every index of which has been checked.
-struct Stored {
-    file: Arc<bth::File>,
-    object: u32,
-    /// Whether the hashes of the sections are known to be right: not in files of the user.
-    hashed: bool,
+    /// What each part of a mesh file is, its format and the object that it became.
+    parts: Vec<(Hash, String, u32)>,
 }
 
 /// An object that comes from a mesh.
@@ -67,6 +65,14 @@ struct Task<'a> {
     file: &'a File<'a>,
     mesh: Found,
     number: usize,
+    content: blake3::Hash,
+}
+
+/// A part of a source.
+enum Part {
+    /// The file that was there tells its format and its object there.
+    Known(String, u32),
+    Mesh(Box<Found>),
 }
 
 /// Reads and builds the objects that are used, or takes them from the cache.
@@ -81,31 +87,55 @@ pub(super) fn build(
     // Copied objects have their place, the others get it when they are built.
     let mut places: Vec<Option<(Stored, ObjectReport)>> = Vec::new();
     let mut tasks = Vec::new();
-    for (file, meshes) in sources.iter().zip(read(sources, context, clock)?) {
+    let mut taken = 0;
+    for (file, parts) in sources.iter().zip(read(sources, context, clock)?) {
         if file.compiled {
             objects.sources.push(("bth".to_owned(), file.digest.file.hex()));
             copy(&mut objects, &mut places, manifest, file, &mut of_content)?;
             continue;
         }
-        let format = meshes.first().map_or(String::new(), |m| m.facts.report.format.clone());
-        objects.sources.push((format, file.digest.file.hex()));
-        for ((_, rows), mesh) in file.parts.iter().zip(meshes) {
-            let number = match of_content.entry(content(&mesh.facts)) {
+        let format = match parts.first() {
+            Some(Part::Known(format, _)) => format.clone(),
+            Some(Part::Mesh(mesh)) => mesh.facts.report.format.clone(),
+            None => String::new(),
+        };
+        objects.sources.push((format.clone(), file.digest.file.hex()));
+        for ((part, rows), what) in file.parts.iter().zip(parts) {
+            let (old, content) = find(&what, context);
+            let number = match of_content.entry(content) {
                 Entry::Occupied(there) => *there.get(),
                 Entry::Vacant(free) => {
                     let number = places.len();
-                    tasks.push(Task { file, mesh, number });
-                    places.push(None);
+                    match (old, what) {
+                        (Some((file, object)), _) => {
+                            taken += 1;
+                            objects.note_worker(file.outline.worker_of(object).clone());
+                            places.push(Some((
+                                Stored::Old { file: file.clone(), object },
+                                file.outline.report_of(object),
+                            )));
+                        }
+                        (None, Part::Mesh(mesh)) => {
+                            tasks.push(Task { file, mesh: *mesh, number, content });
+                            places.push(None);
+                        }
+                        (None, Part::Known(..)) => {
+                            unreachable!("what is known is in the file that was there")
+                        }
+                    }
                     *free.insert(number as u32)
                 }
             };
+            objects.parts.push((part_hash(file, *part), format.clone(), number));
             rows.iter().for_each(|row| objects.number[*row] = Some(number));
         }
     }
-    for (number, built) in build_all(tasks, context, clock)? {
-        objects.note_worker(built.facts.worker);
-        let stored = Stored { file: Arc::new(built.file), object: 0, hashed: true };
-        places[number] = Some((stored, built.facts.object));
+    context.cache.hits("object", taken);
+    for (number, content, built) in build_all(tasks, context, clock)? {
+        objects.note_worker(built.facts.worker.clone());
+        let made = Some((content, built.facts.worker));
+        places[number] =
+            Some((Stored::Read { file: Arc::new(built.file), object: 0, made }, built.facts.object));
     }
     (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
@@ -119,23 +149,71 @@ pub(super) fn build(
     Ok(objects)
 }
 
-/// The meshes of all files, in order; none of compiled ones.
-fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Found>>> {
+/// The parts of all files, in order; none of compiled ones.
+fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
+    let mut all: Vec<Option<Vec<Part>>> = sources.iter().map(|file| known(file, context)).collect();
     let bytes = |file: &&File<'_>| std::fs::metadata(&file.full).map_or(0, |m| m.len());
     // The file and what is made of it.
     let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
-    at_once(sources.iter().collect(), context, clock, estimate, |context, clock, file| match file.compiled {
-        true => Ok(Vec::new()),
-        false => clock.time("mesh", || meshes::read(file, context)),
-    })
+    let unknown =
+        sources.iter().zip(&all).filter(|(_, known)| known.is_none()).map(|(file, _)| file).collect();
+    let found = at_once(unknown, context, clock, estimate, |context, clock, file| {
+        clock.time("mesh", || meshes::read(file, context))
+    })?;
+    let meshes =
+        found.into_iter().map(|meshes| meshes.into_iter().map(|mesh| Part::Mesh(Box::new(mesh))).collect());
+    all.iter_mut()
+        .filter(|known| known.is_none())
+        .zip(meshes)
+        .for_each(|(place, meshes)| *place = Some(meshes));
+    Ok(all.into_iter().flatten().collect())
+}
+
+/// The parts of a file, if it need not be read: it is a compiled one, or the file that was there has all of them.
+fn known(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
+    if file.compiled {
+        return Some(Vec::new());
+    }
+    let previous = context.previous.as_ref()?;
+    let part = |number: Option<u32>| {
+        let row = previous.outline.part(&part_hash(file, number))?;
+        let format = previous.outline.formats[row.format as usize].clone();
+        previous.has(row.object).then_some(Part::Known(format, row.object))
+    };
+    file.parts.iter().map(|(number, _)| part(*number)).collect()
+}
+
+/// Where the file that was there has an object, and what makes it equal to others.
+fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>, u32)>, blake3::Hash) {
+    let previous = context.previous.as_ref();
+    match part {
+        Part::Known(_, object) => {
+            let hash = previous.map_or([0; 32], |p| p.outline.objects[*object as usize].content);
+            (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
+        }
+        Part::Mesh(mesh) => {
+            let content = content(&mesh.facts);
+            let old = previous.and_then(|p| Some((p, p.outline.object_of(content.as_bytes())?)));
+            (old.filter(|(p, object)| p.has(*object)), content)
+        }
+    }
+}
+
+/// What a part of a source is.
+fn part_hash(file: &File<'_>, part: Option<u32>) -> Hash {
+    *blake3::hash(file.content(part).as_bytes()).as_bytes()
 }
 
 /// Builds objects: large ones one by one, the others at once. With the number of each.
-fn build_all(tasks: Vec<Task<'_>>, context: &Context<'_>, clock: &mut Clock) -> Result<Vec<(usize, Built)>> {
+fn build_all(
+    tasks: Vec<Task<'_>>,
+    context: &Context<'_>,
+    clock: &mut Clock,
+) -> Result<Vec<(usize, blake3::Hash, Built)>> {
     let triangles = |task: &Task<'_>| task.mesh.facts.report.triangles;
     let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
         let built = object::build(task.file, &mut task.mesh, context, task.number, clock)?;
-        Ok((task.number, built))
+        Ok((task.number, task.content, built))
     };
     let (large, small): (Vec<_>, Vec<_>) = tasks.into_iter().partition(|task| triangles(task) > LARGE);
     let mut built = large.into_iter().map(|task| one(context, clock, task)).collect::<Result<Vec<_>>>()?;
@@ -198,7 +276,7 @@ fn copy(
                 copied: true,
                 ..ObjectReport::default()
             };
-            places.push(Some((Stored { file: read.clone(), object, hashed: false }, report)));
+            places.push(Some((Stored::Read { file: read.clone(), object, made: None }, report)));
             places.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
@@ -215,39 +293,60 @@ impl Objects {
     }
 
     /// Adds the sections of all objects.
-    pub(super) fn write<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<()> {
+    pub(super) fn write(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
-            for section in stored.sections() {
-                let (e, number) = (section.entry, number as u32);
-                match stored.hashed {
-                    true => builder.hashed_section(e.kind, number, e.stride, section.bytes.into(), e.hash)?,
-                    false => builder.section(e.kind, number, e.stride, section.bytes)?,
-                };
-            }
+            stored.write(number as u32, builder)?;
         }
         Ok(())
     }
 
     /// Adds the OBJECT rows only: all that placing instances needs.
-    pub(super) fn outline<'a>(&'a self, builder: &mut FileBuilder<'a>) -> Result<()> {
+    pub(super) fn outline(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
-            for section in stored.sections().filter(|s| s.entry.kind == kind::OBJECT) {
-                builder.section(kind::OBJECT, number as u32, section.entry.stride, section.bytes)?;
+            if let Some(row) = stored.row() {
+                let stride = size_of::<layout::Object>() as u32;
+                builder.section(kind::OBJECT, number as u32, stride, row.as_bytes().to_vec())?;
             }
         }
         Ok(())
     }
-}
 
-impl Stored {
-    /// Its sections; kinds that we do not know may mean what we would break.
-    fn sections(&self) -> impl Iterator<Item = bth::file::SectionView<'_>> {
-        let known = |e: &bth::layout::SectionEntry| bth::file::kind_stride(e.kind).is_some();
-        self.file.sections().filter(move |s| s.entry.object == self.object && known(s.entry))
-    }
-
-    /// Bytes of those that tracing reads.
-    fn resident_bytes(&self) -> u64 {
-        self.sections().map(|s| s.entry).filter(|e| e.kind <= kind::TRIANGLE_HOMES).map(|e| e.length).sum()
+    /// What the next compilation can take from the file with this section table. Without what was copied from files of the user.
+    pub(super) fn outline_of(&self, table: &[SectionEntry]) -> Outline {
+        let mut outline = Outline::default();
+        let mut rows = vec![None; self.stored.len()];
+        for (number, (stored, report)) in self.stored.iter().zip(&self.reports).enumerate() {
+            let (Some((content, worker)), Some(object)) = (stored.made(), stored.row()) else { continue };
+            let first = outline.sections.len() as u32;
+            let start = table.partition_point(|e| e.object < number as u32);
+            let sections = table[start..].iter().take_while(|e| e.object == number as u32);
+            outline.sections.extend(sections.map(|e| SectionRow {
+                kind: e.kind,
+                stride: e.stride,
+                offset: e.offset,
+                length: e.length,
+                hash: e.hash,
+            }));
+            rows[number] = Some(outline.objects.len() as u32);
+            outline.objects.push(ObjectRow {
+                content,
+                triangles: report.triangles,
+                degenerate: report.degenerate,
+                tet_leaves: report.tet_leaves,
+                tet_triangles: report.tet_triangles,
+                object,
+                first,
+                sections: outline.sections.len() as u32 - first,
+                worker: Outline::word(&mut outline.workers, worker),
+                reserved: 0,
+            });
+        }
+        for (part, format, number) in &self.parts {
+            if let Some(object) = rows[*number as usize] {
+                let format = Outline::word(&mut outline.formats, format);
+                outline.parts.push(PartRow { part: *part, object, format });
+            }
+        }
+        outline
     }
 }

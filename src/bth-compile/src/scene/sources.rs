@@ -27,6 +27,11 @@ impl File<'_> {
         part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
     }
 
+    /// What a part of it is, wherever the file lies.
+    pub(super) fn content(&self, part: Option<u32>) -> String {
+        format!("{} {} {}", self.digest.text(), self.part(part), cached::extension(&self.full))
+    }
+
     /// What stands for a part of it when misses of the cache are explained.
     pub(super) fn name_of(&self, part: Option<u32>) -> String {
         format!("{} {}", self.path, self.part(part))
@@ -38,8 +43,7 @@ pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String>
     let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
     for file in sources {
         for (part, rows) in &file.parts {
-            let name =
-                format!("{} {} {}", file.digest.text(), file.part(*part), cached::extension(&file.full));
+            let name = file.content(*part);
             rows.iter().for_each(|row| contents[*row].clone_from(&name));
         }
     }

@@ -1,5 +1,6 @@
 //! Files that are whole or absent; how is `bth_cache`'s affair.
 
+use super::Content;
 use crate::error::{Error, Result};
 use std::io::Write;
 use std::path::Path;
@@ -20,9 +21,17 @@ pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {
-    bth_cache::replace(path, write).map_err(|e| Error::File {
-        code: "BTH-O020",
-        path: path.to_owned(),
-        message: format!("cannot write: {e}"),
-    })
+    bth_cache::replace(path, write).map_err(|e| cannot(path, &e))
+}
+
+/// As [`write_atomically`]. What is in other files is copied by the system.
+///
+/// # Errors
+/// As [`write_atomically`]; also when such a file cannot be read or has changed.
+pub fn write_content(path: &Path, content: &Content) -> Result<()> {
+    bth_cache::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
+}
+
+fn cannot(path: &Path, error: &std::io::Error) -> Error {
+    Error::File { code: "BTH-O020", path: path.to_owned(), message: format!("cannot write: {error}") }
 }

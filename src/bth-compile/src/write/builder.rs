@@ -1,12 +1,12 @@
 //! Lays sections out behind header and table. The same sections give the same bytes in whatever
 //! order they are added.
 
+use super::content::{Bytes, Content};
 use crate::error::{Error, Result};
 use bth::file::{content_id, hash128};
 use bth::layout::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::Write;
 use zerocopy::IntoBytes;
 
 /// Collects the sections of a file.
@@ -14,6 +14,8 @@ use zerocopy::IntoBytes;
 pub struct FileBuilder<'a> {
     /// By (object, kind), the order of the table.
     sections: BTreeMap<(u32, u32), Section<'a>>,
+    /// What the objects need of a reader.
+    required_features: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -21,7 +23,7 @@ struct Section<'a> {
     flags: u32,
     stride: u32,
     hash: [u8; 16],
-    bytes: Cow<'a, [u8]>,
+    bytes: Bytes<'a>,
 }
 
 impl<'a> FileBuilder<'a> {
@@ -50,22 +52,23 @@ impl<'a> FileBuilder<'a> {
             )));
         }
         let hash = hash128(&bytes);
-        self.hashed_section(kind, object, stride, bytes, hash)
+        let coordinates = coordinates_of(kind, &bytes);
+        self.known_section(Known { kind, object, stride, hash }, coordinates, Bytes::Here(bytes))
     }
 
-    /// As [`Self::section`], for bytes whose hash is known already.
+    /// As [`Self::section`], for a section whose hash is known already. `coordinates` is that field of the row, if it is an
+    /// OBJECT section.
     ///
     /// # Errors
     /// As [`Self::section`].
-    pub(crate) fn hashed_section(
+    pub(crate) fn known_section(
         &mut self,
-        kind: u32,
-        object: u32,
-        stride: u32,
-        bytes: Cow<'a, [u8]>,
-        hash: [u8; 16],
+        Known { kind, object, stride, hash }: Known,
+        coordinates: Option<u32>,
+        bytes: Bytes<'a>,
     ) -> Result<&mut Self> {
         let flags = if kind::is_required(kind) { SECTION_REQUIRED } else { 0 };
+        self.required_features |= coordinates.map_or(0, features);
         let before = self.sections.insert((object, kind), Section { flags, stride, hash, bytes });
         match before {
             None => Ok(self),
@@ -122,18 +125,38 @@ impl<'a> FileBuilder<'a> {
     }
 
     /// The whole file in memory.
+    ///
+    /// # Panics
+    /// When a section is still in another file.
     pub fn finish(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.file_length() as usize);
-        self.write_to(&mut bytes).expect("a vector takes all bytes");
+        let entries = self.entries();
+        bytes.extend(self.head(&entries));
+        for (entry, section) in entries.iter().zip(self.sections.values()) {
+            bytes.resize(entry.offset as usize, 0);
+            bytes.extend_from_slice(
+                section.bytes.in_memory().expect("the bytes of all sections are in memory"),
+            );
+        }
+        bytes.resize(self.file_length() as usize, 0);
         bytes
     }
 
-    /// Writes the whole file.
-    ///
-    /// # Errors
-    /// Those of the writer.
-    pub fn write_to(&self, out: &mut dyn Write) -> std::io::Result<()> {
+    /// The file, ready to be written, and its section table.
+    pub(crate) fn content(self) -> (Content, Vec<SectionEntry>) {
         let entries = self.entries();
+        let mut content = Content::new(self.head(&entries));
+        let length = self.file_length();
+        for (entry, section) in entries.iter().zip(self.sections.into_values()) {
+            content.pad_to(entry.offset);
+            content.push(section.bytes);
+        }
+        content.pad_to(length);
+        (content, entries)
+    }
+
+    /// Header and section table.
+    fn head(&self, entries: &[SectionEntry]) -> Vec<u8> {
         let mut header = Header {
             identifier: IDENTIFIER,
             writer_version: WRITER_VERSION,
@@ -142,37 +165,14 @@ impl<'a> FileBuilder<'a> {
             section_offset: size_of::<Header>() as u64,
             section_count: entries.len() as u32,
             reserved: 0,
-            required_features: self.required_features(),
+            required_features: self.required_features,
             optional_features: 0,
-            content_id: content_id(&entries),
+            content_id: content_id(entries),
             table_hash: hash128(entries.as_bytes()),
             header_hash: [0; 16],
         };
         header.header_hash = hash128(&header.as_bytes()[..std::mem::offset_of!(Header, header_hash)]);
-        out.write_all(header.as_bytes())?;
-        out.write_all(entries.as_bytes())?;
-        let mut at = self.table_end();
-        let zeros = [0; ALIGNMENT];
-        for (entry, section) in entries.iter().zip(self.sections.values()) {
-            out.write_all(&zeros[..(entry.offset - at) as usize])?;
-            out.write_all(&section.bytes)?;
-            at = entry.offset + entry.length;
-        }
-        out.write_all(&zeros[..(header.file_length - at) as usize])
-    }
-
-    /// What the objects need.
-    fn required_features(&self) -> u64 {
-        let at = std::mem::offset_of!(Object, coordinates);
-        let objects = self.sections.iter().filter(|((_, kind), _)| *kind == kind::OBJECT);
-        let codes = objects.filter_map(|(_, section)| {
-            let bytes = section.bytes.get(at..at + 4)?;
-            Some(u32::from_le_bytes(bytes.try_into().ok()?))
-        });
-        codes.fold(0, |features, code| {
-            let grid = if code & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
-            features | grid | if code & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }
-        })
+        [header.as_bytes(), entries.as_bytes()].concat()
     }
 
     fn table_end(&self) -> u64 {
@@ -183,7 +183,7 @@ impl<'a> FileBuilder<'a> {
         let mut end = self.table_end();
         let entry = |(&(object, kind), section): (&(u32, u32), &Section)| {
             let offset = end.next_multiple_of(ALIGNMENT as u64);
-            let length = section.bytes.len() as u64;
+            let length = section.bytes.length();
             end = offset + length;
             SectionEntry {
                 kind,
@@ -200,6 +200,28 @@ impl<'a> FileBuilder<'a> {
         };
         self.sections.iter().map(entry).collect()
     }
+}
+
+/// What is known of a section without its bytes.
+pub(crate) struct Known {
+    pub(crate) kind: u32,
+    /// `NONE` for sections of the whole file.
+    pub(crate) object: u32,
+    pub(crate) stride: u32,
+    pub(crate) hash: [u8; 16],
+}
+
+/// The field of that name, if this is an OBJECT section.
+fn coordinates_of(kind: u32, bytes: &[u8]) -> Option<u32> {
+    let at = std::mem::offset_of!(Object, coordinates);
+    let bytes = bytes.get(at..at + 4).filter(|_| kind == kind::OBJECT)?;
+    Some(u32::from_le_bytes(bytes.try_into().ok()?))
+}
+
+/// What an object with such coordinates needs of a reader.
+fn features(coordinates: u32) -> u64 {
+    let grid = if coordinates & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
+    grid | if coordinates & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }
 }
 
 pub(super) fn defect(message: String) -> Error {

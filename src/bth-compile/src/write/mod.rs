@@ -2,13 +2,20 @@
 
 mod atomic;
 mod builder;
+mod content;
 mod object;
 mod scene;
+mod whole;
 
-pub use atomic::{write_atomically, write_atomically_with};
+pub use atomic::{write_atomically, write_atomically_with, write_content};
 pub use builder::FileBuilder;
+pub(crate) use builder::Known;
+pub(crate) use content::Bytes;
+pub use content::Content;
 pub use object::{ObjectParts, Source, object};
 pub use scene::{SceneParts, scene};
+pub use whole::name_if_whole;
+pub(crate) use whole::{HEADER, are_zeros, name};
 
 use crate::error::{Error, Result};
 

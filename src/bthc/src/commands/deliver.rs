@@ -6,7 +6,7 @@ use crate::table::{bytes, seconds};
 use bth_cache::{Digest, Record, Store};
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::Outcome;
-use bth_compile::write;
+use bth_compile::write::{self, Content};
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{Read, Write};
@@ -41,6 +41,14 @@ impl Target {
         }
     }
 
+    /// The file, if it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Stdout | Self::Cache => None,
+        }
+    }
+
     pub(super) fn name(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),
@@ -56,7 +64,13 @@ fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
         return true;
     }
     let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
-    let same = || File::open(path).and_then(Digest::of_reader).is_ok_and(|(digest, _)| digest == record.blob);
+    let same = || {
+        let found = match record.whole {
+            true => File::open(path).and_then(Digest::of_reader).ok().map(|(digest, _)| digest),
+            false => write::name_if_whole(path),
+        };
+        found == Some(record.blob)
+    };
     let same = same_size && same();
     if let (true, Some(store)) = (same, store) {
         store.stamp(path, record.blob);
@@ -76,9 +90,9 @@ pub(super) fn deliver<R>(
     inputs: &dyn Fn() -> bth_compile::Result<Vec<PathBuf>>,
 ) -> Result<Done, Failure> {
     let start = Instant::now();
-    match (&job.target, &outcome.bytes) {
-        (Target::File(path), Some(bytes)) => {
-            write::write_atomically(path, bytes)?;
+    match (&job.target, &outcome.content) {
+        (Target::File(path), Some(content)) => {
+            write::write_content(path, content)?;
             if let (Some(store), Some(record)) = (&setting.store, &outcome.record) {
                 store.stamp(path, record.blob);
             }
@@ -89,9 +103,9 @@ pub(super) fn deliver<R>(
                 touch(path, outcome.record.as_ref(), setting.store.as_ref())?;
             }
         }
-        (Target::Stdout, Some(bytes)) => {
+        (Target::Stdout, Some(content)) => {
             let mut out = std::io::stdout().lock();
-            out.write_all(bytes)?;
+            content.write_to(&mut out)?;
             out.flush()?;
         }
         (Target::Stdout | Target::Cache, _) => {}
@@ -103,12 +117,12 @@ pub(super) fn deliver<R>(
             &"the compiled file could not be kept",
         ));
     }
-    let (from, wrote) = match (&outcome.built, &outcome.bytes) {
+    let (from, wrote) = match (&outcome.built, &outcome.content) {
         (Some(_), _) => ("compiled", "wrote"),
         (None, Some(_)) => ("from the cache", "wrote"),
         (None, None) => ("unchanged", "up to date:"),
     };
-    let size = outcome.record.as_ref().map(|r| r.bytes).or(outcome.bytes.as_ref().map(|b| b.len() as u64));
+    let size = outcome.record.as_ref().map(|r| r.bytes).or(outcome.content.as_ref().map(Content::length));
     let name = job.target.name();
     let key = outcome.record.as_ref().map(|r| r.key.id());
     let log = cache.log();
@@ -119,14 +133,14 @@ pub(super) fn deliver<R>(
         "misses": log.misses,
         "entry": outcome.record.as_ref().zip(setting.store.as_ref()).map(|(r, s)| s.path(r).to_string_lossy().into_owned()),
     });
-    let took = if outcome.bytes.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
+    let took = if outcome.content.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
     text.push_str(&format!("{wrote} {name}\n"));
     Ok(Done {
         json: json!({
             "model": job.model.to_string_lossy(),
             "output": name,
-            "written": outcome.bytes.is_some(),
+            "written": outcome.content.is_some(),
             "cache": state,
         }),
         text,

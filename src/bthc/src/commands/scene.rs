@@ -62,6 +62,7 @@ pub(super) fn compile(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -
     let keep = Keep {
         whole: job.target == Target::Cache,
         needed: &|record| job.target.needs(record, setting.store.as_ref()),
+        target: job.target.path(),
     };
     let outcome = scene::compile_cached(&manifest, place, &setting.options, &cache, keep, monitor)?;
     let mut done = deliver(setting, job, &outcome, &cache, &|| files(&manifest, &job.model))?;

@@ -1,0 +1,215 @@
+//! What is in the file of a scene, and what each object of it was made from: so that the next compilation can take from it
+//! what has not changed.
+
+use super::objects::ObjectReport;
+use crate::cached::{Parts, Rows, Stored};
+use crate::tets::WorkerStatus;
+use bth::layout as on_disk;
+use bth::layout::ALIGNMENT;
+use std::collections::HashMap;
+use zerocopy::{FromBytes, Immutable, IntoBytes};
+
+/// A hash, of what makes objects equal or of what a part of a source is.
+pub(super) type Hash = [u8; 32];
+
+/// An object of the file.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
+#[repr(C)]
+pub(super) struct ObjectRow {
+    /// What makes it equal to others.
+    pub(super) content: Hash,
+    pub(super) triangles: u64,
+    pub(super) degenerate: u64,
+    pub(super) tet_leaves: u64,
+    pub(super) tet_triangles: u64,
+    /// Its OBJECT row.
+    pub(super) object: on_disk::Object,
+    /// Its sections: rows of the outline.
+    pub(super) first: u32,
+    pub(super) sections: u32,
+    /// Row of the workers.
+    pub(super) worker: u32,
+    pub(super) reserved: u32,
+}
+
+/// A section of an object.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
+#[repr(C)]
+pub(super) struct SectionRow {
+    pub(super) kind: u32,
+    pub(super) stride: u32,
+    /// Place and length in the file, bytes.
+    pub(super) offset: u64,
+    pub(super) length: u64,
+    pub(super) hash: [u8; 16],
+}
+
+/// A part of a source, which became an object.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
+#[repr(C)]
+pub(super) struct PartRow {
+    /// What it is.
+    pub(super) part: Hash,
+    /// Row of the objects.
+    pub(super) object: u32,
+    /// Row of the formats.
+    pub(super) format: u32,
+}
+
+/// What is in the file of a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Outline {
+    pub(super) objects: Vec<ObjectRow>,
+    pub(super) sections: Vec<SectionRow>,
+    pub(super) parts: Vec<PartRow>,
+    /// Formats of sources.
+    pub(super) formats: Vec<String>,
+    /// What became of the worker, for the objects that needed one.
+    pub(super) workers: Vec<Option<WorkerStatus>>,
+    by_content: HashMap<Hash, u32>,
+    by_part: HashMap<Hash, u32>,
+}
+
+impl Outline {
+    /// Adds a word to a list unless it is there; its row.
+    pub(super) fn word<T: PartialEq + Clone>(words: &mut Vec<T>, word: &T) -> u32 {
+        let there = words.iter().position(|known| known == word);
+        there.unwrap_or_else(|| {
+            words.push(word.clone());
+            words.len() - 1
+        }) as u32
+    }
+
+    /// The object that is equal to others of this content.
+    pub(super) fn object_of(&self, content: &Hash) -> Option<u32> {
+        self.by_content.get(content).copied()
+    }
+
+    /// What became of a part of a source.
+    pub(super) fn part(&self, part: &Hash) -> Option<&PartRow> {
+        self.parts.get(*self.by_part.get(part)? as usize)
+    }
+
+    /// The sections of an object.
+    pub(super) fn sections_of(&self, object: u32) -> &[SectionRow] {
+        let row = &self.objects[object as usize];
+        &self.sections[row.first as usize..][..row.sections as usize]
+    }
+
+    /// What became of the worker for an object.
+    pub(super) fn worker_of(&self, object: u32) -> &Option<WorkerStatus> {
+        &self.workers[self.objects[object as usize].worker as usize]
+    }
+
+    /// What is said of an object.
+    pub(super) fn report_of(&self, object: u32) -> ObjectReport {
+        let row = &self.objects[object as usize];
+        ObjectReport {
+            triangles: row.triangles,
+            degenerate: row.degenerate,
+            tet_leaves: row.tet_leaves,
+            tet_triangles: row.tet_triangles,
+            ..ObjectReport::default()
+        }
+    }
+
+    /// Whether all rows and places are there, each object's sections one behind the other.
+    fn holds(&self) -> bool {
+        let sections = |row: &ObjectRow| {
+            let end = row.first.checked_add(row.sections)?;
+            let sections = self.sections.get(row.first as usize..end as usize)?;
+            let object = sections.first().is_some_and(|s| s.kind == on_disk::kind::OBJECT);
+            let follows = |pair: &[SectionRow]| {
+                let end = pair[0].offset.checked_add(pair[0].length)?;
+                Some(end.checked_next_multiple_of(ALIGNMENT as u64)? == pair[1].offset)
+            };
+            Some(object && sections.windows(2).all(|pair| follows(pair) == Some(true)))
+        };
+        let object =
+            |row: &ObjectRow| (row.worker as usize) < self.workers.len() && sections(row).unwrap_or(false);
+        let part = |row: &PartRow| {
+            (row.object as usize) < self.objects.len() && (row.format as usize) < self.formats.len()
+        };
+        self.objects.iter().all(object) && self.parts.iter().all(part)
+    }
+}
+
+impl Stored for Outline {
+    fn rows(&self, to: &mut Rows) {
+        to.add(&self.objects);
+        to.add(&self.sections);
+        to.add(&self.parts);
+        // Names and states: there is nothing in them that is no JSON.
+        to.add(&serde_json::to_vec(&(&self.formats, &self.workers)).unwrap_or_default());
+    }
+
+    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+        let (objects, sections, parts) = (from.take()?, from.take()?, from.take()?);
+        let words: Vec<u8> = from.take()?;
+        let (formats, workers) = serde_json::from_slice(&words).ok()?;
+        let mut outline = Self { objects, sections, parts, formats, workers, ..Self::default() };
+        let numbered = |hashes: &mut dyn Iterator<Item = Hash>| hashes.zip(0..).collect();
+        outline.by_content = numbered(&mut outline.objects.iter().map(|row| row.content));
+        outline.by_part = numbered(&mut outline.parts.iter().map(|row| row.part));
+        outline.holds().then_some(outline)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cached::{decode, encode};
+
+    fn outline() -> Outline {
+        let section = |kind, offset, length| SectionRow { kind, stride: 4, offset, length, hash: [9; 16] };
+        let object = on_disk::Object::read_from_bytes(&[0; size_of::<on_disk::Object>()]).unwrap();
+        let row = ObjectRow {
+            content: [1; 32],
+            triangles: 3,
+            degenerate: 1,
+            tet_leaves: 0,
+            tet_triangles: 0,
+            object,
+            first: 1,
+            sections: 2,
+            worker: 0,
+            reserved: 0,
+        };
+        Outline {
+            objects: vec![row],
+            sections: vec![section(1, 0, 0), section(1, 640, 100), section(2, 768, 8)],
+            parts: vec![PartRow { part: [2; 32], object: 0, format: 0 }],
+            formats: vec!["obj".into()],
+            workers: vec![None],
+            ..Outline::default()
+        }
+    }
+
+    #[test]
+    fn an_outline_comes_back_and_is_searched() {
+        let back: Outline = decode(&encode(&outline())).unwrap();
+        assert_eq!((back.object_of(&[1; 32]), back.object_of(&[2; 32])), (Some(0), None));
+        assert_eq!(back.part(&[2; 32]).map(|part| part.object), Some(0));
+        assert!(back.part(&[1; 32]).is_none());
+        assert_eq!(back.sections_of(0).iter().map(|s| s.offset).collect::<Vec<_>>(), [640, 768]);
+        assert_eq!((back.report_of(0).triangles, back.report_of(0).degenerate), (3, 1));
+    }
+
+    #[test]
+    fn rows_out_of_range_and_sections_apart_do_not_come_back() {
+        let changes: [fn(&mut Outline); 7] = [
+            |o| o.objects[0].sections = 3,
+            |o| o.objects[0].first = u32::MAX,
+            |o| o.objects[0].sections = 0,
+            |o| o.objects[0].worker = 1,
+            |o| o.parts[0].object = 1,
+            |o| o.parts[0].format = 1,
+            |o| o.sections[2].offset = 832,
+        ];
+        for (number, change) in changes.iter().enumerate() {
+            let mut outline = outline();
+            change(&mut outline);
+            assert!(decode::<Outline>(&encode(&outline)).is_none(), "change {number}");
+        }
+    }
+}

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The folder into which cargo builds (`target/debug`, `target/release`, `target/checks`).
+/// The folder into which cargo builds (`target/debug`, `target/release`).
 pub fn target_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the test's own path");
     let deps = test.parent().expect("a folder");

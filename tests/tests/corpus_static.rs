@@ -32,7 +32,9 @@ fn chosen(data: &Path) -> Vec<(PathBuf, u64)> {
         match listed_triangles(data, "static", &model) {
             Some(triangles) if triangles <= most_triangles() => chosen.push((model, triangles)),
             Some(triangles) => {
-                println!("SKIPPED: {name} has {triangles} triangles (BTH_CORPUS=large takes up to 300,000, BTH_CORPUS=all any)")
+                println!(
+                    "SKIPPED: {name} has {triangles} triangles (BTH_CORPUS=large takes up to 300,000, BTH_CORPUS=all any)"
+                )
             }
             None => println!("SKIPPED: {name} is not listed"),
         }

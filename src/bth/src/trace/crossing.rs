@@ -24,7 +24,8 @@ impl Crossing {
     /// Barycentric weights of the triangle's second and third vertex, as they are reported.
     pub(crate) fn uv(&self) -> [f32; 2] {
         let [u, v, whole] = self.weight;
-        [reported(u / whole), reported(v / whole)]
+        let share = 1.0 / whole;
+        [reported(u * share), reported(v * share)]
     }
 }
 
@@ -57,6 +58,8 @@ pub(crate) struct Weighed {
     pub(crate) range: f64,
     pub(crate) depth: f64,
     pub(crate) inverse_depth: f64,
+    /// 1 / the sum of the weights.
+    pub(crate) share: f64,
     pub(crate) t: f64,
 }
 
@@ -66,7 +69,7 @@ pub(crate) struct Weighed {
 #[inline(always)]
 pub(crate) fn weigh(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]) -> Weighed {
     let inverse_depth = 1.0 / direction[2];
-    let shear = [direction[0] / direction[2], direction[1] / direction[2]];
+    let shear = [direction[0] * inverse_depth, direction[1] * inverse_depth];
     let (mut x, mut y, mut z) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for c in 0..3 {
         z[c] = corner[c][2] - origin[2];
@@ -81,9 +84,10 @@ pub(crate) fn weigh(origin: [f64; 3], direction: [f64; 3], corner: [[f64; 3]; 3]
     let error = PROJECTION_ERROR * reach;
     let bound = 4.0 * error * (size[0] + size[1] + size[2] + error);
     let sum = weight[0] + weight[1] + weight[2];
-    let depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / sum;
+    let share = 1.0 / sum;
+    let depth = (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) * share;
     let (shallow, deep) = ends(z);
-    Weighed { weight, bound, range: deep - shallow, depth, inverse_depth, t: depth * inverse_depth }
+    Weighed { weight, bound, range: deep - shallow, depth, inverse_depth, share, t: depth * inverse_depth }
 }
 
 /// What is certain of a line and a triangle.

@@ -61,8 +61,8 @@ impl Crossings {
             certain[i] = u32::from(verdict.crossed);
             missed[i] = u32::from(verdict.missed);
             self.t[i] = reported(weighed.t);
-            self.u[i] = reported(b / verdict.sum);
-            self.v[i] = reported(c / verdict.sum);
+            self.u[i] = reported(b * weighed.share);
+            self.v[i] = reported(c * weighed.share);
         }
         let bits = |flags: &[u32; LANES]| s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(flags)));
         self.certain = bits(&certain) & lanes;

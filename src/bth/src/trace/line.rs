@@ -82,19 +82,19 @@ impl Line {
             // Keeps the handedness: faces whose normal points along the ray are counterclockwise.
             std::mem::swap(&mut x, &mut y);
         }
-        let depth = direction[z];
+        let inverse_depth = 1.0 / direction[z];
         Some(Line {
             origin,
             direction,
             axis: [x, y, z],
-            shear: [direction[x] / depth, direction[y] / depth],
-            inverse_depth: 1.0 / depth,
+            shear: [direction[x] * inverse_depth, direction[y] * inverse_depth],
+            inverse_depth,
         })
     }
 
     /// Projects a point. With u = 2^-53 and R the greatest |coordinate| of point - origin, the
-    /// differences are off by uR, the shear by a factor of 1+u, and |shear| <= 1: x and y are off by
-    /// less than 2uR + 4uR + uR < 8uR.
+    /// differences are off by uR, the shear by a factor of 1±2u, its product with the depth by one more and the depth's own
+    /// uR, and |shear| <= 1: x and y are off by less than uR + 4uR + 2uR < 8uR.
     #[inline(always)]
     pub(crate) fn project(&self, point: [f32; 3]) -> Projected {
         let [x, y, z] = self.axis.map(|k| f64::from(point[k]) - self.origin[k]);

@@ -302,7 +302,7 @@ fn enter_tets<Q: Query>(
 
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
-fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
+pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
     let first = object.place(code);
     for i in 0..N::LINES.max(INDEXED_LINES) {
         s.prefetch(first.wrapping_add(i));

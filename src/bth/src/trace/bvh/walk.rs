@@ -44,6 +44,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                     Some((nearest, others)) => {
                         code = nearest;
                         top = stacks.replaced(top, others + 1);
+                        if others > 0 {
+                            super::batch::prefetch(s, _nodes, object, stacks.code(top.below()));
+                        }
                         continue;
                     }
                     None => Found::Nothing,

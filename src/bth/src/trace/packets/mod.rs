@@ -18,6 +18,8 @@ use crate::simd::{LANES, Simd};
 use crate::trace::prepare::Frame;
 use crate::trace::query::{Deliver, Offset, Query};
 
+/// Rays in a line of the cache.
+const RAYS_A_LINE: usize = 64 / size_of::<Ray>();
 /// Fewer rays make no packet.
 const FEWEST: usize = 2 * LANES;
 
@@ -80,6 +82,10 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     let mut packets = None;
     for (i, own) in rays.chunks(PACKET).enumerate() {
         let at = i * PACKET;
+        // So that the next rays are there when this packet is done.
+        for next in rays[(at + PACKET).min(rays.len())..].chunks(RAYS_A_LINE).take(PACKET / RAYS_A_LINE) {
+            s.prefetch(next.as_ptr());
+        }
         let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
             rest.extend(at as u32..(at + own.len()) as u32);
             continue;

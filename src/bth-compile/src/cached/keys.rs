@@ -154,7 +154,7 @@ pub(crate) fn outline(named: &Digest, options: &Options, tetgen: &str) -> Key {
 }
 
 /// All options that a compiled object depends on, in canonical form, each under the name that a person is told when
-/// it differs. A calibrated cost profile belongs in here, by the hash of its content.
+/// it differs. The cost profile is among them by the hash of its content.
 fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     let mut all = vec![
         ("structure", text(&options.structure)),

@@ -38,6 +38,9 @@ fn unchanged_objects_come_from_the_file_that_was_there() {
     forget_objects(path);
     // Greater than before: what follows it moves.
     std::fs::write(path.join("2.obj"), sphere(17)).unwrap();
+    let dry = ["compile", "--dry-run", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5", "s.manifest"];
+    let dry = &crate::cache::cached(path, &dry).expect(0).json()["jobs"][0];
+    assert_eq!((&dry["objects_kept"], &dry["objects"][0]["part"]), (&4.into(), &"2.obj flat".into()));
     let (hits, misses) = found(&compile(path, &["s.manifest"]));
     assert_eq!(hits, ["object 4"]);
     assert!(misses[1..].iter().all(|miss| miss.ends_with("2.obj flat") || miss == "tets"), "{misses:?}");

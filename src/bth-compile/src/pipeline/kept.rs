@@ -171,9 +171,10 @@ fn kept<R>(
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
 ) -> Option<Outcome<R>> {
-    let record = cache.find(key, monitor)?;
+    let mut record = cache.find(key, monitor)?;
     let content = if needed(&record) { Some(cache.read(&record, monitor)?.into()) } else { None };
     cache.hit(key, "");
     cache.store()?.touch(&record);
-    Some(Outcome { content, built: None, report: record.report.clone(), record: Some(record) })
+    let report = std::mem::take(&mut record.report);
+    Some(Outcome { content, built: None, report, record: Some(record) })
 }

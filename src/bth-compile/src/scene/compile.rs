@@ -2,7 +2,7 @@
 
 use super::objects::{self, ObjectReport, Objects};
 use super::outline::Outline;
-use super::previous::{self, Previous};
+use super::previous::{Previous, keep_outline};
 use super::{encode, meshes, sources, visible, weights};
 use crate::cached::{self, Cache, ObjectKeys};
 use crate::costs;
@@ -126,12 +126,10 @@ pub fn compile_cached(
     let plan = Plan::of(manifest, place.folder, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
     let outcome = pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
-        // With the scene's rays an object depends on all others.
-        let target = keep.target.filter(|_| !options.costs.for_scene);
-        context.previous = target.and_then(|path| Previous::open(path, &context)).map(Arc::new);
+        context.previous = previous(keep.target, &context);
         let (content, report, outline) = build(manifest, &plan, place.name, &context, clock)?;
-        if target.is_some() {
-            previous::keep(&content.name(), &outline, &context);
+        if keep.target.is_some() && !options.costs.for_scene {
+            keep_outline(&content.name(), &outline, &context);
         }
         Ok((content, report, keep.whole))
     })?;
@@ -183,7 +181,7 @@ pub fn compile_objects(
     Ok(objects.reports.len() as u64)
 }
 
-/// What [`compile_cached`] would find. Reads and hashes all sources, and does nothing else.
+/// What [`compile_cached`] would find; `target` as in [`Keep`]. Reads and hashes all sources, and does nothing else.
 ///
 /// # Errors
 /// When a source cannot be read.
@@ -192,19 +190,31 @@ pub fn foresee(
     place: Place<'_>,
     options: &Options,
     cache: &Cache<'_>,
+    target: Option<&Path>,
     monitor: &dyn Monitor,
 ) -> Result<Foreseen> {
-    let context = Context::new(options, cache, monitor)?;
+    let mut context = Context::new(options, cache, monitor)?;
+    context.previous = previous(target, &context);
     let plan = Plan::of(manifest, place.folder, &mut Clock::default())?;
     let mut foreseen = Foreseen::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if foreseen.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
+            if objects::known(file, &context).is_some() {
+                foreseen.kept += file.parts.len() as u64;
+                continue;
+            }
             let missing = meshes::missing(file, &context);
             foreseen.kept += (file.parts.len() - missing.len()) as u64;
             foreseen.parts.extend(missing);
         }
     }
     Ok(foreseen)
+}
+
+/// What an earlier compilation left, if it is of use: with the scene's rays an object depends on all others.
+fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous>> {
+    let target = target.filter(|_| !context.options.costs.for_scene)?;
+    Previous::open(target, context).map(Arc::new)
 }
 
 /// The key of a scene, if it may be kept.

@@ -1,6 +1,7 @@
 //! The meshes of a source file: known from the cache, or imported.
 
 use super::compile::Context;
+use super::objects::content;
 use super::sources::File;
 use crate::cached::{self, MeshFacts, Miss};
 use crate::error::Result;
@@ -64,7 +65,7 @@ fn known(key: &Key, context: &Context<'_>) -> Option<MeshFacts> {
     serde_json::from_value(record.report).ok()
 }
 
-/// The objects of a file that the cache lacks, and why.
+/// The objects of a file that neither the file that was there nor the cache has, and why.
 pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |number: Option<u32>| {
         let part = file.name_of(number);
@@ -73,6 +74,13 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
+        let old = context
+            .previous
+            .as_ref()
+            .and_then(|p| Some((p, p.outline.object_of(content(&facts).as_bytes())?)));
+        if old.is_some_and(|(previous, object)| previous.has(object)) {
+            return None;
+        }
         let object = keys.of(&facts);
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {

@@ -69,7 +69,7 @@ struct Task<'a> {
 }
 
 /// A part of a source.
-enum Part {
+pub(super) enum Part {
     /// The file that was there tells its format and its object there.
     Known(String, u32),
     Mesh(Box<Found>),
@@ -170,7 +170,7 @@ fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Resul
 }
 
 /// The parts of a file, if it need not be read: it is a compiled one, or the file that was there has all of them.
-fn known(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
+pub(super) fn known(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
     if file.compiled {
         return Some(Vec::new());
     }
@@ -233,7 +233,7 @@ fn build_all(
 }
 
 /// A hash of what makes objects equal.
-fn content(mesh: &MeshFacts) -> blake3::Hash {
+pub(super) fn content(mesh: &MeshFacts) -> blake3::Hash {
     let shading = mesh.shading.as_ref().map(Digest::hex);
     blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
 }

@@ -67,7 +67,7 @@ impl Previous {
 }
 
 /// Keeps the outline of a file under its name.
-pub(super) fn keep(named: &Digest, outline: &Outline, context: &Context<'_>) {
+pub(super) fn keep_outline(named: &Digest, outline: &Outline, context: &Context<'_>) {
     if let Some(key) = key(named, context) {
         context.cache.keep_here(&key, &cached::encode(outline), context.monitor);
     }

@@ -98,7 +98,7 @@ pub(super) fn foresee(
 ) -> Result<Foreseen, Failure> {
     let (manifest, _) = read(&job.model, &setting.args.gltf, monitor)?;
     let place = Place { folder: folder(&job.model), name: &job.model };
-    Ok(scene::foresee(&manifest, place, &setting.options, cache, monitor)?)
+    Ok(scene::foresee(&manifest, place, &setting.options, cache, job.target.path(), monitor)?)
 }
 
 /// All files that a scene is made from.

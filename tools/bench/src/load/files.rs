@@ -131,8 +131,8 @@ pub(super) fn scene_bytes(scene: &bth::Scene) -> Vec<u8> {
     bytes
 }
 
-/// Reads what [`scene_bytes`] gave.
-pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<Place>)> {
+/// Reads what [`scene_bytes`] gave: the objects, and of each instance the object and the place.
+pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<u32>, Vec<Place>)> {
     const BROKEN: &str = "not a file of a scene";
     let bytes = std::fs::read(path)?;
     let mut rest = bytes.as_slice();
@@ -151,9 +151,10 @@ pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<Place>)> {
     ensure!(rest.len().is_multiple_of(52), BROKEN);
     let place = |b: &[u8]| {
         let object = u32::read_from_bytes(&b[..4]).expect("chunks of the right size");
-        (object, <[[f32; 4]; 3]>::read_from_bytes(&b[4..]).expect("chunks of the right size"))
+        (object, Some(<[[f32; 4]; 3]>::read_from_bytes(&b[4..]).expect("chunks of the right size")))
     };
-    Ok((objects, rest.chunks(52).map(place).collect()))
+    let (object_of, places) = rest.chunks(52).map(place).unzip();
+    Ok((objects, object_of, places))
 }
 
 #[cfg(test)]

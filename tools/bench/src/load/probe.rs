@@ -81,11 +81,15 @@ pub fn run(arguments: &Probe) -> Result<()> {
         Start::Read => probe(&rays, first, threads, || Ok(Opened(bth::open(file)?)))?,
         Start::EmbreeScene | Start::EmbreeSceneRobust => {
             embree::available()?;
-            let (objects, places) = files::read_scene(file)?;
+            let (objects, object_of, places) = files::read_scene(file)?;
             let objects = objects.into_iter().map(|(p, t)| (embree::padded(&p), t)).collect();
             let robust = arguments.start == Start::EmbreeSceneRobust;
             let variant = if robust { &embree::ROBUST } else { &embree::DEFAULT };
-            probe(&rays, first, threads, || embree::build_instances(objects, &places, variant, threads))?
+            probe(&rays, first, threads, || {
+                let mut scene = embree::build_instances(objects, &object_of, variant, threads)?;
+                scene.place(&places);
+                Ok(scene)
+            })?
         }
         Start::Embree | Start::EmbreeRobust => {
             // Neither the library nor the triangles are part of a build.

@@ -1,7 +1,6 @@
 //! The rivals. One that is missing on a machine is left out, with the reason.
 
 pub mod embree;
-pub mod embree_instances;
 pub mod kd_tree;
 mod library;
 mod obvhs;

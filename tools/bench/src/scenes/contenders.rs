@@ -2,8 +2,7 @@
 
 use super::Source;
 use crate::ours::BATCH;
-use crate::rivals::embree::{self, Variant};
-use crate::rivals::embree_instances::{Instances, Object, Place};
+use crate::rivals::embree::{self, Place, Variant};
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Context, Result, anyhow};
 use bth::Scene;
@@ -48,7 +47,10 @@ pub(super) struct Frame {
 impl Frame {
     /// What a scene shows now.
     pub(super) fn of(scene: &Scene, number: i32) -> Frame {
-        let place = |i: u32| Some(scene.instance(i)).filter(|v| v.visible).map(|v| v.to_world);
+        let place = |i: u32| {
+            let rows = Some(scene.instance(i)).filter(|v| v.visible).map(|v| v.to_world);
+            rows.map(|rows| rows.map(|row| row.map(|x| x as f32)))
+        };
         Frame { number, places: (0..scene.instance_count()).map(place).collect() }
     }
 }
@@ -105,10 +107,10 @@ pub(super) fn build(source: &Source, kind: &Kind, shown: &Scene) -> Result<Conte
     if let How::Embree(variant) = &kind.how {
         let objects = (0..shown.object_count()).map(|i| {
             let view = shown.object(i);
-            Object { positions: embree::padded(view.positions), triangles: view.triangles.to_vec() }
+            (embree::padded(view.positions), view.triangles.to_vec())
         });
         let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
-        let instances = Instances::new(objects.collect(), &object_of, variant, 1)?;
+        let instances = embree::build_instances(objects.collect(), &object_of, variant, 1)?;
         let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
         return Ok(Contender { name: kind.name, ours: false, moving, build_s, in_tets: 0.0 });
     }
@@ -139,7 +141,7 @@ impl Moving for Ours {
     }
 }
 
-impl Moving for Instances {
+impl Moving for embree::Scene {
     fn hide(&mut self) -> Result<()> {
         Ok(())
     }

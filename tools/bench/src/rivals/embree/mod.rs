@@ -1,0 +1,62 @@
+//! Embree 4.
+
+mod api;
+mod scene;
+
+pub use self::scene::{Mesh, Place, Scene, build, build_instances};
+
+use self::api::Api;
+use crate::model::Model;
+use crate::tracer::Contender;
+use anyhow::Result;
+use std::ffi::c_int;
+use std::time::Instant;
+
+/// How a scene is built and traced.
+#[derive(Clone, Copy, Debug)]
+pub struct Variant {
+    quality: c_int,
+    flags: c_int,
+    packets: bool,
+}
+
+const QUALITY_MEDIUM: c_int = 1;
+const QUALITY_HIGH: c_int = 2;
+const FLAG_COMPACT: c_int = 2;
+const FLAG_ROBUST: c_int = 4;
+
+/// What a caller gets who sets nothing; one ray a call.
+pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false };
+/// The robust mode, which has no high quality; one ray a call.
+pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
+/// The mode that saves memory; one ray a call.
+pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
+/// High quality (spatial splits); 16 rays a call.
+pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
+
+/// Loads the library, so that a build that is timed does not.
+///
+/// # Errors
+/// If it is missing.
+pub fn available() -> Result<()> {
+    Api::get().map(|_| ())
+}
+
+/// Builds a scene of a model.
+///
+/// # Errors
+/// As [`build`].
+pub fn contender(model: &Model, name: &str, variant: &Variant, threads: usize) -> Result<Contender> {
+    available()?;
+    let (positions, triangles) = (padded(&model.mesh.positions), model.mesh.triangles.clone());
+    let start = Instant::now();
+    let scene = build(positions, triangles, variant, threads)?;
+    let build_s = start.elapsed().as_secs_f64();
+    let bytes = scene.bytes();
+    Ok(Contender { name: name.to_owned(), ours: false, tracer: Box::new(scene), build_s, bytes })
+}
+
+/// Positions as [`Mesh`] wants them.
+pub fn padded(positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    positions.iter().copied().chain([[0.0; 3]]).collect()
+}

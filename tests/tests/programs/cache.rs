@@ -47,6 +47,7 @@ fn an_unchanged_model_is_neither_compiled_nor_written_again() {
     let folder = folder(&[("a.obj", &sphere(16))]);
     let first = compile(folder.path(), &["a.obj"]);
     assert_eq!((&first["cache"]["hit"], &first["written"]), (&false.into(), &true.into()));
+    assert!(Path::new(first["cache"]["entry"].as_str().unwrap()).is_file());
     let output = folder.path().join("a.bth");
     let modified = |path: &Path| std::fs::metadata(path).unwrap().modified().unwrap();
     let written = modified(&output);
@@ -135,6 +136,7 @@ fn moving_an_instance_compiles_nothing_and_changing_an_object_only_that() {
     let whole = std::fs::read(path.join("s.bth")).unwrap();
     let unchanged = compile(path, &["s.manifest"]);
     assert_eq!((&unchanged["cache"]["hit"], &unchanged["written"]), (&true.into(), &false.into()));
+    assert!(unchanged["cache"]["entry"].is_null(), "the scene itself is not kept");
 
     let manifest = path.join("s.manifest");
     let text = std::fs::read_to_string(&manifest).unwrap();

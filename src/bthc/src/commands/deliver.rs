@@ -126,12 +126,14 @@ pub(super) fn deliver<R>(
     let name = job.target.name();
     let key = outcome.record.as_ref().map(|r| r.key.id());
     let log = cache.log();
+    // Scenes that are put together from others have none.
+    let kept = outcome.record.as_ref().filter(|record| record.whole).zip(setting.store.as_ref());
     let state = json!({
         "key": key,
         "hit": outcome.built.is_none(),
         "hits": log.hits,
         "misses": log.misses,
-        "entry": outcome.record.as_ref().zip(setting.store.as_ref()).map(|(r, s)| s.path(r).to_string_lossy().into_owned()),
+        "entry": kept.map(|(record, store)| store.path(record).to_string_lossy().into_owned()),
     });
     let took = if outcome.content.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };

@@ -3,9 +3,9 @@
 
 use super::flight::{Flight, Found};
 use super::landing::Landing;
-use super::nodes::Nodes;
+use super::nodes::{Nodes, prefetch};
 use super::stack::{BOTTOM, Place, Stacks};
-use crate::layout::{Child, INDEXED_LINES, NONE};
+use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -298,13 +298,4 @@ fn enter_tets<Q: Query>(
     slot.flight.settle(object, ray);
     let done = tets(row, ray, slot.flight.query());
     if done { Found::Enough } else { slot.flight.settled(Found::Nothing) }
-}
-
-/// Asks for the lines of a node or of an indexed leaf.
-#[inline(always)]
-pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
-    let first = object.place(code);
-    for i in 0..N::LINES.max(INDEXED_LINES) {
-        s.prefetch(first.wrapping_add(i));
-    }
 }

@@ -1,7 +1,8 @@
 //! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
 
-use crate::layout::{Child, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
+use crate::layout::{Child, INDEXED_LINES, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
 use crate::object::ObjectView;
+use crate::simd::Simd;
 use crate::trace::slabs::Boxes;
 
 /// A kind of nodes.
@@ -47,5 +48,14 @@ impl Nodes for Packed {
     #[inline(always)]
     fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a PackedNode {
         object.packed_node(code & !Child::PACKED_BIT)
+    }
+}
+
+/// Asks for the lines of a node or of an indexed leaf.
+#[inline(always)]
+pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
+    let first = object.place(code);
+    for i in 0..N::LINES.max(INDEXED_LINES) {
+        s.prefetch(first.wrapping_add(i));
     }
 }

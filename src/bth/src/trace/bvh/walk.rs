@@ -1,7 +1,7 @@
 //! The walk of one ray through the wide BVH.
 
 use super::flight::{Flight, Found};
-use super::nodes::Nodes;
+use super::nodes::{Nodes, prefetch};
 use super::stack::Stacks;
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
@@ -23,7 +23,7 @@ pub(crate) enum TetOutcome {
 #[expect(clippy::too_many_arguments)]
 pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     s: S,
-    _nodes: N,
+    nodes: N,
     object: &ObjectView<'_>,
     ray: &Ray,
     walked: u32,
@@ -44,8 +44,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                     Some((nearest, others)) => {
                         code = nearest;
                         top = stacks.replaced(top, others + 1);
+                        // A ray alone has nothing to do while it waits for that one.
                         if others > 0 {
-                            super::batch::prefetch(s, _nodes, object, stacks.code(top.below()));
+                            prefetch(s, nodes, object, stacks.code(top.below()));
                         }
                         continue;
                     }

@@ -8,12 +8,13 @@
 use super::group::Group;
 use super::hull::Hull;
 use super::leaf::{Leaf, Points, Rays, no_points};
-use crate::layout::{Child, NODE_LINES, NONE, WIDTH};
+use crate::layout::{Child, NONE, WIDTH};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
+use crate::trace::bvh::nodes::{Wide, prefetch};
 use crate::trace::crossings::Crossings;
 use crate::trace::query::{Deliver, Query};
 
@@ -149,7 +150,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
                 let (node, slot) = (object.node(entry.parent), entry.slot as usize % WIDTH);
                 code = node.child[slot];
-                prefetch(s, object, code);
+                prefetch(s, Wide, object, code);
                 let corners = hull.corners(node, slot);
                 let mut meets = 0;
                 for (i, group) in groups.iter().enumerate() {
@@ -230,13 +231,4 @@ fn farthest_limit<S: Simd>(s: S, groups: &[Group<S>]) -> f32 {
         farthest = s.max(farthest, group.limit);
     }
     -s.least(s.sub(s.splat(0.0), farthest))
-}
-
-/// Asks for the lines of a node or of an indexed leaf.
-#[inline(always)]
-fn prefetch<S: Simd>(s: S, object: &ObjectView<'_>, code: u32) {
-    let first = object.place(code);
-    for i in 0..NODE_LINES {
-        s.prefetch(first.wrapping_add(i));
-    }
 }

@@ -135,8 +135,7 @@ pub unsafe extern "C" fn bth_nearest(
     }
     // SAFETY: not null, `count` elements by contract; any bits are a valid `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
-    // Unwinding must not reach C. A panic would be a defect; the rest then reads as misses.
-    hits.fill(Hit::MISS);
+    // Unwinding must not reach C. A panic would be a defect; the rest then reads as misses, with which tracing begins.
     let _ = catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits)));
 }
 

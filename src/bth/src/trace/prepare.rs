@@ -5,9 +5,10 @@
 
 use super::sight::{self, Sight};
 use super::slabs::{self, Slabs};
-use crate::layout::Object;
+use crate::layout::{NONE, Object};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use std::mem::offset_of;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Directions of this size or its inverse, and coordinates up to it, are prepared in f32.
@@ -55,15 +56,52 @@ impl Frame {
     }
 }
 
-/// A ray prepared for boxes and for triangles: two cache lines.
+/// A ray prepared for boxes, and for triangles: a cache line each, so that a step of a ray among many on their way needs no
+/// more of the innermost cache than one of them.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct Aim {
     pub(crate) slabs: Slabs,
+    /// Its place in the batch.
+    pub(crate) ray: u32,
     pub(crate) sight: Sight,
+    pub(crate) noted: Noted,
 }
 
-const _: () = assert!(size_of::<Slabs>() == 64 && size_of::<Sight>() == 64);
+const _: () = assert!(offset_of!(Aim, sight) == 64 && size_of::<Aim>() == 128);
+
+/// What the walk of a ray has come upon.
+#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
+#[repr(C)]
+pub(crate) struct Noted {
+    /// Lower bound of the depth of the nearest hit so far.
+    pub(crate) nearest: f32,
+    /// Leaf of the nearest hit so far, if it is certain but where it is has still to be computed; else `NONE`. Most rays come
+    /// upon several hits, each nearer than the last, and only the last is worth f64.
+    pub(crate) leaf: u32,
+    /// Triangle of that leaf.
+    pub(crate) triangle: u16,
+    /// What has been decided so far.
+    pub(crate) decided: u16,
+}
+
+impl Noted {
+    pub(crate) const NOTHING: Noted =
+        Noted { nearest: f32::INFINITY, leaf: NONE, triangle: 0, decided: Noted::NEVER_ASKED };
+
+    /// Nothing: the ray's query has not been made.
+    pub(crate) const NEVER_ASKED: u16 = 0;
+    /// What the ray's query says.
+    pub(crate) const ASKED: u16 = 1;
+    /// That something is certainly hit, which is all that was asked.
+    pub(crate) const ACCEPTED: u16 = 2;
+}
+
+impl Aim {
+    pub(crate) fn new(slabs: Slabs, sight: Sight) -> Aim {
+        Aim { slabs, ray: 0, sight, noted: Noted::NOTHING }
+    }
+}
 
 impl Aim {
     /// A single ray, to the same bounds as [`Prepared::fill`]; false where f32 can't prepare it. Written in place: copies of
@@ -95,7 +133,7 @@ impl Aim {
         }
         let pad = extent * slabs::PAD as f32;
         let least = greatest * slabs::LEAST_COMPONENT as f32;
-        let Aim { slabs, sight } = self;
+        let Aim { slabs, sight, .. } = self;
         for k in 0..3 {
             let magnitude = greatest / greater(size[k], least);
             let reciprocal = magnitude.copysign(d[k]);
@@ -169,7 +207,12 @@ impl Prepared {
     ) {
         let wanted = s.mask(((1u64 << count) - 1) as u32);
         let field = fields(s, wanted, rays, s.load_u(at));
-        let (aim, usable) = rows(s, frame, field);
+        let (mut aim, usable) = rows(s, frame, field);
+        aim[offset_of!(Aim, ray) / 4] = s.floats(s.load_u(at));
+        let nothing: [u32; 3] = zerocopy::transmute!(Noted::NOTHING);
+        for (k, word) in nothing.into_iter().enumerate() {
+            aim[offset_of!(Aim, noted) / 4 + k] = s.floats(s.splat_u(word));
+        }
         for half in 0..2 {
             let mut rows = [s.splat(0.0); LANES];
             for i in 0..LANES {

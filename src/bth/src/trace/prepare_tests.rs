@@ -53,7 +53,7 @@ impl Kernel for Look<'_> {
     type Output = (u32, Found);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let Look(Aim { slabs, sight }, Single { node, leaf, .. }) = self;
+        let Look(Aim { slabs, sight, .. }, Single { node, leaf, .. }) = self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
         let candidates = sight.candidates(s, leaf, slabs.first, slabs.last);
@@ -83,7 +83,7 @@ impl Kernel for Together<'_> {
 /// All ways to prepare a ray: in f64, alone in f32, and with others on every instruction set.
 fn aims(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<Aim> {
     let slabs = Slabs::new(ray, line, object);
-    let mut aims = vec![Aim { slabs, sight: Sight::new(ray, line, &slabs, object) }];
+    let mut aims = vec![Aim::new(slabs, Sight::new(ray, line, &slabs, object))];
     let mut aim = Aim::new_zeroed();
     if aim.set(&Frame::new(object), ray) {
         aims.push(aim);

@@ -55,7 +55,6 @@ pub(crate) struct Sight {
     pub(crate) last: f32,
     /// What the bound grows by with the greatest |x| or |y| of the points.
     pub(crate) error_slope: f32,
-    pub(crate) reserved: [u32; 3],
 }
 
 /// Triangles of a leaf that the ray may hit, a bit each.
@@ -211,7 +210,6 @@ impl Sight {
             first,
             last,
             error_slope,
-            reserved: [0; 3],
         }
     }
 

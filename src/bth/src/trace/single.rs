@@ -110,8 +110,9 @@ impl<Q: Query, C: Count> Single<'_, Q, C> {
     #[inline(always)]
     fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) -> Q::Answer {
         let (object, ray) = (self.object, self.ray);
-        let mut flight = Flight::vacant(self.query());
-        if flight.aim_at(object, &Frame::new(object.header), ray) {
+        let query = self.query();
+        let mut flight = Flight::vacant(query);
+        if flight.aim_at(object, &Frame::new(object.header), (0, ray), Some(query)) {
             if self.start.is_some() {
                 flight.take_over();
             }

@@ -41,7 +41,6 @@ pub(crate) struct Slabs {
     pub(crate) last: f32,
     /// Per axis the row of the ends that are met first: 0 or [`FAR`].
     pub(crate) near: [u32; 3],
-    pub(crate) reserved: u32,
 }
 
 impl Slabs {
@@ -54,7 +53,6 @@ impl Slabs {
         far_addend: [f32::INFINITY; 3],
         last: 0.0,
         near: [0; 3],
-        reserved: 0,
     };
 
     pub(crate) fn new(ray: &Ray, line: &Line, object: &Object) -> Slabs {

@@ -65,12 +65,22 @@ impl Lists {
 
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Slot<Q> {
-    flight: Flight<Q>,
-    /// Place of the ray in the batch.
-    ray: usize,
-    /// Place of the top of its stack.
-    top: Place,
+struct Slot<Q>(Flight<Q>);
+
+/// What a step of a ray begins with, apart from the rest of the slots: few cache lines, always at hand.
+struct Tops {
+    place: [Place; IN_FLIGHT],
+    code: [u32; IN_FLIGHT],
+}
+
+impl Tops {
+    /// Notes the top of a stack; returns the code there.
+    #[inline(always)]
+    fn set(&mut self, at: usize, top: Place, stacks: &Stacks) -> u32 {
+        let code = stacks.code(top);
+        (self.place[at], self.code[at]) = (top, code);
+        code
+    }
 }
 
 /// The rays still to be traced.
@@ -130,67 +140,66 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
             before: 0,
         };
         let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
-        let mut slots = [Slot { flight: Flight::vacant(vacant), ray: 0, top: Place::NOWHERE }; IN_FLIGHT];
+        let mut slots = [Slot(Flight::vacant(vacant)); IN_FLIGHT];
+        let mut tops = Tops { place: [Place::NOWHERE; IN_FLIGHT], code: [root; IN_FLIGHT] };
         let mut landing = Landing::new();
         let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
         for (i, slot) in slots.iter_mut().enumerate() {
-            if self.launch(s, &mut supply, i, slot) {
+            if self.launch(s, &mut supply, i, &mut slot.0, &mut tops) {
                 lists.sort(i, root);
             }
         }
         loop {
-            self.inner_steps(s, nodes, &mut slots, &mut lists);
+            self.inner_steps(s, nodes, &slots, &mut tops, &mut lists);
             if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
                 return landing.clear(s, self.object, self.rays, self.to);
             }
             for i in 0..lists.bottom.take() {
                 let at = lists.bottom.get(i);
-                let slot = &mut slots[at];
-                if slot.top > self.stacks.bottom(at) {
+                if tops.place[at] > self.stacks.bottom(at) {
                     // An empty slot of a node.
-                    slot.top = slot.top.below();
-                    lists.sort(at, self.stacks.code(slot.top));
+                    lists.sort(at, tops.set(at, tops.place[at].below(), self.stacks));
                     continue;
                 }
-                landing.land(s, self.object, self.rays, (slot.ray, &mut slot.flight), self.to);
-                if self.launch(s, &mut supply, at, &mut slots[at]) {
+                landing.land(s, self.object, self.rays, &slots[at].0, self.to);
+                if self.launch(s, &mut supply, at, &mut slots[at].0, &mut tops) {
                     lists.sort(at, root);
                 }
             }
             for i in 0..lists.leaf.take() {
                 let at = lists.leaf.get(i);
-                let slot = &mut slots[at];
-                let ray = &self.rays[slot.ray];
+                let flight = &mut slots[at].0;
+                let ray = &self.rays[flight.ray()];
                 let (mut indexed, mut raw) = (None, None);
-                let code = self.stacks.code(slot.top);
+                let (code, top) = (tops.code[at], tops.place[at]);
                 let found = match Child::from_code(code) {
                     Some(Child::Indexed(line)) => {
                         let leaf = self.object.indexed(line, &mut indexed);
-                        slot.flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
+                        flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
                     }
                     Some(Child::Raw(line)) => {
                         let leaf = self.object.raw(line, &mut raw);
-                        slot.flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
+                        flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
                     }
                     Some(Child::Tets(row)) => {
-                        if self.waiting.walked.is_some_and(|walked| walked[slot.ray] == row) {
+                        if self.waiting.walked.is_some_and(|walked| walked[flight.ray()] == row) {
                             Found::Nothing
                         } else {
-                            enter_tets(self.object, row, ray, slot, self.stacks, &mut tets)
+                            enter_tets(self.object, row, ray, (flight, top), self.stacks, &mut tets)
                         }
                     }
                     _ => Found::Nothing,
                 };
-                let below = slot.top.below();
-                slot.top = match found {
+                let below = top.below();
+                let top = match found {
                     // Any-hit queries keep no keys, so nothing can be told of what waits.
                     Found::Nearer if Q::ANY => below,
                     Found::Nothing => below,
-                    Found::Again => slot.top,
-                    Found::Nearer => self.stacks.keep_up_to(s, at, below, slot.flight.key_limit()),
+                    Found::Again => top,
+                    Found::Nearer => self.stacks.keep_up_to(s, at, below, flight.key_limit()),
                     Found::Enough => self.stacks.bottom(at),
                 };
-                let code = self.stacks.code(slot.top);
+                let code = tops.set(at, top, self.stacks);
                 prefetch(s, nodes, self.object, code);
                 lists.sort(at, code);
             }
@@ -203,17 +212,16 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
         &mut self,
         s: S,
         nodes: N,
-        slots: &mut [Slot<Q>; IN_FLIGHT],
+        slots: &[Slot<Q>; IN_FLIGHT],
+        tops: &mut Tops,
         lists: &mut Lists,
     ) {
         while lists.inner.len > 0 {
             for i in 0..lists.inner.take() {
                 let at = lists.inner.get(i);
-                let slot = &mut slots[at];
-                let node = N::node(self.object, self.stacks.code(slot.top));
-                let count = slot.flight.enter_node(s, node, self.stacks.room(slot.top));
-                slot.top = self.stacks.replaced(slot.top, count);
-                let code = self.stacks.code(slot.top);
+                let (top, node) = (tops.place[at], N::node(self.object, tops.code[at]));
+                let count = slots[at].0.enter_node(s, node, self.stacks.room(top));
+                let code = tops.set(at, self.stacks.replaced(top, count), self.stacks);
                 prefetch(s, nodes, self.object, code);
                 lists.sort(at, code);
             }
@@ -225,29 +233,35 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
 
     /// Puts the next ray that can hit anything into a slot; false if there is none.
     #[inline(always)]
-    fn launch<S: Simd>(&mut self, s: S, supply: &mut Supply, at: usize, slot: &mut Slot<Q>) -> bool {
+    fn launch<S: Simd>(
+        &mut self,
+        s: S,
+        supply: &mut Supply,
+        at: usize,
+        flight: &mut Flight<Q>,
+        tops: &mut Tops,
+    ) -> bool {
         loop {
             if supply.used == supply.filled && !self.refill(s, supply) {
                 return false;
             }
             let lane = supply.used % LANES;
             supply.used += 1;
-            let place = supply.ray[lane] as usize;
-            let ray = &self.rays[place];
-            let query = self.waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
+            let place = supply.ray[lane];
+            let query = self.waiting.queries.map(|queries| queries[place as usize]);
             if let Some(aim) = supply.prepared.aim(lane) {
-                slot.flight.launch(aim, query);
+                flight.launch(aim, query);
             } else {
-                *slot.flight.query() = query;
-                if !slot.flight.aim_at(self.object, &supply.frame, ray) {
+                let ray = (place, &self.rays[place as usize]);
+                if !flight.aim_at(self.object, &supply.frame, ray, query) {
                     continue;
                 }
             }
-            if self.waiting.queries.is_some() {
-                slot.flight.take_over();
+            if query.is_some() {
+                flight.take_over();
             }
-            slot.ray = place;
-            slot.top = self.stacks.start(at, supply.root);
+            tops.place[at] = self.stacks.start(at, supply.root);
+            tops.code[at] = supply.root;
             return true;
         }
     }
@@ -286,16 +300,16 @@ fn enter_tets<Q: Query>(
     object: &ObjectView<'_>,
     row: u32,
     ray: &Ray,
-    slot: &mut Slot<Q>,
+    (flight, top): (&mut Flight<Q>, Place),
     stacks: &mut Stacks,
     tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
 ) -> Found {
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
-        stacks.set_code(slot.top, subtree);
+        stacks.set_code(top, subtree);
         return Found::Again;
     }
-    slot.flight.settle(object, ray);
-    let done = tets(row, ray, slot.flight.query());
-    if done { Found::Enough } else { slot.flight.settled(Found::Nothing) }
+    flight.settle(object, ray);
+    let done = tets(row, ray, flight.ask(ray));
+    if done { Found::Enough } else { flight.settled(Found::Nothing) }
 }

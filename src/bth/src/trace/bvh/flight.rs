@@ -1,15 +1,15 @@
 //! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
-use crate::layout::WIDTH;
+use crate::layout::{NONE, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, open, settle};
 use crate::trace::crossing::{Crossing, Estimate, estimate};
 use crate::trace::line::Line;
-use crate::trace::prepare::{Aim, Frame};
-use crate::trace::query::{Named, Query};
+use crate::trace::prepare::{Aim, Frame, Noted};
+use crate::trace::query::{Deliver, Named, Query};
 use crate::trace::quick::Test;
 use crate::trace::sight::{Block, Candidates, Sight};
 use crate::trace::slabs::{Boxes, Slabs};
@@ -23,14 +23,9 @@ pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Flight<Q> {
+    /// Nothing whose depth certainly exceeds its `last` matters any more.
     aim: Aim,
-    /// Nothing whose depth certainly exceeds this matters.
-    limit: f32,
-    /// Lower bound of the depth of the nearest hit so far.
-    nearest: f32,
-    /// The nearest hit so far, if it is certain but where it is has still to be computed. Most rays come upon several hits,
-    /// each nearer than the last, and only the last is worth f64.
-    waiting: Candidate,
+    /// Of rays of which something had to be decided ([`Noted::ASKED`]): for most nothing is ever, and they don't touch it.
     query: Q,
 }
 
@@ -47,11 +42,21 @@ pub(crate) enum Found {
 }
 
 impl<Q: Query> Flight<Q> {
-    /// Takes in a ray; false if it hits nothing whatever there is: see [`Line::new`], or an empty range of t.
+    /// Takes in a ray, and its query if it has one; false if it hits nothing whatever there is: see [`Line::new`], or an empty
+    /// range of t.
     #[inline(always)]
-    pub(crate) fn aim_at(&mut self, object: &ObjectView<'_>, frame: &Frame, ray: &Ray) -> bool {
+    pub(crate) fn aim_at(
+        &mut self,
+        object: &ObjectView<'_>,
+        frame: &Frame,
+        (place, ray): (u32, &Ray),
+        query: Option<Q>,
+    ) -> bool {
         let hits = self.aim.set(frame, ray) || self.aim_in_f64(object, ray);
-        self.start();
+        (self.aim.ray, self.aim.noted) = (place, Noted::NOTHING);
+        if let Some(query) = query {
+            self.give(query);
+        }
         hits
     }
 
@@ -62,53 +67,81 @@ impl<Q: Query> Flight<Q> {
         let Some(line) = Line::new(ray) else { return false };
         let slabs = Slabs::new(ray, &line, object.header);
         let sight = Sight::new(ray, &line, &slabs, object.header);
-        self.aim = Aim { slabs, sight };
+        self.aim = Aim::new(slabs, sight);
         ray.tmin <= ray.tmax
     }
 
     /// A place for a ray.
     pub(crate) fn vacant(query: Q) -> Self {
-        Flight { aim: Aim::new_zeroed(), limit: 0.0, nearest: f32::INFINITY, waiting: Candidate::NONE, query }
+        Flight { aim: Aim::new_zeroed(), query }
     }
 
-    /// Takes in a ray that has been prepared.
+    /// Takes in a ray that has been prepared, and its query if it has one.
     #[inline(always)]
-    pub(crate) fn launch(&mut self, aim: &Aim, query: Q) {
+    pub(crate) fn launch(&mut self, aim: &Aim, query: Option<Q>) {
         self.aim = *aim;
-        self.query = query;
-        self.start();
-    }
-
-    /// Nothing has been found yet.
-    #[inline(always)]
-    fn start(&mut self) {
-        self.limit = self.aim.slabs.last;
-        if Q::DEFERS {
-            (self.nearest, self.waiting) = (f32::INFINITY, Candidate::NONE);
+        if let Some(query) = query {
+            self.give(query);
         }
     }
 
+    fn give(&mut self, query: Q) {
+        (self.query, self.aim.noted.decided) = (query, Noted::ASKED);
+    }
+
+    /// Place of the ray in the batch.
+    #[inline(always)]
+    pub(crate) fn ray(&self) -> usize {
+        self.aim.ray as usize
+    }
+
+    /// The query of a ray that was given one.
     #[inline(always)]
     pub(crate) fn query(&mut self) -> &mut Q {
+        &mut self.query
+    }
+
+    /// Hands on what has been found, but for what waits to be computed.
+    #[inline(always)]
+    pub(crate) fn hand_on(&self, to: &mut impl Deliver<Q>) {
+        match self.aim.noted.decided {
+            Noted::NEVER_ASKED => {}
+            Noted::ACCEPTED => {
+                let mut query = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+                query.accept();
+                to.query(self.ray(), &query);
+            }
+            _ => to.query(self.ray(), &self.query),
+        }
+    }
+
+    /// The query: a new one, unless there is one already.
+    #[inline(always)]
+    pub(crate) fn ask(&mut self, ray: &Ray) -> &mut Q {
+        if self.aim.noted.decided == Noted::NEVER_ASKED {
+            self.give(Q::new(ray));
+        }
         &mut self.query
     }
 
     /// Takes over what the query has found meanwhile.
     pub(crate) fn take_over(&mut self) {
         let limit = self.query.limit();
-        self.limit = self.aim.slabs.limit(limit);
+        self.aim.slabs.last = self.aim.slabs.limit(limit);
         if Q::DEFERS
             && let Some(t) = self.query.found()
         {
             // As far below as the limit lies above.
-            self.nearest = (((2.0 * t - limit) * f64::from(self.aim.slabs.scale)) as f32).next_down();
+            self.aim.noted.nearest =
+                (((2.0 * t - limit) * f64::from(self.aim.slabs.scale)) as f32).next_down();
         }
     }
 
     /// What waits to be computed.
     #[inline(always)]
     pub(crate) fn waiting(&self) -> Candidate {
-        self.waiting
+        let Noted { leaf, triangle, .. } = self.aim.noted;
+        Candidate { leaf, triangle: triangle.into() }
     }
 
     /// The axes of the projection.
@@ -120,16 +153,17 @@ impl<Q: Query> Flight<Q> {
     /// Computes what waits.
     #[inline(always)]
     pub(crate) fn settle(&mut self, object: &ObjectView<'_>, ray: &Ray) {
-        if Q::DEFERS && self.waiting != Candidate::NONE {
-            let waiting = std::mem::replace(&mut self.waiting, Candidate::NONE);
-            settle(object, ray, self.aim.sight.axis, [waiting, Candidate::NONE], &mut self.query);
+        if Q::DEFERS && self.aim.noted.leaf != NONE {
+            let (waiting, axis) = (self.waiting(), self.axis());
+            self.aim.noted.leaf = NONE;
+            settle(object, ray, axis, [waiting, Candidate::NONE], self.ask(ray));
         }
     }
 
     /// Keys of the stack beyond this are of no interest any more.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
-        self.limit + (self.limit.abs() * KEY_SLACK + f32::MIN_POSITIVE)
+        self.aim.slabs.last + (self.aim.slabs.last.abs() * KEY_SLACK + f32::MIN_POSITIVE)
     }
 
     /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
@@ -140,7 +174,7 @@ impl<Q: Query> Flight<Q> {
         node: &B,
         (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
-        let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
+        let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
         let children = s.load_u(node.child());
         if Q::ANY {
             s.compress(bits, children, codes)
@@ -158,7 +192,7 @@ impl<Q: Query> Flight<Q> {
         node: &B,
         (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> Option<(u32, usize)> {
-        let (bits, enter) = self.aim.slabs.children(s, node, self.limit);
+        let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
         if bits == 0 {
             return None;
         }
@@ -187,12 +221,16 @@ impl<Q: Query> Flight<Q> {
         if Q::TEST != Test::Exact {
             return self.enter_leaf_quickly(s, object, ray, block);
         }
-        let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.limit);
+        let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.aim.slabs.last);
         if found.maybe == 0 {
             return Found::Nothing;
         }
         if Q::ANY && found.sure != 0 {
-            self.query.accept();
+            if DEFER {
+                self.aim.noted.decided = Noted::ACCEPTED;
+            } else {
+                self.query.accept();
+            }
             return Found::Enough;
         }
         if DEFER && Q::DEFERS {
@@ -221,14 +259,14 @@ impl<Q: Query> Flight<Q> {
             s.store(nearest, &mut near);
             s.store(farthest, &mut far);
             let triangle = maybe.trailing_zeros() as usize % WIDTH;
-            if far[triangle] < self.nearest {
+            if far[triangle] < self.aim.noted.nearest {
                 let place = (block.first() as usize).wrapping_add(triangle);
                 s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
-                self.waiting = Candidate { leaf: code, triangle: triangle as u32 };
-                self.nearest = near[triangle];
-                let nearer = far[triangle] < self.limit;
+                let noted = &mut self.aim.noted;
+                (noted.nearest, noted.leaf, noted.triangle) = (near[triangle], code, triangle as u16);
+                let nearer = far[triangle] < self.aim.slabs.last;
                 if nearer {
-                    self.limit = far[triangle];
+                    self.aim.slabs.last = far[triangle];
                     return Found::Nearer;
                 }
                 return Found::Nothing;
@@ -247,13 +285,14 @@ impl<Q: Query> Flight<Q> {
         ray: &Ray,
         block: &B,
     ) -> Found {
-        let Some(found) = self.aim.sight.nearby(s, block, ray, Q::TEST, self.limit, self.aim.slabs.scale)
+        let Some(found) =
+            self.aim.sight.nearby(s, block, ray, Q::TEST, self.aim.slabs.last, self.aim.slabs.scale)
         else {
             return Found::Nothing;
         };
         let weight = [found.weight[0].into(), found.weight[1].into(), 1.0];
         let place = block.first() + found.triangle as u32;
-        self.query.offer(Named::place(place, object.triangle_ids), Crossing { t: found.t.into(), weight });
+        self.ask(ray).offer(Named::place(place, object.triangle_ids), Crossing { t: found.t.into(), weight });
         self.settled(Found::Nothing)
     }
 
@@ -268,6 +307,7 @@ impl<Q: Query> Flight<Q> {
         mut bits: u32,
     ) -> Found {
         let axis = self.aim.sight.axis;
+        self.ask(ray);
         let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
         for k in 0..3 {
             origin[k] = ray.origin[axis[k] as usize].into();
@@ -299,9 +339,9 @@ impl<Q: Query> Flight<Q> {
         if Q::ANY {
             return otherwise;
         }
-        let limit = self.limit;
+        let limit = self.aim.slabs.last;
         self.take_over();
-        if self.limit < limit { Found::Nearer } else { otherwise }
+        if self.aim.slabs.last < limit { Found::Nearer } else { otherwise }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Rays at the end of their way whose nearest hit is certain, and where it is still to be computed: sixteen at a time.
 
 use super::flight::Flight;
-use crate::layout::WIDTH;
+use crate::layout::{NONE, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -60,12 +60,12 @@ impl Landing {
         s: S,
         object: &ObjectView<'_>,
         rays: &[Ray],
-        (at, flight): (usize, &mut Flight<Q>),
+        flight: &Flight<Q>,
         to: &mut impl Deliver<Q>,
     ) {
-        let candidate = flight.waiting();
-        if !Q::DEFERS || candidate == Candidate::NONE {
-            return to.query(at, flight.query());
+        let (at, candidate) = (flight.ray(), flight.waiting());
+        if !Q::DEFERS || candidate.leaf == NONE {
+            return flight.hand_on(to);
         }
         let (lane, axis) = (self.count % LANES, flight.axis());
         let ray = &rays[at];

@@ -179,9 +179,13 @@ impl<S: Simd> Group<S> {
         s.mask_bits(s.le(enter, leave))
     }
 
-    /// Computes where rays cross the triangles that wait to be computed.
+    /// Computes where rays cross the triangles that wait to be computed; if none does, nothing is written.
     #[inline(always)]
     pub(crate) fn cross(&self, s: S, crossings: &mut Crossings) {
+        let some = s.mask_bits(s.lt_u(self.leaf, s.splat_u(NONE)));
+        if some == 0 {
+            return;
+        }
         let Projected { mut origin, mut direction, mut corner } = Projected::NONE;
         let (o, d) = (self.turn(s, self.origin), self.turn(s, self.direction));
         for k in 0..3 {
@@ -195,7 +199,6 @@ impl<S: Simd> Group<S> {
             }
         }
         s.store_u(self.place, &mut crossings.place);
-        let some = s.mask_bits(s.lt_u(self.leaf, s.splat_u(NONE)));
         crossings.compute(s, some, &Projected { origin, direction, corner });
     }
 

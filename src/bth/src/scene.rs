@@ -108,6 +108,22 @@ impl Scene {
         self.file.view(object).expect("an object below object_count, checked when opened")
     }
 
+    /// A file and its instances.
+    #[cfg(test)]
+    pub(crate) fn of(file: File, world: World) -> Scene {
+        Scene { file, world: Some(world) }
+    }
+
+    /// The only object that rays can meet, where its space is the world's, and the instance it is: no top level is needed then.
+    fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
+        let Some(world) = &self.world else {
+            return (self.object_count() == 1).then(|| (self.view(0), 0));
+        };
+        let (instance, object) = world.sole()?;
+        world.touch(object);
+        Some((self.view(object), instance))
+    }
+
     /// Bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
         self.file.resident_bytes()
@@ -123,6 +139,9 @@ impl Scene {
 
     /// As [`Self::nearest`], with a count of the work.
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
+        if let Some((object, instance)) = self.sole() {
+            return trace::nearest_counted(object, ray, hint(from, instance), instance);
+        }
         if let Some(world) = &self.world {
             return world.nearest_counted(&self.file, ray, from);
         }
@@ -151,16 +170,22 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
+        hits.fill(Hit::MISS);
+        if let Some((object, instance)) = self.sole() {
+            return trace::with_scratch(|scratch| {
+                if rays.len() >= trace::FEW {
+                    let from = hints(object, from, instance);
+                    return trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
+                }
+                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                    *hit = trace::nearest(object, ray, hint(surface(from, i), instance), instance, scratch);
+                }
+            });
+        }
         if let Some(world) = &self.world {
             return world.nearest(&self.file, rays, from, hits);
         }
-        hits.fill(Hit::MISS);
         trace::with_scratch(|scratch| {
-            if self.object_count() == 1 && rays.len() >= trace::FEW {
-                let object = self.view(0);
-                let from = hints(object, from);
-                return trace::nearest_batch(object, rays, from.as_deref(), 0, scratch, hits);
-            }
             for instance in 0..self.object_count() {
                 let object = self.view(instance);
                 for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
@@ -198,16 +223,22 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
+        found.fill(false);
+        if let Some((object, instance)) = self.sole() {
+            return trace::with_scratch(|scratch| {
+                if rays.len() >= trace::FEW {
+                    let from = hints(object, from, instance);
+                    return trace::any_batch(object, rays, from.as_deref(), scratch, found);
+                }
+                for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
+                    *found = trace::any(object, ray, hint(surface(from, i), instance), scratch);
+                }
+            });
+        }
         if let Some(world) = &self.world {
             return world.any(&self.file, rays, from, found);
         }
-        found.fill(false);
         trace::with_scratch(|scratch| {
-            if self.object_count() == 1 && rays.len() >= trace::FEW {
-                let object = self.view(0);
-                let from = hints(object, from);
-                return trace::any_batch(object, rays, from.as_deref(), scratch, found);
-            }
             for instance in 0..self.object_count() {
                 let object = self.view(instance);
                 for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
@@ -228,8 +259,9 @@ fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
 }
 
 /// The triangles of the only object that rays start on, if that is of use.
-fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>) -> Option<Vec<u32>> {
-    from.filter(|_| !object.tet_leaves.is_empty()).map(|from| from.iter().map(|&f| hint(f, 0)).collect())
+fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>, instance: u32) -> Option<Vec<u32>> {
+    let from = from.filter(|_| !object.tet_leaves.is_empty())?;
+    Some(from.iter().map(|&from| hint(from, instance)).collect())
 }
 
 /// The triangle of an object that a ray starts on, or `NONE`.

@@ -140,6 +140,11 @@ pub(crate) struct ObjectRay {
 }
 
 impl Inverse {
+    /// Whether an object's space is the world's.
+    pub(crate) fn is_identity(&self) -> bool {
+        self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
+    }
+
     /// The ray in object space: the same points at the same t, but for one rounding to f32 of each
     /// component of origin and direction (relative 2^-24). All triangles of the object see the same rounded ray, so
     /// nothing leaks within an object; where objects meet, answers may differ from those of one

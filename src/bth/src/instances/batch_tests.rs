@@ -3,6 +3,7 @@
 use super::super::affine::Affine;
 use super::super::placed::Parts;
 use super::*;
+use crate::scene::Scene;
 use crate::testing::Rng;
 
 const FILES: [&[u8]; 2] = [
@@ -186,4 +187,44 @@ fn packets_through_the_top_level_change_no_answer() {
     }
     assert!(in_packets > 60, "{in_packets} of 200 rounds in packets");
     assert!(hits_seen > all / 5 && refused > 2, "{hits_seen} of {all} hit, {refused} refused");
+}
+
+#[test]
+fn the_only_instance_is_traced_as_one_of_many() {
+    let mut rng = Rng(31);
+    let (mut hits_seen, mut all) = (0, 0);
+    for round in 0..60 {
+        let file = File::from_bytes(FILES[round % 2]).unwrap();
+        let identity = Affine::IDENTITY;
+        let number = rng.below(u64::from(file.object_count())) as u32;
+        let parts = Parts::whole(file.object_header(number));
+        let placed = Placed::new(&identity, number, file.object_header(number), &parts).unwrap();
+        // Among others that cannot be seen.
+        let (row, count) = (round % 5, [1, 3, 40, 64][round % 4]);
+        let mut places = vec![None; 5];
+        places[row] = Some(placed);
+        let world = World::of_places(places.clone(), file.object_count());
+        assert_eq!(world.sole(), Some((row as u32, number)));
+        places[(row + 1) % 5] = Some(placed);
+        assert_eq!(World::of_places(places, file.object_count()).sole(), None);
+
+        let rays = rays(&mut rng, &[identity], count);
+        let from: Vec<Surface> = rays
+            .iter()
+            .map(|_| Surface { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
+            .collect();
+        let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
+        world.nearest(&file, &rays, Some(&from), &mut hits);
+        world.any(&file, &rays, Some(&from), &mut found);
+        let scene = Scene::of(file, world);
+        let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
+        scene.nearest_batch(&rays, Some(&from), &mut sole_hits);
+        scene.any_batch(&rays, Some(&from), &mut sole_found);
+        assert_eq!((&sole_hits, &sole_found), (&hits, &found), "round {round}: {rays:?}");
+        assert_eq!(scene.nearest_counted(&rays[0], from[0]).0, hits[0]);
+        assert_eq!(scene.touched_objects(), 1);
+        hits_seen += hits.iter().filter(|hit| hit.is_hit()).count();
+        all += count;
+    }
+    assert!(hits_seen > all / 4, "{hits_seen} of {all} hit");
 }

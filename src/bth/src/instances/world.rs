@@ -32,6 +32,8 @@ pub(crate) struct World {
     /// Per instance its place; `None` for those that cannot be seen.
     pub(crate) placed: Vec<Option<Placed>>,
     pub(crate) top: TopLevel,
+    /// The only instance that can be seen, if its object's space is the world's.
+    sole: Option<u32>,
     /// Per object whether a ray was traced in it.
     touched: Vec<AtomicBool>,
 }
@@ -49,6 +51,7 @@ impl World {
             pose: Pose::new(&view),
             placed: vec![None; view.instances.len()],
             top: TopLevel::default(),
+            sole: None,
             touched: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
         };
         world.place(file, world.seconds, true)?;
@@ -72,7 +75,8 @@ impl World {
         let mut top = TopLevel::default();
         top.build(&placed);
         let touched = (0..objects).map(|_| AtomicBool::new(false)).collect();
-        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, touched }
+        let sole = sole(&placed);
+        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, sole, touched }
     }
 
     /// Moves to a time. After an error all is as it was.
@@ -131,6 +135,7 @@ impl World {
         if update.placed > 0 {
             let start = Instant::now();
             self.top.build(&self.placed);
+            self.sole = sole(&self.placed);
             update.top_level = start.elapsed();
         }
         update.visible = self.placed.iter().flatten().count();
@@ -154,6 +159,13 @@ impl World {
         (self.pose.world(&view, node).rows(), !self.pose.hidden(node))
     }
 
+    /// The only instance that can be seen, and its object, if the object's space is the world's: models that came as a scene,
+    /// mostly.
+    pub(crate) fn sole(&self) -> Option<(u32, u32)> {
+        let instance = self.sole?;
+        Some((instance, self.placed[instance as usize].as_ref()?.object()))
+    }
+
     /// Notes that a ray is traced in an object.
     pub(crate) fn touch(&self, object: u32) {
         let touched = &self.touched[object as usize];
@@ -171,4 +183,11 @@ impl World {
     pub(crate) fn bytes(&self) -> (usize, usize) {
         (size_of_val(self.placed.as_slice()) + self.top.bytes(), self.pose.bytes())
     }
+}
+
+/// See [`World::sole`].
+fn sole(placed: &[Option<Placed>]) -> Option<u32> {
+    let mut seen = placed.iter().enumerate().filter_map(|(row, place)| Some((row, place.as_ref()?)));
+    let (row, place) = seen.next()?;
+    (seen.next().is_none() && place.inverse.is_identity()).then_some(row as u32)
 }

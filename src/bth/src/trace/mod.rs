@@ -12,8 +12,6 @@ mod hinted;
 mod line;
 mod packets;
 mod prepare;
-#[cfg(test)]
-mod prepare_tests;
 mod query;
 mod quick;
 mod sight;

@@ -6,11 +6,10 @@
 
 use crate::layout::NONE;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::Simd;
 use crate::trace::crossings::{Crossings, Projected};
-use crate::trace::prepare::{self, Aim, Frame};
+use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
 use crate::trace::sight::Block;
-use std::mem::offset_of;
 
 /// Sixteen rays, and what they have found.
 #[derive(Clone, Copy)]
@@ -30,13 +29,13 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) limit: S::F,
     /// The axes of f64's projection ([`crate::trace::line`]).
     pub(crate) axis: [S::U; 3],
-    is_x: S::M,
-    is_y: S::M,
-    /// The axes of the projection, if they are the same for all.
-    common: Option<[usize; 3]>,
+    mixed: Mixed<S>,
+    /// The axis along the rays, if it is the same for all.
+    pub(crate) common: Option<Common>,
     plane_origin: [S::F; 2],
-    shear: [S::F; 2],
-    forward: S::F,
+    /// Slopes of the rays: how far they go along the plane's axes while they go 1 along the third, whichever way.
+    pub(crate) shear: [S::F; 2],
+    pub(crate) forward: S::F,
     start: S::F,
     /// From which to which depth hits are certainly in range.
     pub(crate) certain: [S::F; 2],
@@ -49,17 +48,6 @@ pub(crate) struct Group<S: Simd> {
     /// its place in leaf order and corners (`[corner][axis]`).
     place: S::U,
     corner: [[S::F; 3]; 3],
-}
-
-/// Place of a field of [`Aim`] among its floats.
-macro_rules! row {
-    ($($field:tt)*) => { offset_of!(Aim, $($field)*) / size_of::<f32>() };
-}
-
-/// Three successive rows.
-#[inline(always)]
-fn three<T: Copy>(rows: &[T; 2 * LANES], at: usize) -> [T; 3] {
-    [rows[at], rows[at + 1], rows[at + 2]]
 }
 
 impl<S: Simd> Group<S> {
@@ -78,8 +66,7 @@ impl<S: Simd> Group<S> {
             first: zero,
             limit: zero,
             axis: [none; 3],
-            is_x: no,
-            is_y: no,
+            mixed: Mixed { is_x: no, is_y: no },
             common: None,
             plane_origin: [zero; 2],
             shear: [zero; 2],
@@ -123,44 +110,35 @@ impl<S: Simd> Group<S> {
         let lane = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
         let last = s.splat_u(rays.len() as u32 - 1);
         let field = prepare::fields(s, s.mask(0xffff), rays, s.select_u(s.lt_u(lane, last), lane, last));
-        let (rows, usable) = prepare::rows(s, frame, field);
-        let zero = s.splat(0.0);
+        self.mixed = Mixed::of(s, [field[4], field[5], field[6]]);
+        self.common = self.mixed.common(s);
         self.origin = [field[0], field[1], field[2]];
         self.direction = [field[4], field[5], field[6]];
-        self.reciprocal = three(&rows, row!(slabs.reciprocal));
-        self.near_addend = three(&rows, row!(slabs.near_addend));
-        self.far_addend = three(&rows, row!(slabs.far_addend));
-        let near = three(&rows, row!(slabs.near));
-        for k in 0..3 {
-            self.negative[k] = s.lt_u(s.splat_u(0), s.bits(near[k]));
-        }
-        self.scale = rows[row!(slabs.scale)];
-        self.first = rows[row!(slabs.first)];
-        self.limit = rows[row!(slabs.last)];
-        let axis = three(&rows, row!(sight.axis));
-        for k in 0..3 {
-            self.axis[k] = s.bits(axis[k]);
-        }
-        self.is_x = s.eq_u(self.axis[2], s.splat_u(0));
-        self.is_y = s.eq_u(self.axis[2], s.splat_u(1));
-        self.common = match (s.mask_bits(self.is_x), s.mask_bits(self.is_y)) {
-            (0xffff, _) => Some([1, 2, 0]),
-            (_, 0xffff) => Some([2, 0, 1]),
-            (0, 0) => Some([0, 1, 2]),
-            _ => None,
-        };
-        self.forward = rows[row!(sight.forward)];
-        self.start = rows[row!(sight.start)];
-        let backward = s.lt(self.forward, zero);
-        let (origin, shear) = (row!(sight.origin), row!(sight.shear));
-        for k in 0..2 {
-            self.plane_origin[k] = s.select(backward, rows[origin + 1 - k], rows[origin + k]);
-            self.shear[k] = s.select(backward, rows[shear + 1 - k], rows[shear + k]);
-        }
-        self.certain = [rows[row!(sight.first)], rows[row!(sight.last)]];
         self.nearest = s.splat(f32::INFINITY);
         self.leaf = s.splat_u(NONE);
-        s.mask_bits(usable) == 0xffff
+        // Each taken over where it is made: merged first, they would all pass through memory once more.
+        match self.common {
+            Some(common) => self.take(s, prepare::lanes(s, frame, field, &common)),
+            None => self.take(s, prepare::lanes(s, frame, field, &self.mixed)),
+        }
+    }
+
+    /// Takes over what rays are prepared to; false if one of them can't be prepared.
+    #[inline(always)]
+    fn take(&mut self, s: S, lanes: prepare::Lanes<S>) -> bool {
+        self.reciprocal = lanes.reciprocal;
+        self.near_addend = lanes.near_addend;
+        self.far_addend = lanes.far_addend;
+        self.negative = lanes.negative;
+        self.scale = lanes.scale;
+        [self.first, self.limit] = lanes.depths;
+        self.certain = lanes.certain;
+        self.axis = lanes.axis;
+        self.plane_origin = lanes.origin;
+        self.shear = lanes.shear;
+        self.forward = lanes.forward;
+        self.start = lanes.start;
+        s.mask_bits(lanes.usable) == 0xffff
     }
 
     /// The rays that may meet a box within their range. Where all go into the same octant (not `MIXED`) the corners
@@ -205,10 +183,11 @@ impl<S: Simd> Group<S> {
     /// A point as the rays see it: its place in the plane of projection, and its depth.
     #[inline(always)]
     pub(crate) fn project(&self, s: S, point: [f32; 3]) -> [S::F; 3] {
-        let [x, y, z] = if let Some([x, y, z]) = self.common {
+        let [x, y, z] = if let Some(common) = self.common {
+            let [x, y, z] = common.order();
             [s.splat(point[x]), s.splat(point[y]), s.splat(point[z])]
         } else {
-            self.turn(s, [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])])
+            self.mixed.turn(s, [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])])
         };
         let depth = s.fma(z, self.forward, self.start);
         let x = s.sub(x, self.plane_origin[0]);
@@ -218,13 +197,10 @@ impl<S: Simd> Group<S> {
 
     /// Coordinates along the axes of the projection.
     #[inline(always)]
-    pub(crate) fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        [self.choose(s, y, z, x), self.choose(s, z, x, y), self.choose(s, x, y, z)]
-    }
-
-    /// By the axis along the ray.
-    #[inline(always)]
-    fn choose(&self, s: S, x: S::F, y: S::F, z: S::F) -> S::F {
-        s.select(self.is_x, x, s.select(self.is_y, y, z))
+    pub(crate) fn turn(&self, s: S, point: [S::F; 3]) -> [S::F; 3] {
+        match &self.common {
+            Some(common) => common.turn(s, point),
+            None => self.mixed.turn(s, point),
+        }
     }
 }

@@ -33,8 +33,8 @@ pub(crate) trait Hull<S: Simd> {
 ///
 /// **Triangles.** With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
-/// its half width, and an interval of a. Coherent rays have |s| <= 1.25. Roundings: 6uE for the first two
-/// terms, 5uE for s in the third, 17uE for a, 8uE for the sums; the pad is 64uE.
+/// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
+/// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
 pub(crate) struct Beam<S: Simd> {
     center: [S::F; 3],
     /// Least and greatest reciprocal.
@@ -123,7 +123,11 @@ impl<S: Simd> Beam<S> {
         for j in 0..2 {
             let (mut shear, mut addend) = (Ends::none(s), Ends::none(s));
             for group in groups {
-                let slope = s.div(group.direction[axis[j]], group.direction[main]);
+                let slope = match group.common {
+                    // As good as the quotient, and there already.
+                    Some(common) if common.0 == main => s.mul(group.shear[j], group.forward),
+                    _ => s.div(group.direction[axis[j]], group.direction[main]),
+                };
                 let from = s.sub(beam.center[main], group.origin[main]);
                 let a = s.fnma(slope, from, s.sub(beam.center[axis[j]], group.origin[axis[j]]));
                 shear.add(s, slope, slope);

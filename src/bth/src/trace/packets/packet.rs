@@ -8,7 +8,7 @@
 use super::group::Group;
 use super::hull::Hull;
 use super::leaf::{Leaf, Points, Rays, no_points};
-use crate::layout::{Child, NONE, WIDTH};
+use crate::layout::{Child, NONE, WIDTH, WideNode};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -26,7 +26,7 @@ pub(crate) const PACKET: usize = GROUPS * LANES;
 /// A child that waits to be entered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
-    /// Rays that entered the parent.
+    /// Rays that entered the parent; of those that go into different octants, and are asked at once, which meet the box.
     rays: u64,
     /// Line of the parent, and the slot there.
     parent: u32,
@@ -97,7 +97,8 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             used += mask.count_ones();
             match Child::from_code(code) {
                 Some(Child::Node(line)) => {
-                    let (bits, keys) = hull.children(s, object.node(line), limit);
+                    let node = object.node(line);
+                    let (bits, keys) = hull.children(s, node, limit);
                     let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
                     let count = if Q::ANY {
                         s.compress(bits, slots, &mut slot)
@@ -106,10 +107,15 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                     };
                     let room: &mut [Entry; WIDTH] =
                         stack[top..].first_chunk_mut().expect("as many levels as the header says");
+                    let mut some = 0;
                     for i in 0..count {
-                        room[i % WIDTH] = Entry { rays: mask, parent: line, slot: slot[i], key: key[i] };
+                        let slot = slot[i];
+                        let rays =
+                            if H::MIXED { mask & meeting(s, hull, groups, mask, node, slot) } else { mask };
+                        room[some % WIDTH] = Entry { rays, parent: line, slot, key: key[i] };
+                        some += usize::from(rays != 0);
                     }
-                    top += count;
+                    top += some;
                 }
                 Some(Child::Indexed(line)) => {
                     let mut room = None;
@@ -148,22 +154,13 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 if mask == 0 || (!Q::ANY && entry.key > limit + limit.abs() * KEY_SLACK) {
                     continue;
                 }
-                let (node, slot) = (object.node(entry.parent), entry.slot as usize % WIDTH);
-                code = node.child[slot];
+                let node = object.node(entry.parent);
+                code = node.child[entry.slot as usize % WIDTH];
                 prefetch(s, Wide, object, code);
-                let corners = hull.corners(node, slot);
-                let mut meets = 0;
-                for (i, group) in groups.iter().enumerate() {
-                    if mask >> (i * LANES) & 0xffff != 0 {
-                        let bits = if H::MIXED {
-                            group.meets::<true>(s, corners)
-                        } else {
-                            group.meets::<false>(s, corners)
-                        };
-                        meets |= u64::from(bits) << (i * LANES);
-                    }
+                // Later: hits may have come between, which leave less of it to meet.
+                if !H::MIXED {
+                    mask &= meeting(s, hull, groups, mask, node, entry.slot);
                 }
-                mask &= meets;
                 if mask != 0 {
                     break;
                 }
@@ -174,6 +171,28 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         let steps = u64::from(steps + rays.settled);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
+}
+
+/// Which of these rays, a bit each, meet the box of a child. Groups none of whose rays is asked about are left out.
+#[inline(always)]
+fn meeting<S: Simd, H: Hull<S>>(
+    s: S,
+    hull: &H,
+    groups: &[Group<S>],
+    rays: u64,
+    node: &WideNode,
+    slot: u32,
+) -> u64 {
+    let corners = hull.corners(node, slot as usize % WIDTH);
+    let mut meets = 0;
+    for (i, group) in groups.iter().enumerate() {
+        if rays >> (i * LANES) & 0xffff != 0 {
+            let bits =
+                if H::MIXED { group.meets::<true>(s, corners) } else { group.meets::<false>(s, corners) };
+            meets |= u64::from(bits) << (i * LANES);
+        }
+    }
+    meets
 }
 
 /// Computes what is still to be computed, and hands on what was found.

@@ -1,15 +1,15 @@
 //! However a ray is prepared, and on every instruction set, f32 leaves out nothing that exact arithmetic accepts, and is
 //! sure of nothing that it does not.
 
-use super::crossing::Crossing;
-use super::line::Line;
-use super::prepare::{Aim, Frame, Prepared};
-use super::sight::Sight;
-use super::slabs::Slabs;
+use super::{Aim, Frame, Prepared};
 use crate::layout::{IndexedLeaf, NONE, Object, WIDTH, WideNode};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use crate::testing::Rng;
+use crate::trace::crossing::Crossing;
+use crate::trace::line::Line;
+use crate::trace::sight::Sight;
+use crate::trace::slabs::Slabs;
 use zerocopy::FromZeros;
 
 /// One triangle: its node, its leaf, and the object whose bounds it has.

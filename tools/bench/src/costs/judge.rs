@@ -6,7 +6,7 @@ use crate::rounds::median;
 use anyhow::{Context, Result};
 use bth_compile::costs::{Walk, fit};
 
-/// Sizes between which the cost of a step changes, bytes: those are taken that fit best.
+/// Sizes between which the cost of a step changes, bytes: of both kinds of rays those are taken that fit best.
 const SIZES: [[f64; 4]; 2] = [[2.5e5, 5e5, 1e6, 2e6], [4e6, 8e6, 1.6e7, 3.2e7]];
 
 /// Fits the constants.
@@ -25,34 +25,48 @@ pub fn constants(nodes: &[Node]) -> Result<Constants> {
         };
         let mean =
             |start: usize| nodes.iter().map(|n| n.hits[start]).sum::<f64>() / nodes.len().max(1) as f64;
-        let mut best: Option<(f64, Constants)> = None;
-        for sizes in SIZES[0].iter().flat_map(|small| SIZES[1].map(|large| [*small, large])) {
-            let Some(walk) = walk(nodes, sizes, 0).zip(walk(nodes, sizes, 1)) else { continue };
-            let constants = Constants {
-                levels: [[levels(0, 0)?, levels(0, 1)?], [levels(1, 0)?, levels(1, 1)?]],
-                area: [area(0)?[0], area(1)?[0]],
-                walk: [walk.0, walk.1],
-                hits: [mean(0), mean(1)],
-                sizes,
-            };
-            let off = |n: &Node, start: usize| {
-                let predicted = constants.nanoseconds(start, n.steps[start], n.hits[start], n.bytes);
-                (predicted / n.nanoseconds[start] - 1.0).powi(2)
-            };
-            let error = nodes.iter().map(|n| off(n, 0) + off(n, 1)).sum::<f64>();
-            if best.is_none_or(|b| error < b.0) {
-                best = Some((error, constants));
-            }
-        }
-        best.map(|b| b.1)
+        let (outside, surface) = (best_walk(nodes, 0)?, best_walk(nodes, 1)?);
+        Some(Constants {
+            levels: [[levels(0, 0)?, levels(0, 1)?], [levels(1, 0)?, levels(1, 1)?]],
+            area: [area(0)?[0], area(1)?[0]],
+            walk: [outside.0, surface.0],
+            hits: [mean(0), mean(1)],
+            sizes: [outside.1, surface.1],
+        })
     };
     fitted().context("too few nodes to fit constants on")
+}
+
+/// Costs of a walk, and the sizes with which they fit best.
+fn best_walk(nodes: &[Node], start: usize) -> Option<([f64; 4], [f64; 2])> {
+    let mut best: Option<(f64, [f64; 4], [f64; 2])> = None;
+    for sizes in SIZES[0].iter().flat_map(|small| SIZES[1].map(|large| [*small, large])) {
+        let Some(walk) = walk(nodes, sizes, start) else { continue };
+        let off = |n: &Node| {
+            let predicted = cost(walk, n.steps[start], n.hits[start], walked(n, start), sizes);
+            (predicted / n.nanoseconds[start] - 1.0).powi(2)
+        };
+        let error = nodes.iter().map(off).sum::<f64>();
+        if best.is_none_or(|b| error < b.0) {
+            best = Some((error, walk, sizes));
+        }
+    }
+    best.map(|(_, walk, sizes)| (walk, sizes))
+}
+
+/// Bytes of the tetrahedra and vertices that rays come to.
+fn walked(node: &Node, start: usize) -> f64 {
+    node.bytes * node.spread[start]
+}
+
+fn cost([entry, hit, small, large]: [f64; 4], steps: f64, hits: f64, bytes: f64, sizes: [f64; 2]) -> f64 {
+    Walk { entry, hit, step: [small, large] }.cost(steps, hits, bytes, sizes)
 }
 
 /// Costs of a walk, for these sizes.
 fn walk(nodes: &[Node], sizes: [f64; 2], start: usize) -> Option<[f64; 4]> {
     let row = |n: &Node| {
-        let share = share(n.bytes, sizes);
+        let share = share(walked(n, start), sizes);
         let steps = n.steps[start];
         ([1.0, n.hits[start], steps * (1.0 - share), steps * share], n.nanoseconds[start])
     };
@@ -80,14 +94,17 @@ impl Constants {
 
     /// Nanoseconds that an estimator predicts for a ray through a node.
     pub fn predict(&self, estimator: usize, start: usize, node: &Node) -> f64 {
-        let hits = if estimator == 3 { node.sampled_hits[start] } else { self.hits[start] };
-        self.nanoseconds(start, self.steps(estimator, start, node), hits, node.bytes)
+        // Only sampling tells how many rays hit something, and which tetrahedra they come to.
+        let (hits, bytes) = match estimator {
+            3 => (node.sampled_hits[start], walked(node, start)),
+            _ => (self.hits[start], node.bytes),
+        };
+        self.nanoseconds(start, self.steps(estimator, start, node), hits, bytes)
     }
 
-    /// Nanoseconds of a ray of so many steps, if such a share of rays ends at triangles.
+    /// Nanoseconds of a ray of so many steps, if such a share of rays ends at triangles, and they come to so many bytes.
     pub fn nanoseconds(&self, start: usize, steps: f64, hits: f64, bytes: f64) -> f64 {
-        let [entry, hit, small, large] = self.walk[start];
-        Walk { entry, hit, step: [small, large] }.cost(steps, hits, bytes, self.sizes)
+        cost(self.walk[start], steps, hits, bytes, self.sizes[start])
     }
 }
 
@@ -102,7 +119,7 @@ pub fn judge(constants: &Constants, nodes: &[Node]) -> Vec<Judged> {
             let of_time: Vec<(f64, f64)> = nodes
                 .iter()
                 .map(|n| match exact {
-                    true => constants.nanoseconds(start, n.steps[start], n.hits[start], n.bytes),
+                    true => constants.nanoseconds(start, n.steps[start], n.hits[start], walked(n, start)),
                     false => constants.predict(row, start, n),
                 })
                 .zip(nodes.iter().map(|n| n.nanoseconds[start]))
@@ -137,6 +154,7 @@ mod tests {
             steps,
             hits,
             sampled_hits: hits,
+            spread: [1.0; 2],
             nanoseconds: steps.map(|s| 40.0 + 20.0 * hits[0] + s * (2.0 + share)),
             estimates: [[levels; 2], [levels * 1.1; 2], steps.map(|s| s / 1.25), steps],
             micros: [1.0; ESTIMATORS.len()],

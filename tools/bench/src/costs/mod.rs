@@ -53,17 +53,22 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
     let options =
         json!({"least": which.least, "most": which.most, "nodes": which.nodes, "rounds": which.rounds});
     let progress = Progress::new();
-    let all = |models: &[String]| -> Result<(Vec<String>, Vec<record::Node>)> {
+    let all = |models: &[String]| -> Result<(Vec<String>, Vec<nodes::Candidate>)> {
         let (mut names, mut found) = (Vec::new(), Vec::new());
         for name in models {
             let model = Model::load(name)?;
-            found.extend(nodes::measure(&model, &which, &progress)?);
+            found.extend(nodes::candidates(&model, &which, &progress)?);
             names.push(model.name);
         }
         Ok((names, found))
     };
-    let (fitted_on, fitted) = all(&arguments.fit)?;
-    let (judged_on, judged_nodes) = all(&arguments.models)?;
+    let (fitted_on, mut candidates) = all(&arguments.fit)?;
+    let (judged_on, others) = all(&arguments.models)?;
+    let fitted = candidates.len();
+    candidates.extend(others);
+    let mut fitted_nodes = nodes::time(candidates, which.rounds, &progress);
+    let judged_nodes = fitted_nodes.split_off(fitted);
+    let fitted = fitted_nodes;
     let constants = constants(&fitted)?;
     let mut regrets = Vec::new();
     for name in &arguments.small {

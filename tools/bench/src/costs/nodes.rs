@@ -10,15 +10,16 @@ use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
 use bth::layout::RecordKind;
 use bth::rays::{Hit, Ray, Surface};
-use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
+use bth_compile::costs::{self, Estimator, SampleRay, Spread, Start, TetWalker};
 use bth_compile::mesh::Mesh;
 use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::tets::TetMesh;
 use bth_compile::{Silent, bvh, marks, tets};
 use std::collections::HashMap;
 use std::time::Instant;
 
 /// Rays whose steps the sampling estimator counts, and rays that are measured.
-const SAMPLES: usize = 256;
+const SAMPLES: usize = 1024;
 const RAYS: usize = 8192;
 
 /// What to measure of each model.
@@ -34,11 +35,20 @@ pub(super) struct Which {
     pub(super) rounds: usize,
 }
 
-/// Measures the candidate nodes of a model: suitable ones, evenly spread over their sizes.
+/// A candidate node as an object of its own, ready to be measured.
+pub(super) struct Candidate {
+    /// All that is known of it without a clock.
+    node: Node,
+    tracer: Box<dyn Tracer>,
+    /// Rays from outside and from surfaces.
+    sets: [(Vec<Ray>, Vec<Surface>); 2],
+}
+
+/// The candidate nodes of a model: suitable ones, evenly spread over their sizes.
 ///
 /// # Errors
 /// If the model cannot be used.
-pub(super) fn measure(model: &Model, which: &Which, progress: &Progress) -> Result<Vec<Node>> {
+pub(super) fn candidates(model: &Model, which: &Which, progress: &Progress) -> Result<Vec<Candidate>> {
     progress.say(format!("{}: marks", model.name));
     let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent)?;
     let (marks, _) = marks::mark(&model.mesh, &tree, &Silent)?;
@@ -48,15 +58,15 @@ pub(super) fn measure(model: &Model, which: &Which, progress: &Progress) -> Resu
         .collect();
     candidates.sort_by_key(|i| (std::cmp::Reverse(count(i)), *i));
     let keep = which.nodes.min(candidates.len());
-    let mut nodes = Vec::new();
+    let mut built = Vec::new();
     for k in 0..keep {
         let node = candidates[k * candidates.len() / keep];
         progress.say(format!("{}: node {} of {keep}", model.name, k + 1));
         let first = tree.nodes[node as usize].first as usize;
         let rows = &tree.order[first..first + tree.nodes[node as usize].count as usize];
-        nodes.extend(measure_node(&model.name, node, &part(&model.mesh, rows), which)?);
+        built.extend(candidate(&model.name, node, &part(&model.mesh, rows))?);
     }
-    Ok(nodes)
+    Ok(built)
 }
 
 /// Some of a mesh's triangles as a mesh.
@@ -75,7 +85,7 @@ fn part(mesh: &Mesh, triangles: &[u32]) -> Mesh {
 }
 
 /// `None` if TetGen fails on it.
-fn measure_node(model: &str, node: u32, mesh: &Mesh, which: &Which) -> Result<Option<Node>> {
+fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
     let options = Options {
         structure: Structure::Tets,
         record: RecordKind::Link32,
@@ -93,12 +103,11 @@ fn measure_node(model: &str, node: u32, mesh: &Mesh, which: &Which) -> Result<Op
     let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
     let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
     let walker = TetWalker::new(tets);
-    let counted = [&outside, &surface].map(|rays| count(&walker, rays));
-    let times = times(&*tracer, &[&outside, &surface], which.rounds);
+    let counted = [&outside, &surface].map(|rays| count(tets, &walker, rays));
 
     let triangles = tree.order.len() as u32;
     let mut estimates = [[0.0; 2]; ESTIMATORS.len()];
-    let mut sampled_hits = [0.0; 2];
+    let (mut sampled_hits, mut spread) = ([0.0; 2], [1.0; 2]);
     let mut micros = [0.0; ESTIMATORS.len()];
     let depth = || average_depth(&tree);
     for (row, name) in ESTIMATORS.iter().enumerate() {
@@ -114,36 +123,41 @@ fn measure_node(model: &str, node: u32, mesh: &Mesh, which: &Which) -> Result<Op
                 let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
                 // The walker is part of what sampling takes.
                 let walker = TetWalker::new(tets);
-                let counted = [outside, surface].map(|rays| count(&walker, &rays));
+                let counted = [outside, surface].map(|rays| count(tets, &walker, &rays));
                 sampled_hits = counted.map(|c| c[1]);
+                spread = counted.map(|c| c[2]);
                 counted.map(|c| c[0])
             }
         };
         micros[row] = 1e6 * clock.elapsed().as_secs_f64();
     }
-    Ok(Some(Node {
+    let node = Node {
         model: model.to_owned(),
         node,
         triangles,
         bytes: (tets.tets.len() * 32 + tets.vertices.len() * 16) as f64,
         steps: counted.map(|c| c[0]),
         hits: counted.map(|c| c[1]),
-        nanoseconds: times,
+        nanoseconds: [0.0; 2],
         estimates,
         sampled_hits,
+        spread,
         micros,
-    }))
+    };
+    Ok(Some(Candidate { node, tracer, sets: [rays(&outside), rays(&surface)] }))
 }
 
-/// Mean steps of rays, and the share of them that end at a triangle.
-fn count(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [f64; 2] {
+/// Mean steps of rays, the share of them that end at a triangle, and the share of the tetrahedra that they spread over.
+fn count(tets: &TetMesh, walker: &TetWalker<'_>, rays: &[SampleRay]) -> [f64; 3] {
+    let mut spread = Spread::new(tets.tets.len());
     let (mut sums, mut walked) = ([0.0; 2], 0.0f64);
-    for walk in rays.iter().filter_map(|ray| walker.walk(ray)) {
+    for walk in rays.iter().filter_map(|ray| spread.walk(walker, ray)) {
         sums[0] += f64::from(walk.steps);
         sums[1] += f64::from(u8::from(walk.hit));
         walked += 1.0;
     }
-    sums.map(|sum| sum / walked.max(1.0))
+    let [steps, hits] = sums.map(|sum| sum / walked.max(1.0));
+    [steps, hits, spread.share()]
 }
 
 /// Mean depth of the leaves.
@@ -161,15 +175,30 @@ fn average_depth(tree: &bvh::BinaryBvh) -> f64 {
     sum / leaves.max(1.0)
 }
 
-/// Nanoseconds of a ray of each set, in batches with hints.
-fn times(tracer: &dyn Tracer, sets: &[&[SampleRay]; 2], rounds: usize) -> [f64; 2] {
-    let sets = sets.map(rays);
+/// Measures candidates in batches with hints, all of them in turn: whatever keeps the machine busy for a while falls on all.
+/// Each comes with what it needs in the caches, as one more batch goes before.
+pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progress) -> Vec<Node> {
     let mut hits = vec![Hit::MISS; RAYS];
-    let seconds = least(&sets, rounds, |_, (rays, from)| {
+    let items: Vec<(&Candidate, usize)> = candidates.iter().flat_map(|c| [(c, 0), (c, 1)]).collect();
+    let mut said = usize::MAX;
+    let seconds = least(&items, rounds, |round, (candidate, set)| {
+        if round != said {
+            progress.say(format!("round {round} of {rounds}: {} nodes", candidates.len()));
+            said = round;
+        }
+        let (rays, from) = &candidate.sets[*set];
         let batch = Batch { rays, from: Some(from), coherent: false };
-        Some(Clock::ThreadCpu.time(|| tracer.nearest(batch, &mut hits[..rays.len()])))
+        let hits = &mut hits[..rays.len()];
+        candidate.tracer.nearest(batch, hits);
+        Some(Clock::ThreadCpu.time(|| candidate.tracer.nearest(batch, hits)))
     });
-    [0, 1].map(|set| 1e9 * seconds[set].unwrap_or(0.0) / sets[set].0.len().max(1) as f64)
+    let nanoseconds = |(row, rays): (usize, usize)| 1e9 * seconds[row].unwrap_or(0.0) / rays.max(1) as f64;
+    let mut nodes = Vec::new();
+    for (row, Candidate { node, sets, .. }) in candidates.into_iter().enumerate() {
+        let nanoseconds = [0, 1].map(|set| nanoseconds((2 * row + set, sets[set].0.len())));
+        nodes.push(Node { nanoseconds, ..node });
+    }
+    nodes
 }
 
 /// Sampled rays as the library takes them.

@@ -31,6 +31,8 @@ pub struct Node {
     pub estimates: [[f64; 2]; ESTIMATORS.len()],
     /// Share of the rays that end at a triangle, as the sampling estimator finds it.
     pub sampled_hits: [f64; 2],
+    /// Share of the tetrahedra that these rays spread over.
+    pub spread: [f64; 2],
     /// Microseconds that it takes to say so.
     pub micros: [f64; ESTIMATORS.len()],
 }
@@ -47,7 +49,7 @@ pub struct Constants {
     /// Mean share of the rays that end at a triangle: for estimators that don't tell.
     pub hits: [f64; 2],
     /// Those sizes, bytes.
-    pub sizes: [f64; 2],
+    pub sizes: [[f64; 2]; 2],
 }
 
 /// How an estimator does on models that it was not fitted on.

@@ -58,18 +58,19 @@ pub fn markdown(record: &CostsRecord) -> String {
             levels(0),
             levels(1),
             format!("{:.3}", c.area[start]),
-            format!("{entry:.1} + {hit:.1} for a hit + {small:.2} to {large:.2} a step"),
+            format!(
+                "{entry:.1} + {hit:.1} for a hit + {small:.2} a step up to {:.2} MB, {large:.2} from {:.0} MB on",
+                c.sizes[start][0] / 1e6,
+                c.sizes[start][1] / 1e6
+            ),
         ]);
     }
     let head = row(&["rays from", "steps by face count", "by average depth", "factor of the area", "ns"]);
     text.push_str(&table(&head, &rows));
-    let [small, large] = c.sizes;
-    text.push_str(&format!(
-        "\nA step costs the first up to {:.2} MB of tetrahedra and vertices, the second from {:.0} MB on, and in between what the \
-         logarithm of the size says.\n",
-        small / 1e6,
-        large / 1e6
-    ));
+    text.push_str(
+        "\nSizes are those of the tetrahedra that rays come to, and of their vertices, as sampling finds them; in between the logarithm \
+         decides. The other estimators know only of the whole size.\n",
+    );
     if !record.regrets.is_empty() {
         text.push_str(
             "\n## Regret\n\nEvery selection of the suitable nodes in the three topmost levels of small models was measured: \

@@ -124,8 +124,7 @@ impl Sampled {
                 let Ok(k) = nodes.binary_search(&at) else { continue };
                 let node = &bvh.nodes[at as usize];
                 let share = if ray.tmax.is_finite() { SHORT_STEPS } else { 1.0 };
-                let mut time =
-                    prices.surface(node.count.into(), share * steps(Start::Surface, at), hits(met, node));
+                let mut time = prices.surface(node.count, share * steps(Start::Surface, at), hits(met, node));
                 if at != 0 && leaves(ray, met, node) {
                     time += bvh_time;
                 }
@@ -143,8 +142,8 @@ impl Sampled {
             if !prices.keep_subtrees {
                 let n = steps(Start::Outside, at);
                 let walked = match at {
-                    0 => prices.outside(node.count.into(), n, LINES_THAT_HIT),
-                    _ => prices.alone(node.count.into(), n, LINES_THAT_HIT),
+                    0 => prices.outside(node.count, n, LINES_THAT_HIT),
+                    _ => prices.alone(node.count, n, LINES_THAT_HIT),
                 };
                 // At the root the ray is not prepared twice.
                 let prepared = if at == 0 { costs.ray } else { 0.0 };

@@ -1,7 +1,7 @@
 //! Which suitable nodes to tetrahedralize.
 //!
 //! `profile` holds what tracing costs on a machine; `rays`, `bvh_walk` and `tet_walk` sample rays and
-//! count their steps, `spread` how many tetrahedra they come to; `estimate` and `area` predict steps. `choose` selects: by the paper's rule (`top_down`) or
+//! count their steps, `estimate` and `area` predict these. `choose` selects: by the paper's rule (`top_down`) or
 //! what saves most time (`gains`, `bottom_up`). `probe` looks again when the tetrahedra are built.
 
 mod area;
@@ -18,7 +18,6 @@ mod probe;
 mod profile;
 mod random;
 mod rays;
-mod spread;
 mod subtree_sums;
 mod tet_walk;
 mod top_down;
@@ -40,6 +39,5 @@ pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
 pub(crate) use random::Random;
 pub use rays::{SampleRay, from_surface, outside};
-pub use spread::Spread;
 pub use tet_walk::{TetWalker, Walked, mean_steps};
 pub use weighting::Weighting;

@@ -41,27 +41,26 @@ impl<'a> Prices<'a> {
     }
 
     /// What a step touches: the record and a vertex.
-    fn walked(&self, triangles: f64) -> f64 {
-        triangles * (TETS * self.record.stride() as f64 + VERTICES * size_of::<TetVertex>() as f64)
+    fn walked(&self, triangles: u32) -> f64 {
+        f64::from(triangles) * (TETS * self.record.stride() as f64 + VERTICES * size_of::<TetVertex>() as f64)
     }
 
-    fn cost(&self, walk: &Walk, triangles: f64, steps: f64, hits: f64) -> f64 {
+    fn cost(&self, walk: &Walk, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.scale * walk.cost(steps, hits, self.walked(triangles), self.options.profile.bytes)
     }
 
-    /// Nanoseconds of a ray that starts on a triangle of the node, as large as rays come to it; `hits` is the share of such rays
-    /// that end at one.
-    pub(super) fn surface(&self, triangles: f64, steps: f64, hits: f64) -> f64 {
+    /// Nanoseconds of a ray that starts on a triangle of the node; `hits` is the share of such rays that end at one.
+    pub(super) fn surface(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.surface, triangles, steps, hits)
     }
 
     /// Nanoseconds of a ray that enters the node's box, sixteen rays at a time.
-    pub(super) fn outside(&self, triangles: f64, steps: f64, hits: f64) -> f64 {
+    pub(super) fn outside(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.outside, triangles, steps, hits)
     }
 
     /// The same for a leaf below a BVH node, where rays enter one by one.
-    pub(super) fn alone(&self, triangles: f64, steps: f64, hits: f64) -> f64 {
+    pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.alone, triangles, steps, hits)
     }
 

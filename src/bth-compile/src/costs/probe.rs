@@ -10,8 +10,7 @@ use super::gains::leaves;
 use super::options::{Options, Probe, Select};
 use super::prices::Prices;
 use super::rays::{SampleRay, from_surface, outside};
-use super::spread::Spread;
-use super::tet_walk::{TetWalker, Walked};
+use super::tet_walk::TetWalker;
 use super::{Weighting, subtree_sums::half_area};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
@@ -156,13 +155,13 @@ fn surface(
         here.copied().take(count).collect()
     });
     let rays = of_scene.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
-    let (walks, triangles) = walks(tets, at.count, &rays);
+    let walker = TetWalker::new(tets);
     let (mut steps, mut through_tets, mut through_bvh, mut traced) = (0.0, 0.0, 0.0, 0.0f64);
-    for (ray, walked) in rays.iter().zip(walks) {
-        let Some(walked) = walked else { continue };
+    for ray in &rays {
+        let Some(walked) = walker.walk(ray) else { continue };
         let met = walk(mesh, bvh, ray, |_| {});
         let plain = costs.ray + costs.surface * f64::from(met.visits);
-        let mut time = prices.surface(triangles, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+        let mut time = prices.surface(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
         if node != 0 && walked.left && leaves(ray, &met, at) {
             time += plain;
         }
@@ -183,13 +182,6 @@ fn surface(
     }
 }
 
-/// The walks of rays, and how many of the triangles' tetrahedra they spread over, as triangles.
-fn walks(tets: &TetMesh, triangles: u32, rays: &[SampleRay]) -> (Vec<Option<Walked>>, f64) {
-    let (walker, mut spread) = (TetWalker::new(tets), Spread::new(tets.tets.len()));
-    let walks = rays.iter().map(|ray| spread.walk(&walker, ray)).collect();
-    (walks, f64::from(triangles) * spread.share())
-}
-
 /// What is saved of rays from outside where no BVH stays beside the tetrahedra, for each that meets the root.
 fn entering(
     mesh: &Mesh,
@@ -202,18 +194,17 @@ fn entering(
 ) -> f64 {
     let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
     let below = node..node + 2 * at.count - 1;
-    let rays = outside(at.lower, at.upper, count, 4 + u64::from(node));
-    let (walks, triangles) = walks(tets, at.count, &rays);
+    let walker = TetWalker::new(tets);
     let (mut saved, mut traced) = (0.0, 0.0f64);
-    for (ray, walked) in rays.iter().zip(walks) {
-        let Some(walked) = walked else { continue };
+    for ray in outside(at.lower, at.upper, count, 4 + u64::from(node)) {
+        let Some(walked) = walker.walk(&ray) else { continue };
         let mut visits = 0u32;
-        walk(mesh, bvh, ray, |i| visits += u32::from(below.contains(&i)));
+        walk(mesh, bvh, &ray, |i| visits += u32::from(below.contains(&i)));
         let (steps, hits) = (f64::from(walked.steps), f64::from(u8::from(walked.hit)));
         saved += costs.outside * f64::from(visits);
         saved -= match node {
-            0 => prices.outside(triangles, steps, hits) - costs.ray,
-            _ => prices.alone(triangles, steps, hits),
+            0 => prices.outside(at.count, steps, hits) - costs.ray,
+            _ => prices.alone(at.count, steps, hits),
         };
         traced += 1.0;
     }

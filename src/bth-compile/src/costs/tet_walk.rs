@@ -54,11 +54,6 @@ impl<'a> TetWalker<'a> {
     /// The walk of a ray: from its triangle if that is one of the node's, else from where it enters the
     /// box; `None` if it misses the box.
     pub fn walk(&self, ray: &SampleRay) -> Option<Walked> {
-        self.walk_through(ray, |_| {})
-    }
-
-    /// The same; `visit` gets the tetrahedra on the way.
-    pub fn walk_through(&self, ray: &SampleRay, visit: impl FnMut(u32)) -> Option<Walked> {
         let start = ray.from.and_then(|triangle| {
             let row = self.face_of.binary_search_by_key(&triangle, |(id, _)| *id).ok()?;
             let row = self.face_of[row].1;
@@ -73,7 +68,7 @@ impl<'a> TetWalker<'a> {
             Some(start) => start,
             None => self.entry(ray)?,
         };
-        Some(self.go(ray, tet, k, visit))
+        Some(self.go(ray, tet, k))
     }
 
     /// The tetrahedron and face through which a ray comes in from outside: the nearest of the hull.
@@ -88,9 +83,8 @@ impl<'a> TetWalker<'a> {
         best.map(|b| b.1)
     }
 
-    fn go(&self, ray: &SampleRay, mut tet: u32, mut entered: usize, mut visit: impl FnMut(u32)) -> Walked {
+    fn go(&self, ray: &SampleRay, mut tet: u32, mut entered: usize) -> Walked {
         for steps in 1..=self.mesh.tets.len() as u32 {
-            visit(tet);
             // Out through the nearest of the planes that the ray crosses outwards.
             let mut out = (f64::INFINITY, entered);
             for k in (0..4).filter(|k| *k != entered) {

@@ -43,7 +43,7 @@ fn best_walk(nodes: &[Node], start: usize) -> Option<([f64; 4], [f64; 2])> {
     for sizes in SIZES[0].iter().flat_map(|small| SIZES[1].map(|large| [*small, large])) {
         let Some(walk) = walk(nodes, sizes, start) else { continue };
         let off = |n: &Node| {
-            let predicted = cost(walk, n.steps[start], n.hits[start], walked(n, start), sizes);
+            let predicted = cost(walk, n.steps[start], n.hits[start], n.bytes, sizes);
             (predicted / n.nanoseconds[start] - 1.0).powi(2)
         };
         let error = nodes.iter().map(off).sum::<f64>();
@@ -54,11 +54,6 @@ fn best_walk(nodes: &[Node], start: usize) -> Option<([f64; 4], [f64; 2])> {
     best.map(|(_, walk, sizes)| (walk, sizes))
 }
 
-/// Bytes of the tetrahedra and vertices that rays come to.
-fn walked(node: &Node, start: usize) -> f64 {
-    node.bytes * node.spread[start]
-}
-
 fn cost([entry, hit, small, large]: [f64; 4], steps: f64, hits: f64, bytes: f64, sizes: [f64; 2]) -> f64 {
     Walk { entry, hit, step: [small, large] }.cost(steps, hits, bytes, sizes)
 }
@@ -66,7 +61,7 @@ fn cost([entry, hit, small, large]: [f64; 4], steps: f64, hits: f64, bytes: f64,
 /// Costs of a walk, for these sizes.
 fn walk(nodes: &[Node], sizes: [f64; 2], start: usize) -> Option<[f64; 4]> {
     let row = |n: &Node| {
-        let share = share(walked(n, start), sizes);
+        let share = share(n.bytes, sizes);
         let steps = n.steps[start];
         ([1.0, n.hits[start], steps * (1.0 - share), steps * share], n.nanoseconds[start])
     };
@@ -94,15 +89,11 @@ impl Constants {
 
     /// Nanoseconds that an estimator predicts for a ray through a node.
     pub fn predict(&self, estimator: usize, start: usize, node: &Node) -> f64 {
-        // Only sampling tells how many rays hit something, and which tetrahedra they come to.
-        let (hits, bytes) = match estimator {
-            3 => (node.sampled_hits[start], walked(node, start)),
-            _ => (self.hits[start], node.bytes),
-        };
-        self.nanoseconds(start, self.steps(estimator, start, node), hits, bytes)
+        let hits = if estimator == 3 { node.sampled_hits[start] } else { self.hits[start] };
+        self.nanoseconds(start, self.steps(estimator, start, node), hits, node.bytes)
     }
 
-    /// Nanoseconds of a ray of so many steps, if such a share of rays ends at triangles, and they come to so many bytes.
+    /// Nanoseconds of a ray of so many steps, if such a share of rays ends at triangles.
     pub fn nanoseconds(&self, start: usize, steps: f64, hits: f64, bytes: f64) -> f64 {
         cost(self.walk[start], steps, hits, bytes, self.sizes[start])
     }
@@ -119,7 +110,7 @@ pub fn judge(constants: &Constants, nodes: &[Node]) -> Vec<Judged> {
             let of_time: Vec<(f64, f64)> = nodes
                 .iter()
                 .map(|n| match exact {
-                    true => constants.nanoseconds(start, n.steps[start], n.hits[start], walked(n, start)),
+                    true => constants.nanoseconds(start, n.steps[start], n.hits[start], n.bytes),
                     false => constants.predict(row, start, n),
                 })
                 .zip(nodes.iter().map(|n| n.nanoseconds[start]))
@@ -154,7 +145,6 @@ mod tests {
             steps,
             hits,
             sampled_hits: hits,
-            spread: [1.0; 2],
             nanoseconds: steps.map(|s| 40.0 + 20.0 * hits[0] + s * (2.0 + share)),
             estimates: [[levels; 2], [levels * 1.1; 2], steps.map(|s| s / 1.25), steps],
             micros: [1.0; ESTIMATORS.len()],

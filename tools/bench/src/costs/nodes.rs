@@ -10,10 +10,9 @@ use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
 use bth::layout::RecordKind;
 use bth::rays::{Hit, Ray, Surface};
-use bth_compile::costs::{self, Estimator, SampleRay, Spread, Start, TetWalker};
+use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
 use bth_compile::mesh::Mesh;
 use bth_compile::pipeline::{self, Options, Structure};
-use bth_compile::tets::TetMesh;
 use bth_compile::{Silent, bvh, marks, tets};
 use std::collections::HashMap;
 use std::time::Instant;
@@ -103,11 +102,11 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
     let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
     let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
     let walker = TetWalker::new(tets);
-    let counted = [&outside, &surface].map(|rays| count(tets, &walker, rays));
+    let counted = [&outside, &surface].map(|rays| count(&walker, rays));
 
     let triangles = tree.order.len() as u32;
     let mut estimates = [[0.0; 2]; ESTIMATORS.len()];
-    let (mut sampled_hits, mut spread) = ([0.0; 2], [1.0; 2]);
+    let mut sampled_hits = [0.0; 2];
     let mut micros = [0.0; ESTIMATORS.len()];
     let depth = || average_depth(&tree);
     for (row, name) in ESTIMATORS.iter().enumerate() {
@@ -123,9 +122,8 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
                 let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
                 // The walker is part of what sampling takes.
                 let walker = TetWalker::new(tets);
-                let counted = [outside, surface].map(|rays| count(tets, &walker, &rays));
+                let counted = [outside, surface].map(|rays| count(&walker, &rays));
                 sampled_hits = counted.map(|c| c[1]);
-                spread = counted.map(|c| c[2]);
                 counted.map(|c| c[0])
             }
         };
@@ -141,23 +139,20 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
         nanoseconds: [0.0; 2],
         estimates,
         sampled_hits,
-        spread,
         micros,
     };
     Ok(Some(Candidate { node, tracer, sets: [rays(&outside), rays(&surface)] }))
 }
 
-/// Mean steps of rays, the share of them that end at a triangle, and the share of the tetrahedra that they spread over.
-fn count(tets: &TetMesh, walker: &TetWalker<'_>, rays: &[SampleRay]) -> [f64; 3] {
-    let mut spread = Spread::new(tets.tets.len());
+/// Mean steps of rays, and the share of them that end at a triangle.
+fn count(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [f64; 2] {
     let (mut sums, mut walked) = ([0.0; 2], 0.0f64);
-    for walk in rays.iter().filter_map(|ray| spread.walk(walker, ray)) {
+    for walk in rays.iter().filter_map(|ray| walker.walk(ray)) {
         sums[0] += f64::from(walk.steps);
         sums[1] += f64::from(u8::from(walk.hit));
         walked += 1.0;
     }
-    let [steps, hits] = sums.map(|sum| sum / walked.max(1.0));
-    [steps, hits, spread.share()]
+    sums.map(|sum| sum / walked.max(1.0))
 }
 
 /// Mean depth of the leaves.

@@ -31,8 +31,6 @@ pub struct Node {
     pub estimates: [[f64; 2]; ESTIMATORS.len()],
     /// Share of the rays that end at a triangle, as the sampling estimator finds it.
     pub sampled_hits: [f64; 2],
-    /// Share of the tetrahedra that these rays spread over.
-    pub spread: [f64; 2],
     /// Microseconds that it takes to say so.
     pub micros: [f64; ESTIMATORS.len()],
 }

@@ -68,8 +68,7 @@ pub fn markdown(record: &CostsRecord) -> String {
     let head = row(&["rays from", "steps by face count", "by average depth", "factor of the area", "ns"]);
     text.push_str(&table(&head, &rows));
     text.push_str(
-        "\nSizes are those of the tetrahedra that rays come to, and of their vertices, as sampling finds them; in between the logarithm \
-         decides. The other estimators know only of the whole size.\n",
+        "\nSizes are those of the tetrahedra and their vertices; in between what the logarithm of the size says.\n",
     );
     if !record.regrets.is_empty() {
         text.push_str(

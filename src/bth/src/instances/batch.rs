@@ -79,11 +79,24 @@ impl Kernel for Start<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Start { round, first, count, ways: Ways { packets, walks, active, .. } } = self;
-        let (top, rays) = (&round.world.top, &round.rays[first..first + count]);
+        let Start { round, first, count, ways: Ways { packets, walks, active, visits } } = self;
+        let (world, rays) = (round.world, &round.rays[first..first + count]);
+        let top = &world.top;
         packets.start(s, top, rays, active);
+        // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
+        let start = |number: usize| world.start_of(round.from, first + number);
+        if round.from.is_some() {
+            let starts = active.iter().filter_map(|&number| Some((number, start(number as usize)?)));
+            visits
+                .all
+                .extend(starts.map(|(number, instance)| Visit { ray: first as u32 + number, instance }));
+            // Where there is no other that is all.
+            if world.is_alone() {
+                active.retain(|&number| start(number as usize).is_none());
+            }
+        }
         // Where it starts it will have been.
-        walks.start(s, top, rays, active, |number| round.world.start_of(round.from, first + number));
+        walks.start(s, top, rays, active, start);
     }
 }
 
@@ -147,12 +160,6 @@ impl World {
             let end = (first + CHUNK).min(rays.len());
             ways.visits.all.clear();
             isa.run(Start { round: &round, first, count: end - first, ways: &mut ways });
-            // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
-            if from.is_some() {
-                let starts = ways.active.iter().map(|&number| first + number as usize);
-                let starts = starts.filter_map(|ray| Some((ray, self.start_of(from, ray)?)));
-                ways.visits.all.extend(starts.map(|(ray, instance)| Visit { ray: ray as u32, instance }));
-            }
             self.trace(&round, query, &mut ways.visits);
             while !ways.active.is_empty() || !ways.packets.is_empty() {
                 isa.run(Advance { round: &round, query, first, ways: &mut ways });

@@ -32,8 +32,8 @@ pub(crate) struct World {
     /// Per instance its place; `None` for those that cannot be seen.
     pub(crate) placed: Vec<Option<Placed>>,
     pub(crate) top: TopLevel,
-    /// The only instance that can be seen, if its object's space is the world's.
-    sole: Option<u32>,
+    /// The only instance that can be seen.
+    alone: Option<u32>,
     /// Per object whether a ray was traced in it.
     touched: Vec<AtomicBool>,
 }
@@ -51,7 +51,7 @@ impl World {
             pose: Pose::new(&view),
             placed: vec![None; view.instances.len()],
             top: TopLevel::default(),
-            sole: None,
+            alone: None,
             touched: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
         };
         world.place(file, world.seconds, true)?;
@@ -75,8 +75,8 @@ impl World {
         let mut top = TopLevel::default();
         top.build(&placed);
         let touched = (0..objects).map(|_| AtomicBool::new(false)).collect();
-        let sole = sole(&placed);
-        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, sole, touched }
+        let alone = alone(&placed);
+        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, alone, touched }
     }
 
     /// Moves to a time. After an error all is as it was.
@@ -135,7 +135,7 @@ impl World {
         if update.placed > 0 {
             let start = Instant::now();
             self.top.build(&self.placed);
-            self.sole = sole(&self.placed);
+            self.alone = alone(&self.placed);
             update.top_level = start.elapsed();
         }
         update.visible = self.placed.iter().flatten().count();
@@ -162,8 +162,14 @@ impl World {
     /// The only instance that can be seen, and its object, if the object's space is the world's: models that came as a scene,
     /// mostly.
     pub(crate) fn sole(&self) -> Option<(u32, u32)> {
-        let instance = self.sole?;
-        Some((instance, self.placed[instance as usize].as_ref()?.object()))
+        let instance = self.alone?;
+        let place = self.placed[instance as usize].as_ref()?;
+        place.inverse.is_identity().then(|| (instance, place.object()))
+    }
+
+    /// Whether only one instance can be seen.
+    pub(crate) fn is_alone(&self) -> bool {
+        self.alone.is_some()
     }
 
     /// Notes that a ray is traced in an object.
@@ -185,9 +191,9 @@ impl World {
     }
 }
 
-/// See [`World::sole`].
-fn sole(placed: &[Option<Placed>]) -> Option<u32> {
-    let mut seen = placed.iter().enumerate().filter_map(|(row, place)| Some((row, place.as_ref()?)));
-    let (row, place) = seen.next()?;
-    (seen.next().is_none() && place.inverse.is_identity()).then_some(row as u32)
+/// The only instance that has a place.
+fn alone(placed: &[Option<Placed>]) -> Option<u32> {
+    let mut seen = placed.iter().enumerate().filter(|(_, place)| place.is_some());
+    let (row, _) = seen.next()?;
+    seen.next().is_none().then_some(row as u32)
 }

@@ -226,6 +226,9 @@ pub struct Costs {
     /// Nodes of a model, at most.
     #[arg(long, value_name = "N", default_value_t = 40, value_parser = at_least_one)]
     pub nodes: usize,
+    /// Nodes of a model to fit on, at most; by default as many.
+    #[arg(long, value_name = "N", value_parser = at_least_one)]
+    pub fit_nodes: Option<usize>,
     /// Rounds of which the fastest counts; one more comes before.
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = at_least_one)]
     pub rounds: usize,

@@ -50,20 +50,20 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
         nodes: arguments.nodes,
         rounds: arguments.rounds,
     };
-    let options =
-        json!({"least": which.least, "most": which.most, "nodes": which.nodes, "rounds": which.rounds});
+    let options = json!({"least": which.least, "most": which.most, "nodes": which.nodes, "fit_nodes": fit_nodes, "rounds": which.rounds});
     let progress = Progress::new();
-    let all = |models: &[String]| -> Result<(Vec<String>, Vec<nodes::Candidate>)> {
+    let fit_nodes = arguments.fit_nodes.unwrap_or(which.nodes);
+    let all = |models: &[String], nodes: usize| -> Result<(Vec<String>, Vec<nodes::Candidate>)> {
         let (mut names, mut found) = (Vec::new(), Vec::new());
         for name in models {
             let model = Model::load(name)?;
-            found.extend(nodes::candidates(&model, &which, &progress)?);
+            found.extend(nodes::candidates(&model, &Which { nodes, ..which }, &progress)?);
             names.push(model.name);
         }
         Ok((names, found))
     };
-    let (fitted_on, mut candidates) = all(&arguments.fit)?;
-    let (judged_on, others) = all(&arguments.models)?;
+    let (fitted_on, mut candidates) = all(&arguments.fit, fit_nodes)?;
+    let (judged_on, others) = all(&arguments.models, which.nodes)?;
     let fitted = candidates.len();
     candidates.extend(others);
     let mut fitted_nodes = nodes::time(candidates, which.rounds, &progress);

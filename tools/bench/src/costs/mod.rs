@@ -50,9 +50,9 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
         nodes: arguments.nodes,
         rounds: arguments.rounds,
     };
+    let fit_nodes = arguments.fit_nodes.unwrap_or(which.nodes);
     let options = json!({"least": which.least, "most": which.most, "nodes": which.nodes, "fit_nodes": fit_nodes, "rounds": which.rounds});
     let progress = Progress::new();
-    let fit_nodes = arguments.fit_nodes.unwrap_or(which.nodes);
     let all = |models: &[String], nodes: usize| -> Result<(Vec<String>, Vec<nodes::Candidate>)> {
         let (mut names, mut found) = (Vec::new(), Vec::new());
         for name in models {

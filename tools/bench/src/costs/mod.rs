@@ -51,7 +51,13 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
         rounds: arguments.rounds,
     };
     let fit_nodes = arguments.fit_nodes.unwrap_or(which.nodes);
-    let options = json!({"least": which.least, "most": which.most, "nodes": which.nodes, "fit_nodes": fit_nodes, "rounds": which.rounds});
+    let options = json!({
+        "least": which.least,
+        "most": which.most,
+        "nodes": which.nodes,
+        "fit_nodes": fit_nodes,
+        "rounds": which.rounds,
+    });
     let progress = Progress::new();
     let all = |models: &[String], nodes: usize| -> Result<(Vec<String>, Vec<nodes::Candidate>)> {
         let (mut names, mut found) = (Vec::new(), Vec::new());

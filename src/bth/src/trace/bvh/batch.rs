@@ -63,6 +63,7 @@ impl Lists {
     }
 }
 
+/// A ray in flight, on cache lines of its own.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Slot<Q>(Flight<Q>);

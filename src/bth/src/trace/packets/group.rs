@@ -2,7 +2,6 @@
 //!
 //! What [`crate::trace::slabs`] and [`crate::trace::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
 //! one box or triangle: the same operations on the same prepared floats ([`crate::trace::prepare`]), so the same bounds hold.
-//! The axes of the plane need not be swapped for rays that go backward: the tests do not see handedness.
 
 use crate::layout::NONE;
 use crate::rays::Ray;

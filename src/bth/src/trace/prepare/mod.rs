@@ -64,8 +64,8 @@ impl Frame {
     }
 }
 
-/// A ray prepared for boxes, and for triangles: a cache line each, so that a step of a ray among many on their way needs no
-/// more of the innermost cache than one of them.
+/// A ray prepared for boxes and for triangles, and what its walk notes: a cache line for steps through nodes and one for leaves,
+/// so that rays on their way take as little of the innermost cache as can be.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct Aim {
@@ -109,9 +109,7 @@ impl Aim {
     pub(crate) fn new(slabs: Slabs, sight: Sight) -> Aim {
         Aim { slabs, ray: 0, sight, noted: Noted::NOTHING }
     }
-}
 
-impl Aim {
     /// A single ray, to the same bounds as [`Prepared::fill`]; false where f32 can't prepare it. Written in place: copies of
     /// what was just written word by word stall.
     #[inline(always)]

@@ -70,9 +70,18 @@ pub struct ObjectView<'a> {
     pub uvs: &'a [[f32; 2]],
 }
 
-impl<'a> ObjectView<'a> {
+/// The nodes and leaves of an object, for loops that keep at hand what they need.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ground<'a> {
+    lines: &'a [Line],
+    /// The bit of leaves, where those are on a grid: they are counted in half lines then.
+    halved: u32,
+}
+
+impl<'a> Ground<'a> {
+    #[inline(always)]
     fn block<T: FromBytes + zerocopy::KnownLayout + zerocopy::Immutable>(
-        &self,
+        self,
         line: u32,
         lines: usize,
     ) -> &'a T {
@@ -80,10 +89,41 @@ impl<'a> ObjectView<'a> {
         let bytes = self.lines[at..at + lines].as_bytes();
         T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")
     }
+    /// As [`ObjectView::node`].
+    #[inline(always)]
+    pub(crate) fn node(self, line: u32) -> &'a WideNode {
+        self.block(line, NODE_LINES)
+    }
+    /// As [`ObjectView::packed_node`].
+    #[inline(always)]
+    pub(crate) fn packed_node(self, line: u32) -> &'a PackedNode {
+        self.block(line, PACKED_NODE_LINES)
+    }
+    /// The indexed leaf of `f32` that a code leads to, if it is one.
+    #[inline(always)]
+    pub(crate) fn indexed_leaf(self, code: u32) -> Option<&'a IndexedLeaf> {
+        let line = code ^ Child::LEAF_BIT;
+        // Only codes of indexed leaves are below the limit then.
+        (line | self.halved < Child::INDEX_LIMIT).then(|| self.block(line, INDEXED_LINES))
+    }
+    /// Where the block of a child code begins, to ask for it before it is needed: maybe nowhere.
+    #[inline(always)]
+    pub(crate) fn place(self, code: u32) -> *const Line {
+        let index = code & (Child::INDEX_LIMIT - 1);
+        self.lines.as_ptr().wrapping_add((index >> ((code & self.halved) >> 31)) as usize)
+    }
+}
+
+impl<'a> ObjectView<'a> {
+    /// Its nodes and leaves.
+    #[inline(always)]
+    pub(crate) fn ground(&self) -> Ground<'a> {
+        Ground { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
+    }
     /// The node at a line. Panics when the lines end before the node does; checked files never do.
     #[inline(always)]
     pub fn node(&self, line: u32) -> &'a WideNode {
-        self.block(line, NODE_LINES)
+        self.ground().node(line)
     }
     /// The root, if it is a node and not a leaf, and is there: files that are not checked may lack it.
     pub(crate) fn root(&self) -> Option<WideNode> {
@@ -104,16 +144,16 @@ impl<'a> ObjectView<'a> {
     /// The packed node at a line; panics as [`Self::node`] does.
     #[inline(always)]
     pub fn packed_node(&self, line: u32) -> &'a PackedNode {
-        self.block(line, PACKED_NODE_LINES)
+        self.ground().packed_node(line)
     }
     /// The indexed leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
     pub(crate) fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
-        self.block(line, INDEXED_LINES)
+        self.ground().block(line, INDEXED_LINES)
     }
     /// The raw leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
     pub(crate) fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
-        self.block(line, RAW_LINES)
+        self.ground().block(line, RAW_LINES)
     }
 }

@@ -200,13 +200,4 @@ impl<'a> ObjectView<'a> {
             _ => 0,
         }
     }
-
-    /// Where the block of a child code begins, to ask for it before it is needed: maybe nowhere.
-    #[inline(always)]
-    pub(crate) fn place(&self, code: u32) -> *const Line {
-        let index = code & (Child::INDEX_LIMIT - 1);
-        // Leaves on a grid are counted in half lines.
-        let halved = u32::from(self.grid.is_some()) & (code >> 31);
-        self.lines.as_ptr().wrapping_add((index >> halved) as usize)
-    }
 }

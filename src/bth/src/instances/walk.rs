@@ -156,7 +156,7 @@ impl Walks {
         if limit < way.limit {
             way.limit = limit;
             let keys = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
-            way.top = self.stacks.keep_up_to(s, ray, way.top, keys);
+            way.top = self.stacks.keep_up_to(s, self.stacks.bottom(ray), way.top, keys);
         }
         self.stacks.code(way.top)
     }

@@ -8,7 +8,7 @@ use super::bvh::walk::TetOutcome;
 use super::choice::{self, LEAST_RAYS, Way};
 use super::hinted::Hinted;
 use super::packets;
-use super::query::{Any, Deliver, Nearest, Query};
+use super::query::{Any, Deliver, Nearest, Offset, Query};
 use super::quick::{Fast, MoellerTrumbore, Quick, Test, Watertight};
 use super::tets;
 use super::tets::batch::Walk;
@@ -18,6 +18,7 @@ use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
+use std::marker::PhantomData;
 
 /// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
 const PART: usize = 2048;
@@ -32,7 +33,8 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    trace::<Nearest>(object, rays, from, scratch, Sink { ids: object.triangle_ids, answers: hits, instance });
+    let mut sink = Sink::<Nearest> { ids: object.triangle_ids, answers: hits, instance };
+    trace_batch(object, rays, from, scratch, &mut sink);
 }
 
 /// Nearest hits of rays in object space by a test, each ray on its own.
@@ -51,7 +53,7 @@ pub(crate) fn nearest_batch_by(
     ) {
         let waiting = Waiting { order: None, queries: None, walked: None };
         let mut sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
-        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, sink: &mut sink });
+        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, to: &mut sink });
     }
     if object.header.root == NONE {
         return;
@@ -73,7 +75,8 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    trace::<Any>(object, rays, from, scratch, Sink { ids: object.triangle_ids, answers: found, instance: 0 });
+    let mut sink = Sink::<Any> { ids: object.triangle_ids, answers: found, instance: 0 };
+    trace_batch(object, rays, from, scratch, &mut sink);
 }
 
 /// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.
@@ -96,12 +99,13 @@ impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
     }
 }
 
-fn trace<Q: Query>(
+/// Hands on what rays in object space hit, of those that hit anything; `from` as for [`nearest_batch`].
+pub(crate) fn trace_batch<Q: Query, D: Deliver<Q>>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    sink: Sink<'_, Q>,
+    to: &mut D,
 ) {
     if object.header.root == NONE {
         return;
@@ -113,7 +117,7 @@ fn trace<Q: Query>(
     });
     // Where there is no BVH beside the tetrahedra there is no choice.
     if from.is_none() || !has_subtrees(object) {
-        return trace_one_way(object, rays, from, scratch, sink);
+        return trace_one_way(object, rays, from, scratch, to);
     }
     let hinted = Hinted::chosen();
     let at = std::ptr::from_ref(object.header).addr();
@@ -126,7 +130,7 @@ fn trace<Q: Query>(
         Hinted::Measured => choice.best(),
     };
     let start = if measured { choice::now() } else { None };
-    trace_one_way(object, rays, from.filter(|_| way == Way::Tets), scratch, sink);
+    trace_one_way(object, rays, from.filter(|_| way == Way::Tets), scratch, to);
     if let Some(start) = start {
         let seconds_a_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
         scratch.choices.of(at, usize::from(Q::ANY)).learn(way, seconds_a_ray);
@@ -134,26 +138,29 @@ fn trace<Q: Query>(
 }
 
 /// Traces rays that start on surfaces of which tetrahedra are known through those; others through packets and the BVH.
-fn trace_one_way<Q: Query>(
+fn trace_one_way<Q: Query, D: Deliver<Q>>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    mut sink: Sink<'_, Q>,
+    to: &mut D,
 ) {
     if from.is_some() || whole(object) != NONE {
-        for (part, (rays, answers)) in rays.chunks(PART).zip(sink.answers.chunks_mut(PART)).enumerate() {
-            let from = from.map(|from| &from[part * PART..][..rays.len()]);
-            trace_hinted::<Q>(object, rays, from, scratch, &mut Sink { answers, ..sink });
+        for (part, rays) in rays.chunks(PART).enumerate() {
+            let first = part * PART;
+            let from = from.map(|from| &from[first..][..rays.len()]);
+            trace_hinted::<Q, _>(object, rays, from, scratch, &mut Offset { first, to: &mut *to });
         }
         return;
     }
-    let packed = Isa::chosen().run(Together { object, rays, scratch, sink: &mut sink });
+    // The same kernels as for parts.
+    let to = &mut Offset { first: 0, to };
+    let packed = Isa::chosen().run(Together { object, rays, scratch, to: &mut *to, query: PhantomData::<Q> });
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
         let waiting = Waiting { order, queries: None, walked: None };
-        through_bvh(object, rays, waiting, scratch, &mut sink);
+        through_bvh(object, rays, waiting, scratch, to);
         scratch.packets.rest = rest;
     }
 }
@@ -172,15 +179,15 @@ fn whole(object: &ObjectView<'_>) -> u32 {
 }
 
 /// Traces at most [`PART`] rays, some of which start on known surfaces, or all of which enter the same tetrahedra.
-fn trace_hinted<Q: Query>(
+fn trace_hinted<Q: Query, D: Deliver<Q>>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    sink: &mut Sink<'_, Q>,
+    to: &mut D,
 ) {
     // Packets of rays that go together beat all else, where they serve enough of their rays.
-    let packed = Isa::chosen().run(Together { object, rays, scratch, sink });
+    let packed = Isa::chosen().run(Together { object, rays, scratch, to: &mut *to, query: PhantomData::<Q> });
     let mut faces = vec![NONE; rays.len()];
     let home = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
@@ -204,7 +211,7 @@ fn trace_hinted<Q: Query>(
         let ray = ray as usize;
         let done = walks[ray] == Walk::Done || walks[ray] == Walk::Left && is_all;
         if done {
-            sink.query(ray, &queries[ray]);
+            to.query(ray, &queries[ray]);
         } else if walks[ray] == Walk::Left {
             walked[ray] = leaf_of_face(object, faces[ray]);
         }
@@ -212,7 +219,7 @@ fn trace_hinted<Q: Query>(
     });
     if !order.is_empty() {
         let waiting = Waiting { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
-        through_bvh(object, rays, waiting, scratch, sink);
+        through_bvh(object, rays, waiting, scratch, to);
     }
 }
 
@@ -255,55 +262,55 @@ fn walk_tets<Q: Query>(
 
 /// Packets of rays that go together, as a kernel; returns how many rays went in them. If any did, the others are in the
 /// scratch's rest.
-struct Together<'a, 'b, Q: Query> {
+struct Together<'a, Q, D> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut Scratch,
-    sink: &'a mut Sink<'b, Q>,
+    to: &'a mut D,
+    query: PhantomData<Q>,
 }
 
-impl<Q: Query> Kernel for Together<'_, '_, Q> {
+impl<Q: Query, D: Deliver<Q>> Kernel for Together<'_, Q, D> {
     type Output = usize;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
-        let (packets, sink) = (&mut self.scratch.packets, self.sink);
-        packets::trace(s, self.object, self.rays, packets, packets::LEAST_USE, sink).rays
+        let packets = &mut self.scratch.packets;
+        packets::trace(s, self.object, self.rays, packets, packets::LEAST_USE, self.to).rays
     }
 }
 
 /// Rays through the BVH, each on its own.
-fn through_bvh<Q: Query>(
+fn through_bvh<Q: Query, D: Deliver<Q>>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     waiting: Waiting<'_, Q>,
     scratch: &mut Scratch,
-    sink: &mut Sink<'_, Q>,
+    to: &mut D,
 ) {
     if object.has_packed_nodes() {
-        Isa::chosen().run(ThroughBvh { nodes: Packed, object, rays, waiting, scratch, sink });
+        Isa::chosen().run(ThroughBvh { nodes: Packed, object, rays, waiting, scratch, to });
     } else {
-        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, sink });
+        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, to });
     }
 }
 
 /// As [`through_bvh`], as a kernel.
-struct ThroughBvh<'a, 'b, N, Q: Query> {
+struct ThroughBvh<'a, N, Q, D> {
     nodes: N,
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     waiting: Waiting<'a, Q>,
     scratch: &'a mut Scratch,
-    sink: &'a mut Sink<'b, Q>,
+    to: &'a mut D,
 }
 
-impl<N: Nodes, Q: Query> Kernel for ThroughBvh<'_, '_, N, Q> {
+impl<N: Nodes, Q: Query, D: Deliver<Q>> Kernel for ThroughBvh<'_, N, Q, D> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let (object, rays, waiting, sink) = (self.object, self.rays, self.waiting, self.sink);
-        let stacks = &mut self.scratch.stacks;
-        let walk = BatchWalk { object, rays, waiting, stacks, to: sink };
-        walk.run(s, self.nodes, |leaf, ray, query| {
+        let ThroughBvh { nodes, object, rays, waiting, scratch, to } = self;
+        let walk = BatchWalk { object, rays, waiting, stacks: &mut scratch.stacks, to };
+        walk.run(s, nodes, |leaf, ray, query| {
             enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
         });
     }

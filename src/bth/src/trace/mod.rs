@@ -19,7 +19,7 @@ mod single;
 mod slabs;
 mod tets;
 
-pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by};
+pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by, trace_batch};
 pub(crate) use bvh::flight::KEY_SLACK;
 pub(crate) use bvh::stack::{BOTTOM, Place, Stacks};
 pub use hinted::Hinted;
@@ -29,6 +29,7 @@ pub(crate) use packets::hull::{Beam, Hull};
 pub(crate) use packets::packet::PACKET;
 pub(crate) use prepare::{Frame, Prepared};
 pub use query::Steps;
+pub(crate) use query::{Any, Deliver, Nearest, Query};
 pub use quick::Test;
 pub(crate) use slabs::Slabs;
 
@@ -36,7 +37,6 @@ use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
 use choice::Choices;
 use packets::PacketScratch;
-use query::{Any, Nearest};
 use single::trace;
 use std::cell::Cell;
 

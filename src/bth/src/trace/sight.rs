@@ -235,7 +235,8 @@ impl Sight {
         let greatest = greatest_coordinate(s, &corners);
         let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
         let sides = sides(s, &corners, error);
-        let valid = (1 << block.triangles().min(WIDTH as u32)) - 1;
+        // Of no more than there are lanes, whatever an unchecked file says.
+        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
         // Most leaves that a ray enters have no triangle that it could meet: then depths do not matter.
         if valid & !s.mask_bits(sides.missed) == 0 {
             return Candidates { maybe: 0, sure: 0, nearest: error, farthest: error };

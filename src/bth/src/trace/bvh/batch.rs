@@ -1,88 +1,16 @@
-//! Many rays through the wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
-//! with the work of the others.
+//! Rays of a batch through the BVH of an object: taken in sixteen at a time, and handed on as they end.
 
 use super::flight::{Flight, Found};
+use super::flights::{Flights, IN_FLIGHT};
 use super::landing::Landing;
-use super::nodes::{Nodes, prefetch};
-use super::stack::{BOTTOM, Place, Stacks};
+use super::nodes::Nodes;
+use super::stack::{Place, Stacks};
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::prepare::{Frame, Prepared};
 use crate::trace::query::{Deliver, Query};
-
-/// Rays on their way at once.
-const IN_FLIGHT: usize = 32;
-/// While at least this many rays stand before inner nodes, those before leaves wait.
-const ENOUGH: u8 = (IN_FLIGHT / 4) as u8;
-
-/// Slots of rays that wait for the same kind of step.
-struct List {
-    /// As long as any `u8` reaches; a list is never longer than the rays in flight, plus one.
-    slot: [u8; 256],
-    len: u8,
-}
-
-impl List {
-    fn new() -> Self {
-        List { slot: [0; 256], len: 0 }
-    }
-    #[inline(always)]
-    fn get(&self, i: u8) -> usize {
-        usize::from(self.slot[usize::from(i)]) % IN_FLIGHT
-    }
-    /// Adds a slot on a condition, without a branch.
-    #[inline(always)]
-    fn push_if(&mut self, slot: usize, condition: bool) {
-        self.slot[usize::from(self.len)] = slot as u8;
-        self.len += u8::from(condition);
-    }
-    /// Empties the list, whose entries can still be read if at most as many are added as were read.
-    #[inline(always)]
-    fn take(&mut self) -> u8 {
-        std::mem::replace(&mut self.len, 0)
-    }
-}
-
-/// The rays on their way, by what they do next.
-struct Lists {
-    inner: List,
-    leaf: List,
-    /// At the bottom of the stack, or before an empty slot of a node.
-    bottom: List,
-}
-
-impl Lists {
-    #[inline(always)]
-    fn sort(&mut self, slot: usize, code: u32) {
-        let (leaf, bottom) = (code & Child::LEAF_BIT != 0, code >= BOTTOM);
-        self.inner.push_if(slot, !leaf);
-        self.leaf.push_if(slot, leaf && !bottom);
-        self.bottom.push_if(slot, bottom);
-    }
-}
-
-/// A ray in flight, on cache lines of its own.
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-struct Slot<Q>(Flight<Q>);
-
-/// What a step of a ray begins with, apart from the rest of the slots: few cache lines, always at hand.
-struct Tops {
-    place: [Place; IN_FLIGHT],
-    code: [u32; IN_FLIGHT],
-}
-
-impl Tops {
-    /// Notes the top of a stack; returns the code there.
-    #[inline(always)]
-    fn set(&mut self, at: usize, top: Place, stacks: &Stacks) -> u32 {
-        let code = stacks.code(top);
-        (self.place[at], self.code[at]) = (top, code);
-        code
-    }
-}
 
 /// The rays still to be traced.
 pub(crate) struct Waiting<'a, Q> {
@@ -104,18 +32,25 @@ pub(crate) struct BatchWalk<'a, Q, D> {
     pub(crate) to: &'a mut D,
 }
 
-/// The next rays, sixteen at a time.
-struct Supply {
+/// The next rays, sixteen at a time: prepared, and tested against the boxes of the root's children.
+struct Supply<'a, Q> {
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    waiting: Waiting<'a, Q>,
     /// Where rays start.
     root: u32,
     frame: Frame,
     prepared: Prepared,
     /// Places in the batch of those prepared.
     ray: [u32; LANES],
-    /// Lanes that are prepared, and of these those that are gone.
+    /// Per lane the children of the root that the ray may meet, a bit each, and the depths at which it enters them.
+    met: [u32; LANES],
+    enter: [[f32; LANES]; LANES],
+    /// Lanes of rays that meet any, and how many of these are gone.
+    lane: [u8; LANES + 1],
     filled: usize,
     used: usize,
-    /// Rays prepared before.
+    /// Rays taken before.
     before: usize,
 }
 
@@ -124,164 +59,120 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
     /// the query has what it wants.
     #[inline(always)]
     pub(crate) fn run<S: Simd, N: Nodes>(
-        mut self,
+        self,
         s: S,
         nodes: N,
         mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool,
     ) {
-        self.stacks.reserve(self.object, IN_FLIGHT);
-        let root = root(self.object);
+        let BatchWalk { object, rays, waiting, stacks, to } = self;
+        let walked = waiting.walked;
         let mut supply = Supply {
-            root,
-            frame: Frame::new(self.object.header),
+            object,
+            rays,
+            waiting,
+            root: root(object),
+            frame: Frame::new(object.header),
             prepared: Prepared::new(),
             ray: [0; LANES],
+            met: [0; LANES],
+            enter: [[0.0; LANES]; LANES],
+            lane: [0; LANES + 1],
             filled: 0,
             used: 0,
             before: 0,
         };
-        let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
-        let mut slots = [Slot(Flight::vacant(vacant)); IN_FLIGHT];
-        let mut tops = Tops { place: [Place::NOWHERE; IN_FLIGHT], code: [root; IN_FLIGHT] };
         let mut landing = Landing::new();
-        let mut lists = Lists { inner: List::new(), leaf: List::new(), bottom: List::new() };
-        for (i, slot) in slots.iter_mut().enumerate() {
-            if self.launch(s, &mut supply, i, &mut slot.0, &mut tops) {
-                lists.sort(i, root);
-            }
+        let mut flights = Flights::new(object, stacks);
+        for at in 0..IN_FLIGHT {
+            supply.launch(s, nodes, at, &mut flights);
         }
-        loop {
-            self.inner_steps(s, nodes, &slots, &mut tops, &mut lists);
-            if lists.leaf.len + lists.bottom.len + lists.inner.len == 0 {
-                return landing.clear(s, self.object, self.rays, self.to);
-            }
-            for i in 0..lists.bottom.take() {
-                let at = lists.bottom.get(i);
-                if tops.place[at] > self.stacks.bottom(at) {
-                    // An empty slot of a node.
-                    lists.sort(at, tops.set(at, tops.place[at].below(), self.stacks));
-                    continue;
-                }
-                landing.land(s, self.object, self.rays, &slots[at].0, self.to);
-                if self.launch(s, &mut supply, at, &mut slots[at].0, &mut tops) {
-                    lists.sort(at, root);
+        while !flights.is_empty() {
+            flights.inner_steps(s, nodes, object);
+            for i in 0..flights.take_ended() {
+                if let Some(at) = flights.ended(i) {
+                    landing.land(s, object, rays, flights.flight(at), to);
+                    supply.launch(s, nodes, at, &mut flights);
                 }
             }
-            for i in 0..lists.leaf.take() {
-                let at = lists.leaf.get(i);
-                let flight = &mut slots[at].0;
-                let ray = &self.rays[flight.ray()];
-                let (mut indexed, mut raw) = (None, None);
-                let (code, top) = (tops.code[at], tops.place[at]);
-                let found = match Child::from_code(code) {
-                    Some(Child::Indexed(line)) => {
-                        let leaf = self.object.indexed(line, &mut indexed);
-                        flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
-                    }
-                    Some(Child::Raw(line)) => {
-                        let leaf = self.object.raw(line, &mut raw);
-                        flight.enter_leaf::<S, _, true>(s, self.object, ray, (leaf, code))
-                    }
-                    Some(Child::Tets(row)) => {
-                        if self.waiting.walked.is_some_and(|walked| walked[flight.ray()] == row) {
-                            Found::Nothing
-                        } else {
-                            enter_tets(self.object, row, ray, (flight, top), self.stacks, &mut tets)
-                        }
-                    }
-                    _ => Found::Nothing,
-                };
-                let below = top.below();
-                let top = match found {
-                    // Any-hit queries keep no keys, so nothing can be told of what waits.
-                    Found::Nearer if Q::ANY => below,
-                    Found::Nothing => below,
-                    Found::Again => top,
-                    Found::Nearer => self.stacks.keep_up_to(s, at, below, flight.key_limit()),
-                    Found::Enough => self.stacks.bottom(at),
-                };
-                let code = tops.set(at, top, self.stacks);
-                prefetch(s, nodes, self.object, code);
-                lists.sort(at, code);
-            }
+            flights.leaf_steps(s, nodes, (object, rays), |row, flight, top, stacks| {
+                let place = flight.ray();
+                if walked.is_some_and(|walked| walked[place] == row) {
+                    return Found::Nothing;
+                }
+                enter_tets(object, row, &rays[place], (flight, top), stacks, &mut tets)
+            });
         }
+        landing.clear(s, object, rays, to);
     }
+}
 
-    /// Steps through inner nodes until few rays stand before one.
+impl<Q: Query> Supply<'_, Q> {
+    /// Puts the next ray that can hit anything into a slot, if there is one.
     #[inline(always)]
-    fn inner_steps<S: Simd, N: Nodes>(
-        &mut self,
-        s: S,
-        nodes: N,
-        slots: &[Slot<Q>; IN_FLIGHT],
-        tops: &mut Tops,
-        lists: &mut Lists,
-    ) {
-        while lists.inner.len > 0 {
-            for i in 0..lists.inner.take() {
-                let at = lists.inner.get(i);
-                let (top, node) = (tops.place[at], N::node(self.object, tops.code[at]));
-                let count = slots[at].0.enter_node(s, node, self.stacks.room(top));
-                let code = tops.set(at, self.stacks.replaced(top, count), self.stacks);
-                prefetch(s, nodes, self.object, code);
-                lists.sort(at, code);
-            }
-            if lists.inner.len < ENOUGH && lists.leaf.len + lists.bottom.len > 0 {
-                return;
-            }
-        }
-    }
-
-    /// Puts the next ray that can hit anything into a slot; false if there is none.
-    #[inline(always)]
-    fn launch<S: Simd>(
-        &mut self,
-        s: S,
-        supply: &mut Supply,
-        at: usize,
-        flight: &mut Flight<Q>,
-        tops: &mut Tops,
-    ) -> bool {
+    fn launch<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, at: usize, flights: &mut Flights<'_, Q>) {
         loop {
-            if supply.used == supply.filled && !self.refill(s, supply) {
-                return false;
+            while self.used == self.filled {
+                if !self.refill(s, nodes) {
+                    return;
+                }
             }
-            let lane = supply.used % LANES;
-            supply.used += 1;
-            let place = supply.ray[lane];
+            let lane = usize::from(self.lane[self.used]) % LANES;
+            self.used += 1;
+            let place = self.ray[lane];
             let query = self.waiting.queries.map(|queries| queries[place as usize]);
-            if let Some(aim) = supply.prepared.aim(lane) {
+            let aim = self.prepared.aim(lane);
+            let flight = flights.flight(at);
+            if let Some(aim) = aim {
                 flight.launch(aim, query);
             } else {
                 let ray = (place, &self.rays[place as usize]);
-                if !flight.aim_at(self.object, &supply.frame, ray, query) {
+                if !flight.aim_at(self.object, &self.frame, ray, query) {
                     continue;
                 }
             }
             if query.is_some() {
                 flight.take_over();
             }
-            tops.place[at] = self.stacks.start(at, supply.root);
-            tops.code[at] = supply.root;
-            return true;
+            if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
+                let root = N::node(self.object.ground(), self.root);
+                flights.start_among(s, at, root, (self.met[lane], s.load(&self.enter[lane])));
+            } else {
+                flights.start(at, self.root);
+            }
+            return;
         }
     }
 
     /// Prepares the next sixteen rays; false if there are none.
     #[inline(always)]
-    fn refill<S: Simd>(&mut self, s: S, supply: &mut Supply) -> bool {
-        let total = self.waiting.order.map_or(self.rays.len(), <[u32]>::len);
-        let count = (total - supply.before).min(LANES);
+    fn refill<S: Simd, N: Nodes>(&mut self, s: S, _nodes: N) -> bool {
+        let order = self.waiting.order;
+        let total = order.map_or(self.rays.len(), <[u32]>::len);
+        let count = (total - self.before).min(LANES);
         for i in 0..count {
-            let place = supply.before + i;
-            supply.ray[i] = self.waiting.order.map_or(place as u32, |order| order[place]);
+            let place = self.before + i;
+            self.ray[i] = order.map_or(place as u32, |order| order[place]);
         }
-        supply.before += count;
-        (supply.used, supply.filled) = (0, count);
-        if count > 0 {
-            supply.prepared.fill(s, &supply.frame, self.rays, &supply.ray, count);
+        self.before += count;
+        (self.used, self.filled) = (0, 0);
+        if count == 0 {
+            return false;
         }
-        count > 0
+        self.prepared.fill(s, &self.frame, self.rays, &self.ray, count);
+        let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.ground(), self.root));
+        for lane in 0..count {
+            let mut meets = true;
+            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), root) {
+                let (bits, enter) = aim.slabs.children(s, root, aim.slabs.last);
+                s.store(enter, &mut self.enter[lane % LANES]);
+                self.met[lane % LANES] = bits;
+                meets = bits != 0;
+            }
+            // Without a branch: many rays of a batch may miss all that there is.
+            self.lane[self.filled % LANES] = lane as u8;
+            self.filled += usize::from(meets);
+        }
+        true
     }
 }
 

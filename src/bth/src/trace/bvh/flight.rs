@@ -172,15 +172,10 @@ impl<Q: Query> Flight<Q> {
         &self,
         s: S,
         node: &B,
-        (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+        to: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
-        let children = s.load_u(node.child());
-        if Q::ANY {
-            s.compress(bits, children, codes)
-        } else {
-            s.compress_far_to_near(bits, enter, children, codes, keys)
-        }
+        write_children::<S, Q, B>(s, node, (bits, enter), to)
     }
 
     /// The child of a node to enter next, of those that the ray may meet, and how many others there are: those are written,
@@ -209,17 +204,17 @@ impl<Q: Query> Flight<Q> {
         Some((node.child()[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
     }
 
-    /// Tests the triangles of a leaf with this code.
+    /// Tests the triangles of a leaf with this code. Of the rays of the batch only its own is looked up, and only if it must be.
     #[inline(always)]
     pub(crate) fn enter_leaf<S: Simd, B: Block, const DEFER: bool>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
-        ray: &Ray,
+        rays: &[Ray],
         (block, code): (&B, u32),
     ) -> Found {
         if Q::TEST != Test::Exact {
-            return self.enter_leaf_quickly(s, object, ray, block);
+            return self.enter_leaf_quickly(s, object, &rays[self.ray()], block);
         }
         let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.aim.slabs.last);
         if found.maybe == 0 {
@@ -234,9 +229,9 @@ impl<Q: Query> Flight<Q> {
             return Found::Enough;
         }
         if DEFER && Q::DEFERS {
-            return self.defer(s, object, ray, (block, code), found);
+            return self.defer(s, object, rays, (block, code), found);
         }
-        self.decide(s, object, ray, block, found.maybe)
+        self.decide(s, object, &rays[self.ray()], block, found.maybe)
     }
 
     /// Notes the nearest hit of a leaf if that is certain, and nearer than all before; else decides.
@@ -245,7 +240,7 @@ impl<Q: Query> Flight<Q> {
         &mut self,
         s: S,
         object: &ObjectView<'_>,
-        ray: &Ray,
+        rays: &[Ray],
         (block, code): (&B, u32),
         found: Candidates<S>,
     ) -> Found {
@@ -272,6 +267,7 @@ impl<Q: Query> Flight<Q> {
                 return Found::Nothing;
             }
         }
+        let ray = &rays[self.ray()];
         self.settle(object, ray);
         self.decide(s, object, ray, block, maybe)
     }
@@ -342,6 +338,22 @@ impl<Q: Query> Flight<Q> {
         let limit = self.aim.slabs.last;
         self.take_over();
         if self.aim.slabs.last < limit { Found::Nearer } else { otherwise }
+    }
+}
+
+/// Writes the children of a node whose bits are set, the nearest last; returns how many.
+#[inline(always)]
+pub(crate) fn write_children<S: Simd, Q: Query, B: Boxes>(
+    s: S,
+    node: &B,
+    (bits, enter): (u32, S::F),
+    (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+) -> usize {
+    let children = s.load_u(node.child());
+    if Q::ANY {
+        s.compress(bits, children, codes)
+    } else {
+        s.compress_far_to_near(bits, enter, children, codes, keys)
     }
 }
 

@@ -1,8 +1,9 @@
-//! Rays through the wide BVH: many at once ([`batch`]) or one ([`walk`]), by the same steps ([`flight`]); where many end
-//! is computed together ([`landing`]).
+//! Rays through the wide BVH: batches ([`batch`]) with many on their way at once ([`flights`]), or one ray ([`walk`]), by
+//! the same steps ([`flight`]); where many end is computed together ([`landing`]).
 
 pub(crate) mod batch;
 pub(crate) mod flight;
+mod flights;
 pub(crate) mod landing;
 pub(crate) mod nodes;
 pub(crate) mod stack;

@@ -1,7 +1,7 @@
 //! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
 
 use crate::layout::{Child, INDEXED_LINES, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
-use crate::object::ObjectView;
+use crate::object::Ground;
 use crate::simd::Simd;
 use crate::trace::slabs::Boxes;
 
@@ -14,7 +14,7 @@ pub(crate) trait Nodes: Copy {
     /// Whether a child is one.
     fn is(child: Child) -> bool;
     /// The node that the code of a child leads to.
-    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a Self::Node;
+    fn node(ground: Ground<'_>, code: u32) -> &Self::Node;
 }
 
 /// [`WideNode`]s.
@@ -33,8 +33,8 @@ impl Nodes for Wide {
         matches!(child, Child::Node(_))
     }
     #[inline(always)]
-    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a WideNode {
-        object.node(code)
+    fn node(ground: Ground<'_>, code: u32) -> &WideNode {
+        ground.node(code)
     }
 }
 
@@ -46,15 +46,15 @@ impl Nodes for Packed {
         matches!(child, Child::Packed(_))
     }
     #[inline(always)]
-    fn node<'a>(object: &ObjectView<'a>, code: u32) -> &'a PackedNode {
-        object.packed_node(code & !Child::PACKED_BIT)
+    fn node(ground: Ground<'_>, code: u32) -> &PackedNode {
+        ground.packed_node(code & !Child::PACKED_BIT)
     }
 }
 
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
-pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, object: &ObjectView<'_>, code: u32) {
-    let first = object.place(code);
+pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, ground: Ground<'_>, code: u32) {
+    let first = ground.place(code);
     for i in 0..N::LINES.max(INDEXED_LINES) {
         s.prefetch(first.wrapping_add(i));
     }

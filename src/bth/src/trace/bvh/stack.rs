@@ -61,9 +61,7 @@ impl Stacks {
     /// Checks a place.
     #[inline(always)]
     fn place(&self, at: usize) -> Place {
-        // Both vectors have this length, and `reserve` made it at least LANES.
-        assert!(at <= self.codes.len() - LANES, "the BVH is deeper than its header says");
-        Place(at)
+        place(&self.codes, at)
     }
 
     /// The bottom of a stack.
@@ -82,12 +80,18 @@ impl Stacks {
         self.place(bottom + 1)
     }
 
+    /// Empties the stack with this bottom; returns the place above it, for a root that is entered at once and need not be
+    /// written.
+    #[inline(always)]
+    pub(crate) fn start_at(&mut self, bottom: Place) -> Place {
+        self.codes[bottom.0] = BOTTOM;
+        self.place(bottom.0 + 1)
+    }
+
     /// The code at a place.
     #[inline(always)]
     pub(crate) fn code(&self, at: Place) -> u32 {
-        debug_assert!(at.0 < self.codes.len());
-        // SAFETY: a place lies before the end of `codes`.
-        unsafe { *self.codes.get_unchecked(at.0) }
+        code(&self.codes, at)
     }
 
     /// Puts another code in the place of the one there.
@@ -96,17 +100,11 @@ impl Stacks {
         self.codes[at.0] = code;
     }
 
-    /// Room for the children of a node from the top on, which they replace.
+    /// As [`OpenStacks::room`].
     #[inline(always)]
     pub(crate) fn room(&mut self, top: Place) -> (&mut [u32; LANES], &mut [f32; LANES]) {
-        debug_assert!(top.0 + LANES <= self.codes.len() && top.0 + LANES <= self.keys.len());
-        // SAFETY: a place has LANES entries from it on in both vectors, which are borrowed mutably together.
-        unsafe {
-            (
-                &mut *self.codes.as_mut_ptr().add(top.0).cast::<[u32; LANES]>(),
-                &mut *self.keys.as_mut_ptr().add(top.0).cast::<[f32; LANES]>(),
-            )
-        }
+        let OpenStacks { codes, keys } = self.open();
+        room(codes, keys, top)
     }
 
     /// The top after `count` entries were written in place of it.
@@ -115,12 +113,77 @@ impl Stacks {
         self.place((top.0 + count).wrapping_sub(1))
     }
 
-    /// Drops all entries of a stack whose key exceeds the limit; returns the top.
+    /// The stacks for a loop, which keeps at hand where they lie.
     #[inline(always)]
-    pub(crate) fn keep_up_to<S: Simd>(&mut self, s: S, stack: usize, top: Place, limit: f32) -> Place {
-        let bottom = stack * self.size;
+    pub(crate) fn open(&mut self) -> OpenStacks<'_> {
+        OpenStacks { codes: &mut self.codes, keys: &mut self.keys }
+    }
+
+    /// Drops all entries above a bottom, up to the top, whose key exceeds the limit; returns the top.
+    #[inline(always)]
+    pub(crate) fn keep_up_to<S: Simd>(&mut self, s: S, bottom: Place, top: Place, limit: f32) -> Place {
+        let bottom = bottom.0;
         let range = bottom + 1..top.0.max(bottom) + 1;
         let kept = s.keep_up_to(&mut self.codes[range.clone()], &mut self.keys[range], limit);
         self.place(bottom + kept)
+    }
+}
+
+/// [`Stacks`] whose vectors are at hand.
+pub(crate) struct OpenStacks<'a> {
+    codes: &'a mut [u32],
+    keys: &'a mut [f32],
+}
+
+impl OpenStacks<'_> {
+    /// The code at a place.
+    #[inline(always)]
+    pub(crate) fn code(&self, at: Place) -> u32 {
+        code(self.codes, at)
+    }
+
+    /// Room for the children of a node from the top on, which they replace.
+    #[inline(always)]
+    pub(crate) fn room(&mut self, top: Place) -> (&mut [u32; LANES], &mut [f32; LANES]) {
+        room(self.codes, self.keys, top)
+    }
+
+    /// The top after `count` entries were written in place of it.
+    #[inline(always)]
+    pub(crate) fn replaced(&self, top: Place, count: usize) -> Place {
+        place(self.codes, (top.0 + count).wrapping_sub(1))
+    }
+}
+
+/// Checks a place among the codes of stacks.
+#[inline(always)]
+fn place(codes: &[u32], at: usize) -> Place {
+    // Both vectors have this length, and `reserve` made it at least LANES.
+    assert!(at <= codes.len() - LANES, "the BVH is deeper than its header says");
+    Place(at)
+}
+
+/// The code at a place of the stacks that these are all codes of.
+#[inline(always)]
+fn code(codes: &[u32], at: Place) -> u32 {
+    debug_assert!(at.0 < codes.len());
+    // SAFETY: a place lies before the end of `codes`.
+    unsafe { *codes.get_unchecked(at.0) }
+}
+
+/// The entries from a place on, of the stacks that these are all codes and keys of.
+#[inline(always)]
+fn room<'a>(
+    codes: &'a mut [u32],
+    keys: &'a mut [f32],
+    top: Place,
+) -> (&'a mut [u32; LANES], &'a mut [f32; LANES]) {
+    debug_assert!(top.0 + LANES <= codes.len() && top.0 + LANES <= keys.len());
+    // SAFETY: a place has LANES entries from it on in both vectors, which are borrowed mutably together.
+    unsafe {
+        (
+            &mut *codes.as_mut_ptr().add(top.0).cast::<[u32; LANES]>(),
+            &mut *keys.as_mut_ptr().add(top.0).cast::<[f32; LANES]>(),
+        )
     }
 }

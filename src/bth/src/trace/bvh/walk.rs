@@ -8,6 +8,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::query::{Count, Query};
+use std::slice::from_ref;
 
 /// What a tet leaf made of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,13 +41,13 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         let found = match Child::from_code(code) {
             Some(child) if N::is(child) => {
                 count.node();
-                match flight.nearest_child(s, N::node(object, code), stacks.room(top)) {
+                match flight.nearest_child(s, N::node(object.ground(), code), stacks.room(top)) {
                     Some((nearest, others)) => {
                         code = nearest;
                         top = stacks.replaced(top, others + 1);
                         // A ray alone has nothing to do while it waits for that one.
                         if others > 0 {
-                            prefetch(s, nodes, object, stacks.code(top.below()));
+                            prefetch(s, nodes, object.ground(), stacks.code(top.below()));
                         }
                         continue;
                     }
@@ -58,14 +59,14 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                 let leaf = object.indexed(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf::<S, _, false>(s, object, ray, (leaf, code))
+                flight.enter_leaf::<S, _, false>(s, object, from_ref(ray), (leaf, code))
             }
             Some(Child::Raw(at)) => {
                 let mut room = None;
                 let leaf = object.raw(at, &mut room);
                 count.leaf();
                 count.triangles(leaf.triangles);
-                flight.enter_leaf::<S, _, false>(s, object, ray, (leaf, code))
+                flight.enter_leaf::<S, _, false>(s, object, from_ref(ray), (leaf, code))
             }
             Some(Child::Tets(row)) if row != walked => {
                 let subtree = object.tet_leaves[row as usize].subtree;
@@ -84,7 +85,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
             Found::Nothing | Found::Again => {}
             // Any-hit queries keep no keys, so nothing can be told of what waits.
             Found::Nearer if Q::ANY => {}
-            Found::Nearer => top = stacks.keep_up_to(s, 0, top, flight.key_limit()),
+            Found::Nearer => top = stacks.keep_up_to(s, stacks.bottom(0), top, flight.key_limit()),
             Found::Enough => return,
         }
         if top <= stacks.bottom(0) {

@@ -1,0 +1,248 @@
+//! Rays on their way through a wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
+//! with the work of the others. Where they come from and where they go is not known here.
+
+use super::flight::{Flight, Found, write_children};
+use super::nodes::{Nodes, prefetch};
+use super::stack::{BOTTOM, Place, Stacks};
+use crate::layout::Child;
+use crate::object::ObjectView;
+use crate::rays::Ray;
+use crate::simd::Simd;
+use crate::trace::query::Query;
+use crate::trace::slabs::Boxes;
+
+/// Rays on their way at once.
+pub(super) const IN_FLIGHT: usize = 32;
+/// While at least this many rays stand before inner nodes, those before leaves wait.
+const ENOUGH: u8 = (IN_FLIGHT / 4) as u8;
+
+/// Slots of rays that wait for the same kind of step: as long as any `u8` reaches, and never fuller than there are rays in
+/// flight, and one.
+type List = [u8; 256];
+
+/// The rays on their way, by what they do next.
+struct Lists {
+    inner: List,
+    leaf: List,
+    /// At the bottom of the stack, or before an empty slot of a node.
+    bottom: List,
+}
+
+/// How many rays are in each of the [`Lists`], a byte each. Loops count in a copy, which stays in a register.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts(u32);
+
+impl Counts {
+    const LEAF: u32 = 8;
+    const BOTTOM: u32 = 16;
+    /// What a code with these upper three bits adds: nodes are below 4, leaves below 7.
+    const ADDED: [u32; 8] = {
+        let (leaf, bottom) = (1 << Self::LEAF, 1 << Self::BOTTOM);
+        [1, 1, 1, 1, leaf, leaf, leaf, bottom]
+    };
+
+    #[inline(always)]
+    fn inner(self) -> u8 {
+        self.0 as u8
+    }
+    #[inline(always)]
+    fn leaf(self) -> u8 {
+        (self.0 >> Self::LEAF) as u8
+    }
+    #[inline(always)]
+    fn bottom(self) -> u8 {
+        (self.0 >> Self::BOTTOM) as u8
+    }
+    /// Empties the list whose count lies at these bits, and returns how many were in it. They can still be read if at most as
+    /// many are added as were read.
+    #[inline(always)]
+    fn take(&mut self, at: u32) -> usize {
+        let count = self.0 >> at & 0xff;
+        self.0 -= count << at;
+        count as usize
+    }
+}
+
+const _: () = assert!(Child::LEAF_BIT == 4 << 29 && BOTTOM == 7 << 29);
+
+impl Lists {
+    /// Adds a slot to the list that the code on top of its stack belongs in, without a branch.
+    #[inline(always)]
+    fn sort(&mut self, counts: &mut Counts, slot: usize, code: u32) {
+        self.inner[usize::from(counts.inner())] = slot as u8;
+        self.leaf[usize::from(counts.leaf())] = slot as u8;
+        self.bottom[usize::from(counts.bottom())] = slot as u8;
+        counts.0 += Counts::ADDED[(code >> 29) as usize];
+    }
+}
+
+/// A ray in flight, on cache lines of its own.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Slot<Q>(Flight<Q>);
+
+/// What a step of a ray begins with, apart from the rest of the slots: few cache lines, always at hand.
+struct Tops {
+    place: [Place; IN_FLIGHT],
+    code: [u32; IN_FLIGHT],
+}
+
+/// Rays on their way, a slot each.
+pub(super) struct Flights<'a, Q> {
+    slots: [Slot<Q>; IN_FLIGHT],
+    tops: Tops,
+    lists: Lists,
+    counts: Counts,
+    stacks: &'a mut Stacks,
+    /// Of each slot's stack.
+    bottoms: [Place; IN_FLIGHT],
+}
+
+impl<'a, Q: Query> Flights<'a, Q> {
+    /// No rays yet, for the BVH of an object.
+    #[inline(always)]
+    pub(super) fn new(object: &ObjectView<'_>, stacks: &'a mut Stacks) -> Self {
+        let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+        stacks.reserve(object, IN_FLIGHT);
+        let mut bottoms = [Place::NOWHERE; IN_FLIGHT];
+        for (stack, bottom) in bottoms.iter_mut().enumerate() {
+            *bottom = stacks.bottom(stack);
+        }
+        Flights {
+            slots: [Slot(Flight::vacant(vacant)); IN_FLIGHT],
+            tops: Tops { place: bottoms, code: [BOTTOM; IN_FLIGHT] },
+            lists: Lists { inner: [0; 256], leaf: [0; 256], bottom: [0; 256] },
+            counts: Counts::default(),
+            stacks,
+            bottoms,
+        }
+    }
+
+    /// Whether no ray is on its way.
+    #[inline(always)]
+    pub(super) fn is_empty(&self) -> bool {
+        self.counts.0 == 0
+    }
+
+    /// The ray of a slot.
+    #[inline(always)]
+    pub(super) fn flight(&mut self, at: usize) -> &mut Flight<Q> {
+        &mut self.slots[at % IN_FLIGHT].0
+    }
+
+    /// Sends the ray of a slot on its way from a root.
+    #[inline(always)]
+    pub(super) fn start(&mut self, at: usize, root: u32) {
+        let at = at % IN_FLIGHT;
+        let top = self.stacks.start_at(self.bottoms[at]);
+        (self.tops.place[at], self.tops.code[at]) = (top, root);
+        self.lists.sort(&mut self.counts, at, root);
+    }
+
+    /// As [`Self::start`], where the ray may meet these children of the root, and enters them at these depths.
+    #[inline(always)]
+    pub(super) fn start_among<S: Simd, B: Boxes>(&mut self, s: S, at: usize, root: &B, met: (u32, S::F)) {
+        let at = at % IN_FLIGHT;
+        let top = self.stacks.start_at(self.bottoms[at]);
+        let count = write_children::<S, Q, B>(s, root, met, self.stacks.room(top));
+        let top = self.stacks.replaced(top, count);
+        let code = self.stacks.code(top);
+        (self.tops.place[at], self.tops.code[at]) = (top, code);
+        self.lists.sort(&mut self.counts, at, code);
+    }
+
+    /// How many rays have come to the bottom of their stacks, or before an empty slot of a node. They are to be asked for one
+    /// after the other, and at most one ray started for each.
+    #[inline(always)]
+    pub(super) fn take_ended(&mut self) -> usize {
+        self.counts.take(Counts::BOTTOM)
+    }
+
+    /// The slot of one of those, if it has come to the bottom; else it goes on.
+    #[inline(always)]
+    pub(super) fn ended(&mut self, i: usize) -> Option<usize> {
+        let at = usize::from(self.lists.bottom[i]) % IN_FLIGHT;
+        let top = self.tops.place[at];
+        if top <= self.bottoms[at] {
+            return Some(at);
+        }
+        let below = top.below();
+        let code = self.stacks.code(below);
+        (self.tops.place[at], self.tops.code[at]) = (below, code);
+        self.lists.sort(&mut self.counts, at, code);
+        None
+    }
+
+    /// Steps through inner nodes until few rays stand before one.
+    #[inline(always)]
+    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, object: &ObjectView<'_>) {
+        let Flights { slots, tops, lists, stacks, .. } = self;
+        let (mut counts, mut stacks, ground) = (self.counts, stacks.open(), object.ground());
+        while counts.inner() > 0 {
+            for i in 0..counts.take(0) {
+                let at = usize::from(lists.inner[i]) % IN_FLIGHT;
+                let (top, node) = (tops.place[at], N::node(ground, tops.code[at]));
+                let count = slots[at].0.enter_node(s, node, stacks.room(top));
+                let top = stacks.replaced(top, count);
+                let code = stacks.code(top);
+                (tops.place[at], tops.code[at]) = (top, code);
+                prefetch(s, nodes, ground, code);
+                lists.sort(&mut counts, at, code);
+            }
+            if counts.inner() < ENOUGH && counts.leaf() | counts.bottom() > 0 {
+                break;
+            }
+        }
+        self.counts = counts;
+    }
+
+    /// Takes each ray that stands before a leaf through it. Tet leaves are handed to `tets`, with the ray and its place on the
+    /// stack.
+    #[inline(always)]
+    pub(super) fn leaf_steps<S: Simd, N: Nodes>(
+        &mut self,
+        s: S,
+        nodes: N,
+        (object, rays): (&ObjectView<'_>, &[Ray]),
+        mut tets: impl FnMut(u32, &mut Flight<Q>, Place, &mut Stacks) -> Found,
+    ) {
+        let Flights { slots, tops, lists, stacks, bottoms, .. } = self;
+        let (mut counts, ground) = (self.counts, object.ground());
+        for i in 0..counts.take(Counts::LEAF) {
+            let at = usize::from(lists.leaf[i]) % IN_FLIGHT;
+            let flight = &mut slots[at].0;
+            let (code, top) = (tops.code[at], tops.place[at]);
+            let found = if let Some(leaf) = ground.indexed_leaf(code) {
+                flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+            } else {
+                let (mut indexed, mut raw) = (None, None);
+                match Child::from_code(code) {
+                    Some(Child::Indexed(index)) => {
+                        let leaf = object.indexed(index, &mut indexed);
+                        flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+                    }
+                    Some(Child::Raw(index)) => {
+                        let leaf = object.raw(index, &mut raw);
+                        flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+                    }
+                    Some(Child::Tets(row)) => tets(row, flight, top, stacks),
+                    _ => Found::Nothing,
+                }
+            };
+            let below = top.below();
+            let top = match found {
+                // Any-hit queries keep no keys, so nothing can be told of what waits.
+                Found::Nearer if Q::ANY => below,
+                Found::Nothing => below,
+                Found::Again => top,
+                Found::Nearer => stacks.keep_up_to(s, bottoms[at], below, flight.key_limit()),
+                Found::Enough => bottoms[at],
+            };
+            let code = stacks.code(top);
+            (tops.place[at], tops.code[at]) = (top, code);
+            prefetch(s, nodes, ground, code);
+            lists.sort(&mut counts, at, code);
+        }
+        self.counts = counts;
+    }
+}

@@ -2,6 +2,7 @@
 
 use crate::layout::Node;
 use crate::rays::Ray;
+use crate::simd::LANES;
 
 /// Transforms whose condition number (in the maximum norm) exceeds this count as singular: the rounding of
 /// rays to f32 in object space, 2^-24, would then be as large as the object.
@@ -130,6 +131,24 @@ pub(crate) struct Inverse {
 /// Directions in object space whose greatest component has an exponent within this of 0 are taken as they are.
 const PLAIN_EXPONENTS: i32 = 64;
 
+/// The least number with such an exponent, and the least with a greater one.
+const LEAST_PLAIN: f64 = 1.0 / (1u128 << PLAIN_EXPONENTS) as f64;
+const MOST_PLAIN: f64 = (1u128 << (PLAIN_EXPONENTS + 1)) as f64;
+
+/// Sixteen rays, a lane each.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RayLanes {
+    pub(super) origin: [[f32; LANES]; 3],
+    pub(super) direction: [[f32; LANES]; 3],
+    /// Not 0 for rays whose t in the object is that in the world.
+    pub(super) plain: [u32; LANES],
+}
+
+impl RayLanes {
+    pub(super) const NONE: RayLanes =
+        RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], plain: [0; LANES] };
+}
+
 /// A ray in an object's space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectRay {
@@ -167,6 +186,29 @@ impl Inverse {
         let t = |t: f32| (f64::from(t) * up) as f32;
         let ray = Ray { origin, direction, tmin: t(ray.tmin), tmax: t(ray.tmax) };
         ObjectRay { ray, t_scale: (1.0 / up) as f32 }
+    }
+
+    /// As [`Self::ray`], sixteen rays, to the same bits; but lanes that are not `plain` are not what that makes of them.
+    #[inline(always)]
+    pub(super) fn turn(&self, lanes: &mut RayLanes) {
+        let RayLanes { origin, direction, plain } = lanes;
+        let Inverse { linear, origin: place } = *self;
+        // Without branches, so that it is compiled to vectors.
+        for i in 0..LANES {
+            let (mut from, mut along) = ([0.0; 3], [0.0; 3]);
+            for k in 0..3 {
+                from[k] = f64::from(origin[k][i]) - place[k];
+                along[k] = f64::from(direction[k][i]);
+            }
+            let mut greatest = 0.0;
+            for k in 0..3 {
+                let turned = dot(linear[k], along);
+                origin[k][i] = dot(linear[k], from) as f32;
+                direction[k][i] = turned as f32;
+                greatest = if turned.abs() > greatest { turned.abs() } else { greatest };
+            }
+            plain[i] = u32::from(greatest >= LEAST_PLAIN) & u32::from(greatest < MOST_PLAIN);
+        }
     }
 
     /// A normal of the object in the world: by the transpose of this; its length has no meaning.
@@ -257,6 +299,41 @@ mod tests {
                 assert!((back[k] - expected).abs() <= bound, "round {round}: {back:?}, {expected}");
             }
         }
+    }
+
+    #[test]
+    fn sixteen_rays_at_once_are_the_same_to_the_bit() {
+        let mut rng = Rng(9);
+        let mut plain = 0;
+        for round in 0..500 {
+            let scale = [1.0, 1e-12, 1e12, 1e25, 1e-25, 3.0][rng.below(6) as usize];
+            let Some((inverse, _)) = random(&mut rng, scale).inverse() else { continue };
+            let mut lanes = RayLanes::NONE;
+            let mut expected = vec![];
+            for lane in 0..LANES {
+                let mut point = |size: f64| [(); 3].map(|()| (unit(&mut rng) * size) as f32);
+                let mut ray = Ray { origin: point(3.0), tmin: 0.5, direction: point(1.0), tmax: 2.0 };
+                ray.direction[lane % 3] *= [1.0, 0.0, -0.0, f32::INFINITY, f32::NAN][(round + lane) % 5];
+                for k in 0..3 {
+                    (lanes.origin[k][lane], lanes.direction[k][lane]) = (ray.origin[k], ray.direction[k]);
+                }
+                expected.push(inverse.ray(&ray));
+            }
+            inverse.turn(&mut lanes);
+            for (lane, ObjectRay { ray, t_scale }) in expected.into_iter().enumerate() {
+                let finite = ray.direction.iter().all(|x| x.is_finite());
+                assert!(lanes.plain[lane] == 0 || t_scale == 1.0 && finite, "{ray:?}");
+                if lanes.plain[lane] == 0 {
+                    continue;
+                }
+                plain += 1;
+                for k in 0..3 {
+                    assert_eq!(lanes.origin[k][lane].to_bits(), ray.origin[k].to_bits());
+                    assert_eq!(lanes.direction[k][lane].to_bits(), ray.direction[k].to_bits());
+                }
+            }
+        }
+        assert!(plain > 2000, "{plain}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 
 use super::World;
 use super::affine::ObjectRay;
+use super::entry::Batch;
 use super::packets::Packets;
 use super::placed::Placed;
 use super::visits::{Visit, Visits};
@@ -12,11 +13,11 @@ use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::trace::{self, Scratch, Steps};
+use crate::trace::{self, Deliver, Query as _, Scratch, Steps};
 use std::cell::RefCell;
 
 /// Rays that are under way together.
-const CHUNK: usize = 1024;
+const CHUNK: usize = 2048;
 /// Rays through one instance from which on they are traced apart from those through others: enough for a packet, if they go
 /// together.
 const PACKET: usize = 64;
@@ -30,20 +31,20 @@ trait Query {
 }
 
 /// What the visits of a round share.
-struct Round<'a> {
-    world: &'a World,
+pub(super) struct Round<'a> {
+    pub(super) world: &'a World,
     file: &'a File,
-    rays: &'a [Ray],
-    from: Option<&'a [Surface]>,
+    pub(super) rays: &'a [Ray],
+    pub(super) from: Option<&'a [Surface]>,
 }
 
 impl Round<'_> {
     /// The ray of a visit in the object's space.
-    fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
+    pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
         self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
     }
 
-    fn hint(&self, ray: usize, instance: u32) -> u32 {
+    pub(super) fn hint(&self, ray: usize, instance: u32) -> u32 {
         let from = self.from.map_or(Surface::NONE, |f| f[ray]);
         if from.instance == instance { from.triangle } else { NONE }
     }
@@ -117,11 +118,10 @@ impl<Q: Query> Kernel for Advance<'_, Q> {
         let Advance { round, query, first, ways: Ways { packets, walks, active, visits } } = self;
         let world = round.world;
         let tmax = |number: usize| query.tmax(first + number);
-        let mut arrive = |number: usize, instance| {
+        packets.advance(&round.rays[first..], tmax, |number, instance| {
             visits.all.push(Visit { ray: (first + number) as u32, instance });
-        };
-        packets.advance(&round.rays[first..], tmax, &mut arrive);
-        walks.advance(s, &world.top, active, tmax, arrive);
+        });
+        walks.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
     }
 }
 
@@ -176,7 +176,8 @@ impl World {
     }
 
     /// The place of an instance that the top level holds.
-    fn placed_at(&self, instance: u32) -> &Placed {
+    #[inline]
+    pub(super) fn placed_at(&self, instance: u32) -> &Placed {
         self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
     }
 
@@ -209,34 +210,6 @@ impl World {
             trace(runs[0][0], gathered);
         }
         visits.all.clear();
-    }
-}
-
-/// Rays that go through an object together.
-#[derive(Default)]
-struct Batch {
-    visits: Vec<(Visit, f32)>,
-    rays: Vec<Ray>,
-    /// The triangle that each starts on.
-    from: Vec<u32>,
-    hits: Vec<Hit>,
-    found: Vec<bool>,
-}
-
-impl Batch {
-    fn clear(&mut self) {
-        self.visits.clear();
-        self.rays.clear();
-        self.from.clear();
-    }
-    fn push(&mut self, visit: Visit, ray: ObjectRay, from: Option<u32>) {
-        self.visits.push((visit, ray.t_scale));
-        self.rays.push(ray.ray);
-        self.from.extend(from);
-    }
-    /// The triangles that rays start on, if they were asked for and there are some.
-    fn hints(&self) -> Option<&[u32]> {
-        self.from.iter().any(|from| *from != NONE).then_some(&self.from)
     }
 }
 
@@ -279,27 +252,53 @@ impl Query for Nearest<'_> {
             }
             return;
         }
-        self.batch.clear();
-        // Only in tetrahedra are they of use.
-        let hinted = round.from.is_some() && !object.tet_leaves.is_empty();
-        for &visit in visits {
-            let i = visit.ray as usize;
-            let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
-            self.batch.push(visit, ray, hinted.then(|| round.hint(i, visit.instance)));
-        }
-        let mut hits = std::mem::take(&mut self.batch.hits);
-        hits.clear();
-        hits.resize(visits.len(), Hit::MISS);
-        let batch = &self.batch;
-        trace::nearest_batch(object, &batch.rays, batch.hints(), 0, self.scratch, &mut hits);
-        for (&(visit, scale), hit) in batch.visits.iter().zip(&mut hits) {
-            if hit.is_hit() {
-                hit.surface.instance = visit.instance;
-                let i = visit.ray as usize;
-                self.hits[i] = better(&round.rays[i], &self.hits[i], hit, scale).unwrap_or(self.hits[i]);
-            }
-        }
-        self.batch.hits = hits;
+        self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax.min(self.hits[ray].t));
+        let ids = object.triangle_ids;
+        let mut to = Arrivals { round, visits, t_scale: &self.batch.t_scale, ids, answers: &mut *self.hits };
+        trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
+    }
+}
+
+/// Takes in what rays hit in an object, by the place of their visits.
+struct Arrivals<'a, A> {
+    round: &'a Round<'a>,
+    visits: &'a [Visit],
+    t_scale: &'a [f32],
+    /// Of the object.
+    ids: &'a [u32],
+    /// Of all rays.
+    answers: &'a mut [A],
+}
+
+impl Arrivals<'_, Hit> {
+    #[inline(always)]
+    fn take(&mut self, visit: usize, hit: &Hit) {
+        let (i, scale) = (self.visits[visit].ray as usize, self.t_scale[visit]);
+        let best = &mut self.answers[i];
+        *best = better(&self.round.rays[i], best, hit, scale).unwrap_or(*best);
+    }
+}
+
+impl Deliver<trace::Nearest> for Arrivals<'_, Hit> {
+    #[inline(always)]
+    fn query(&mut self, visit: usize, query: &trace::Nearest) {
+        self.take(visit, &query.answer(self.ids, self.visits[visit].instance));
+    }
+    #[inline(always)]
+    fn hit(&mut self, visit: usize, place: u32, t: f32, u: f32, v: f32) {
+        let (instance, triangle) = (self.visits[visit].instance, self.ids[place as usize]);
+        self.take(visit, &Hit { t, u, v, surface: Surface { instance, triangle } });
+    }
+}
+
+impl Deliver<trace::Any> for Arrivals<'_, bool> {
+    #[inline(always)]
+    fn query(&mut self, visit: usize, query: &trace::Any) {
+        self.answers[self.visits[visit].ray as usize] |= query.answer(self.ids, self.visits[visit].instance);
+    }
+    #[inline(always)]
+    fn hit(&mut self, visit: usize, _: u32, _: f32, _: f32, _: f32) {
+        self.answers[self.visits[visit].ray as usize] = true;
     }
 }
 
@@ -323,23 +322,10 @@ impl Query for Any<'_> {
             }
             return;
         }
-        self.batch.clear();
-        // Only in tetrahedra are they of use.
-        let hinted = round.from.is_some() && !object.tet_leaves.is_empty();
-        for &visit in visits {
-            let i = visit.ray as usize;
-            let ray = round.object_ray(visit, self.rays[i].tmax);
-            self.batch.push(visit, ray, hinted.then(|| round.hint(i, visit.instance)));
-        }
-        let mut found = std::mem::take(&mut self.batch.found);
-        found.clear();
-        found.resize(visits.len(), false);
-        let batch = &self.batch;
-        trace::any_batch(object, &batch.rays, batch.hints(), self.scratch, &mut found);
-        for ((visit, _), found) in batch.visits.iter().zip(&found) {
-            self.found[visit.ray as usize] |= *found;
-        }
-        self.batch.found = found;
+        self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax);
+        let ids = object.triangle_ids;
+        let mut to = Arrivals { round, visits, t_scale: &self.batch.t_scale, ids, answers: &mut *self.found };
+        trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
     }
 }
 

@@ -1,10 +1,12 @@
 //! Scenes of instances that move: per time the tracks and the hierarchy (`pose`), the instances' inverses
-//! and boxes (`placed`), a BVH over these (`top_level`), and batches of rays through it (`batch`: rays that go together, `packets`, and others, `walk`).
+//! and boxes (`placed`), a BVH over these (`top_level`), and batches of rays through it (`batch`: rays that go together, `packets`, and others, `walk`)
+//! and into objects (`entry`).
 //!
 //! A ray is transformed into the space of each object that it may meet and traced there, with t unchanged.
 
 mod affine;
 mod batch;
+mod entry;
 mod packets;
 mod placed;
 mod pose;

@@ -104,7 +104,7 @@ impl Packets {
         rays: &[Ray],
     ) -> Listed {
         let span = Span::of(s, rays);
-        if top.nodes.is_empty() || !span.is_coherent() || span.farthest_origin() > top.reach {
+        if top.is_empty() || !span.is_coherent() || span.farthest_origin() > top.reach {
             return Listed::Apart;
         }
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
@@ -121,7 +121,7 @@ impl Packets {
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let node = &top.nodes[waiting[count] as usize];
+            let node = top.node(waiting[count]);
             let (mut bits, depth) = beam.children(s, node, f32::INFINITY);
             let mut depths = [0.0; WIDTH];
             s.store(depth, &mut depths);

@@ -4,7 +4,8 @@
 //! or three, whose empty slots cost memory and time.
 
 use super::placed::Placed;
-use crate::layout::{Child, NODE_LINES, NONE, WIDTH, WideNode};
+use crate::layout::{Child, Line, NODE_LINES, NONE, WIDTH, WideNode};
+use zerocopy::{FromBytes, IntoBytes};
 
 /// Rays whose origin has no greater coordinate than this times that of the world's boxes take the boxes as they
 /// are built; others widen them (see [`TopLevel::looseness`]).
@@ -16,8 +17,9 @@ pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 /// The BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// The root is node 0. Children are codes: rows of `nodes`, or [`INSTANCE`] and a row of the instances.
-    pub(crate) nodes: Vec<WideNode>,
+    /// Its nodes, the root first, on lines of their own as those of objects are: rows that cross lines take twice as long to
+    /// read. Children are codes: the line of a node, or [`INSTANCE`] and a row of the instances.
+    lines: Vec<Line>,
     /// Greatest coordinate of the boxes.
     pub(crate) extent: f32,
     /// Rays that start farther than this from the world's origin widen the boxes by `looseness` times their own
@@ -111,8 +113,8 @@ impl TopLevel {
     /// Builds over the instances that have a place.
     pub(crate) fn build(&mut self, placed: &[Option<Placed>]) {
         // Rarely more than one node for seven instances.
-        self.nodes.clear();
-        self.nodes.reserve_exact(placed.len() / 7 + 1);
+        self.lines.clear();
+        self.lines.reserve_exact((placed.len() / 7 + 1) * NODE_LINES);
         (self.extent, self.looseness, self.depth) = (0.0, 0.0, 0);
         for place in placed.iter().flatten() {
             self.looseness = self.looseness.max(place.looseness);
@@ -134,8 +136,7 @@ impl TopLevel {
         if items.is_empty() {
             return;
         }
-        self.nodes.push(EMPTY);
-        let mut tasks = vec![Task { node: 0, level: 1, run: Run::of(0, &items) }];
+        let mut tasks = vec![Task { node: self.add_node(), level: 1, run: Run::of(0, &items) }];
         while let Some(Task { node, level, run }) = tasks.pop() {
             self.depth = self.depth.max(level);
             let items = &mut items[..];
@@ -148,16 +149,36 @@ impl TopLevel {
             let mut runs = [run; WIDTH];
             let count = split_into(items, &mut runs);
             for (slot, run) in runs[..count].iter().enumerate() {
-                let child = self.nodes.len() as u32;
-                self.nodes.push(EMPTY);
+                let child = self.add_node();
                 self.put(node, slot, child, &run.bounds);
                 tasks.push(Task { node: child, level: level + 1, run: *run });
             }
         }
     }
 
+    /// Adds a node without children; returns its code.
+    fn add_node(&mut self) -> u32 {
+        let code = self.lines.len();
+        self.lines.resize(code + NODE_LINES, Line([0; 16]));
+        EMPTY.write_to(self.lines[code..].as_mut_bytes()).expect("a node is as long as its lines");
+        code as u32
+    }
+
+    /// The node with a code.
+    #[inline(always)]
+    pub(crate) fn node(&self, code: u32) -> &WideNode {
+        let lines = &self.lines[code as usize..][..NODE_LINES];
+        WideNode::ref_from_bytes(lines.as_bytes()).expect("a node is as long as its lines")
+    }
+
+    /// Whether no instance can be seen.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
     fn put(&mut self, node: u32, slot: usize, code: u32, bounds: &Bounds) {
-        let node = &mut self.nodes[node as usize];
+        let lines = &mut self.lines[node as usize..][..NODE_LINES];
+        let node = WideNode::mut_from_bytes(lines.as_mut_bytes()).expect("a node is as long as its lines");
         node.child[slot] = code;
         for k in 0..3 {
             node.bounds[k][0][slot] = -bounds.0[k];
@@ -172,7 +193,7 @@ impl TopLevel {
 
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<WideNode>()
+        self.lines.capacity() * size_of::<Line>()
     }
 }
 
@@ -228,5 +249,3 @@ fn split(items: &mut [Item], run: Run) -> (Run, Run) {
 /// A node without children.
 const EMPTY: WideNode =
     WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
-
-const _: () = assert!(NODE_LINES == 7);

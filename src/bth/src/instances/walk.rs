@@ -3,6 +3,7 @@
 //! All rays take a step each in turn, so that none waits for another's, and rest where they come to an instance.
 
 use super::top_level::{INSTANCE, TopLevel};
+use super::visits::Visit;
 use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -24,7 +25,9 @@ pub(super) struct Walks {
 struct Way {
     /// Its slopes. Depths are t in units of the greatest component of the direction.
     slabs: Slabs,
-    /// Nothing whose depth exceeds this matters.
+    /// Nothing beyond this t matters,
+    tmax: f32,
+    /// and so nothing beyond this depth.
     limit: f32,
     /// Code of the instance that it passes by, or `NONE`.
     skip: u32,
@@ -45,7 +48,9 @@ fn slabs_from_afar(ray: &Ray, top: &TopLevel) -> Option<Slabs> {
 pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
     const SLACK: f64 = 1.0 / (1 << 22) as f64;
     let tmax = f64::from(tmax);
-    (((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * f64::from(scale)) as f32).next_up()
+    let limit = ((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * f64::from(scale)) as f32;
+    // At least the next number, without a branch: rays with and without an end are mixed.
+    limit + (limit.abs() * f32::EPSILON + f32::MIN_POSITIVE)
 }
 
 impl Walks {
@@ -60,11 +65,11 @@ impl Walks {
         active: &mut Vec<u32>,
         skip: impl Fn(usize) -> Option<u32>,
     ) {
-        if top.nodes.is_empty() || active.is_empty() {
+        if top.is_empty() || active.is_empty() {
             return active.clear();
         }
         self.stacks.reserve_for(top.depth as usize, rays.len());
-        let nowhere = Way { slabs: Slabs::NONE, limit: 0.0, skip: NONE, top: Place::NOWHERE };
+        let nowhere = Way { slabs: Slabs::NONE, tmax: 0.0, limit: 0.0, skip: NONE, top: Place::NOWHERE };
         if self.ways.len() < rays.len() {
             self.ways.resize(rays.len(), nowhere);
         }
@@ -89,7 +94,7 @@ impl Walks {
                         None => continue,
                     },
                 }
-                way.limit = f32::INFINITY;
+                (way.tmax, way.limit) = (ray.tmax, limit(way.slabs.scale, ray.tmax));
                 way.skip = skip(number).map_or(NONE, |instance| INSTANCE | instance);
                 way.top = self.stacks.start(number, 0);
                 active[kept] = at[lane];
@@ -100,8 +105,8 @@ impl Walks {
     }
 
     /// Takes rays on to the next instance whose box they may meet at a t that, rounded to f32, is at most that which
-    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. `arrive`
-    /// takes numbers and instances in the order of `active`.
+    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. The
+    /// visits are added to these, in the order of `active`; rays are numbered from the first.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
@@ -109,7 +114,7 @@ impl Walks {
         top: &TopLevel,
         active: &mut Vec<u32>,
         tmax: impl Fn(usize) -> Option<f32>,
-        mut arrive: impl FnMut(usize, u32),
+        (first_ray, visits): (u32, &mut Vec<Visit>),
     ) {
         let mut kept = 0;
         let mut block = Block::new();
@@ -122,28 +127,30 @@ impl Walks {
                     Some(tmax) => self.resume(s, ray, tmax),
                     None => BOTTOM,
                 };
-                block.sort(place, code, self.ways[ray].skip);
+                block.sort(place, code);
             }
             let numbers = &active[first..end];
             while block.inner.len > 0 {
                 for i in 0..block.inner.take() {
                     let place = block.inner.get(i);
                     let ray = numbers[place] as usize;
-                    let code = self.step(s, top, ray);
-                    block.sort(place, code, self.ways[ray].skip);
+                    let code = self.step(s, top, ray, block.code[place]);
+                    block.sort(place, code);
                 }
             }
+            // Without branches: which rays go on can't be foretold.
+            let mut count = visits.len();
+            visits.resize(count + end - first, Visit { ray: NONE, instance: NONE });
             for place in 0..end - first {
-                let code = block.code[place];
-                if code != BOTTOM {
-                    let number = active[first + place];
-                    let way = &mut self.ways[number as usize];
-                    way.top = way.top.below();
-                    arrive(number as usize, code & !INSTANCE);
-                    active[kept] = number;
-                    kept += 1;
-                }
+                let (code, number) = (block.code[place % BLOCK], active[first + place]);
+                let way = &mut self.ways[number as usize];
+                way.top = way.top.below();
+                visits[count] = Visit { ray: first_ray + number, instance: code & !INSTANCE };
+                active[kept] = number;
+                count += usize::from(code != BOTTOM);
+                kept += usize::from(code != BOTTOM);
             }
+            visits.truncate(count);
         }
         active.truncate(kept);
     }
@@ -152,32 +159,27 @@ impl Walks {
     #[inline(always)]
     fn resume<S: Simd>(&mut self, s: S, ray: usize, tmax: f32) -> u32 {
         let way = &mut self.ways[ray];
-        let limit = limit(way.slabs.scale, tmax);
-        if limit < way.limit {
-            way.limit = limit;
+        if tmax < way.tmax {
+            let limit = limit(way.slabs.scale, tmax);
+            (way.tmax, way.limit) = (tmax, limit);
             let keys = limit + (limit.abs() * KEY_SLACK + f32::MIN_POSITIVE);
             way.top = self.stacks.keep_up_to(s, self.stacks.bottom(ray), way.top, keys);
         }
         self.stacks.code(way.top)
     }
 
-    /// Takes what is on top of a ray's stack off it, and puts the children on it if that is a node; returns the code on top then.
+    /// Takes the node on top of a ray's stack off it, and puts its children on it; returns the code on top then.
     #[inline(always)]
-    fn step<S: Simd>(&mut self, s: S, top: &TopLevel, ray: usize) -> u32 {
+    fn step<S: Simd>(&mut self, s: S, top: &TopLevel, ray: usize, code: u32) -> u32 {
         let way = &mut self.ways[ray];
-        let code = self.stacks.code(way.top);
-        way.top = if code & INSTANCE != 0 {
-            way.top.below()
-        } else {
-            let node = &top.nodes[code as usize];
-            let (bits, enter) = way.slabs.children(s, node, way.limit);
-            let child = s.load_u(&node.child);
-            // Where coordinates are too great for f32 all boxes are met, those of no child too.
-            let some = bits & s.mask_bits(s.lt_u(child, s.splat_u(BOTTOM)));
-            let (codes, keys) = self.stacks.room(way.top);
-            let count = s.compress_far_to_near(some, enter, child, codes, keys);
-            self.stacks.replaced(way.top, count)
-        };
+        let node = top.node(code);
+        let (bits, enter) = way.slabs.children(s, node, way.limit);
+        let child = s.load_u(&node.child);
+        // Where coordinates are too great for f32 all boxes are met, those of no child too. What it passes by it need not meet.
+        let wanted = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(way.skip)));
+        let (codes, keys) = self.stacks.room(way.top);
+        let count = s.compress_far_to_near(bits & s.mask_bits(wanted), enter, child, codes, keys);
+        way.top = self.stacks.replaced(way.top, count);
         self.stacks.code(way.top)
     }
 }
@@ -186,7 +188,7 @@ impl Walks {
 struct Block {
     /// Those that are not yet where they rest.
     inner: List,
-    /// Code at which a ray rests: of an instance, or [`BOTTOM`].
+    /// Code on top of a ray's stack; where it rests, of an instance, or [`BOTTOM`].
     code: [u32; BLOCK],
 }
 
@@ -214,12 +216,11 @@ impl Block {
         Block { inner, code: [BOTTOM; BLOCK] }
     }
 
-    /// Notes the code on top of the stack of a ray that passes by the instance with the code `skip`. Without a branch.
+    /// Notes the code on top of the stack of a ray. Without a branch.
     #[inline(always)]
-    fn sort(&mut self, place: usize, code: u32, skip: u32) {
+    fn sort(&mut self, place: usize, code: u32) {
         self.code[place] = code;
         self.inner.place[usize::from(self.inner.len) % (2 * BLOCK)] = place as u8;
-        let goes_on = code & INSTANCE == 0 || code == skip;
-        self.inner.len += u8::from(goes_on);
+        self.inner.len += u8::from(code & INSTANCE == 0);
     }
 }

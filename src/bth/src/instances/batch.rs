@@ -20,7 +20,7 @@ use std::cell::RefCell;
 const CHUNK: usize = 2048;
 /// Rays through one instance from which on they are traced apart from those through others: enough for a packet, if they go
 /// together.
-const PACKET: usize = 64;
+const PACKET: usize = 256;
 
 /// What a query makes of rays in an object.
 trait Query {

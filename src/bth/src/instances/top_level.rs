@@ -158,9 +158,9 @@ impl TopLevel {
 
     /// Adds a node without children; returns its code.
     fn add_node(&mut self) -> u32 {
+        const LINES: [Line; NODE_LINES] = zerocopy::transmute!(EMPTY);
         let code = self.lines.len();
-        self.lines.resize(code + NODE_LINES, Line([0; 16]));
-        EMPTY.write_to(self.lines[code..].as_mut_bytes()).expect("a node is as long as its lines");
+        self.lines.extend_from_slice(&LINES);
         code as u32
     }
 

@@ -18,8 +18,8 @@ use std::cell::RefCell;
 
 /// Rays that are under way together.
 const CHUNK: usize = 2048;
-/// Rays through one instance from which on they are traced apart from those through others: enough for a packet, if they go
-/// together.
+/// Rays through one instance from which on they are traced apart from those through others: so many, four packets if they go
+/// together, that a small batch more is no loss.
 const PACKET: usize = 256;
 
 /// What a query makes of rays in an object.

@@ -47,7 +47,7 @@ struct Supply<'a, Q> {
     met: [u32; LANES],
     enter: [[f32; LANES]; LANES],
     /// Lanes of rays that meet any, and how many of these are gone.
-    lane: [u8; LANES + 1],
+    lane: [u8; LANES],
     filled: usize,
     used: usize,
     /// Rays taken before.
@@ -76,7 +76,7 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
             ray: [0; LANES],
             met: [0; LANES],
             enter: [[0.0; LANES]; LANES],
-            lane: [0; LANES + 1],
+            lane: [0; LANES],
             filled: 0,
             used: 0,
             before: 0,

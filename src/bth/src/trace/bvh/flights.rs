@@ -33,17 +33,19 @@ struct Lists {
 struct Counts(u32);
 
 impl Counts {
+    /// Where the counts lie: the lowest bit.
+    const INNER: u32 = 0;
     const LEAF: u32 = 8;
     const BOTTOM: u32 = 16;
     /// What a code with these upper three bits adds: nodes are below 4, leaves below 7.
     const ADDED: [u32; 8] = {
-        let (leaf, bottom) = (1 << Self::LEAF, 1 << Self::BOTTOM);
-        [1, 1, 1, 1, leaf, leaf, leaf, bottom]
+        let (inner, leaf, bottom) = (1 << Self::INNER, 1 << Self::LEAF, 1 << Self::BOTTOM);
+        [inner, inner, inner, inner, leaf, leaf, leaf, bottom]
     };
 
     #[inline(always)]
     fn inner(self) -> u8 {
-        self.0 as u8
+        (self.0 >> Self::INNER) as u8
     }
     #[inline(always)]
     fn leaf(self) -> u8 {
@@ -179,7 +181,7 @@ impl<'a, Q: Query> Flights<'a, Q> {
         let Flights { slots, tops, lists, stacks, .. } = self;
         let (mut counts, mut stacks, ground) = (self.counts, stacks.open(), object.ground());
         while counts.inner() > 0 {
-            for i in 0..counts.take(0) {
+            for i in 0..counts.take(Counts::INNER) {
                 let at = usize::from(lists.inner[i]) % IN_FLIGHT;
                 let (top, node) = (tops.place[at], N::node(ground, tops.code[at]));
                 let count = slots[at].0.enter_node(s, node, stacks.room(top));

@@ -163,6 +163,32 @@ unsafe fn compression(bits: u8) -> __m256i {
     }
 }
 
+/// All rows in order.
+const ALL: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// These rows by their columns.
+///
+/// # Safety
+/// All of them must be readable.
+#[inline(always)]
+unsafe fn columns8(simd: Avx2, from: *const [u32; 8], row: [u32; LANES]) -> [U; 8] {
+    let mut out = [simd.splat_u(0); 8];
+    // SAFETY: see above; unaligned loads.
+    unsafe {
+        for half in 0..2 {
+            let mut rows = [simd.splat(0.0)[0]; 8];
+            for i in 0..8 {
+                rows[i] = _mm256_loadu_ps(from.add(row[8 * half + i] as usize).cast());
+            }
+            let columns = transpose8(rows);
+            for k in 0..8 {
+                out[k][half] = _mm256_castps_si256(columns[k]);
+            }
+        }
+    }
+    out
+}
+
 impl Simd for Avx2 {
     type F = F;
     type U = U;
@@ -299,21 +325,13 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
         let row = within(self, m, row, from.len());
-        let mut out = [self.splat_u(0); 8];
-        // SAFETY: as `rows4`.
-        unsafe {
-            for half in 0..2 {
-                let mut rows = [self.splat(0.0)[0]; 8];
-                for i in 0..8 {
-                    rows[i] = _mm256_loadu_ps(from.as_ptr().add(row[8 * half + i] as usize).cast());
-                }
-                let columns = transpose8(rows);
-                for k in 0..8 {
-                    out[k][half] = _mm256_castps_si256(columns[k]);
-                }
-            }
-        }
-        out
+        // SAFETY: `within` gives rows of the slice.
+        unsafe { columns8(self, from.as_ptr(), row) }
+    }
+    #[inline(always)]
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
+        // SAFETY: there are sixteen rows.
+        unsafe { columns8(self, rows.as_ptr(), ALL) }
     }
     #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {

@@ -156,6 +156,58 @@ unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
     }
 }
 
+/// These rows by their columns.
+///
+/// # Safety
+/// All of them must be readable.
+#[inline(always)]
+unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LANES]) -> [__m512i; 8] {
+    // SAFETY: see above; unaligned loads.
+    unsafe {
+        macro_rules! load {
+            ($i:literal) => {
+                _mm256_loadu_ps(from.add(row[$i] as usize).cast())
+            };
+        }
+        macro_rules! halves {
+            ($a:literal $b:literal) => {
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
+            };
+        }
+        // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
+        let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
+        let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
+        let mut out = [simd.bits(low[0]); 8];
+        for k in 0..4 {
+            out[k] = simd.bits(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[k], high[k]));
+            out[4 + k] = simd.bits(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[k], high[k]));
+        }
+        out
+    }
+}
+
+/// Of sixteen rows of five words, one after the other: the row of a word,
+const ROWS5: [[u32; LANES]; 5] = {
+    let mut rows = [[0; LANES]; 5];
+    let mut i = 0;
+    while i < 5 * LANES {
+        rows[i / LANES][i % LANES] = i as u32 / 5;
+        i += 1;
+    }
+    rows
+};
+
+/// and a bit each for the words that are of a column.
+const COLUMNS5: [[u16; 5]; 5] = {
+    let mut columns = [[0; 5]; 5];
+    let mut i = 0;
+    while i < 5 * LANES {
+        columns[i / LANES][i % 5] |= 1 << (i % LANES);
+        i += 1;
+    }
+    columns
+};
+
 impl Simd for Avx512 {
     type F = __m512;
     type U = __m512i;
@@ -246,27 +298,25 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn rows8(self, m: u16, from: &[[u32; 8]], row: __m512i) -> [__m512i; 8] {
         let row = within(self, m, row, from.len());
-        // SAFETY: as `rows4`.
-        unsafe {
-            macro_rules! load {
-                ($i:literal) => {
-                    _mm256_loadu_ps(from.as_ptr().add(row[$i] as usize).cast())
-                };
+        // SAFETY: `within` gives rows of the slice.
+        unsafe { columns8(self, from.as_ptr(), row) }
+    }
+    #[inline(always)]
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [__m512i; 8] {
+        // SAFETY: there are sixteen rows.
+        unsafe { columns8(self, rows.as_ptr(), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]) }
+    }
+    #[inline(always)]
+    fn store_rows5(self, columns: [__m512i; 5], to: &mut [[u32; 5]; LANES]) {
+        let to = to.as_flattened_mut();
+        for (part, to) in to.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+            let row = self.load_u(&ROWS5[part]);
+            let mut words = self.lookup_u(columns[0], row);
+            for k in 1..5 {
+                // SAFETY: registers only.
+                words = unsafe { _mm512_mask_permutexvar_epi32(words, COLUMNS5[part][k], row, columns[k]) };
             }
-            macro_rules! halves {
-                ($a:literal $b:literal) => {
-                    _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
-                };
-            }
-            // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
-            let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
-            let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
-            let mut out = [self.bits(low[0]); 8];
-            for k in 0..4 {
-                out[k] = self.bits(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[k], high[k]));
-                out[4 + k] = self.bits(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[k], high[k]));
-            }
-            out
+            self.store_u(words, to);
         }
     }
     #[inline(always)]

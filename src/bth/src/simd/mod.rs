@@ -72,6 +72,19 @@ pub(crate) trait Simd: Copy {
     fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
     /// As [`Self::rows4`], rows of eight words.
     fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
+    /// Sixteen rows of eight words by their columns.
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [Self::U; 8];
+    /// Columns of five words as rows: element k of row i is lane i of the k-th.
+    #[inline(always)]
+    fn store_rows5(self, columns: [Self::U; 5], to: &mut [[u32; 5]; LANES]) {
+        let mut words = [[0; LANES]; 5];
+        for k in 0..5 {
+            self.store_u(columns[k], &mut words[k]);
+        }
+        for i in 0..LANES {
+            to[i] = [words[0][i], words[1][i], words[2][i], words[3][i], words[4][i]];
+        }
+    }
     /// Where the mask is set, the next elements of `from` in order; else `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 

@@ -194,6 +194,10 @@ impl Simd for Scalar {
         columns(m, from, row)
     }
     #[inline(always)]
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
+        from_fn(|k| from_fn(|i| rows[i][k]))
+    }
+    #[inline(always)]
     fn expand(self, a: F, m: u32, from: &F) -> F {
         expand(a, m, from)
     }

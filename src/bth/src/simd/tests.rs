@@ -75,6 +75,14 @@ impl Kernel for Everything<'_> {
         for row in square {
             turned.extend(u(s.bits(row)));
         }
+        let block: [[u32; 8]; LANES] =
+            std::array::from_fn(|i| std::array::from_fn(|k| self.u[i].wrapping_add(k as u32)));
+        for column in s.columns8(&block) {
+            turned.extend(u(column));
+        }
+        let mut rows = [[0; 5]; LANES];
+        s.store_rows5([x, y, s.bits(a), s.bits(b), s.splat_u(7)], &mut rows);
+        turned.extend(rows.as_flattened());
         let zero = s.splat(0.0);
         for column in s.rows4(mask, table.as_chunks().0, s.and_u(x, s.splat_u(7))) {
             turned.extend(f(s.select(mask, column, zero)));

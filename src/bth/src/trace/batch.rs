@@ -6,9 +6,10 @@ use super::bvh::batch::{BatchWalk, Waiting};
 use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::bvh::walk::TetOutcome;
 use super::choice::{self, LEAST_RAYS, Way};
+use super::crossings::Crossings;
 use super::hinted::Hinted;
 use super::packets;
-use super::query::{Any, Deliver, Nearest, Offset, Query};
+use super::query::{Any, Deliver, Nearest, Offset, Query, one_by_one};
 use super::quick::{Fast, MoellerTrumbore, Quick, Test, Watertight};
 use super::tets;
 use super::tets::batch::Walk;
@@ -96,6 +97,14 @@ impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
     fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
         let triangle = self.ids[place as usize];
         self.answers[ray] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
+    }
+    #[inline(always)]
+    fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
+        if let Some(to) = self.answers[first..].first_chunk_mut() {
+            Q::answers_of(s, lanes, crossings, self.ids, self.instance, to);
+        } else {
+            one_by_one(self, first, lanes, crossings);
+        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! What a traversal looks for: the nearest hit or any hit; and what it counts.
 
 use super::crossing::Crossing;
+use super::crossings::Crossings;
 use super::quick::Test;
 use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
+use crate::simd::{LANES, Simd};
 
 /// Where answers go. Rays that are not spoken of hit nothing.
 pub(crate) trait Deliver<Q> {
@@ -11,6 +13,27 @@ pub(crate) trait Deliver<Q> {
     fn query(&mut self, ray: usize, query: &Q);
     /// The nearest hit of a ray is the triangle at this place in leaf order; all else as reported. (In single words: what goes through memory as a pair stalls.)
     fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32);
+    /// The same of up to sixteen rays from this one on, a bit each, of which nothing has been said before.
+    #[inline(always)]
+    fn hits<S: Simd>(&mut self, _s: S, first: usize, lanes: u32, crossings: &Crossings) {
+        one_by_one(self, first, lanes, crossings);
+    }
+}
+
+/// [`Deliver::hits`] as single ones.
+#[inline(always)]
+pub(crate) fn one_by_one<Q, D: Deliver<Q> + ?Sized>(
+    to: &mut D,
+    first: usize,
+    mut lanes: u32,
+    crossings: &Crossings,
+) {
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize % LANES;
+        lanes &= lanes - 1;
+        let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
+        to.hit(first + lane, crossings.place[lane], t, u, v);
+    }
 }
 
 /// Answers to rays from a place in the batch on.
@@ -27,6 +50,10 @@ impl<Q, D: Deliver<Q>> Deliver<Q> for Offset<'_, D> {
     #[inline(always)]
     fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
         self.to.hit(self.first + ray, place, t, u, v);
+    }
+    #[inline(always)]
+    fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
+        self.to.hits(s, self.first + first, lanes, crossings);
     }
 }
 
@@ -67,6 +94,15 @@ pub(crate) trait Query: Copy {
     fn answer(&self, ids: &[u32], instance: u32) -> Self::Answer;
     /// The same, given t, u and v as they are to be reported.
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
+    /// The same of sixteen rays; those whose bit is not set hit nothing.
+    fn answers_of<S: Simd>(
+        s: S,
+        lanes: u32,
+        crossings: &Crossings,
+        ids: &[u32],
+        instance: u32,
+        to: &mut [Self::Answer; LANES],
+    );
     fn new(ray: &Ray) -> Self;
     /// Whether walks should keep an eye on how far they are: where rays are often short, and where
     /// [`Self::settled_by`] has a use for it.
@@ -131,6 +167,25 @@ impl Query for Nearest {
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Hit {
         Hit { t, u, v, surface }
     }
+    #[inline(always)]
+    fn answers_of<S: Simd>(
+        s: S,
+        lanes: u32,
+        crossings: &Crossings,
+        ids: &[u32],
+        instance: u32,
+        to: &mut [Hit; LANES],
+    ) {
+        let m = s.mask(lanes);
+        let triangle = s.gather_u(m, ids, s.load_u(&crossings.place));
+        let Hit { t, u, v, surface } = Hit::MISS;
+        let t = s.select(m, s.load(&crossings.t), s.splat(t));
+        let u = s.select(m, s.load(&crossings.u), s.splat(u));
+        let v = s.select(m, s.load(&crossings.v), s.splat(v));
+        let instance = s.select_u(m, s.splat_u(instance), s.splat_u(surface.instance));
+        let triangle = s.select_u(m, triangle, s.splat_u(surface.triangle));
+        s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(to));
+    }
     fn new(ray: &Ray) -> Self {
         let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
         Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_place: false, best }
@@ -192,6 +247,18 @@ impl Query for Any {
     }
     fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
         true
+    }
+    fn answers_of<S: Simd>(
+        _s: S,
+        lanes: u32,
+        _crossings: &Crossings,
+        _ids: &[u32],
+        _instance: u32,
+        to: &mut [bool; LANES],
+    ) {
+        for (lane, found) in to.iter_mut().enumerate() {
+            *found = lanes >> lane & 1 != 0;
+        }
     }
     fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }

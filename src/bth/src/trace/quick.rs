@@ -1,11 +1,12 @@
 //! Triangle tests in f32 alone, as other tracers have them: what exact answers cost is measured against these.
 
 use super::crossing::Crossing;
+use super::crossings::Crossings;
 use super::query::{Named, Nearest, Query};
 use super::sight::{Block, Corners, Sight, cross};
 use crate::layout::WIDTH;
 use crate::rays::{Hit, Ray, Surface};
-use crate::simd::Simd;
+use crate::simd::{LANES, Simd};
 use std::marker::PhantomData;
 
 /// How triangles are decided.
@@ -63,6 +64,17 @@ impl<W: Way> Query for Quick<W> {
     #[inline(always)]
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Hit {
         Nearest::answer_of(surface, t, u, v)
+    }
+    #[inline(always)]
+    fn answers_of<S: Simd>(
+        s: S,
+        lanes: u32,
+        crossings: &Crossings,
+        ids: &[u32],
+        instance: u32,
+        to: &mut [Hit; LANES],
+    ) {
+        Nearest::answers_of(s, lanes, crossings, ids, instance, to);
     }
     fn new(ray: &Ray) -> Self {
         Quick(Nearest::new(ray), PhantomData)

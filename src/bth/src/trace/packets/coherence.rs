@@ -60,13 +60,24 @@ fn both(least: &[f32; LANES], greatest: &[f32; LANES], at: usize) -> [f32; 2] {
 impl Span {
     #[inline(always)]
     pub(crate) fn of<S: Simd>(s: S, rays: &[Ray]) -> Span {
-        let mut least = pair(s, rays, 0);
-        let mut greatest = least;
-        for at in (2..rays.len()).step_by(2) {
-            let two = pair(s, rays, at);
-            least = s.min(two, least);
-            greatest = s.max(two, greatest);
+        let first = pair(s, rays, 0);
+        // Two of each, so that no operation waits for the one before.
+        let (mut least, mut greatest) = ([first; 2], [first; 2]);
+        let (fours, rest) = rays.as_chunks::<4>();
+        for four in fours {
+            let (pairs, _) = four.as_chunks::<2>();
+            for i in 0..2 {
+                let two = s.load(floats(&pairs[i]));
+                least[i] = s.min(two, least[i]);
+                greatest[i] = s.max(two, greatest[i]);
+            }
         }
+        for at in (0..rest.len()).step_by(2) {
+            let two = pair(s, rest, at);
+            least[0] = s.min(two, least[0]);
+            greatest[0] = s.max(two, greatest[0]);
+        }
+        let (least, greatest) = (s.min(least[0], least[1]), s.max(greatest[0], greatest[1]));
         let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
         s.store(least, &mut low);
         s.store(greatest, &mut high);
@@ -129,8 +140,10 @@ impl Span {
         let end = s.load_u(&[7, 7, 7, 7, 7, 7, 7, 7, 15, 15, 15, 15, 15, 15, 15, 15]);
         let (mut least, mut greatest) = (s.splat(f32::INFINITY), s.splat(f32::NEG_INFINITY));
         let mut longest = s.splat(0.0);
-        for at in (0..rays.len()).step_by(2) {
-            let two = pair(s, rays, at);
+        let (pairs, odd) = rays.as_chunks::<2>();
+        let last = [odd.first().copied().unwrap_or(rays[0]); 2];
+        for pair in pairs.iter().chain([&last]) {
+            let two = s.load(floats(pair));
             let d = s.lookup(two, direction);
             let p = s.fma(d, s.lookup(two, start), two);
             let q = s.fma(d, s.lookup(two, end), two);

@@ -5,7 +5,7 @@
 
 use crate::layout::NONE;
 use crate::rays::Ray;
-use crate::simd::Simd;
+use crate::simd::{LANES, Simd};
 use crate::trace::crossings::{Crossings, Projected};
 use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
 use crate::trace::sight::Block;
@@ -26,8 +26,6 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) first: S::F,
     /// or certainly exceeds this.
     pub(crate) limit: S::F,
-    /// The axes of f64's projection ([`crate::trace::line`]).
-    pub(crate) axis: [S::U; 3],
     mixed: Mixed<S>,
     /// The axis along the rays, if it is the same for all.
     pub(crate) common: Option<Common>,
@@ -64,7 +62,6 @@ impl<S: Simd> Group<S> {
             scale: zero,
             first: zero,
             limit: zero,
-            axis: [none; 3],
             mixed: Mixed { is_x: no, is_y: no },
             common: None,
             plane_origin: [zero; 2],
@@ -106,9 +103,14 @@ impl<S: Simd> Group<S> {
     /// prepared.
     #[inline(always)]
     pub(crate) fn prepare(&mut self, s: S, frame: &Frame, rays: &[Ray]) -> bool {
-        let lane = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
-        let last = s.splat_u(rays.len() as u32 - 1);
-        let field = prepare::fields(s, s.mask(0xffff), rays, s.select_u(s.lt_u(lane, last), lane, last));
+        let field = match rays.first_chunk() {
+            Some(rays) => prepare::fields_of(s, rays),
+            None => {
+                let mut all = [rays[rays.len() - 1]; LANES];
+                all[..rays.len()].copy_from_slice(rays);
+                prepare::fields_of(s, &all)
+            }
+        };
         self.mixed = Mixed::of(s, [field[4], field[5], field[6]]);
         self.common = self.mixed.common(s);
         self.origin = [field[0], field[1], field[2]];
@@ -132,7 +134,6 @@ impl<S: Simd> Group<S> {
         self.scale = lanes.scale;
         [self.first, self.limit] = lanes.depths;
         self.certain = lanes.certain;
-        self.axis = lanes.axis;
         self.plane_origin = lanes.origin;
         self.shear = lanes.shear;
         self.forward = lanes.forward;
@@ -192,6 +193,15 @@ impl<S: Simd> Group<S> {
         let x = s.sub(x, self.plane_origin[0]);
         let y = s.sub(y, self.plane_origin[1]);
         [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
+    }
+
+    /// The axes of f64's projection ([`crate::trace::line`]).
+    #[inline(always)]
+    pub(crate) fn axes(&self, s: S) -> [S::U; 3] {
+        match &self.common {
+            Some(common) => common.axes(s),
+            None => self.mixed.axes(s),
+        }
     }
 
     /// Coordinates along the axes of the projection.

@@ -3,7 +3,7 @@
 use super::coherence::Span;
 use super::group::Group;
 use crate::layout::{WIDTH, WideNode};
-use crate::simd::Simd;
+use crate::simd::{LANES, Simd};
 use crate::trace::prepare::Frame;
 use crate::trace::slabs::{self, PAD};
 
@@ -24,27 +24,28 @@ pub(crate) trait Hull<S: Simd> {
 /// Rays into one octant: interval arithmetic over their origins and directions (Wald, Boulos and Shirley, "Ray Tracing
 /// Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007, cull boxes in this way).
 ///
-/// **Boxes.** With a point c among the origins, the depth at which ray l meets a plane is (plane - c)·r + a with
-/// a = (c - o)·r: an interval of r and one of a bound it from both sides. As all operations round
-/// monotonically, only their roundings for each ray need a pad. With u = 2^-24 and E the sum of the greatest coordinate
-/// of the object and that of all origins, they come to at most uE|r| each for the reciprocal and plane - c, 6uE|r|
-/// for the product and sum (twice rounded, |plane - c| <= E, |a| <= 2E|r|), 6uE|r| for a: with the
-/// half [`PAD`] = 8uE|r| of [`crate::trace::slabs`] for clamped components less than 22uE|r|; the pad is 2 · PAD = 32uE|r|.
+/// **Boxes.** The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
+/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
+/// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
+/// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`crate::trace::slabs`] for
+/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE.
 ///
 /// **Triangles.** With s = d_x/d_z along one axis z for all, a point's sheared x is
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
 /// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
 /// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
 pub(crate) struct Beam<S: Simd> {
-    center: [S::F; 3],
+    /// The end of the origins' interval that is nearest to the planes that are met first, and that nearest to the others.
+    near_origin: [S::F; 3],
+    far_origin: [S::F; 3],
     /// Least and greatest reciprocal.
     reciprocal: [[S::F; 2]; 3],
-    near_addend: [S::F; 3],
-    far_addend: [S::F; 3],
     /// Row of the ends that are met first.
     near: [u32; 3],
     first: S::F,
     axis: [usize; 3],
+    /// Of the origins.
+    center: [S::F; 3],
     shear: [S::F; 2],
     shear_width: [S::F; 2],
     /// What keeps points on the upper side, and on the lower.
@@ -52,27 +53,20 @@ pub(crate) struct Beam<S: Simd> {
     lower: [S::F; 2],
 }
 
-/// The least and the greatest value of a few vectors.
-#[derive(Clone, Copy)]
-struct Ends<S: Simd> {
-    least: S::F,
-    greatest: S::F,
-}
-
-impl<S: Simd> Ends<S> {
-    #[inline(always)]
-    fn none(s: S) -> Self {
-        Ends { least: s.splat(f32::INFINITY), greatest: s.splat(f32::NEG_INFINITY) }
+/// The least of each vector.
+#[inline(always)]
+fn least_of_each<S: Simd>(s: S, rows: [S::F; LANES]) -> [f32; LANES] {
+    let mut columns = s.transpose(rows);
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            columns[i] = s.min(columns[i], columns[i + half]);
+        }
+        half /= 2;
     }
-    #[inline(always)]
-    fn add(&mut self, s: S, low: S::F, high: S::F) {
-        self.least = s.min(low, self.least);
-        self.greatest = s.max(high, self.greatest);
-    }
-    #[inline(always)]
-    fn get(&self, s: S) -> [f32; 2] {
-        [s.least(self.least), -s.least(s.sub(s.splat(0.0), self.greatest))]
-    }
+    let mut least = [0.0; LANES];
+    s.store(columns[0], &mut least);
+    least
 }
 
 impl<S: Simd> Beam<S> {
@@ -81,59 +75,61 @@ impl<S: Simd> Beam<S> {
     pub(crate) fn new(s: S, frame: &Frame, span: &Span, groups: &[Group<S>]) -> Self {
         let zero = s.splat(0.0);
         let extent = frame.extent(span.farthest_origin());
-        let pad = s.splat(2.0 * PAD as f32 * extent);
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
-        let mut beam = Beam {
-            center: [zero; 3],
-            reciprocal: [[zero; 2]; 3],
-            near_addend: [zero; 3],
-            far_addend: [zero; 3],
-            near: [0; 3],
-            first: zero,
-            axis,
-            shear: [zero; 2],
-            shear_width: [zero; 2],
-            upper: [zero; 2],
-            lower: [zero; 2],
-        };
+        let mut center = [0.0; 3];
         for k in 0..3 {
-            let center = s.splat(0.5 * span.origin[k][0] + 0.5 * span.origin[k][1]);
-            let (mut reciprocal, mut addend) = (Ends::none(s), Ends::none(s));
-            for group in groups {
-                let r = group.reciprocal[k];
-                let a = s.mul(s.sub(center, group.origin[k]), r);
-                let pad = s.mul(pad, s.abs(r));
-                reciprocal.add(s, r, r);
-                addend.add(s, s.sub(a, pad), s.add(a, pad));
-            }
-            let (reciprocal, addend) = (reciprocal.get(s), addend.get(s));
-            beam.center[k] = center;
-            beam.reciprocal[k] = [s.splat(reciprocal[0]), s.splat(reciprocal[1])];
-            beam.near_addend[k] = s.splat(addend[0]);
-            beam.far_addend[k] = s.splat(addend[1]);
-            beam.near[k] = if span.direction[k][0] < 0.0 { slabs::FAR } else { 0 };
+            center[k] = 0.5 * span.origin[k][0] + 0.5 * span.origin[k][1];
         }
-        let mut first = Ends::none(s);
+        // Least and, negated, greatest: the reciprocals, slopes and what is added to sheared coordinates; the first depth.
+        let mut ends = [s.splat(f32::INFINITY); LANES];
         for group in groups {
-            first.add(s, group.first, group.first);
-        }
-        beam.first = s.splat(first.get(s)[0]);
-        let pad = 4.0 * PAD as f32 * extent;
-        for j in 0..2 {
-            let (mut shear, mut addend) = (Ends::none(s), Ends::none(s));
-            for group in groups {
+            for k in 0..3 {
+                widen(s, &mut ends, k, group.reciprocal[k]);
+            }
+            let from = s.sub(s.splat(center[main]), group.origin[main]);
+            for j in 0..2 {
                 let slope = match group.common {
                     // As good as the quotient, and there already.
                     Some(common) if common.0 == main => s.mul(group.shear[j], group.forward),
                     _ => s.div(group.direction[axis[j]], group.direction[main]),
                 };
-                let from = s.sub(beam.center[main], group.origin[main]);
-                let a = s.fnma(slope, from, s.sub(beam.center[axis[j]], group.origin[axis[j]]));
-                shear.add(s, slope, slope);
-                addend.add(s, a, a);
+                let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);
+                widen(s, &mut ends, 3 + j, slope);
+                widen(s, &mut ends, 5 + j, s.fnma(slope, from, beside));
             }
-            let (shear, addend) = (shear.get(s), addend.get(s));
+            ends[14] = s.min(ends[14], group.first);
+        }
+        let ends = least_of_each(s, ends);
+        let both = |of: usize| [ends[of], -ends[7 + of]];
+        let mut beam = Beam {
+            near_origin: [zero; 3],
+            far_origin: [zero; 3],
+            reciprocal: [[zero; 2]; 3],
+            near: [0; 3],
+            first: s.splat(ends[14]),
+            axis,
+            center: [zero; 3],
+            shear: [zero; 2],
+            shear_width: [zero; 2],
+            upper: [zero; 2],
+            lower: [zero; 2],
+        };
+        let pad = 2.0 * PAD as f32 * extent;
+        for k in 0..3 {
+            let [least, greatest] = both(k);
+            beam.reciprocal[k] = [s.splat(least), s.splat(greatest)];
+            let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
+            let is_negative = span.direction[k][0] < 0.0;
+            let [near, far] = if is_negative { [low, high] } else { [high, low] };
+            beam.near_origin[k] = s.splat(near);
+            beam.far_origin[k] = s.splat(far);
+            beam.near[k] = if is_negative { slabs::FAR } else { 0 };
+            beam.center[k] = s.splat(center[k]);
+        }
+        let pad = 4.0 * PAD as f32 * extent;
+        for j in 0..2 {
+            let (shear, addend) = (both(3 + j), both(5 + j));
             let middle = 0.5 * (shear[0] + shear[1]);
             beam.shear[j] = s.splat(middle);
             beam.shear_width[j] = s.splat((shear[1] - middle).max(middle - shear[0]));
@@ -144,6 +140,13 @@ impl<S: Simd> Beam<S> {
     }
 }
 
+/// Takes a vector into the least and the negated greatest of one of seven.
+#[inline(always)]
+fn widen<S: Simd>(s: S, ends: &mut [S::F; LANES], of: usize, x: S::F) {
+    ends[of] = s.min(ends[of], x);
+    ends[7 + of] = s.min(ends[7 + of], s.sub(s.splat(0.0), x));
+}
+
 impl<S: Simd> Hull<S> for Beam<S> {
     const MIXED: bool = false;
 
@@ -152,13 +155,11 @@ impl<S: Simd> Hull<S> for Beam<S> {
         let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
             let [least, greatest] = self.reciprocal[k];
-            let near = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k])), self.center[k]);
-            let far = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)), self.center[k]);
-            let (a, b) =
-                (s.fma(near, least, self.near_addend[k]), s.fma(near, greatest, self.near_addend[k]));
-            enter = s.max(s.min(a, b), enter);
-            let (a, b) = (s.fma(far, least, self.far_addend[k]), s.fma(far, greatest, self.far_addend[k]));
-            leave = s.min(s.max(a, b), leave);
+            let near = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k])), self.near_origin[k]);
+            let far =
+                s.sub(s.load(slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)), self.far_origin[k]);
+            enter = s.max(s.min(s.mul(near, least), s.mul(near, greatest)), enter);
+            leave = s.min(s.max(s.mul(far, least), s.mul(far, greatest)), leave);
         }
         (s.mask_bits(s.le(enter, leave)), enter)
     }

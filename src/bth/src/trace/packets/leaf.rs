@@ -97,8 +97,6 @@ pub(crate) struct Rays<'a, Q> {
     pub(crate) asked: u64,
     /// Those that are not done.
     pub(crate) alive: u64,
-    /// Candidates that were decided one at a time.
-    pub(crate) settled: u32,
 }
 
 /// A leaf and its code.
@@ -225,8 +223,8 @@ impl<Q: Query> Rays<'_, Q> {
         mut lanes: u32,
     ) {
         let (mut axis, mut leaf, mut triangle) = ([[0; LANES]; 3], [0; LANES], [0; LANES]);
-        for k in 0..3 {
-            s.store_u(group.axis[k], &mut axis[k]);
+        for (row, along) in axis.iter_mut().zip(group.axes(s)) {
+            s.store_u(along, row);
         }
         s.store_u(group.leaf, &mut leaf);
         s.store_u(group.triangle, &mut triangle);
@@ -260,7 +258,8 @@ impl<Q: Query> Rays<'_, Q> {
     #[inline(always)]
     pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &Group<S>, at: usize, mut lanes: u32) {
         let mut rows = [[0; LANES]; 5];
-        for (row, &values) in rows.iter_mut().zip(group.axis.iter().chain([&group.leaf, &group.triangle])) {
+        for (row, &values) in rows.iter_mut().zip(group.axes(s).iter().chain([&group.leaf, &group.triangle]))
+        {
             s.store_u(values, row);
         }
         while lanes != 0 {
@@ -278,7 +277,6 @@ impl<Q: Query> Rays<'_, Q> {
             self.queries[ray] = Q::new(&self.rays[ray]);
             self.asked |= 1 << ray;
         }
-        self.settled += 1;
         settle(self.object, &self.rays[ray], axis, candidates, &mut self.queries[ray])
     }
 }

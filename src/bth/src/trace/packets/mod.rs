@@ -83,8 +83,9 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     for (i, own) in rays.chunks(PACKET).enumerate() {
         let at = i * PACKET;
         // So that the next rays are there when this packet is done.
-        for next in rays[(at + PACKET).min(rays.len())..].chunks(RAYS_A_LINE).take(PACKET / RAYS_A_LINE) {
-            s.prefetch(next.as_ptr());
+        let next = own.as_ptr().wrapping_add(PACKET);
+        for line in 0..PACKET / RAYS_A_LINE {
+            s.prefetch(next.wrapping_add(line * RAYS_A_LINE));
         }
         let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
             rest.extend(at as u32..(at + own.len()) as u32);

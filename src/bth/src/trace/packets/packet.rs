@@ -82,7 +82,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         let Packets { groups, points, stack, queries } = self;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
-        let mut rays = Rays { object, rays, queries, asked: 0, alive: all, settled: 0 };
+        let mut rays = Rays { object, rays, queries, asked: 0, alive: all };
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray hold nothing up.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
@@ -91,7 +91,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         let mut limit = farthest_limit(s, groups);
         let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
         let (mut code, mut mask, mut top) = (object.header.root, all, 0);
-        let (mut steps, mut used) = (0, 0);
+        let (mut steps, mut used) = (0u32, 0);
         'steps: loop {
             steps += 1;
             used += mask.count_ones();
@@ -167,8 +167,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             }
         }
         finish(s, groups, &mut rays, all, to);
-        // Deciding one candidate alone costs about as much as a step.
-        let steps = u64::from(steps + rays.settled);
+        let steps = u64::from(steps);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
 }
@@ -221,12 +220,9 @@ fn finish<S: Simd, Q: Query>(
     }
     for (i, (group, crossings)) in groups.iter().zip(&crossings).enumerate() {
         let asked = (rays.asked >> (i * LANES)) as u32 & 0xffff;
-        let mut clear = crossings.certain & !asked;
-        while clear != 0 {
-            let lane = clear.trailing_zeros() as usize % LANES;
-            clear &= clear - 1;
-            let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
-            to.hit(i * LANES + lane, crossings.place[lane], t, u, v);
+        let clear = crossings.certain & !asked;
+        if clear != 0 {
+            to.hits(s, i * LANES, clear, crossings);
         }
         let rest = crossings.open | crossings.certain & asked;
         if rest != 0 {

@@ -19,6 +19,18 @@ pub(crate) fn fields<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8
     out
 }
 
+/// The same of sixteen rays that lie one behind the other.
+#[inline(always)]
+pub(crate) fn fields_of<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
+    let rows = Ray::rows(rays).first_chunk().expect("sixteen rows");
+    let words = s.columns8(rows);
+    let mut out = [s.splat(0.0); 8];
+    for k in 0..8 {
+        out[k] = s.floats(words[k]);
+    }
+    out
+}
+
 /// What [`Aim`]s say of sixteen rays, a row of lanes for each.
 pub(crate) struct Lanes<S: Simd> {
     pub(crate) reciprocal: [S::F; 3],
@@ -51,17 +63,23 @@ pub(crate) fn lanes<S: Simd>(s: S, frame: &Frame, field: [S::F; 8], axes: &impl 
 
     let mut reach = zero;
     let mut farthest = zero;
-    let mut finite = s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(greatest, s.splat(LARGEST)));
+    // Sums, because the greater of NaN and a number may be the number.
+    let (mut from, mut along) = (zero, zero);
     for k in 0..3 {
         let far =
             s.max(s.abs(s.sub(s.splat(frame.lower[k]), o[k])), s.abs(s.sub(s.splat(frame.upper[k]), o[k])));
         reach = s.max(far, reach);
-        farthest = s.max(s.abs(o[k]), farthest);
-        // Also false for NaN, which `max` may drop.
-        finite = s.and(finite, s.and(s.lt(far, s.splat(LARGEST)), s.lt(size[k], s.splat(LARGEST))));
+        let coordinate = s.abs(o[k]);
+        farthest = s.max(coordinate, farthest);
+        from = s.add(coordinate, from);
+        along = s.add(size[k], along);
     }
     let extent = s.mul(s.add(s.splat(frame.farthest), farthest), s.splat(UP));
-    finite = s.and(finite, s.and(s.lt(s.splat(SMALLEST), extent), s.lt(extent, s.splat(LARGEST))));
+    let large = s.splat(LARGEST);
+    let finite = s.and(
+        s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(along, large)),
+        s.and(s.and(s.lt(s.splat(SMALLEST), extent), s.lt(extent, large)), s.lt(from, large)),
+    );
     let pad = s.mul(extent, s.splat(slabs::PAD as f32));
     let least = s.mul(greatest, s.splat(slabs::LEAST_COMPONENT as f32));
     let (mut reciprocal, mut near_addend, mut far_addend) = ([zero; 3], [zero; 3], [zero; 3]);
@@ -70,9 +88,9 @@ pub(crate) fn lanes<S: Simd>(s: S, frame: &Frame, field: [S::F; 8], axes: &impl 
         let magnitude = s.div(greatest, s.max(size[k], least));
         let sign = s.and_u(s.bits(d[k]), s.splat_u(1 << 31));
         reciprocal[k] = s.floats(s.or_u(s.bits(magnitude), sign));
-        let (middle, pad) = (s.mul(o[k], reciprocal[k]), s.mul(pad, magnitude));
-        near_addend[k] = s.sub(zero, s.add(middle, pad));
-        far_addend[k] = s.sub(pad, middle);
+        let pad = s.mul(pad, magnitude);
+        near_addend[k] = s.fnma(o[k], reciprocal[k], s.sub(zero, pad));
+        far_addend[k] = s.fnma(o[k], reciprocal[k], pad);
         negative[k] = s.lt_u(s.splat_u(i32::MAX as u32), sign);
     }
 

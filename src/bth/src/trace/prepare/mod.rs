@@ -9,7 +9,7 @@ mod lanes;
 mod tests;
 
 pub(crate) use self::axes::{Axes, Common, Mixed};
-pub(crate) use self::lanes::{Lanes, fields, lanes};
+pub(crate) use self::lanes::{Lanes, fields, fields_of, lanes};
 use super::sight::{self, Sight};
 use super::slabs::{self, Slabs};
 use crate::layout::{NONE, Object};

@@ -27,7 +27,7 @@ pub(crate) struct Crossings {
     /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
     /// else the triangles would have been decided upon at once.)
     pub(crate) certain: u32,
-    /// Lanes that must be looked at one by one.
+    /// The others, which must be looked at one by one. (f32 was sure of all of them, so none is certainly missed.)
     pub(crate) open: u32,
     /// In leaf order.
     pub(crate) place: [u32; LANES],
@@ -50,22 +50,19 @@ impl Crossings {
     #[inline(always)]
     pub(crate) fn compute<S: Simd>(&mut self, s: S, lanes: u32, projected: &Projected) {
         let Projected { origin, direction, corner } = projected;
-        let (mut certain, mut missed) = ([0; LANES], [0; LANES]);
+        let mut certain = [0; LANES];
         // Without branches, so that it is compiled to vectors.
         for i in 0..LANES {
             let at = |rows: &[Many; 3]| [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()];
             let corners = [at(&corner[0]), at(&corner[1]), at(&corner[2])];
             let weighed = weigh(at(origin), at(direction), corners);
-            let verdict = weighed.verdict();
             let [_, b, c] = weighed.weight;
-            certain[i] = u32::from(verdict.crossed);
-            missed[i] = u32::from(verdict.missed);
+            certain[i] = u32::from(weighed.verdict().crossed);
             self.t[i] = reported(weighed.t);
             self.u[i] = reported(b * weighed.share);
             self.v[i] = reported(c * weighed.share);
         }
-        let bits = |flags: &[u32; LANES]| s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(flags)));
-        self.certain = bits(&certain) & lanes;
-        self.open = lanes & !self.certain & !bits(&missed);
+        self.certain = s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(&certain))) & lanes;
+        self.open = lanes & !self.certain;
     }
 }

@@ -26,7 +26,7 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) first: S::F,
     /// or certainly exceeds this.
     pub(crate) limit: S::F,
-    mixed: Mixed<S>,
+    pub(crate) mixed: Mixed<S>,
     /// The axis along the rays, if it is the same for all.
     pub(crate) common: Option<Common>,
     plane_origin: [S::F; 2],
@@ -180,19 +180,13 @@ impl<S: Simd> Group<S> {
         crossings.compute(s, some, &Projected { origin, direction, corner });
     }
 
-    /// A point as the rays see it: its place in the plane of projection, and its depth.
+    /// A point as the rays see it, given along their axes: its place in the plane of projection, negated (which shows in no
+    /// weight), and its depth.
     #[inline(always)]
-    pub(crate) fn project(&self, s: S, point: [f32; 3]) -> [S::F; 3] {
-        let [x, y, z] = if let Some(common) = self.common {
-            let [x, y, z] = common.order();
-            [s.splat(point[x]), s.splat(point[y]), s.splat(point[z])]
-        } else {
-            self.mixed.turn(s, [s.splat(point[0]), s.splat(point[1]), s.splat(point[2])])
-        };
+    pub(crate) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         let depth = s.fma(z, self.forward, self.start);
-        let x = s.sub(x, self.plane_origin[0]);
-        let y = s.sub(y, self.plane_origin[1]);
-        [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
+        let (x, y) = (s.sub(self.plane_origin[0], x), s.sub(self.plane_origin[1], y));
+        [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
     }
 
     /// The axes of f64's projection ([`crate::trace::line`]).

@@ -81,11 +81,12 @@ impl<S: Simd> Beam<S> {
         for k in 0..3 {
             center[k] = 0.5 * span.origin[k][0] + 0.5 * span.origin[k][1];
         }
-        // Least and, negated, greatest: the reciprocals, slopes and what is added to sheared coordinates; the first depth.
-        let mut ends = [s.splat(f32::INFINITY); LANES];
+        // Of the reciprocals, the slopes and what is added to sheared coordinates; and of the first depth.
+        let (mut least, mut greatest) = ([s.splat(f32::INFINITY); 8], [s.splat(f32::NEG_INFINITY); 7]);
         for group in groups {
             for k in 0..3 {
-                widen(s, &mut ends, k, group.reciprocal[k]);
+                let r = group.reciprocal[k];
+                (least[k], greatest[k]) = (s.min(least[k], r), s.max(greatest[k], r));
             }
             let from = s.sub(s.splat(center[main]), group.origin[main]);
             for j in 0..2 {
@@ -95,19 +96,25 @@ impl<S: Simd> Beam<S> {
                     _ => s.div(group.direction[axis[j]], group.direction[main]),
                 };
                 let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);
-                widen(s, &mut ends, 3 + j, slope);
-                widen(s, &mut ends, 5 + j, s.fnma(slope, from, beside));
+                let addend = s.fnma(slope, from, beside);
+                (least[3 + j], greatest[3 + j]) = (s.min(least[3 + j], slope), s.max(greatest[3 + j], slope));
+                (least[5 + j], greatest[5 + j]) =
+                    (s.min(least[5 + j], addend), s.max(greatest[5 + j], addend));
             }
-            ends[14] = s.min(ends[14], group.first);
+            least[7] = s.min(least[7], group.first);
+        }
+        let mut ends = [least[7]; LANES];
+        for i in 0..7 {
+            (ends[i], ends[8 + i]) = (least[i], s.sub(s.splat(0.0), greatest[i]));
         }
         let ends = least_of_each(s, ends);
-        let both = |of: usize| [ends[of], -ends[7 + of]];
+        let both = |of: usize| [ends[of], -ends[8 + of]];
         let mut beam = Beam {
             near_origin: [zero; 3],
             far_origin: [zero; 3],
             reciprocal: [[zero; 2]; 3],
             near: [0; 3],
-            first: s.splat(ends[14]),
+            first: s.splat(ends[7]),
             axis,
             center: [zero; 3],
             shear: [zero; 2],
@@ -138,13 +145,6 @@ impl<S: Simd> Beam<S> {
         }
         beam
     }
-}
-
-/// Takes a vector into the least and the negated greatest of one of seven.
-#[inline(always)]
-fn widen<S: Simd>(s: S, ends: &mut [S::F; LANES], of: usize, x: S::F) {
-    ends[of] = s.min(ends[of], x);
-    ends[7 + of] = s.min(ends[7 + of], s.sub(s.splat(0.0), x));
 }
 
 impl<S: Simd> Hull<S> for Beam<S> {

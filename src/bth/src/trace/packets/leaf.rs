@@ -10,6 +10,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Settled, settle};
+use crate::trace::prepare::{Axes, Common};
 use crate::trace::query::Query;
 use crate::trace::sight::{self, Block};
 
@@ -27,8 +28,13 @@ pub(crate) fn no_points<S: Simd>(s: S) -> Points<S> {
 
 /// A leaf as points, and triangles between them.
 pub(crate) trait Mesh: Block {
-    /// A point; its number is taken modulo [`POINTS`].
-    fn point(&self, at: usize) -> [f32; 3];
+    /// One coordinate of all points.
+    type Row<'a>: Copy
+    where
+        Self: 'a;
+    fn row(&self, axis: usize) -> Self::Row<'_>;
+    /// That of a point, whose number is below [`POINTS`].
+    fn at(row: Self::Row<'_>, point: usize) -> f32;
     /// The points of a triangle, below [`POINTS`].
     fn points_of(&self, triangle: usize) -> [usize; 3];
     /// The triangles that have no corner inside, and none on another side of the hull than the others: missed by
@@ -48,11 +54,18 @@ fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
     [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
 }
 
+/// From the first corner's row of an axis to the end of the last one's.
+const RAW_ROW: usize = 7 * WIDTH;
+
 impl Mesh for IndexedLeaf {
+    type Row<'a> = &'a [f32; WIDTH];
     #[inline(always)]
-    fn point(&self, at: usize) -> [f32; 3] {
-        let at = at % WIDTH;
-        [self.vertex[0][at], self.vertex[1][at], self.vertex[2][at]]
+    fn row(&self, axis: usize) -> &[f32; WIDTH] {
+        &self.vertex[axis]
+    }
+    #[inline(always)]
+    fn at(row: &[f32; WIDTH], point: usize) -> f32 {
+        row[point % WIDTH]
     }
     #[inline(always)]
     fn points_of(&self, triangle: usize) -> [usize; 3] {
@@ -70,10 +83,17 @@ impl Mesh for IndexedLeaf {
 }
 
 impl Mesh for RawLeaf {
+    type Row<'a> = &'a [f32; RAW_ROW];
     #[inline(always)]
-    fn point(&self, at: usize) -> [f32; 3] {
-        let (corner, at) = (at / WIDTH % 3, at % WIDTH);
-        [self.corner[corner][0][at], self.corner[corner][1][at], self.corner[corner][2][at]]
+    fn row(&self, axis: usize) -> &[f32; RAW_ROW] {
+        self.corner.as_flattened().as_flattened()[axis * WIDTH..]
+            .first_chunk()
+            .expect("up to the last corner")
+    }
+    #[inline(always)]
+    fn at(row: &[f32; RAW_ROW], point: usize) -> f32 {
+        // Rows of other axes lie between those of two corners.
+        row[(point + point / WIDTH * (2 * WIDTH)).min(RAW_ROW - 1)]
     }
     #[inline(always)]
     fn points_of(&self, triangle: usize) -> [usize; 3] {
@@ -97,6 +117,22 @@ pub(crate) struct Rays<'a, Q> {
     pub(crate) asked: u64,
     /// Those that are not done.
     pub(crate) alive: u64,
+}
+
+/// Of projected points: |x| or |y|, and |depth|.
+struct Greatest<S: Simd> {
+    coordinate: S::F,
+    depth: S::F,
+}
+
+impl<S: Simd> Greatest<S> {
+    /// Takes in a point, and hands it back.
+    #[inline(always)]
+    fn including(&mut self, s: S, point: [S::F; 3]) -> [S::F; 3] {
+        self.coordinate = s.max_abs(s.max_abs(point[0], self.coordinate), point[1]);
+        self.depth = s.max_abs(point[2], self.depth);
+        point
+    }
 }
 
 /// A leaf and its code.
@@ -150,17 +186,29 @@ impl<Q: Query> Rays<'_, Q> {
         (mut triangles, mut used): (u32, u64),
         mut active: u32,
     ) -> bool {
-        let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
-        while used != 0 {
-            let i = used.trailing_zeros() as usize % POINTS;
-            used &= used - 1;
-            let point = group.project(s, leaf.block.point(i));
-            size = s.max(sight::size(s, point), size);
-            depth = s.max(s.abs(point[2]), depth);
-            points[i] = point;
+        let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
+        let order = group.common.map_or([0, 1, 2], Common::order);
+        let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
+        if group.common.is_some() {
+            while used != 0 {
+                let i = used.trailing_zeros() as usize % POINTS;
+                used &= used - 1;
+                let point =
+                    [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
+                points[i] = greatest.including(s, group.project(s, point));
+            }
+        } else {
+            while used != 0 {
+                let i = used.trailing_zeros() as usize % POINTS;
+                used &= used - 1;
+                let point =
+                    [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
+                points[i] = greatest.including(s, group.project(s, group.mixed.turn(s, point)));
+            }
         }
         let floor = s.splat(f32::MIN_POSITIVE);
-        let error = sight::error(s, size, depth, floor);
+        let size = s.add(greatest.coordinate, greatest.coordinate);
+        let error = sight::error(s, size, greatest.depth, floor);
         let minus_error = s.sub(s.splat(0.0), error);
         let mut nearer = false;
         while triangles != 0 {

@@ -10,6 +10,26 @@ use crate::trace::crossings::{Crossings, Projected};
 use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
 use crate::trace::sight::Block;
 
+/// How sixteen rays see points.
+#[derive(Clone, Copy)]
+pub(crate) struct Projection<S: Simd> {
+    origin: [S::F; 2],
+    /// Slopes of the rays: how far they go along the plane's axes while they go 1 along the third, whichever way.
+    pub(crate) shear: [S::F; 2],
+    pub(crate) forward: S::F,
+    start: S::F,
+}
+
+impl<S: Simd> Projection<S> {
+    /// A point, given along the axes of the projection: its place in the plane, negated (which shows in no weight), and its depth.
+    #[inline(always)]
+    pub(crate) fn of(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+        let depth = s.fma(z, self.forward, self.start);
+        let (x, y) = (s.sub(self.origin[0], x), s.sub(self.origin[1], y));
+        [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
+    }
+}
+
 /// Sixteen rays, and what they have found.
 #[derive(Clone, Copy)]
 pub(crate) struct Group<S: Simd> {
@@ -29,11 +49,7 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) mixed: Mixed<S>,
     /// The axis along the rays, if it is the same for all.
     pub(crate) common: Option<Common>,
-    plane_origin: [S::F; 2],
-    /// Slopes of the rays: how far they go along the plane's axes while they go 1 along the third, whichever way.
-    pub(crate) shear: [S::F; 2],
-    pub(crate) forward: S::F,
-    start: S::F,
+    pub(crate) projection: Projection<S>,
     /// From which to which depth hits are certainly in range.
     pub(crate) certain: [S::F; 2],
     /// Lower bound of the depth of the nearest hit so far.
@@ -64,10 +80,7 @@ impl<S: Simd> Group<S> {
             limit: zero,
             mixed: Mixed { is_x: no, is_y: no },
             common: None,
-            plane_origin: [zero; 2],
-            shear: [zero; 2],
-            forward: zero,
-            start: zero,
+            projection: Projection { origin: [zero; 2], shear: [zero; 2], forward: zero, start: zero },
             certain: [zero; 2],
             nearest: zero,
             leaf: none,
@@ -134,10 +147,8 @@ impl<S: Simd> Group<S> {
         self.scale = lanes.scale;
         [self.first, self.limit] = lanes.depths;
         self.certain = lanes.certain;
-        self.plane_origin = lanes.origin;
-        self.shear = lanes.shear;
-        self.forward = lanes.forward;
-        self.start = lanes.start;
+        let prepare::Lanes { origin, shear, forward, start, .. } = lanes;
+        self.projection = Projection { origin, shear, forward, start };
         s.mask_bits(lanes.usable) == 0xffff
     }
 
@@ -178,15 +189,6 @@ impl<S: Simd> Group<S> {
         }
         s.store_u(self.place, &mut crossings.place);
         crossings.compute(s, some, &Projected { origin, direction, corner });
-    }
-
-    /// A point as the rays see it, given along their axes: its place in the plane of projection, negated (which shows in no
-    /// weight), and its depth.
-    #[inline(always)]
-    pub(crate) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        let depth = s.fma(z, self.forward, self.start);
-        let (x, y) = (s.sub(self.plane_origin[0], x), s.sub(self.plane_origin[1], y));
-        [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
     }
 
     /// The axes of f64's projection ([`crate::trace::line`]).

@@ -92,7 +92,9 @@ impl<S: Simd> Beam<S> {
             for j in 0..2 {
                 let slope = match group.common {
                     // As good as the quotient, and there already.
-                    Some(common) if common.0 == main => s.mul(group.shear[j], group.forward),
+                    Some(common) if common.0 == main => {
+                        s.mul(group.projection.shear[j], group.projection.forward)
+                    }
                     _ => s.div(group.direction[axis[j]], group.direction[main]),
                 };
                 let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);

@@ -189,22 +189,14 @@ impl<Q: Query> Rays<'_, Q> {
         let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         let order = group.common.map_or([0, 1, 2], Common::order);
         let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
-        if group.common.is_some() {
-            while used != 0 {
-                let i = used.trailing_zeros() as usize % POINTS;
-                used &= used - 1;
-                let point =
-                    [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
-                points[i] = greatest.including(s, group.project(s, point));
-            }
-        } else {
-            while used != 0 {
-                let i = used.trailing_zeros() as usize % POINTS;
-                used &= used - 1;
-                let point =
-                    [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
-                points[i] = greatest.including(s, group.project(s, group.mixed.turn(s, point)));
-            }
+        // Copies, which stay in registers where the group itself would be read for each point.
+        let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
+        while used != 0 {
+            let i = used.trailing_zeros() as usize % POINTS;
+            used &= used - 1;
+            let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
+            let point = if is_common { point } else { mixed.turn(s, point) };
+            points[i] = greatest.including(s, projection.of(s, point));
         }
         let floor = s.splat(f32::MIN_POSITIVE);
         let size = s.add(greatest.coordinate, greatest.coordinate);

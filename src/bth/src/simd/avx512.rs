@@ -494,6 +494,30 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
+    fn least_of_each(self, rows: [__m512; LANES]) -> __m512 {
+        let mut r = rows;
+        // SAFETY: registers only.
+        unsafe {
+            // Halves of two vectors in one, over and over: of each quarter of the lanes, then over the quarters.
+            for i in 0..8 {
+                let (a, b) = (r[2 * i], r[2 * i + 1]);
+                r[i] = _mm512_min_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+            }
+            for i in 0..4 {
+                let (a, b) = (_mm512_castps_pd(r[2 * i]), _mm512_castps_pd(r[2 * i + 1]));
+                let (low, high) = (_mm512_unpacklo_pd(a, b), _mm512_unpackhi_pd(a, b));
+                r[i] = _mm512_min_ps(_mm512_castpd_ps(low), _mm512_castpd_ps(high));
+            }
+            for i in 0..2 {
+                let (a, b) = (r[2 * i], r[2 * i + 1]);
+                let low = _mm512_shuffle_f32x4::<0b01_00_01_00>(a, b);
+                r[i] = _mm512_min_ps(low, _mm512_shuffle_f32x4::<0b11_10_11_10>(a, b));
+            }
+            let even = _mm512_shuffle_f32x4::<0b10_00_10_00>(r[0], r[1]);
+            _mm512_min_ps(even, _mm512_shuffle_f32x4::<0b11_01_11_01>(r[0], r[1]))
+        }
+    }
+    #[inline(always)]
     fn prefetch<T>(self, place: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }

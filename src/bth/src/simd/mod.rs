@@ -144,6 +144,20 @@ pub(crate) trait Simd: Copy {
     /// Row i becomes lane i of every row.
     fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
 
+    /// Lane i is the least of row i; none may hold a NaN.
+    #[inline(always)]
+    fn least_of_each(self, rows: [Self::F; LANES]) -> Self::F {
+        let mut columns = self.transpose(rows);
+        let mut half = LANES / 2;
+        while half > 0 {
+            for i in 0..half {
+                columns[i] = self.min(columns[i], columns[i + half]);
+            }
+            half /= 2;
+        }
+        columns[0]
+    }
+
     /// Asks for a cache line.
     fn prefetch<T>(self, place: *const T);
 }

@@ -83,6 +83,11 @@ impl Kernel for Everything<'_> {
         let mut rows = [[0; 5]; LANES];
         s.store_rows5([x, y, s.bits(a), s.bits(b), s.splat_u(7)], &mut rows);
         turned.extend(rows.as_flattened());
+        let mut signed = [s.load(&ordered); LANES];
+        for (i, row) in signed.iter_mut().enumerate() {
+            *row = s.sub(s.splat(i as f32 - 8.0), s.lookup(*row, s.add_u(x, s.splat_u(i as u32))));
+        }
+        turned.extend(u(s.bits(s.least_of_each(signed))));
         let zero = s.splat(0.0);
         for column in s.rows4(mask, table.as_chunks().0, s.and_u(x, s.splat_u(7))) {
             turned.extend(f(s.select(mask, column, zero)));

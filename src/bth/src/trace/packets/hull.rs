@@ -53,22 +53,6 @@ pub(crate) struct Beam<S: Simd> {
     lower: [S::F; 2],
 }
 
-/// The least of each vector.
-#[inline(always)]
-fn least_of_each<S: Simd>(s: S, rows: [S::F; LANES]) -> [f32; LANES] {
-    let mut columns = s.transpose(rows);
-    let mut half = LANES / 2;
-    while half > 0 {
-        for i in 0..half {
-            columns[i] = s.min(columns[i], columns[i + half]);
-        }
-        half /= 2;
-    }
-    let mut least = [0.0; LANES];
-    s.store(columns[0], &mut least);
-    least
-}
-
 impl<S: Simd> Beam<S> {
     /// Of a coherent run ([`Span::is_coherent`]).
     #[inline(always)]
@@ -109,7 +93,9 @@ impl<S: Simd> Beam<S> {
         for i in 0..7 {
             (ends[i], ends[8 + i]) = (least[i], s.sub(s.splat(0.0), greatest[i]));
         }
-        let ends = least_of_each(s, ends);
+        let mut least = [0.0; LANES];
+        s.store(s.least_of_each(ends), &mut least);
+        let ends = least;
         let both = |of: usize| [ends[of], -ends[8 + of]];
         let mut beam = Beam {
             near_origin: [zero; 3],

@@ -104,6 +104,7 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
+    #[inline]
     fn view(&self, object: u32) -> &ObjectView<'_> {
         self.file.view(object).expect("an object below object_count, checked when opened")
     }
@@ -115,6 +116,7 @@ impl Scene {
     }
 
     /// The only object that rays can meet, where its space is the world's, and the instance it is: no top level is needed then.
+    #[inline]
     fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
@@ -170,7 +172,7 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
-        hits.fill(Hit::MISS);
+        trace::miss_all(hits);
         if let Some((object, instance)) = self.sole() {
             return trace::with_scratch(|scratch| {
                 if rays.len() >= trace::FEW {
@@ -178,7 +180,8 @@ impl Scene {
                     return trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
                 }
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = trace::nearest(object, ray, hint(surface(from, i), instance), instance, scratch);
+                    let from = hint(surface(from, i), instance);
+                    trace::nearest_to(object, ray, from, instance, scratch, hit);
                 }
             });
         }
@@ -213,7 +216,7 @@ impl Scene {
         if self.world.is_some() || self.object_count() != 1 {
             return self.nearest_batch(rays, None, hits);
         }
-        hits.fill(Hit::MISS);
+        trace::miss_all(hits);
         trace::with_scratch(|scratch| trace::nearest_batch_by(self.view(0), rays, test, scratch, hits));
     }
 

@@ -168,12 +168,19 @@ impl File {
     }
 
     /// As [`Self::object`], made only once.
-    #[allow(unsafe_code)]
+    #[inline]
     pub(crate) fn view(&self, object: u32) -> Result<&ObjectView<'_>> {
-        let cell = self.views.get(object as usize);
-        if let Some(view) = cell.and_then(OnceLock::get) {
-            return Ok(view);
+        // Asked for by every query.
+        match self.views.get(object as usize).and_then(OnceLock::get) {
+            Some(view) => Ok(view),
+            None => self.first_view(object),
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    #[allow(unsafe_code)]
+    fn first_view(&self, object: u32) -> Result<&ObjectView<'_>> {
         let view = self.make_view(object)?;
         // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`: memory on the heap or mapped, which
         // does not move when `self` does, is never written to or replaced, and lives until `self` is dropped. What

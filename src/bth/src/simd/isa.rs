@@ -101,16 +101,20 @@ impl Isa {
 
     /// What tracing uses: what [`Self::choose`] said, else what the environment variable `BTH_ISA` says if this
     /// machine has it, else the best.
+    #[inline]
     pub fn chosen() -> Isa {
         match CHOSEN.load(Ordering::Relaxed) {
-            0 => {
-                let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
-                // Two threads that get here at once store the same.
-                CHOSEN.store(isa as u8 + 1, Ordering::Relaxed);
-                isa
-            }
+            0 => Isa::choose_first(),
             n => Isa::ALL[usize::from(n) - 1],
         }
+    }
+
+    #[cold]
+    fn choose_first() -> Isa {
+        let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
+        // Two threads that get here at once store the same.
+        CHOSEN.store(isa as u8 + 1, Ordering::Relaxed);
+        isa
     }
 
     /// What the environment variable `BTH_ISA` says, if it is set. Programs check it at their start; the
@@ -125,17 +129,29 @@ impl Isa {
     }
 
     /// Runs a kernel with this instruction set, or with plain code if the machine lacks it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        match self.run_wide(kernel) {
-            Ok(output) => output,
-            Err(kernel) => kernel.run(Scalar),
+        // Not by way of `run_wide`, whose result would be one more copy.
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Isa::Scalar => {}
+            Isa::Avx2 => {
+                if let Some(simd) = super::avx2::Avx2::detect() {
+                    return simd.run(kernel);
+                }
+            }
+            Isa::Avx512 => {
+                if let Some(simd) = super::avx512::Avx512::detect() {
+                    return simd.run(kernel);
+                }
+            }
         }
+        kernel.run(Scalar)
     }
 
     /// Runs a kernel with this instruction set unless that is plain code: gives it back then. For kernels that are no
     /// gain without vectors, and a lot of code.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
         #[cfg(target_arch = "x86_64")]
         match self {

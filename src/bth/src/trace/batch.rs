@@ -1,7 +1,6 @@
 //! Batches of rays through one object: those that start on a known surface walk its tetrahedra first, all together;
 //! the rest goes through the BVH.
 
-use super::Scratch;
 use super::bvh::batch::{BatchWalk, Waiting};
 use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::bvh::walk::TetOutcome;
@@ -15,6 +14,7 @@ use super::tets;
 use super::tets::batch::Walk;
 use super::tets::records::LaneRecords;
 use super::tets::{enter_tets, leaf_of_face};
+use super::{FEW, Scratch};
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
@@ -78,6 +78,32 @@ pub(crate) fn any_batch(
 ) {
     let mut sink = Sink::<Any> { ids: object.triangle_ids, answers: found, instance: 0 };
     trace_batch(object, rays, from, scratch, &mut sink);
+}
+
+/// Says of all rays that they hit nothing.
+#[inline]
+pub(crate) fn miss_all(hits: &mut [Hit]) {
+    // One ray alone need not pay for a kernel.
+    if hits.len() < FEW {
+        hits.fill(Hit::MISS);
+    } else {
+        Isa::chosen().run(MissAll(hits));
+    }
+}
+
+/// [`miss_all`] as a kernel: whole vectors are stored, not hits.
+struct MissAll<'a>(&'a mut [Hit]);
+
+impl Kernel for MissAll<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let (blocks, rest) = self.0.as_chunks_mut();
+        for block in blocks {
+            Nearest::answers_of(s, 0, &Crossings::NONE, &[], NONE, block);
+        }
+        rest.fill(Hit::MISS);
+    }
 }
 
 /// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.

@@ -19,7 +19,7 @@ mod single;
 mod slabs;
 mod tets;
 
-pub(crate) use batch::{any_batch, nearest_batch, nearest_batch_by, trace_batch};
+pub(crate) use batch::{any_batch, miss_all, nearest_batch, nearest_batch_by, trace_batch};
 pub(crate) use bvh::flight::KEY_SLACK;
 pub(crate) use bvh::stack::{BOTTOM, Place, Stacks};
 pub use hinted::Hinted;
@@ -52,15 +52,18 @@ pub(crate) struct Scratch {
 }
 
 /// Lends the thread's scratch memory.
+#[inline(always)]
 pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
     thread_local! {
         static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
     }
     // Taken out while it is in use, so that a panic leaves nothing half done behind.
-    let mut scratch = SCRATCH.take().unwrap_or_default();
-    let result = work(&mut scratch);
-    SCRATCH.set(Some(scratch));
-    result
+    SCRATCH.with(|lent| {
+        let mut scratch = lent.take().unwrap_or_default();
+        let result = work(&mut scratch);
+        lent.set(Some(scratch));
+        result
+    })
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
@@ -72,19 +75,37 @@ pub(crate) fn nearest(
     instance: u32,
     scratch: &mut Scratch,
 ) -> Hit {
-    trace::<Nearest, ()>(object, ray, from, instance, scratch, &mut ())
+    let mut hit = Hit::MISS;
+    nearest_to(object, ray, from, instance, scratch, &mut hit);
+    hit
+}
+
+/// As [`nearest`], put in its place.
+#[inline]
+pub(crate) fn nearest_to(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    instance: u32,
+    scratch: &mut Scratch,
+    to: &mut Hit,
+) {
+    trace::<Nearest, ()>(object, ray, from, instance, scratch, &mut (), to);
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
-    let mut steps = Steps::default();
-    let hit =
-        with_scratch(|scratch| trace::<Nearest, Steps>(object, ray, from, instance, scratch, &mut steps));
+    let (mut hit, mut steps) = (Hit::MISS, Steps::default());
+    with_scratch(|scratch| {
+        trace::<Nearest, Steps>(object, ray, from, instance, scratch, &mut steps, &mut hit);
+    });
     (hit, steps)
 }
 
 /// Whether a ray in object space hits anything.
 #[inline]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
-    trace::<Any, ()>(object, ray, from, 0, scratch, &mut ())
+    let mut found = false;
+    trace::<Any, ()>(object, ray, from, 0, scratch, &mut (), &mut found);
+    found
 }

@@ -12,7 +12,8 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 
-/// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with.
+/// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with. The answer goes
+/// into `to`.
 #[inline]
 pub(crate) fn trace<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -21,11 +22,12 @@ pub(crate) fn trace<Q: Query, C: Count>(
     instance: u32,
     scratch: &mut Scratch,
     count: &mut C,
-) -> Q::Answer {
+    to: &mut Q::Answer,
+) {
     if from == NONE || object.tet_leaves.is_empty() {
-        return through_bvh::<Q, C>(Single { object, ray, instance, start: None, scratch, count });
+        return through_bvh::<Q, C>(Single { object, ray, instance, start: None, scratch, count, to });
     }
-    trace_from::<Q, C>(object, ray, from, instance, scratch, count)
+    trace_from::<Q, C>(object, ray, from, instance, scratch, count, to);
 }
 
 /// As [`trace`], from a triangle that may lie on tetrahedra.
@@ -37,27 +39,33 @@ fn trace_from<Q: Query, C: Count>(
     instance: u32,
     scratch: &mut Scratch,
     count: &mut C,
-) -> Q::Answer {
+    to: &mut Q::Answer,
+) {
     let mut query = Q::new(ray);
     let walked = match start_in_tets(object, ray, from, &mut query, count) {
-        Start::Done => return query.answer(object.triangle_ids, instance),
+        Start::Done => {
+            *to = query.answer(object.triangle_ids, instance);
+            return;
+        }
         Start::Walked(leaf) => leaf,
     };
     if object.header.root == Child::Tets(walked).code() && walked != NONE {
-        return query.answer(object.triangle_ids, instance);
+        *to = query.answer(object.triangle_ids, instance);
+        return;
     }
-    through_bvh(Single { object, ray, instance, start: Some((&query, walked)), scratch, count })
+    through_bvh(Single { object, ray, instance, start: Some((&query, walked)), scratch, count, to });
 }
 
 #[inline]
-fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) -> Q::Answer {
+fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) {
     if single.object.header.root == NONE {
-        return single.query().answer(single.object.triangle_ids, single.instance);
+        *single.to = single.query().answer(single.object.triangle_ids, single.instance);
+        return;
     }
-    Isa::chosen().run(&mut single)
+    Isa::chosen().run(&mut single);
 }
 
-struct Single<'a, Q, C> {
+struct Single<'a, Q: Query, C> {
     object: &'a ObjectView<'a>,
     ray: &'a Ray,
     instance: u32,
@@ -65,6 +73,7 @@ struct Single<'a, Q, C> {
     start: Option<(&'a Q, u32)>,
     scratch: &'a mut Scratch,
     count: &'a mut C,
+    to: &'a mut Q::Answer,
 }
 
 impl<Q: Query, C> Single<'_, Q, C> {
@@ -75,40 +84,40 @@ impl<Q: Query, C> Single<'_, Q, C> {
     }
 }
 
-// By reference, and the query is made, and its answer worked out, within the kernel: copies of what was just written word by
-// word stall.
+// By reference, and the query is made, and its answer worked out and put in its place, within the kernel: copies of what was just
+// written word by word stall.
 impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
-    type Output = Q::Answer;
+    type Output = ();
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Q::Answer {
+    fn run<S: Simd>(self, s: S) {
         if self.object.has_packed_nodes() {
             return through_packed_nodes(self);
         }
-        self.walk(s, Wide)
+        self.walk(s, Wide);
     }
 }
 
 /// Apart, so that the common kernel stays short.
 #[cold]
 #[inline(never)]
-fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) -> Q::Answer {
-    Isa::chosen().run(AmongPacked(single))
+fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) {
+    Isa::chosen().run(AmongPacked(single));
 }
 
 /// A ray among packed nodes, as a kernel.
 struct AmongPacked<'a, T>(&'a mut T);
 
 impl<Q: Query, C: Count> Kernel for AmongPacked<'_, Single<'_, Q, C>> {
-    type Output = Q::Answer;
+    type Output = ();
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Q::Answer {
-        self.0.walk(s, Packed)
+    fn run<S: Simd>(self, s: S) {
+        self.0.walk(s, Packed);
     }
 }
 
 impl<Q: Query, C: Count> Single<'_, Q, C> {
     #[inline(always)]
-    fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) -> Q::Answer {
+    fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
         let (object, ray) = (self.object, self.ray);
         let query = self.query();
         let mut flight = Flight::vacant(query);
@@ -129,6 +138,6 @@ impl<Q: Query, C: Count> Single<'_, Q, C> {
                 |leaf, query, count| enter_tets(object, leaf, ray, query, count),
             );
         }
-        flight.query().answer(object.triangle_ids, self.instance)
+        *self.to = flight.query().answer(object.triangle_ids, self.instance);
     }
 }

@@ -21,6 +21,9 @@ pub(crate) struct Stacks {
     keys: Vec<f32>,
     /// Entries of one stack.
     size: usize,
+    /// What there is room for: levels of nodes, and stacks (none at first).
+    depth: usize,
+    count: usize,
 }
 
 /// A place in the stacks: at least [`LANES`] entries before the end of both vectors of the [`Stacks`] that made it. They
@@ -41,17 +44,28 @@ impl Place {
 
 impl Stacks {
     /// Makes room for this many stacks, at least one, for rays through an object.
+    #[inline]
     pub(crate) fn reserve(&mut self, object: &ObjectView<'_>, count: usize) {
         self.reserve_for((object.header.depth as usize).min(MAX_DEPTH), count);
     }
 
     /// As [`Self::reserve`], for a BVH of so many levels of nodes.
+    #[inline]
     pub(crate) fn reserve_for(&mut self, depth: usize, count: usize) {
+        let count = count.max(1);
+        if depth != self.depth || count > self.count {
+            self.grow(depth, count);
+        }
+    }
+
+    #[inline(never)]
+    fn grow(&mut self, depth: usize, count: usize) {
+        (self.depth, self.count) = (depth, count);
         // At every level all children but the one entered wait; whole vectors are written at the top. An odd
         // number of cache lines keeps the tops of the stacks out of each other's cache sets.
         let entries = 2 + depth * (WIDTH - 1) + LANES;
         self.size = (entries.div_ceil(LANES) | 1) * LANES;
-        let total = self.size * count.max(1);
+        let total = self.size * count;
         if self.codes.len() < total {
             self.codes.resize(total, BOTTOM);
             self.keys.resize(total, 0.0);

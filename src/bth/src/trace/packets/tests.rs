@@ -192,8 +192,10 @@ fn check(surface: &Surface, rays: &[Ray], least: LeastUse) -> [(PacketCount, usi
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = with_scratch(|scratch| {
         let mut trace = |ray: &Ray| {
-            let hit = single::trace::<Nearest, ()>(&object, ray, NONE, 0, scratch, &mut ());
-            (hit, single::trace::<Any, ()>(&object, ray, NONE, 0, scratch, &mut ()))
+            let (mut hit, mut found) = (Hit::MISS, false);
+            single::trace::<Nearest, ()>(&object, ray, NONE, 0, scratch, &mut (), &mut hit);
+            single::trace::<Any, ()>(&object, ray, NONE, 0, scratch, &mut (), &mut found);
+            (hit, found)
         };
         rays.iter().map(&mut trace).collect()
     });

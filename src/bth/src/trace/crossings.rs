@@ -9,6 +9,7 @@ pub(crate) type Many = [f32; LANES];
 
 /// Sixteen rays and a triangle of each, along the axes of each ray's projection ([`super::line`]).
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(crate) struct Projected {
     pub(crate) origin: [Many; 3],
     pub(crate) direction: [Many; 3],
@@ -23,17 +24,18 @@ impl Projected {
 
 /// What f64 makes of the triangles that wait to be computed.
 #[derive(Clone, Copy)]
+#[repr(C, align(64))]
 pub(crate) struct Crossings {
-    /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
-    /// else the triangles would have been decided upon at once.)
-    pub(crate) certain: u32,
-    /// The others, which must be looked at one by one. (f32 was sure of all of them, so none is certainly missed.)
-    pub(crate) open: u32,
     /// In leaf order.
     pub(crate) place: [u32; LANES],
     pub(crate) t: Many,
     pub(crate) u: Many,
     pub(crate) v: Many,
+    /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
+    /// else the triangles would have been decided upon at once.)
+    pub(crate) certain: u32,
+    /// The others, which must be looked at one by one. (f32 was sure of all of them, so none is certainly missed.)
+    pub(crate) open: u32,
 }
 
 impl Crossings {

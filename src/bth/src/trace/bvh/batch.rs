@@ -33,19 +33,21 @@ pub(crate) struct BatchWalk<'a, Q, D> {
 }
 
 /// The next rays, sixteen at a time: prepared, and tested against the boxes of the root's children.
+#[repr(C, align(64))]
 struct Supply<'a, Q> {
+    prepared: Prepared,
+    /// Per lane the depths at which the ray enters the children of the root,
+    enter: [[f32; LANES]; LANES],
+    /// and which of them it may meet, a bit each.
+    met: [u32; LANES],
+    /// Places in the batch of those prepared.
+    ray: [u32; LANES],
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     waiting: Waiting<'a, Q>,
     /// Where rays start.
     root: u32,
     frame: Frame,
-    prepared: Prepared,
-    /// Places in the batch of those prepared.
-    ray: [u32; LANES],
-    /// Per lane the children of the root that the ray may meet, a bit each, and the depths at which it enters them.
-    met: [u32; LANES],
-    enter: [[f32; LANES]; LANES],
     /// Lanes of rays that meet any, and how many of these are gone.
     lane: [u8; LANES],
     filled: usize,

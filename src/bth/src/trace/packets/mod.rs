@@ -82,15 +82,15 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     let mut packets = None;
     for (i, own) in rays.chunks(PACKET).enumerate() {
         let at = i * PACKET;
+        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
+            rest.extend(at as u32..(at + own.len()) as u32);
+            continue;
+        };
         // So that the next rays are there when this packet is done.
         let next = own.as_ptr().wrapping_add(PACKET);
         for line in 0..PACKET / RAYS_A_LINE {
             s.prefetch(next.wrapping_add(line * RAYS_A_LINE));
         }
-        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
-            rest.extend(at as u32..(at + own.len()) as u32);
-            continue;
-        };
         if packets.is_none() {
             packets = Some(Packets::<S, Q>::new(s, object, &mut *stack, &own[0]));
         }

@@ -173,8 +173,9 @@ impl Aim {
     }
 }
 
-/// Sixteen rays, prepared.
+/// Sixteen rays, prepared; on cache lines, because whole vectors are stored.
 #[derive(Debug)]
+#[repr(C, align(64))]
 pub(crate) struct Prepared {
     aim: [[[f32; LANES]; 2]; LANES],
     /// Lanes that are prepared; the others need the constructors.

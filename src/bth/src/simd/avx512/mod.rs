@@ -4,6 +4,11 @@
 //! that the intrinsics need, so each may be executed. Blocks that go through pointers say more.
 #![allow(unsafe_code)]
 
+mod rows;
+mod sort;
+
+use self::rows::{COLUMNS5, ROWS5, columns8, quarters, transpose4};
+use self::sort::{sort4, sort8, sort16};
 use super::{Kernel, LANES, Simd, assert_within, within};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
@@ -54,159 +59,6 @@ macro_rules! intrinsics {
         }
     )* };
 }
-
-/// Step of a bitonic sorting network, descending: lanes whose bit is set keep the greater of themselves and partner.
-macro_rules! exchange {
-    ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
-        let (v, partner) = ($v, $partner);
-        $mask_max($min(v, partner), $keep_greater, v, partner)
-    }};
-}
-
-/// Sorts four lanes of i32, the greatest first.
-///
-/// # Safety
-/// The machine must have the features of [`Avx512`]. Touches registers only, as the next two.
-#[inline(always)]
-unsafe fn sort4(v: __m128i) -> __m128i {
-    // SAFETY: see above.
-    unsafe {
-        let v =
-            exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b10_11_00_01>(v), 0b1001);
-        let v =
-            exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b01_00_11_10>(v), 0b0011);
-        exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b10_11_00_01>(v), 0b0101)
-    }
-}
-
-/// Sorts eight lanes; see [`sort4`].
-///
-/// # Safety
-/// As [`sort4`].
-#[inline(always)]
-unsafe fn sort8(v: __m256i) -> __m256i {
-    macro_rules! step {
-        ($v:expr, $partner:expr, $mask:literal) => {
-            exchange!(_mm256_min_epi32, _mm256_mask_max_epi32, $v, $partner, $mask)
-        };
-    }
-    // SAFETY: see `sort4`.
-    unsafe {
-        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1001_1001);
-        let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_0011);
-        let v = step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_0101);
-        let v = step!(v, _mm256_permute4x64_epi64::<0b01_00_11_10>(v), 0b0000_1111);
-        let v = step!(v, _mm256_shuffle_epi32::<0b01_00_11_10>(v), 0b0011_0011);
-        step!(v, _mm256_shuffle_epi32::<0b10_11_00_01>(v), 0b0101_0101)
-    }
-}
-
-/// Sorts sixteen lanes; see [`sort4`].
-///
-/// # Safety
-/// As [`sort4`].
-#[inline(always)]
-unsafe fn sort16(v: __m512i) -> __m512i {
-    macro_rules! step {
-        ($v:expr, $partner:expr, $mask:literal) => {
-            exchange!(_mm512_min_epi32, _mm512_mask_max_epi32, $v, $partner, $mask)
-        };
-    }
-    // SAFETY: see `sort4`.
-    unsafe {
-        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1001_1001_1001_1001);
-        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_0011_1100_0011);
-        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_0101_1010_0101);
-        let v = step!(v, _mm512_shuffle_i32x4::<0b10_11_00_01>(v, v), 0b1111_0000_0000_1111);
-        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b1100_1100_0011_0011);
-        let v = step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b1010_1010_0101_0101);
-        let v = step!(v, _mm512_shuffle_i32x4::<0b01_00_11_10>(v, v), 0b0000_0000_1111_1111);
-        let v = step!(v, _mm512_shuffle_i32x4::<0b10_11_00_01>(v, v), 0b0000_1111_0000_1111);
-        let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b0011_0011_0011_0011);
-        step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b0101_0101_0101_0101)
-    }
-}
-
-/// Four times four lanes.
-#[inline(always)]
-fn quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
-    // SAFETY: the features are there (the token), and only registers are touched.
-    unsafe {
-        let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
-        _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
-    }
-}
-
-/// Transposes four by four lanes within each quarter.
-///
-/// # Safety
-/// As [`sort4`].
-#[inline(always)]
-unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
-    // SAFETY: see `sort4`.
-    unsafe {
-        let (a, b) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
-        let (c, d) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
-        [
-            _mm512_shuffle_ps::<0b01_00_01_00>(a, c),
-            _mm512_shuffle_ps::<0b11_10_11_10>(a, c),
-            _mm512_shuffle_ps::<0b01_00_01_00>(b, d),
-            _mm512_shuffle_ps::<0b11_10_11_10>(b, d),
-        ]
-    }
-}
-
-/// These rows by their columns.
-///
-/// # Safety
-/// All of them must be readable.
-#[inline(always)]
-unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LANES]) -> [__m512i; 8] {
-    // SAFETY: see above; unaligned loads.
-    unsafe {
-        macro_rules! load {
-            ($i:literal) => {
-                _mm256_loadu_ps(from.add(row[$i] as usize).cast())
-            };
-        }
-        macro_rules! halves {
-            ($a:literal $b:literal) => {
-                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
-            };
-        }
-        // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
-        let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
-        let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
-        let mut out = [simd.bits(low[0]); 8];
-        for k in 0..4 {
-            out[k] = simd.bits(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[k], high[k]));
-            out[4 + k] = simd.bits(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[k], high[k]));
-        }
-        out
-    }
-}
-
-/// Of sixteen rows of five words, one after the other: the row of a word,
-const ROWS5: [[u32; LANES]; 5] = {
-    let mut rows = [[0; LANES]; 5];
-    let mut i = 0;
-    while i < 5 * LANES {
-        rows[i / LANES][i % LANES] = i as u32 / 5;
-        i += 1;
-    }
-    rows
-};
-
-/// and a bit each for the words that are of a column.
-const COLUMNS5: [[u16; 5]; 5] = {
-    let mut columns = [[0; 5]; 5];
-    let mut i = 0;
-    while i < 5 * LANES {
-        columns[i / LANES][i % 5] |= 1 << (i % LANES);
-        i += 1;
-    }
-    columns
-};
 
 impl Simd for Avx512 {
     type F = __m512;

@@ -1,0 +1,86 @@
+//! Rows of a few words to columns of sixteen lanes, and back.
+
+use super::Avx512;
+use crate::simd::{LANES, Simd};
+use std::arch::x86_64::*;
+
+/// Four times four lanes.
+#[inline(always)]
+pub(super) fn quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
+    // SAFETY: the features are there (the token), and only registers are touched.
+    unsafe {
+        let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
+        _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
+    }
+}
+
+/// Transposes four by four lanes within each quarter.
+///
+/// # Safety
+/// As [`super::sort::sort4`].
+#[inline(always)]
+pub(super) unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: see `super::sort::sort4`.
+    unsafe {
+        let (a, b) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+        let (c, d) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0b01_00_01_00>(a, c),
+            _mm512_shuffle_ps::<0b11_10_11_10>(a, c),
+            _mm512_shuffle_ps::<0b01_00_01_00>(b, d),
+            _mm512_shuffle_ps::<0b11_10_11_10>(b, d),
+        ]
+    }
+}
+
+/// These rows by their columns.
+///
+/// # Safety
+/// All of them must be readable.
+#[inline(always)]
+pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LANES]) -> [__m512i; 8] {
+    // SAFETY: see above; unaligned loads.
+    unsafe {
+        macro_rules! load {
+            ($i:literal) => {
+                _mm256_loadu_ps(from.add(row[$i] as usize).cast())
+            };
+        }
+        macro_rules! halves {
+            ($a:literal $b:literal) => {
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
+            };
+        }
+        // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
+        let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
+        let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
+        let mut out = [simd.bits(low[0]); 8];
+        for k in 0..4 {
+            out[k] = simd.bits(_mm512_shuffle_f32x4::<0b10_00_10_00>(low[k], high[k]));
+            out[4 + k] = simd.bits(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[k], high[k]));
+        }
+        out
+    }
+}
+
+/// Of sixteen rows of five words, one after the other: the row of a word,
+pub(super) const ROWS5: [[u32; LANES]; 5] = {
+    let mut rows = [[0; LANES]; 5];
+    let mut i = 0;
+    while i < 5 * LANES {
+        rows[i / LANES][i % LANES] = i as u32 / 5;
+        i += 1;
+    }
+    rows
+};
+
+/// and a bit each for the words that are of a column.
+pub(super) const COLUMNS5: [[u16; 5]; 5] = {
+    let mut columns = [[0; 5]; 5];
+    let mut i = 0;
+    while i < 5 * LANES {
+        columns[i / LANES][i % 5] |= 1 << (i % LANES);
+        i += 1;
+    }
+    columns
+};

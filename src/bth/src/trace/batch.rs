@@ -8,7 +8,7 @@ use super::choice::{self, LEAST_RAYS, Way};
 use super::crossings::Crossings;
 use super::hinted::Hinted;
 use super::packets;
-use super::query::{Any, Deliver, Nearest, Offset, Query, one_by_one};
+use super::query::{Any, Deliver, Nearest, Offset, Query, Sixteen, one_by_one};
 use super::quick::{Fast, MoellerTrumbore, Quick, Test, Watertight};
 use super::tets;
 use super::tets::batch::Walk;
@@ -99,8 +99,9 @@ impl Kernel for MissAll<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let (blocks, rest) = self.0.as_chunks_mut();
+        let none = Sixteen { lanes: 0, crossings: &Crossings::NONE, ids: &[], instance: NONE };
         for block in blocks {
-            Nearest::answers_of(s, 0, &Crossings::NONE, &[], NONE, block);
+            Nearest::answers_of(s, &none, block);
         }
         rest.fill(Hit::MISS);
     }
@@ -127,7 +128,8 @@ impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
     #[inline(always)]
     fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
         if let Some(to) = self.answers[first..].first_chunk_mut() {
-            Q::answers_of(s, lanes, crossings, self.ids, self.instance, to);
+            let hits = Sixteen { lanes, crossings, ids: self.ids, instance: self.instance };
+            Q::answers_of(s, &hits, to);
         } else {
             one_by_one(self, first, lanes, crossings);
         }

@@ -36,6 +36,16 @@ pub(crate) fn one_by_one<Q, D: Deliver<Q> + ?Sized>(
     }
 }
 
+/// What sixteen rays hit in an object.
+pub(crate) struct Sixteen<'a> {
+    /// Those that hit anything, a bit each.
+    pub(crate) lanes: u32,
+    pub(crate) crossings: &'a Crossings,
+    /// Of the object's triangles, in leaf order.
+    pub(crate) ids: &'a [u32],
+    pub(crate) instance: u32,
+}
+
 /// Answers to rays from a place in the batch on.
 pub(crate) struct Offset<'a, D> {
     pub(crate) first: usize,
@@ -95,14 +105,7 @@ pub(crate) trait Query: Copy {
     /// The same, given t, u and v as they are to be reported.
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
     /// The same of sixteen rays; those whose bit is not set hit nothing.
-    fn answers_of<S: Simd>(
-        s: S,
-        lanes: u32,
-        crossings: &Crossings,
-        ids: &[u32],
-        instance: u32,
-        to: &mut [Self::Answer; LANES],
-    );
+    fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Self::Answer; LANES]);
     fn new(ray: &Ray) -> Self;
     /// Whether walks should keep an eye on how far they are: where rays are often short, and where
     /// [`Self::settled_by`] has a use for it.
@@ -168,14 +171,8 @@ impl Query for Nearest {
         Hit { t, u, v, surface }
     }
     #[inline(always)]
-    fn answers_of<S: Simd>(
-        s: S,
-        lanes: u32,
-        crossings: &Crossings,
-        ids: &[u32],
-        instance: u32,
-        to: &mut [Hit; LANES],
-    ) {
+    fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Hit; LANES]) {
+        let &Sixteen { lanes, crossings, ids, instance } = hits;
         let m = s.mask(lanes);
         let triangle = s.gather_u(m, ids, s.load_u(&crossings.place));
         let Hit { t, u, v, surface } = Hit::MISS;
@@ -248,16 +245,9 @@ impl Query for Any {
     fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
         true
     }
-    fn answers_of<S: Simd>(
-        _s: S,
-        lanes: u32,
-        _crossings: &Crossings,
-        _ids: &[u32],
-        _instance: u32,
-        to: &mut [bool; LANES],
-    ) {
+    fn answers_of<S: Simd>(_s: S, hits: &Sixteen<'_>, to: &mut [bool; LANES]) {
         for (lane, found) in to.iter_mut().enumerate() {
-            *found = lanes >> lane & 1 != 0;
+            *found = hits.lanes >> lane & 1 != 0;
         }
     }
     fn new(ray: &Ray) -> Self {

@@ -1,8 +1,7 @@
 //! Triangle tests in f32 alone, as other tracers have them: what exact answers cost is measured against these.
 
 use super::crossing::Crossing;
-use super::crossings::Crossings;
-use super::query::{Named, Nearest, Query};
+use super::query::{Named, Nearest, Query, Sixteen};
 use super::sight::{Block, Corners, Sight, cross};
 use crate::layout::WIDTH;
 use crate::rays::{Hit, Ray, Surface};
@@ -66,15 +65,8 @@ impl<W: Way> Query for Quick<W> {
         Nearest::answer_of(surface, t, u, v)
     }
     #[inline(always)]
-    fn answers_of<S: Simd>(
-        s: S,
-        lanes: u32,
-        crossings: &Crossings,
-        ids: &[u32],
-        instance: u32,
-        to: &mut [Hit; LANES],
-    ) {
-        Nearest::answers_of(s, lanes, crossings, ids, instance, to);
+    fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Hit; LANES]) {
+        Nearest::answers_of(s, hits, to);
     }
     fn new(ray: &Ray) -> Self {
         Quick(Nearest::new(ray), PhantomData)

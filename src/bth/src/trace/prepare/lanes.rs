@@ -11,19 +11,17 @@ use std::mem::offset_of;
 /// The floats of rays, a row of lanes for each.
 #[inline(always)]
 pub(crate) fn fields<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8] {
-    let words = s.rows8(m, Ray::rows(rays), at);
-    let mut out = [s.splat(0.0); 8];
-    for k in 0..8 {
-        out[k] = s.floats(words[k]);
-    }
-    out
+    floats(s, s.rows8(m, Ray::rows(rays), at))
 }
 
 /// The same of sixteen rays that lie one behind the other.
 #[inline(always)]
 pub(crate) fn fields_of<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
-    let rows = Ray::rows(rays).first_chunk().expect("sixteen rows");
-    let words = s.columns8(rows);
+    floats(s, s.columns8(Ray::rows(rays).first_chunk().expect("sixteen rows")))
+}
+
+#[inline(always)]
+fn floats<S: Simd>(s: S, words: [S::U; 8]) -> [S::F; 8] {
     let mut out = [s.splat(0.0); 8];
     for k in 0..8 {
         out[k] = s.floats(words[k]);

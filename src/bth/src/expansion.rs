@@ -45,7 +45,8 @@ impl<const PARTS: usize> Expansion<PARTS> {
         Expansion { part: [0.0; PARTS], len: 0 }
     }
 
-    fn add(&mut self, x: f64) {
+    /// Adds one number.
+    pub(crate) fn add(&mut self, x: f64) {
         if x == 0.0 {
             return;
         }

@@ -285,8 +285,8 @@ impl Deliver<trace::Nearest> for Arrivals<'_, Hit> {
         self.take(visit, &query.answer(self.ids, self.visits[visit].instance));
     }
     #[inline(always)]
-    fn hit(&mut self, visit: usize, place: u32, t: f32, u: f32, v: f32) {
-        let (instance, triangle) = (self.visits[visit].instance, self.ids[place as usize]);
+    fn hit(&mut self, visit: usize, triangle: u32, t: f32, u: f32, v: f32) {
+        let instance = self.visits[visit].instance;
         self.take(visit, &Hit { t, u, v, surface: Surface { instance, triangle } });
     }
 }

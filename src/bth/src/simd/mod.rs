@@ -7,7 +7,7 @@
 //! a library function that takes one (`array::map`), is compiled on its own and must not touch lanes.
 //!
 //! Kernels use these lanes only to *leave out* what certainly does not matter; hits are decided elsewhere, in f64
-//! (`trace::line`). So it does no harm that `fma` rounds once or twice, depending on the machine.
+//! (`trace::crossing`). So it does no harm that `fma` rounds once or twice, depending on the machine.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -104,6 +104,18 @@ pub(crate) trait Simd: Copy {
     fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
     fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
+    /// Whether [`Self::lookup_f64`] takes but a few instructions.
+    const LOOKS_UP_F64: bool = false;
+    /// Elements `at[i] % 16` of the table; with `FEW`, only those of its first half are looked up, the others are undefined.
+    #[inline(always)]
+    fn lookup_f64<const FEW: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
+        let (mut place, mut out) = ([0; LANES], [0.0; LANES]);
+        self.store_u(at, &mut place);
+        for i in 0..LANES {
+            out[i] = table[place[i] as usize % LANES];
+        }
+        out
+    }
     /// Elements of a slice, 0 where the mask is clear. Panics if a lane that is set lies outside.
     fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
     /// Both halves of elements of a slice: one access each where the machine has it. Undefined where the mask is clear.

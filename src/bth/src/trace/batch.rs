@@ -99,7 +99,7 @@ impl Kernel for MissAll<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let (blocks, rest) = self.0.as_chunks_mut();
-        let none = Sixteen { lanes: 0, crossings: &Crossings::NONE, ids: &[], instance: NONE };
+        let none = Sixteen { lanes: 0, crossings: &Crossings::NONE, instance: NONE };
         for block in blocks {
             Nearest::answers_of(s, &none, block);
         }
@@ -121,14 +121,13 @@ impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
         self.answers[ray] = query.answer(self.ids, self.instance);
     }
     #[inline(always)]
-    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
-        let triangle = self.ids[place as usize];
+    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
         self.answers[ray] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
     }
     #[inline(always)]
     fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
         if let Some(to) = self.answers[first..].first_chunk_mut() {
-            let hits = Sixteen { lanes, crossings, ids: self.ids, instance: self.instance };
+            let hits = Sixteen { lanes, crossings, instance: self.instance };
             Q::answers_of(s, &hits, to);
         } else {
             one_by_one(self, first, lanes, crossings);

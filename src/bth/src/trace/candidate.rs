@@ -3,7 +3,7 @@
 use crate::layout::{Child, NONE};
 use crate::object::ObjectView;
 use crate::rays::Ray;
-use crate::trace::crossing::{Crossing, Estimate, estimate};
+use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
 use crate::trace::line::Line;
 use crate::trace::query::{Named, Query};
 use crate::trace::sight::Block;
@@ -51,13 +51,6 @@ impl Candidate {
             Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,
         }
     }
-
-    /// What f64 left open.
-    #[cold]
-    #[inline(never)]
-    fn open(&self, object: &ObjectView<'_>, ray: &Ray) -> Option<Crossing> {
-        open(ray, self.read(object, AsStored)?.1)
-    }
 }
 
 /// What reads a triangle of a leaf.
@@ -66,36 +59,15 @@ pub(crate) trait Reader {
     fn read<B: Block>(self, block: &B, triangle: usize) -> Self::Output;
 }
 
-/// Its corners, along these axes.
-struct Along([u32; 3]);
+/// Its corners.
+struct Corners;
 
-impl Reader for Along {
-    type Output = [[f64; 3]; 3];
-    #[inline(always)]
-    fn read<B: Block>(self, block: &B, triangle: usize) -> [[f64; 3]; 3] {
-        block.corners_along(self.0, triangle)
-    }
-}
-
-/// Its corners as they are.
-struct AsStored;
-
-impl Reader for AsStored {
+impl Reader for Corners {
     type Output = [[f32; 3]; 3];
+    #[inline(always)]
     fn read<B: Block>(self, block: &B, triangle: usize) -> [[f32; 3]; 3] {
         block.corners(triangle)
     }
-}
-
-/// Origin and direction along these axes.
-#[inline(always)]
-fn along(ray: &Ray, axis: [u32; 3]) -> [[f64; 3]; 2] {
-    let mut out = [[0.0; 3]; 2];
-    for k in 0..3 {
-        out[0][k] = ray.origin[axis[k] as usize % 3].into();
-        out[1][k] = ray.direction[axis[k] as usize % 3].into();
-    }
-    out
 }
 
 /// Offers candidates of a ray to its query, and tells how far the nearest hit is now.
@@ -103,18 +75,17 @@ fn along(ray: &Ray, axis: [u32; 3]) -> [[f64; 3]; 2] {
 pub(crate) fn settle<Q: Query>(
     object: &ObjectView<'_>,
     ray: &Ray,
-    axis: [u32; 3],
     candidates: [Candidate; 2],
     query: &mut Q,
 ) -> Settled {
-    let [origin, direction] = along(ray, axis);
+    let (origin, direction) = (wide(ray.origin), wide(ray.direction));
     for candidate in candidates {
-        let Some((place, corners)) = candidate.read(object, Along(axis)) else { continue };
-        let crossing = match estimate(origin, direction, corners) {
+        let Some((place, corners)) = candidate.read(object, Corners) else { continue };
+        let crossing = match estimate(origin, direction, corners.map(wide)) {
             Estimate::Missed => None,
             Estimate::Crossed(crossing) => Some(crossing),
-            Estimate::Open(_, _, t) if !query.cares(t) => None,
-            Estimate::Open(..) => candidate.open(object, ray),
+            Estimate::Open(_, t) if !query.cares(t) => None,
+            Estimate::Open(..) => open(ray, corners),
         };
         if crossing.is_some_and(|crossing| query.offer(Named::place(place, object.triangle_ids), crossing)) {
             return Settled::Enough;

@@ -1,13 +1,9 @@
-//! The line of a ray, and everything that is decided about triangles relative to it.
+//! The line of a ray, and on which side of it points and edges lie: what walks through tetrahedra ask.
 //!
-//! One place decides whether a triangle is hit and at which t, u, v, whatever structure led
-//! there, so that every structure, record and instruction set gives the same bits.
-//!
-//! Points are projected along the ray by the axis shear of Woop, Benthin and Wald
-//! ("Watertight Ray/Triangle Intersection", JCGT 2013), in f64: the line becomes the origin of a
-//! plane. A sign that rounding might have got wrong is decided again in exact arithmetic, so
-//! hits and misses are exact: a closed triangle is hit if and only if the real line of the
-//! ray meets it (rays that lie in its plane miss it).
+//! Points are projected along the ray by the axis shear of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection",
+//! JCGT 2013), in f64: the line becomes the origin of a plane. A sign that rounding might have got wrong is said to be
+//! uncertain. Whether, where and how lines cross triangles is decided in [`super::crossing`], which says of every triangle
+//! exactly whether the real line meets it (lines in its plane miss it).
 
 use super::crossing::RATIO_ERROR;
 use crate::rays::Ray;

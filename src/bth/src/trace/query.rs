@@ -11,8 +11,8 @@ use crate::simd::{LANES, Simd};
 pub(crate) trait Deliver<Q> {
     /// A query over a ray of the batch has ended.
     fn query(&mut self, ray: usize, query: &Q);
-    /// The nearest hit of a ray is the triangle at this place in leaf order; all else as reported. (In single words: what goes through memory as a pair stalls.)
-    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32);
+    /// The nearest hit of a ray, as it is reported. (In single words: what goes through memory as a pair stalls.)
+    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32);
     /// The same of up to sixteen rays from this one on, a bit each, of which nothing has been said before.
     #[inline(always)]
     fn hits<S: Simd>(&mut self, _s: S, first: usize, lanes: u32, crossings: &Crossings) {
@@ -32,7 +32,7 @@ pub(crate) fn one_by_one<Q, D: Deliver<Q> + ?Sized>(
         let lane = lanes.trailing_zeros() as usize % LANES;
         lanes &= lanes - 1;
         let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
-        to.hit(first + lane, crossings.place[lane], t, u, v);
+        to.hit(first + lane, crossings.triangle[lane], t, u, v);
     }
 }
 
@@ -41,8 +41,6 @@ pub(crate) struct Sixteen<'a> {
     /// Those that hit anything, a bit each.
     pub(crate) lanes: u32,
     pub(crate) crossings: &'a Crossings,
-    /// Of the object's triangles, in leaf order.
-    pub(crate) ids: &'a [u32],
     pub(crate) instance: u32,
 }
 
@@ -58,8 +56,8 @@ impl<Q, D: Deliver<Q>> Deliver<Q> for Offset<'_, D> {
         self.to.query(self.first + ray, query);
     }
     #[inline(always)]
-    fn hit(&mut self, ray: usize, place: u32, t: f32, u: f32, v: f32) {
-        self.to.hit(self.first + ray, place, t, u, v);
+    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
+        self.to.hit(self.first + ray, triangle, t, u, v);
     }
     #[inline(always)]
     fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
@@ -172,15 +170,14 @@ impl Query for Nearest {
     }
     #[inline(always)]
     fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Hit; LANES]) {
-        let &Sixteen { lanes, crossings, ids, instance } = hits;
+        let &Sixteen { lanes, crossings, instance } = hits;
         let m = s.mask(lanes);
-        let triangle = s.gather_u(m, ids, s.load_u(&crossings.place));
         let Hit { t, u, v, surface } = Hit::MISS;
         let t = s.select(m, s.load(&crossings.t), s.splat(t));
         let u = s.select(m, s.load(&crossings.u), s.splat(u));
         let v = s.select(m, s.load(&crossings.v), s.splat(v));
         let instance = s.select_u(m, s.splat_u(instance), s.splat_u(surface.instance));
-        let triangle = s.select_u(m, triangle, s.splat_u(surface.triangle));
+        let triangle = s.select_u(m, s.load_u(&crossings.triangle), s.splat_u(surface.triangle));
         s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(to));
     }
     fn new(ray: &Ray) -> Self {

@@ -79,8 +79,6 @@ pub(crate) trait Block {
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3];
     /// One coordinate of a corner; the number of the triangle is taken modulo [`WIDTH`].
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
-    /// The corners along these axes.
-    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3];
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
     /// The corners as they are: `[corner][x, y, z]`.
     fn points<S: Simd>(&self, s: S) -> Corners<S>;
@@ -129,17 +127,6 @@ impl Block for IndexedLeaf {
         self.vertex[axis][usize::from(self.corner[corner][triangle % WIDTH]) % WIDTH]
     }
     #[inline(always)]
-    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {
-        let mut out = [[0.0; 3]; 3];
-        for k in 0..3 {
-            let row = &self.vertex[axis[k] as usize];
-            for c in 0..3 {
-                out[c][k] = row[usize::from(self.corner[c][triangle % WIDTH]) % WIDTH].into();
-            }
-        }
-        out
-    }
-    #[inline(always)]
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S> {
         let points = sight.project(s, &self.vertex);
         [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
@@ -167,16 +154,6 @@ impl Block for RawLeaf {
     #[inline(always)]
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {
         self.corner[corner][axis][triangle % WIDTH]
-    }
-    #[inline(always)]
-    fn corners_along(&self, axis: [u32; 3], triangle: usize) -> [[f64; 3]; 3] {
-        let mut out = [[0.0; 3]; 3];
-        for k in 0..3 {
-            for c in 0..3 {
-                out[c][k] = self.corner[c][axis[k] as usize][triangle % WIDTH].into();
-            }
-        }
-        out
     }
     #[inline(always)]
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S> {

@@ -171,6 +171,26 @@ impl Simd for Avx512 {
             self.store_u(words, to);
         }
     }
+    const LOOKS_UP_F64: bool = true;
+    #[inline(always)]
+    fn lookup_f64<const FEW: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
+        let mut out = [0.0; LANES];
+        // SAFETY: the features are there (the token); eight elements each are read from and written to arrays of sixteen.
+        unsafe {
+            let (low, high) = (_mm512_loadu_pd(table.as_ptr()), _mm512_loadu_pd(table.as_ptr().add(8)));
+            let first = _mm512_cvtepu32_epi64(_mm512_castsi512_si256(at));
+            let second = _mm512_cvtepu32_epi64(_mm512_extracti64x4_epi64::<1>(at));
+            // Three bits of an index count, or four.
+            let [first, second] = if FEW {
+                [_mm512_permutexvar_pd(first, low), _mm512_permutexvar_pd(second, low)]
+            } else {
+                [_mm512_permutex2var_pd(low, first, high), _mm512_permutex2var_pd(low, second, high)]
+            };
+            _mm512_storeu_pd(out.as_mut_ptr(), first);
+            _mm512_storeu_pd(out.as_mut_ptr().add(8), second);
+        }
+        out
+    }
     #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
         assert_within(self, m, at, from.len());

@@ -6,7 +6,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, open, settle};
-use crate::trace::crossing::{Crossing, Estimate, estimate};
+use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
 use crate::trace::line::Line;
 use crate::trace::prepare::{Aim, Frame, Noted};
 use crate::trace::query::{Deliver, Named, Query};
@@ -144,19 +144,13 @@ impl<Q: Query> Flight<Q> {
         Candidate { leaf, triangle: triangle.into() }
     }
 
-    /// The axes of the projection.
-    #[inline(always)]
-    pub(crate) fn axis(&self) -> [u32; 3] {
-        self.aim.sight.axis
-    }
-
     /// Computes what waits.
     #[inline(always)]
     pub(crate) fn settle(&mut self, object: &ObjectView<'_>, ray: &Ray) {
         if Q::DEFERS && self.aim.noted.leaf != NONE {
-            let (waiting, axis) = (self.waiting(), self.axis());
+            let waiting = self.waiting();
             self.aim.noted.leaf = NONE;
-            settle(object, ray, axis, [waiting, Candidate::NONE], self.ask(ray));
+            settle(object, ray, [waiting, Candidate::NONE], self.ask(ray));
         }
     }
 
@@ -302,21 +296,17 @@ impl<Q: Query> Flight<Q> {
         block: &B,
         mut bits: u32,
     ) -> Found {
-        let axis = self.aim.sight.axis;
         self.ask(ray);
-        let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
-        for k in 0..3 {
-            origin[k] = ray.origin[axis[k] as usize].into();
-            direction[k] = ray.direction[axis[k] as usize].into();
-        }
+        let (origin, direction) = (wide(ray.origin), wide(ray.direction));
         while bits != 0 {
             let i = bits.trailing_zeros() as usize % WIDTH;
             bits &= bits - 1;
-            let crossing = match estimate(origin, direction, block.corners_along(axis, i)) {
+            let corners = block.corners(i);
+            let crossing = match estimate(origin, direction, corners.map(wide)) {
                 Estimate::Missed => None,
                 Estimate::Crossed(crossing) => Some(crossing),
-                Estimate::Open(_, _, t) if !self.query.cares(t) => None,
-                Estimate::Open(..) => open(ray, block.corners(i)),
+                Estimate::Open(_, t) if !self.query.cares(t) => None,
+                Estimate::Open(..) => open(ray, corners),
             };
             let Some(crossing) = crossing else { continue };
             let place = block.first() + i as u32;

@@ -6,7 +6,7 @@ use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Reader, settle};
-use crate::trace::crossings::{Crossings, Projected};
+use crate::trace::crossings::{Crossings, Pairs};
 use crate::trace::query::{Deliver, Query};
 use crate::trace::sight::Block;
 
@@ -15,17 +15,17 @@ pub(crate) struct Landing {
     count: usize,
     /// Places in the batch.
     ray: [usize; LANES],
-    axis: [[u32; 3]; LANES],
     candidate: [Candidate; LANES],
-    projected: Projected,
+    /// In leaf order.
+    place: [u32; LANES],
+    pairs: Pairs,
     crossings: Crossings,
 }
 
 /// Notes the corners of a triangle.
 struct Note<'a> {
-    projected: &'a mut Projected,
+    pairs: &'a mut Pairs,
     lane: usize,
-    axis: [u32; 3],
 }
 
 impl Reader for Note<'_> {
@@ -34,8 +34,7 @@ impl Reader for Note<'_> {
     fn read<B: Block>(self, block: &B, triangle: usize) {
         for c in 0..3 {
             for k in 0..3 {
-                self.projected.corner[c][k][self.lane] =
-                    block.coordinate(triangle % WIDTH, c, self.axis[k] as usize);
+                self.pairs.corner[c][k][self.lane] = block.coordinate(triangle % WIDTH, c, k);
             }
         }
     }
@@ -46,9 +45,9 @@ impl Landing {
         Landing {
             count: 0,
             ray: [0; LANES],
-            axis: [[0; 3]; LANES],
             candidate: [Candidate::NONE; LANES],
-            projected: Projected::NONE,
+            place: [0; LANES],
+            pairs: Pairs::NONE,
             crossings: Crossings::NONE,
         }
     }
@@ -67,17 +66,16 @@ impl Landing {
         if !Q::DEFERS || candidate.leaf == NONE {
             return flight.hand_on(to);
         }
-        let (lane, axis) = (self.count % LANES, flight.axis());
+        let lane = self.count % LANES;
         let ray = &rays[at];
         for k in 0..3 {
-            self.projected.origin[k][lane] = ray.origin[axis[k] as usize];
-            self.projected.direction[k][lane] = ray.direction[axis[k] as usize];
+            self.pairs.origin[k][lane] = ray.origin[k];
+            self.pairs.direction[k][lane] = ray.direction[k];
         }
-        let note = Note { projected: &mut self.projected, lane, axis };
+        let note = Note { pairs: &mut self.pairs, lane };
         let Some((place, ())) = candidate.read(object, note) else { return };
-        self.crossings.place[lane] = place;
+        self.place[lane] = place;
         self.ray[lane] = at;
-        self.axis[lane] = axis;
         self.candidate[lane] = candidate;
         self.count = lane + 1;
         if self.count == LANES {
@@ -97,11 +95,11 @@ impl Landing {
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
         let crossings = &mut self.crossings;
-        crossings.compute(s, all, &self.projected);
+        crossings.compute(s, all, &self.pairs);
         for lane in 0..LANES {
             if crossings.certain >> lane & 1 != 0 {
                 let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
-                to.hit(self.ray[lane], crossings.place[lane], t, u, v);
+                to.hit(self.ray[lane], object.triangle_ids[self.place[lane] as usize], t, u, v);
             }
         }
         let mut rest = all & !crossings.certain;
@@ -110,7 +108,7 @@ impl Landing {
             rest &= rest - 1;
             let ray = &rays[self.ray[lane]];
             let mut query = Q::new(ray);
-            settle(object, ray, self.axis[lane], [self.candidate[lane], Candidate::NONE], &mut query);
+            settle(object, ray, [self.candidate[lane], Candidate::NONE], &mut query);
             to.query(self.ray[lane], &query);
         }
     }

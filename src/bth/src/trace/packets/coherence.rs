@@ -116,6 +116,13 @@ impl Span {
         same && spread <= SPREAD * self.main_axis().1
     }
 
+    /// Whether the rays start at one point.
+    #[inline(always)]
+    pub(crate) fn is_from_point(&self) -> bool {
+        let [[x, to_x], [y, to_y], [z, to_z]] = self.origin;
+        x == to_x && y == to_y && z == to_z
+    }
+
     /// Greatest coordinate of an origin.
     #[inline(always)]
     pub(crate) fn farthest_origin(&self) -> f32 {

@@ -3,11 +3,13 @@
 //! What [`crate::trace::slabs`] and [`crate::trace::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
 //! one box or triangle: the same operations on the same prepared floats ([`crate::trace::prepare`]), so the same bounds hold.
 
+use super::leaf::Leaf;
+use super::met::{APART, Looks};
 use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::crossings::{Crossings, Projected};
-use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
+use crate::trace::crossings::{Crossings, Pairs};
+use crate::trace::prepare::{self, Common, Frame, Mixed};
 use crate::trace::sight::Block;
 
 /// How sixteen rays see points.
@@ -54,9 +56,12 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) certain: [S::F; 2],
     /// Lower bound of the depth of the nearest hit so far.
     pub(crate) nearest: S::F,
-    /// The leaf of the nearest hit so far if it is still to be computed, else `NONE`;
+    /// The triangle of the nearest hit so far if it is still to be computed, else `NONE`: its number among those of the
+    /// packet ([`Met`]), or [`APART`].
+    pub(crate) waiting: S::U,
+    /// Of one that is kept apart the leaf,
     pub(crate) leaf: S::U,
-    /// and the triangle within,
+    /// the triangle within,
     pub(crate) triangle: S::U,
     /// its place in leaf order and corners (`[corner][axis]`).
     place: S::U,
@@ -83,6 +88,7 @@ impl<S: Simd> Group<S> {
             projection: Projection { origin: [zero; 2], shear: [zero; 2], forward: zero, start: zero },
             certain: [zero; 2],
             nearest: zero,
+            waiting: none,
             leaf: none,
             triangle: none,
             place: none,
@@ -92,21 +98,22 @@ impl<S: Simd> Group<S> {
 
     /// A triangle is certainly the nearest hit so far of these lanes, between these depths.
     #[inline(always)]
-    pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], leaf: u32, triangle: u32) {
+    pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], number: u32) {
         self.nearest = s.select(m, depth[0], self.nearest);
         self.limit = s.select(m, depth[1], self.limit);
-        self.leaf = s.select_u(m, s.splat_u(leaf), self.leaf);
-        self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
+        self.waiting = s.select_u(m, s.splat_u(number), self.waiting);
     }
 
-    /// What is to be known of it to compute the hit.
+    /// What is to be known of it to compute the hit, if the packet does not keep it.
     #[inline(always)]
-    pub(crate) fn keep<B: Block>(&mut self, s: S, m: S::M, block: &B, triangle: u32) {
-        self.place = s.select_u(m, s.splat_u(block.first() + triangle), self.place);
+    pub(crate) fn keep<B: Block>(&mut self, s: S, m: S::M, leaf: &Leaf<'_, B>, triangle: u32) {
+        self.leaf = s.select_u(m, s.splat_u(leaf.code), self.leaf);
+        self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
+        self.place = s.select_u(m, s.splat_u(leaf.block.first() + triangle), self.place);
         for c in 0..3 {
             for k in 0..3 {
                 // Each straight from the leaf: through an array, what was written in words would be read as more.
-                let x = s.splat(block.coordinate(triangle as usize, c, k));
+                let x = s.splat(leaf.block.coordinate(triangle as usize, c, k));
                 self.corner[c][k] = s.select(m, x, self.corner[c][k]);
             }
         }
@@ -129,7 +136,7 @@ impl<S: Simd> Group<S> {
         self.origin = [field[0], field[1], field[2]];
         self.direction = [field[4], field[5], field[6]];
         self.nearest = s.splat(f32::INFINITY);
-        self.leaf = s.splat_u(NONE);
+        self.waiting = s.splat_u(NONE);
         // Each taken over where it is made: merged first, they would all pass through memory once more.
         match self.common {
             Some(common) => self.take(s, prepare::lanes(s, frame, field, &common)),
@@ -168,44 +175,47 @@ impl<S: Simd> Group<S> {
         s.mask_bits(s.le(enter, leave))
     }
 
-    /// Computes where rays cross the triangles that wait to be computed; if none does, nothing is written.
+    /// Computes where rays cross the triangles that wait to be computed; if none does, it is only said so.
     #[inline(always)]
-    pub(crate) fn cross(&self, s: S, crossings: &mut Crossings) {
-        let some = s.mask_bits(s.lt_u(self.leaf, s.splat_u(NONE)));
+    pub(crate) fn cross(&self, s: S, looks: &mut Looks<'_>, crossings: &mut Crossings) {
+        let some = s.mask_bits(s.lt_u(self.waiting, s.splat_u(NONE)));
+        (crossings.certain, crossings.open) = (0, 0);
         if some == 0 {
             return;
         }
-        let Projected { mut origin, mut direction, mut corner } = Projected::NONE;
-        let (o, d) = (self.turn(s, self.origin), self.turn(s, self.direction));
-        for k in 0..3 {
-            s.store(o[k], &mut origin[k]);
-            s.store(d[k], &mut direction[k]);
-        }
-        for c in 0..3 {
-            let along = self.turn(s, self.corner[c]);
+        let apart = s.eq_u(self.waiting, s.splat_u(APART));
+        let kept = looks.met.kept();
+        if kept > 0 && s.mask_bits(apart) == 0 {
+            looks.look();
+            let (met, seen) = (&*looks.met, &*looks.seen);
+            let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
             for k in 0..3 {
-                s.store(along[k], &mut corner[c][k]);
+                s.store(self.direction[k], &mut direction[k]);
+            }
+            s.store(self.scale, &mut size);
+            s.store_u(s.lookup_u(s.load_u(&met.id), self.waiting), &mut crossings.triangle);
+            let waiting = self.waiting;
+            return if met.are_few() {
+                crossings.compute_from_point::<S, true>(s, some, &direction, &size, seen, waiting)
+            } else {
+                crossings.compute_from_point::<S, false>(s, some, &direction, &size, seen, waiting)
+            };
+        }
+        let (met, ids) = (&*looks.met, looks.ids);
+        let mut pairs = Pairs::NONE;
+        for k in 0..3 {
+            s.store(self.origin[k], &mut pairs.origin[k]);
+            s.store(self.direction[k], &mut pairs.direction[k]);
+            for c in 0..3 {
+                let mut corner = self.corner[c][k];
+                if kept > 0 {
+                    corner = s.select(apart, corner, s.lookup(s.load(&met.corner[c][k]), self.waiting));
+                }
+                s.store(corner, &mut pairs.corner[c][k]);
             }
         }
-        s.store_u(self.place, &mut crossings.place);
-        crossings.compute(s, some, &Projected { origin, direction, corner });
-    }
-
-    /// The axes of f64's projection ([`crate::trace::line`]).
-    #[inline(always)]
-    pub(crate) fn axes(&self, s: S) -> [S::U; 3] {
-        match &self.common {
-            Some(common) => common.axes(s),
-            None => self.mixed.axes(s),
-        }
-    }
-
-    /// Coordinates along the axes of the projection.
-    #[inline(always)]
-    pub(crate) fn turn(&self, s: S, point: [S::F; 3]) -> [S::F; 3] {
-        match &self.common {
-            Some(common) => common.turn(s, point),
-            None => self.mixed.turn(s, point),
-        }
+        let place = s.select_u(apart, self.place, s.lookup_u(s.load_u(&met.place), self.waiting));
+        s.store_u(s.gather_u(s.mask(some), ids, place), &mut crossings.triangle);
+        crossings.compute(s, some, &pairs);
     }
 }

@@ -5,11 +5,13 @@
 
 use super::group::Group;
 use super::hull::Hull;
-use crate::layout::{IndexedLeaf, RawLeaf, WIDTH};
+use super::met::{APART, Met};
+use crate::layout::{IndexedLeaf, NONE, RawLeaf, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Settled, settle};
+use crate::trace::crossings::Many;
 use crate::trace::prepare::{Axes, Common};
 use crate::trace::query::Query;
 use crate::trace::sight::{self, Block};
@@ -17,13 +19,29 @@ use crate::trace::sight::{self, Block};
 /// Points of a leaf at most.
 const POINTS: usize = 3 * WIDTH;
 
-/// Projected points of a leaf: x, y and depth.
-pub(crate) type Points<S> = [[<S as Simd>::F; 3]; POINTS];
+/// In place of the number of a triangle among those that the packet keeps: it has not been asked for.
+const UNKNOWN: u8 = u8::MAX;
 
-/// A place for points.
-#[inline(always)]
-pub(crate) fn no_points<S: Simd>(s: S) -> Points<S> {
-    [[s.splat(0.0); 3]; POINTS]
+/// Projected points of a leaf, x, y and depth of each as sixteen rays see it.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Points([[Many; 3]; POINTS]);
+
+impl Points {
+    pub(crate) const NONE: Points = Points([[[0.0; LANES]; 3]; POINTS]);
+
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, s: S, i: usize, point: [S::F; 3]) {
+        for k in 0..3 {
+            s.store(point[k], &mut self.0[i][k]);
+        }
+    }
+
+    #[inline(always)]
+    fn get<S: Simd>(&self, s: S, i: usize) -> [S::F; 3] {
+        let [x, y, depth] = &self.0[i];
+        [s.load(x), s.load(y), s.load(depth)]
+    }
 }
 
 /// A leaf as points, and triangles between them.
@@ -115,6 +133,7 @@ pub(crate) struct Rays<'a, Q> {
     /// Queries of rays for which anything has been decided, where their bit is set.
     pub(crate) queries: &'a mut [Q],
     pub(crate) asked: u64,
+    pub(crate) met: &'a mut Met,
     /// Those that are not done.
     pub(crate) alive: u64,
 }
@@ -135,6 +154,32 @@ impl<S: Simd> Greatest<S> {
     }
 }
 
+/// What groups keep of triangles that wait, lane by lane.
+struct Apart {
+    leaf: [u32; LANES],
+    triangle: [u32; LANES],
+}
+
+impl Apart {
+    #[inline(always)]
+    fn of<S: Simd>(s: S, group: &Group<S>) -> Self {
+        let mut apart = Apart { leaf: [0; LANES], triangle: [0; LANES] };
+        s.store_u(group.leaf, &mut apart.leaf);
+        s.store_u(group.triangle, &mut apart.triangle);
+        apart
+    }
+
+    /// What waits in a lane.
+    #[inline(always)]
+    fn candidate(&self, met: &Met, waiting: u32, lane: usize) -> Candidate {
+        match waiting {
+            NONE => Candidate::NONE,
+            APART => Candidate { leaf: self.leaf[lane], triangle: self.triangle[lane] },
+            number => met.candidate(number),
+        }
+    }
+}
+
 /// A leaf and its code.
 pub(crate) struct Leaf<'a, B> {
     pub(crate) block: &'a B,
@@ -149,7 +194,7 @@ impl<Q: Query> Rays<'_, Q> {
         s: S,
         hull: &H,
         groups: &mut [Group<S>],
-        points: &mut Points<S>,
+        points: &mut Points,
         leaf: &Leaf<'_, B>,
         rays: u64,
     ) -> bool {
@@ -164,11 +209,12 @@ impl<Q: Query> Rays<'_, Q> {
         if triangles == 0 {
             return false;
         }
-        let mut nearer = false;
+        let (mut nearer, mut numbers) = (false, [UNKNOWN; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
-                nearer |= self.enter_group(s, group, i, points, leaf, (triangles, used), active);
+                nearer |=
+                    self.enter_group(s, group, i, points, leaf, &mut numbers, (triangles, used), active);
             }
         }
         nearer
@@ -181,8 +227,9 @@ impl<Q: Query> Rays<'_, Q> {
         s: S,
         group: &mut Group<S>,
         at: usize,
-        points: &mut Points<S>,
+        points: &mut Points,
         leaf: &Leaf<'_, B>,
+        numbers: &mut [u8; WIDTH],
         (mut triangles, mut used): (u32, u64),
         mut active: u32,
     ) -> bool {
@@ -196,7 +243,7 @@ impl<Q: Query> Rays<'_, Q> {
             used &= used - 1;
             let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
             let point = if is_common { point } else { mixed.turn(s, point) };
-            points[i] = greatest.including(s, projection.of(s, point));
+            points.put(s, i, greatest.including(s, projection.of(s, point)));
         }
         let floor = s.splat(f32::MIN_POSITIVE);
         let size = s.add(greatest.coordinate, greatest.coordinate);
@@ -207,7 +254,7 @@ impl<Q: Query> Rays<'_, Q> {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let [a, b, c] = leaf.block.points_of(triangle as usize);
-            let (a, b, c) = (points[a], points[b], points[c]);
+            let (a, b, c) = (points.get(s, a), points.get(s, b), points.get(s, c));
             let weight = [sight::cross(s, b, c), sight::cross(s, c, a), sight::cross(s, a, b)];
             let least = s.min(s.min(weight[0], weight[1]), weight[2]);
             let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
@@ -231,11 +278,18 @@ impl<Q: Query> Rays<'_, Q> {
             } else {
                 let clear = sure & s.mask_bits(s.lt(weighed.farthest, group.nearest));
                 let m = s.mask(clear);
-                group.accept(s, m, [weighed.nearest, weighed.farthest], leaf.code, triangle);
                 if clear != 0 {
-                    let place = (leaf.block.first() + triangle) as usize;
-                    s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
-                    group.keep(s, m, leaf.block, triangle);
+                    let number = &mut numbers[triangle as usize % WIDTH];
+                    if *number == UNKNOWN {
+                        let place = (leaf.block.first() + triangle) as usize;
+                        s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
+                        *number = self.met.add(leaf, triangle) as u8;
+                    }
+                    let number = u32::from(*number);
+                    group.accept(s, m, [weighed.nearest, weighed.farthest], number);
+                    if number == APART {
+                        group.keep(s, m, leaf, triangle);
+                    }
                 }
                 nearer |= clear != 0;
                 clear
@@ -262,12 +316,9 @@ impl<Q: Query> Rays<'_, Q> {
         candidate: Candidate,
         mut lanes: u32,
     ) {
-        let (mut axis, mut leaf, mut triangle) = ([[0; LANES]; 3], [0; LANES], [0; LANES]);
-        for (row, along) in axis.iter_mut().zip(group.axes(s)) {
-            s.store_u(along, row);
-        }
-        s.store_u(group.leaf, &mut leaf);
-        s.store_u(group.triangle, &mut triangle);
+        let mut waiting = [0; LANES];
+        s.store_u(group.waiting, &mut waiting);
+        let apart = Apart::of(s, group);
         let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         s.store(group.scale, &mut scale);
         s.store(group.limit, &mut limit);
@@ -276,9 +327,7 @@ impl<Q: Query> Rays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
-            let waiting = Candidate { leaf: leaf[lane], triangle: triangle[lane] };
-            let axis = [axis[0][lane], axis[1][lane], axis[2][lane]];
-            match self.settle_one(ray, axis, [waiting, candidate]) {
+            match self.settle_one(ray, [apart.candidate(self.met, waiting[lane], lane), candidate]) {
                 Settled::Enough => self.alive &= !(1 << ray),
                 Settled::Found(t) => {
                     let [near, far] = t.map(|t| t * f64::from(scale[lane]));
@@ -287,9 +336,9 @@ impl<Q: Query> Rays<'_, Q> {
                 }
                 Settled::Nothing => {}
             }
-            leaf[lane] = crate::layout::NONE;
+            waiting[lane] = NONE;
         }
-        group.leaf = s.load_u(&leaf);
+        group.waiting = s.load_u(&waiting);
         group.limit = s.load(&limit);
         group.nearest = s.load(&nearest);
     }
@@ -297,26 +346,24 @@ impl<Q: Query> Rays<'_, Q> {
     /// Decides for a few rays of a group the candidate that waits.
     #[inline(always)]
     pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &Group<S>, at: usize, mut lanes: u32) {
-        let mut rows = [[0; LANES]; 5];
-        for (row, &values) in rows.iter_mut().zip(group.axes(s).iter().chain([&group.leaf, &group.triangle]))
-        {
-            s.store_u(values, row);
-        }
+        let mut waiting = [0; LANES];
+        s.store_u(group.waiting, &mut waiting);
+        let apart = Apart::of(s, group);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
-            let [x, y, z, leaf, triangle] = [0, 1, 2, 3, 4].map(|i: usize| rows[i][lane]);
-            self.settle_one(at * LANES + lane, [x, y, z], [Candidate { leaf, triangle }, Candidate::NONE]);
+            let waiting = apart.candidate(self.met, waiting[lane], lane);
+            self.settle_one(at * LANES + lane, [waiting, Candidate::NONE]);
         }
     }
 
     /// Offers candidates of a ray to its query.
     #[inline(always)]
-    fn settle_one(&mut self, ray: usize, axis: [u32; 3], candidates: [Candidate; 2]) -> Settled {
+    fn settle_one(&mut self, ray: usize, candidates: [Candidate; 2]) -> Settled {
         if self.asked >> ray & 1 == 0 {
             self.queries[ray] = Q::new(&self.rays[ray]);
             self.asked |= 1 << ray;
         }
-        settle(self.object, &self.rays[ray], axis, candidates, &mut self.queries[ray])
+        settle(self.object, &self.rays[ray], candidates, &mut self.queries[ray])
     }
 }

@@ -4,13 +4,14 @@ pub(crate) mod coherence;
 pub(crate) mod group;
 pub(crate) mod hull;
 pub(crate) mod leaf;
+pub(crate) mod met;
 pub(crate) mod packet;
 #[cfg(test)]
 mod tests;
 
 use self::coherence::{Guard, Span, is_same_octant};
 use self::hull::{Beam, SegmentBox};
-use self::packet::{Entry, PACKET, Packets, Use};
+use self::packet::{PACKET, Packets, Room, Use};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -36,7 +37,7 @@ pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 10, short: 15 };
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
 pub(crate) struct PacketScratch {
-    stack: Vec<Entry>,
+    room: Room,
     /// Places of the rays that are left.
     pub(crate) rest: Vec<u32>,
 }
@@ -48,12 +49,6 @@ pub(crate) struct PacketCount {
     pub(crate) coherent: usize,
     pub(crate) short: usize,
     pub(crate) poor: usize,
-}
-
-/// A run of rays that go together.
-enum Run {
-    Coherent(Span),
-    Short([[f32; 3]; 2]),
 }
 
 /// Traces those rays of a batch that are better traced in packets, and leaves the others in `scratch.rest`, unless it does
@@ -76,42 +71,38 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         return count;
     }
     let frame = Frame::new(object.header);
-    let (mut coherent, mut short) = (Guard::new(), Guard::new());
-    let PacketScratch { stack, rest } = scratch;
+    let PacketScratch { room, rest } = scratch;
     rest.clear();
-    let mut packets = None;
-    for (i, own) in rays.chunks(PACKET).enumerate() {
-        let at = i * PACKET;
-        let Some(run) = choose::<S, Q>(s, &frame, own, &mut coherent, &mut short) else {
-            rest.extend(at as u32..(at + own.len()) as u32);
-            continue;
-        };
+    let mut runs = Runs { frame: &frame, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };
+    // The first apart, so that the packets are made where they stay and only if there are any.
+    let Some(mut run) = runs.next::<S, Q>(s) else { return count };
+    let mut packets = Packets::<S, Q>::new(s, object, room, &rays[0]);
+    loop {
+        let (at, own) = (run.at, run.rays);
         // So that the next rays are there when this packet is done.
         let next = own.as_ptr().wrapping_add(PACKET);
         for line in 0..PACKET / RAYS_A_LINE {
             s.prefetch(next.wrapping_add(line * RAYS_A_LINE));
         }
-        if packets.is_none() {
-            packets = Some(Packets::<S, Q>::new(s, object, &mut *stack, &own[0]));
-        }
-        let packets = packets.as_mut().expect("just made");
         let mut to = Offset { first: at, to: &mut *to };
-        let (outcome, guard, least_use, kind) = match run {
-            _ if !prepare(s, &frame, packets, own) => {
-                (Use::Refused, &mut coherent, least.coherent, &mut count.coherent)
+        let (outcome, guard, least_use, kind) = match run.kind {
+            _ if !prepare(s, &frame, &mut packets, own) => {
+                (Use::Refused, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
-            Run::Coherent(span) => {
+            Kind::Coherent(span) => {
                 let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
+                packets.room.met.clear(s, span.is_from_point());
                 let outcome = packets.trace(s, object, &beam, own, &mut to);
-                (outcome, &mut coherent, least.coherent, &mut count.coherent)
+                (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
-            Run::Short(bounds) => {
+            Kind::Short(bounds) => {
+                packets.room.met.clear(s, false);
                 let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to);
-                (outcome, &mut short, least.short, &mut count.short)
+                (outcome, &mut runs.short, least.short, &mut count.short)
             }
         };
         match outcome {
-            Use::Refused => rest.extend(at as u32..(at + own.len()) as u32),
+            Use::Refused => runs.leave(at, own.len()),
             Use::Lanes(share) => {
                 guard.learn(share >= least_use);
                 count.rays += own.len();
@@ -119,8 +110,57 @@ pub(crate) fn trace<S: Simd, Q: Query>(
                 count.poor += usize::from(share < least_use);
             }
         }
+        let Some(next) = runs.next::<S, Q>(s) else { break };
+        run = next;
     }
     count
+}
+
+/// Rays that go together.
+struct Run<'a> {
+    /// Place of the first in the batch.
+    at: usize,
+    rays: &'a [Ray],
+    kind: Kind,
+}
+
+/// How they do.
+enum Kind {
+    Coherent(Span),
+    Short([[f32; 3]; 2]),
+}
+
+/// The runs of a batch.
+struct Runs<'a, 'b> {
+    frame: &'b Frame,
+    rays: &'a [Ray],
+    /// Where the next begins.
+    at: usize,
+    coherent: Guard,
+    short: Guard,
+    /// Places of rays that go alone.
+    rest: &'b mut Vec<u32>,
+}
+
+impl<'a> Runs<'a, '_> {
+    /// The next run; rays before it go alone.
+    #[inline(always)]
+    fn next<S: Simd, Q: Query>(&mut self, s: S) -> Option<Run<'a>> {
+        while self.at < self.rays.len() {
+            let at = self.at;
+            let rays = &self.rays[at..self.rays.len().min(at + PACKET)];
+            self.at = at + PACKET;
+            if let Some(kind) = choose::<S, Q>(s, self.frame, rays, &mut self.coherent, &mut self.short) {
+                return Some(Run { at, rays, kind });
+            }
+            self.leave(at, rays.len());
+        }
+        None
+    }
+
+    fn leave(&mut self, at: usize, count: usize) {
+        self.rest.extend(at as u32..(at + count) as u32);
+    }
 }
 
 /// How rays may go together, if they may.
@@ -131,7 +171,7 @@ fn choose<S: Simd, Q: Query>(
     rays: &[Ray],
     coherent: &mut Guard,
     short: &mut Guard,
-) -> Option<Run> {
+) -> Option<Kind> {
     if rays.len() < FEWEST {
         return None;
     }
@@ -142,10 +182,10 @@ fn choose<S: Simd, Q: Query>(
     }
     let span = Span::of(s, rays);
     if try_coherent && span.is_coherent() {
-        return Some(Run::Coherent(span));
+        return Some(Kind::Coherent(span));
     }
     if try_short {
-        return span.segments(s, frame, rays).map(Run::Short);
+        return span.segments(s, frame, rays).map(Kind::Short);
     }
     None
 }

@@ -7,7 +7,8 @@
 
 use super::group::Group;
 use super::hull::Hull;
-use super::leaf::{Leaf, Points, Rays, no_points};
+use super::leaf::{Leaf, Points, Rays};
+use super::met::{Looks, Met};
 use crate::layout::{Child, NONE, WIDTH, WideNode};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
@@ -15,7 +16,7 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
 use crate::trace::bvh::nodes::{Wide, prefetch};
-use crate::trace::crossings::Crossings;
+use crate::trace::crossings::{Crossings, SeenFromPoint};
 use crate::trace::query::{Deliver, Query};
 
 /// Groups of sixteen rays in a packet.
@@ -35,12 +36,33 @@ pub(crate) struct Entry {
     key: f32,
 }
 
-/// Memory that packets need.
+/// Memory that packets need, kept from one batch to the next.
+#[derive(Debug)]
+pub(crate) struct Room {
+    stack: Vec<Entry>,
+    points: Points,
+    pub(crate) met: Met,
+    seen: SeenFromPoint,
+    crossings: [Crossings; GROUPS],
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Room {
+            stack: Vec::new(),
+            points: Points::NONE,
+            met: Met::NONE,
+            seen: SeenFromPoint::NONE,
+            crossings: [Crossings::NONE; GROUPS],
+        }
+    }
+}
+
+/// The rays of a packet, prepared, and what is decided of them.
 pub(crate) struct Packets<'a, S: Simd, Q> {
     pub(crate) groups: [Group<S>; GROUPS],
-    points: Points<S>,
-    stack: &'a mut Vec<Entry>,
     queries: [Q; PACKET],
+    pub(crate) room: &'a mut Room,
 }
 
 /// How a packet did.
@@ -54,18 +76,13 @@ pub(crate) enum Use {
 
 impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
     #[inline(always)]
-    pub(crate) fn new(s: S, object: &ObjectView<'_>, stack: &'a mut Vec<Entry>, ray: &Ray) -> Self {
+    pub(crate) fn new(s: S, object: &ObjectView<'_>, room: &'a mut Room, ray: &Ray) -> Self {
         // At every level all children but the one entered wait.
         let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
-        if stack.len() < entries {
-            stack.resize(entries, Entry::default());
+        if room.stack.len() < entries {
+            room.stack.resize(entries, Entry::default());
         }
-        Packets {
-            groups: [Group::vacant(s); GROUPS],
-            points: no_points(s),
-            stack,
-            queries: [Q::new(ray); PACKET],
-        }
+        Packets { groups: [Group::vacant(s); GROUPS], queries: [Q::new(ray); PACKET], room }
     }
 
     /// Traces rays for which the groups have been prepared, and hands on the place and query of those that hit
@@ -79,10 +96,11 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         rays: &[Ray],
         to: &mut impl Deliver<Q>,
     ) -> Use {
-        let Packets { groups, points, stack, queries } = self;
+        let Packets { groups, queries, room } = self;
+        let Room { stack, points, met, seen, crossings } = &mut **room;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
-        let mut rays = Rays { object, rays, queries, asked: 0, alive: all };
+        let mut rays = Rays { object, rays, queries, met, asked: 0, alive: all };
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray hold nothing up.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
@@ -166,7 +184,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
             }
         }
-        finish(s, groups, &mut rays, all, to);
+        finish(s, groups, (seen, crossings), &mut rays, all, to);
         let steps = u64::from(steps);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
@@ -199,6 +217,7 @@ fn meeting<S: Simd, H: Hull<S>>(
 fn finish<S: Simd, Q: Query>(
     s: S,
     groups: &[Group<S>],
+    (seen, crossings): (&mut SeenFromPoint, &mut [Crossings; GROUPS]),
     rays: &mut Rays<'_, Q>,
     all: u64,
     to: &mut impl Deliver<Q>,
@@ -214,11 +233,11 @@ fn finish<S: Simd, Q: Query>(
         return;
     }
     // First all, then what comes of them: so the divisions of one group overlap with the next.
-    let mut crossings = [Crossings::NONE; GROUPS];
-    for (group, crossings) in groups.iter().zip(&mut crossings) {
-        group.cross(s, crossings);
+    let mut looks = Looks { origin: rays.rays[0].origin, ids: rays.object.triangle_ids, met: rays.met, seen };
+    for (group, crossings) in groups.iter().zip(&mut *crossings) {
+        group.cross(s, &mut looks, crossings);
     }
-    for (i, (group, crossings)) in groups.iter().zip(&crossings).enumerate() {
+    for (i, (group, crossings)) in groups.iter().zip(crossings.iter()).enumerate() {
         let asked = (rays.asked >> (i * LANES)) as u32 & 0xffff;
         let clear = crossings.certain & !asked;
         if clear != 0 {

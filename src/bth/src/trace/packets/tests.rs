@@ -282,6 +282,35 @@ fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
     }
 }
 
+/// Packets of rays from one point that hit a few triangles, or more than are kept, or some of each.
+#[test]
+fn views_from_one_point_are_traced_to_the_same_bits() {
+    let mut rng = Rng(12);
+    let surface = Surface::new(1.0, 0.0);
+    let eye = [30.3, 60.1, 90.7];
+    let mut rays = vec![];
+    for run in 0..120 {
+        let target = surface.points[rng.below(surface.points.len() as u64) as usize];
+        let spread = [0.3, 1.5, 3.0, 8.0][run / 3 % 4];
+        for _ in 0..64 {
+            let direction = [0, 1, 2].map(|k| target[k] + unit(&mut rng) * spread - eye[k]);
+            rays.push(Ray { origin: eye, tmin: 0.0, direction, tmax: f32::INFINITY });
+        }
+    }
+    let [(count, hits), _] = check(&surface, &rays, ALWAYS);
+    assert!(count.coherent > 60 && hits > 1000, "{count:?}, {hits}");
+    // How many triangles the rays of a packet hit: both halves of what is kept, and more.
+    let mut all = vec![Hit::MISS; rays.len()];
+    packed::<Nearest>(Isa::Scalar, &surface.view(), &rays, ALWAYS, &mut all);
+    let mut runs = [0; 3];
+    for run in all.chunks(64) {
+        let different: std::collections::BTreeSet<u32> =
+            run.iter().filter(|h| h.is_hit()).map(|h| h.surface.triangle).collect();
+        runs[(different.len().max(1) - 1) / 8 % 3] += usize::from(different.len() <= 24);
+    }
+    assert!(runs.iter().all(|&runs| runs > 5), "{runs:?}");
+}
+
 #[test]
 fn short_bundles_are_traced_to_the_same_bits() {
     for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {

@@ -110,11 +110,11 @@ impl Packets {
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
-            if !group.prepare(s, frame, &rays[i * LANES..end]) {
+            if !group.prepare::<Beam<S, false>>(s, frame, &rays[i * LANES..end]) {
                 return Listed::Apart;
             }
         }
-        let beam = Beam::new(s, frame, &span, groups);
+        let beam = Beam::<S, false>::new(s, frame, &span, groups);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
         let mut waiting = [0; MOST_NODES];
@@ -135,7 +135,7 @@ impl Packets {
                 let corners = beam.corners(node, slot);
                 let mut met = 0;
                 for (i, group) in groups.iter().enumerate() {
-                    met |= u64::from(group.meets::<false>(s, corners)) << (i * LANES);
+                    met |= u64::from(group.meets::<Beam<S, false>>(s, corners)) << (i * LANES);
                 }
                 let rays = met & all;
                 if rays == 0 {

@@ -3,6 +3,7 @@
 //! What [`crate::trace::slabs`] and [`crate::trace::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
 //! one box or triangle: the same operations on the same prepared floats ([`crate::trace::prepare`]), so the same bounds hold.
 
+use super::hull::Hull;
 use super::leaf::Leaf;
 use super::met::{APART, Looks};
 use crate::layout::NONE;
@@ -29,6 +30,13 @@ impl<S: Simd> Projection<S> {
         let depth = s.fma(z, self.forward, self.start);
         let (x, y) = (s.sub(self.origin[0], x), s.sub(self.origin[1], y));
         [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
+    }
+
+    /// The same of a point relative to the one at which the rays start.
+    #[inline(always)]
+    pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+        let depth = s.mul(z, self.forward);
+        [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
     }
 }
 
@@ -122,8 +130,8 @@ impl<S: Simd> Group<S> {
     /// Prepares the first sixteen of rays; the last fills up lanes that are too many. False if one of them can't be
     /// prepared.
     #[inline(always)]
-    pub(crate) fn prepare(&mut self, s: S, frame: &Frame, rays: &[Ray]) -> bool {
-        let field = match rays.first_chunk() {
+    pub(crate) fn prepare<H: Hull<S>>(&mut self, s: S, frame: &Frame, rays: &[Ray]) -> bool {
+        let mut field = match rays.first_chunk() {
             Some(rays) => prepare::fields_of(s, rays),
             None => {
                 let mut all = [rays[rays.len() - 1]; LANES];
@@ -133,58 +141,83 @@ impl<S: Simd> Group<S> {
         };
         self.mixed = Mixed::of(s, [field[4], field[5], field[6]]);
         self.common = self.mixed.common(s);
-        self.origin = [field[0], field[1], field[2]];
-        self.direction = [field[4], field[5], field[6]];
-        self.nearest = s.splat(f32::INFINITY);
-        self.waiting = s.splat_u(NONE);
+        // Not one store more than there must be: they are what preparing waits for.
+        if H::FROM_POINT {
+            for k in 0..3 {
+                field[k] = s.splat(rays[0].origin[k]);
+            }
+        } else if !H::MIXED {
+            self.origin = [field[0], field[1], field[2]];
+        }
+        if !H::MIXED {
+            self.direction = [field[4], field[5], field[6]];
+            self.nearest = s.splat(f32::INFINITY);
+            self.waiting = s.splat_u(NONE);
+        }
         // Each taken over where it is made: merged first, they would all pass through memory once more.
         match self.common {
-            Some(common) => self.take(s, prepare::lanes(s, frame, field, &common)),
-            None => self.take(s, prepare::lanes(s, frame, field, &self.mixed)),
+            Some(common) => self.take::<H>(s, prepare::lanes(s, frame, field, &common)),
+            None => self.take::<H>(s, prepare::lanes(s, frame, field, &self.mixed)),
         }
     }
 
     /// Takes over what rays are prepared to; false if one of them can't be prepared.
     #[inline(always)]
-    fn take(&mut self, s: S, lanes: prepare::Lanes<S>) -> bool {
+    fn take<H: Hull<S>>(&mut self, s: S, lanes: prepare::Lanes<S>) -> bool {
         self.reciprocal = lanes.reciprocal;
-        self.near_addend = lanes.near_addend;
-        self.far_addend = lanes.far_addend;
-        self.negative = lanes.negative;
+        if !H::FROM_POINT {
+            self.near_addend = lanes.near_addend;
+            self.far_addend = lanes.far_addend;
+        }
+        if H::MIXED {
+            self.negative = lanes.negative;
+        }
         self.scale = lanes.scale;
         [self.first, self.limit] = lanes.depths;
         self.certain = lanes.certain;
         let prepare::Lanes { origin, shear, forward, start, .. } = lanes;
-        self.projection = Projection { origin, shear, forward, start };
+        (self.projection.shear, self.projection.forward) = (shear, forward);
+        if !H::FROM_POINT {
+            (self.projection.origin, self.projection.start) = (origin, start);
+        }
         s.mask_bits(lanes.usable) == 0xffff
     }
 
-    /// The rays that may meet a box within their range. Where all go into the same octant (not `MIXED`) the corners
+    /// The rays that may meet a box within their range. Where all go into the same octant ([`Hull::MIXED`] is false) the corners
     /// are that at which they enter and the one at which they leave, else the lower and the upper one.
     #[inline(always)]
-    pub(crate) fn meets<const MIXED: bool>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
+    pub(crate) fn meets<H: Hull<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
         let (mut enter, mut leave) = (self.first, self.limit);
         for k in 0..3 {
             let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
-            if MIXED {
+            if H::MIXED {
                 (near, far) = (s.select(self.negative[k], far, near), s.select(self.negative[k], near, far));
             }
-            enter = s.max(s.fma(near, self.reciprocal[k], self.near_addend[k]), enter);
-            leave = s.min(s.fma(far, self.reciprocal[k], self.far_addend[k]), leave);
+            (near, far) = if H::FROM_POINT {
+                (s.mul(near, self.reciprocal[k]), s.mul(far, self.reciprocal[k]))
+            } else {
+                (
+                    s.fma(near, self.reciprocal[k], self.near_addend[k]),
+                    s.fma(far, self.reciprocal[k], self.far_addend[k]),
+                )
+            };
+            enter = s.max(near, enter);
+            leave = s.min(far, leave);
         }
         s.mask_bits(s.le(enter, leave))
     }
 
     /// Computes where rays cross the triangles that wait to be computed; if none does, it is only said so.
     #[inline(always)]
-    pub(crate) fn cross(&self, s: S, looks: &mut Looks<'_>, crossings: &mut Crossings) {
+    pub(crate) fn cross<H: Hull<S>>(&self, s: S, looks: &mut Looks<'_>, crossings: &mut Crossings) {
         let some = s.mask_bits(s.lt_u(self.waiting, s.splat_u(NONE)));
         (crossings.certain, crossings.open) = (0, 0);
         if some == 0 {
             return;
         }
         let apart = s.eq_u(self.waiting, s.splat_u(APART));
-        let kept = looks.met.kept();
+        // Known where this is compiled, of most.
+        let kept = if H::FROM_POINT && S::LOOKS_UP_F64 { looks.met.kept() } else { 0 };
         if kept > 0 && s.mask_bits(apart) == 0 {
             looks.look();
             let (met, seen) = (&*looks.met, &*looks.seen);
@@ -204,7 +237,8 @@ impl<S: Simd> Group<S> {
         let (met, ids) = (&*looks.met, looks.ids);
         let mut pairs = Pairs::NONE;
         for k in 0..3 {
-            s.store(self.origin[k], &mut pairs.origin[k]);
+            let origin = if H::FROM_POINT { s.splat(looks.origin[k]) } else { self.origin[k] };
+            s.store(origin, &mut pairs.origin[k]);
             s.store(self.direction[k], &mut pairs.direction[k]);
             for c in 0..3 {
                 let mut corner = self.corner[c][k];

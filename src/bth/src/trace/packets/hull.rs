@@ -11,6 +11,10 @@ use crate::trace::slabs::{self, PAD};
 pub(crate) trait Hull<S: Simd> {
     /// Whether the rays go into different octants.
     const MIXED: bool;
+    /// Whether they start at one point, and corners of boxes are given relative to that.
+    const FROM_POINT: bool;
+    /// That point.
+    fn point(&self) -> [f32; 3];
     /// The children of a node that it may meet before a depth, a bit each, and lower bounds of the depth at
     /// which any of the rays enters them.
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
@@ -34,7 +38,14 @@ pub(crate) trait Hull<S: Simd> {
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
 /// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
 /// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
-pub(crate) struct Beam<S: Simd> {
+/// Where all rays start at one point (`POINT`), the intervals of origins, widened by their pads, serve for the single rays, too
+/// ([`Group::meets`]), and those of a are zero.
+pub(crate) struct Beam<S: Simd, const POINT: bool> {
+    /// The middle of the origins.
+    start: [f32; 3],
+    /// As numbers.
+    near_end: [f32; 3],
+    far_end: [f32; 3],
     /// The end of the origins' interval that is nearest to the planes that are met first, and that nearest to the others.
     near_origin: [S::F; 3],
     far_origin: [S::F; 3],
@@ -53,7 +64,7 @@ pub(crate) struct Beam<S: Simd> {
     lower: [S::F; 2],
 }
 
-impl<S: Simd> Beam<S> {
+impl<S: Simd, const POINT: bool> Beam<S, POINT> {
     /// Of a coherent run ([`Span::is_coherent`]).
     #[inline(always)]
     pub(crate) fn new(s: S, frame: &Frame, span: &Span, groups: &[Group<S>]) -> Self {
@@ -63,7 +74,8 @@ impl<S: Simd> Beam<S> {
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
         let mut center = [0.0; 3];
         for k in 0..3 {
-            center[k] = 0.5 * span.origin[k][0] + 0.5 * span.origin[k][1];
+            let [least, greatest] = span.origin[k];
+            center[k] = if POINT { least } else { 0.5 * least + 0.5 * greatest };
         }
         // Of the reciprocals, the slopes and what is added to sheared coordinates; and of the first depth.
         let (mut least, mut greatest) = ([s.splat(f32::INFINITY); 8], [s.splat(f32::NEG_INFINITY); 7]);
@@ -72,7 +84,6 @@ impl<S: Simd> Beam<S> {
                 let r = group.reciprocal[k];
                 (least[k], greatest[k]) = (s.min(least[k], r), s.max(greatest[k], r));
             }
-            let from = s.sub(s.splat(center[main]), group.origin[main]);
             for j in 0..2 {
                 let slope = match group.common {
                     // As good as the quotient, and there already.
@@ -81,9 +92,14 @@ impl<S: Simd> Beam<S> {
                     }
                     _ => s.div(group.direction[axis[j]], group.direction[main]),
                 };
-                let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);
-                let addend = s.fnma(slope, from, beside);
                 (least[3 + j], greatest[3 + j]) = (s.min(least[3 + j], slope), s.max(greatest[3 + j], slope));
+                let addend = if POINT {
+                    zero
+                } else {
+                    let from = s.sub(s.splat(center[main]), group.origin[main]);
+                    let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);
+                    s.fnma(slope, from, beside)
+                };
                 (least[5 + j], greatest[5 + j]) =
                     (s.min(least[5 + j], addend), s.max(greatest[5 + j], addend));
             }
@@ -98,6 +114,9 @@ impl<S: Simd> Beam<S> {
         let ends = least;
         let both = |of: usize| [ends[of], -ends[8 + of]];
         let mut beam = Beam {
+            start: center,
+            near_end: [0.0; 3],
+            far_end: [0.0; 3],
             near_origin: [zero; 3],
             far_origin: [zero; 3],
             reciprocal: [[zero; 2]; 3],
@@ -117,6 +136,7 @@ impl<S: Simd> Beam<S> {
             let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
             let is_negative = span.direction[k][0] < 0.0;
             let [near, far] = if is_negative { [low, high] } else { [high, low] };
+            (beam.near_end[k], beam.far_end[k]) = (near, far);
             beam.near_origin[k] = s.splat(near);
             beam.far_origin[k] = s.splat(far);
             beam.near[k] = if is_negative { slabs::FAR } else { 0 };
@@ -135,8 +155,14 @@ impl<S: Simd> Beam<S> {
     }
 }
 
-impl<S: Simd> Hull<S> for Beam<S> {
+impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
     const MIXED: bool = false;
+    const FROM_POINT: bool = POINT;
+
+    #[inline(always)]
+    fn point(&self) -> [f32; 3] {
+        self.start
+    }
 
     #[inline(always)]
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
@@ -174,6 +200,10 @@ impl<S: Simd> Hull<S> for Beam<S> {
         for k in 0..3 {
             out[0][k] = slabs::row(&node.bounds[k], self.near[k])[slot % WIDTH];
             out[1][k] = slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)[slot % WIDTH];
+            if POINT {
+                out[0][k] -= self.near_end[k];
+                out[1][k] -= self.far_end[k];
+            }
         }
         out
     }
@@ -197,6 +227,12 @@ impl<S: Simd> SegmentBox<S> {
 
 impl<S: Simd> Hull<S> for SegmentBox<S> {
     const MIXED: bool = true;
+    const FROM_POINT: bool = false;
+
+    #[inline(always)]
+    fn point(&self) -> [f32; 3] {
+        [0.0; 3]
+    }
 
     #[inline(always)]
     fn children(&self, s: S, node: &WideNode, _limit: f32) -> (u32, S::F) {

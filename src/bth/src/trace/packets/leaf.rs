@@ -44,6 +44,28 @@ impl Points {
     }
 }
 
+/// Points of a leaf relative to the point at which all rays start, a row for each axis.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Relative(pub(crate) [[Many; 3]; 3]);
+
+impl Relative {
+    pub(crate) const NONE: Relative = Relative([[[0.0; LANES]; 3]; 3]);
+
+    /// Sixteen of them.
+    #[inline(always)]
+    fn put<S: Simd>(&mut self, s: S, part: usize, rows: [S::F; 3], from: [f32; 3]) {
+        for k in 0..3 {
+            s.store(s.sub(rows[k], s.splat(from[k])), &mut self.0[k][part]);
+        }
+    }
+
+    #[inline(always)]
+    fn row(&self, axis: usize) -> &[f32; POINTS] {
+        self.0[axis].as_flattened().first_chunk().expect("as many")
+    }
+}
+
 /// A leaf as points, and triangles between them.
 pub(crate) trait Mesh: Block {
     /// One coordinate of all points.
@@ -55,6 +77,8 @@ pub(crate) trait Mesh: Block {
     fn at(row: Self::Row<'_>, point: usize) -> f32;
     /// The points of a triangle, below [`POINTS`].
     fn points_of(&self, triangle: usize) -> [usize; 3];
+    /// All points, relative to one.
+    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative);
     /// The triangles that have no corner inside, and none on another side of the hull than the others: missed by
     /// all rays.
     fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32;
@@ -92,6 +116,10 @@ impl Mesh for IndexedLeaf {
         [usize::from(a[at]) % WIDTH, usize::from(b[at]) % WIDTH, usize::from(c[at]) % WIDTH]
     }
     #[inline(always)]
+    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative) {
+        to.put(s, 0, load(s, &self.vertex), from);
+    }
+    #[inline(always)]
     fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
         let sides = hull.sides(s, load(s, &self.vertex));
         let [a, b, c] = &self.corner;
@@ -117,6 +145,12 @@ impl Mesh for RawLeaf {
     fn points_of(&self, triangle: usize) -> [usize; 3] {
         let at = triangle % WIDTH;
         [at, WIDTH + at, 2 * WIDTH + at]
+    }
+    #[inline(always)]
+    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative) {
+        for c in 0..3 {
+            to.put(s, c, load(s, &self.corner[c]), from);
+        }
     }
     #[inline(always)]
     fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
@@ -194,7 +228,7 @@ impl<Q: Query> Rays<'_, Q> {
         s: S,
         hull: &H,
         groups: &mut [Group<S>],
-        points: &mut Points,
+        (points, relative): (&mut Points, &mut Relative),
         leaf: &Leaf<'_, B>,
         rays: u64,
     ) -> bool {
@@ -209,12 +243,23 @@ impl<Q: Query> Rays<'_, Q> {
         if triangles == 0 {
             return false;
         }
+        if H::FROM_POINT {
+            leaf.block.relative(s, hull.point(), relative);
+        }
         let (mut nearer, mut numbers) = (false, [UNKNOWN; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
-                nearer |=
-                    self.enter_group(s, group, i, points, leaf, &mut numbers, (triangles, used), active);
+                nearer |= self.enter_group::<S, H, B>(
+                    s,
+                    group,
+                    i,
+                    (points, relative),
+                    leaf,
+                    &mut numbers,
+                    (triangles, used),
+                    active,
+                );
             }
         }
         nearer
@@ -222,12 +267,12 @@ impl<Q: Query> Rays<'_, Q> {
 
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
-    fn enter_group<S: Simd, B: Mesh>(
+    fn enter_group<S: Simd, H: Hull<S>, B: Mesh>(
         &mut self,
         s: S,
         group: &mut Group<S>,
         at: usize,
-        points: &mut Points,
+        (points, relative): (&mut Points, &Relative),
         leaf: &Leaf<'_, B>,
         numbers: &mut [u8; WIDTH],
         (mut triangles, mut used): (u32, u64),
@@ -236,14 +281,21 @@ impl<Q: Query> Rays<'_, Q> {
         let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         let order = group.common.map_or([0, 1, 2], Common::order);
         let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
+        let relative = [relative.row(order[0]), relative.row(order[1]), relative.row(order[2])];
         // Copies, which stay in registers where the group itself would be read for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
         while used != 0 {
             let i = used.trailing_zeros() as usize % POINTS;
             used &= used - 1;
-            let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
+            let point = if H::FROM_POINT {
+                [s.splat(relative[0][i]), s.splat(relative[1][i]), s.splat(relative[2][i])]
+            } else {
+                [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))]
+            };
             let point = if is_common { point } else { mixed.turn(s, point) };
-            points.put(s, i, greatest.including(s, projection.of(s, point)));
+            let point =
+                if H::FROM_POINT { projection.of_relative(s, point) } else { projection.of(s, point) };
+            points.put(s, i, greatest.including(s, point));
         }
         let floor = s.splat(f32::MIN_POSITIVE);
         let size = s.add(greatest.coordinate, greatest.coordinate);

@@ -10,7 +10,7 @@ pub(crate) mod packet;
 mod tests;
 
 use self::coherence::{Guard, Span, is_same_octant};
-use self::hull::{Beam, SegmentBox};
+use self::hull::{Beam, Hull, SegmentBox};
 use self::packet::{PACKET, Packets, Room, Use};
 use crate::layout::NONE;
 use crate::object::ObjectView;
@@ -86,18 +86,21 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         }
         let mut to = Offset { first: at, to: &mut *to };
         let (outcome, guard, least_use, kind) = match run.kind {
-            _ if !prepare(s, &frame, &mut packets, own) => {
-                (Use::Refused, &mut runs.coherent, least.coherent, &mut count.coherent)
-            }
             Kind::Coherent(span) => {
-                let beam = Beam::new(s, &frame, &span, &packets.groups[..own.len().div_ceil(LANES)]);
-                packets.room.met.clear(s, span.is_from_point());
-                let outcome = packets.trace(s, object, &beam, own, &mut to);
+                // Whether any hit will do is most often asked on the way to a light, from different points.
+                let outcome = if !Q::ANY && span.is_from_point() {
+                    beam::<S, Q, true>(s, object, &frame, &span, &mut packets, own, &mut to)
+                } else {
+                    beam::<S, Q, false>(s, object, &frame, &span, &mut packets, own, &mut to)
+                };
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
             Kind::Short(bounds) => {
-                packets.room.met.clear(s, false);
-                let outcome = packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to);
+                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &frame, &mut packets, own) {
+                    packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to)
+                } else {
+                    Use::Refused
+                };
                 (outcome, &mut runs.short, least.short, &mut count.short)
             }
         };
@@ -190,12 +193,36 @@ fn choose<S: Simd, Q: Query>(
     None
 }
 
+/// Traces a coherent run.
+#[inline(always)]
+fn beam<S: Simd, Q: Query, const POINT: bool>(
+    s: S,
+    object: &ObjectView<'_>,
+    frame: &Frame,
+    span: &Span,
+    packets: &mut Packets<'_, S, Q>,
+    rays: &[Ray],
+    to: &mut impl Deliver<Q>,
+) -> Use {
+    if !prepare::<S, Q, Beam<S, POINT>>(s, frame, packets, rays) {
+        return Use::Refused;
+    }
+    let beam = Beam::<S, POINT>::new(s, frame, span, &packets.groups[..rays.len().div_ceil(LANES)]);
+    packets.room.met.clear(s, POINT);
+    packets.trace(s, object, &beam, rays, to)
+}
+
 /// Prepares all groups; false if a ray can't be.
 #[inline(always)]
-fn prepare<S: Simd, Q: Query>(s: S, frame: &Frame, packets: &mut Packets<'_, S, Q>, rays: &[Ray]) -> bool {
+fn prepare<S: Simd, Q: Query, H: Hull<S>>(
+    s: S,
+    frame: &Frame,
+    packets: &mut Packets<'_, S, Q>,
+    rays: &[Ray],
+) -> bool {
     let mut ready = true;
     for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
-        ready &= group.prepare(s, frame, rays);
+        ready &= group.prepare::<H>(s, frame, rays);
     }
     ready
 }

@@ -7,7 +7,7 @@
 
 use super::group::Group;
 use super::hull::Hull;
-use super::leaf::{Leaf, Points, Rays};
+use super::leaf::{Leaf, Points, Rays, Relative};
 use super::met::{Looks, Met};
 use crate::layout::{Child, NONE, WIDTH, WideNode};
 use crate::limits::MAX_DEPTH;
@@ -41,6 +41,7 @@ pub(crate) struct Entry {
 pub(crate) struct Room {
     stack: Vec<Entry>,
     points: Points,
+    relative: Relative,
     pub(crate) met: Met,
     seen: SeenFromPoint,
     crossings: [Crossings; GROUPS],
@@ -51,6 +52,7 @@ impl Default for Room {
         Room {
             stack: Vec::new(),
             points: Points::NONE,
+            relative: Relative::NONE,
             met: Met::NONE,
             seen: SeenFromPoint::NONE,
             crossings: [Crossings::NONE; GROUPS],
@@ -97,7 +99,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         to: &mut impl Deliver<Q>,
     ) -> Use {
         let Packets { groups, queries, room } = self;
-        let Room { stack, points, met, seen, crossings } = &mut **room;
+        let Room { stack, points, relative, met, seen, crossings } = &mut **room;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         let mut rays = Rays { object, rays, queries, met, asked: 0, alive: all };
@@ -138,14 +140,14 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 Some(Child::Indexed(line)) => {
                     let mut room = None;
                     let leaf = Leaf { block: object.indexed(line, &mut room), code };
-                    if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
+                    if rays.enter_leaf(s, hull, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
                 }
                 Some(Child::Raw(line)) => {
                     let mut room = None;
                     let leaf = Leaf { block: object.raw(line, &mut room), code };
-                    if rays.enter_leaf(s, hull, groups, points, &leaf, mask) && !Q::ANY {
+                    if rays.enter_leaf(s, hull, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
                 }
@@ -184,7 +186,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
             }
         }
-        finish(s, groups, (seen, crossings), &mut rays, all, to);
+        finish::<S, H, Q>(s, groups, (seen, crossings), &mut rays, all, to);
         let steps = u64::from(steps);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
@@ -204,8 +206,7 @@ fn meeting<S: Simd, H: Hull<S>>(
     let mut meets = 0;
     for (i, group) in groups.iter().enumerate() {
         if rays >> (i * LANES) & 0xffff != 0 {
-            let bits =
-                if H::MIXED { group.meets::<true>(s, corners) } else { group.meets::<false>(s, corners) };
+            let bits = group.meets::<H>(s, corners);
             meets |= u64::from(bits) << (i * LANES);
         }
     }
@@ -214,7 +215,7 @@ fn meeting<S: Simd, H: Hull<S>>(
 
 /// Computes what is still to be computed, and hands on what was found.
 #[inline(always)]
-fn finish<S: Simd, Q: Query>(
+fn finish<S: Simd, H: Hull<S>, Q: Query>(
     s: S,
     groups: &[Group<S>],
     (seen, crossings): (&mut SeenFromPoint, &mut [Crossings; GROUPS]),
@@ -235,7 +236,7 @@ fn finish<S: Simd, Q: Query>(
     // First all, then what comes of them: so the divisions of one group overlap with the next.
     let mut looks = Looks { origin: rays.rays[0].origin, ids: rays.object.triangle_ids, met: rays.met, seen };
     for (group, crossings) in groups.iter().zip(&mut *crossings) {
-        group.cross(s, &mut looks, crossings);
+        group.cross::<H>(s, &mut looks, crossings);
     }
     for (i, (group, crossings)) in groups.iter().zip(crossings.iter()).enumerate() {
         let asked = (rays.asked >> (i * LANES)) as u32 & 0xffff;

@@ -32,11 +32,17 @@ impl<S: Simd> Projection<S> {
         [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
     }
 
-    /// The same of a point relative to the one at which the rays start.
+    /// For points relative to the one at which the rays start: with slopes that count on coordinates as they are.
+    #[inline(always)]
+    pub(crate) fn relative(mut self, s: S) -> Self {
+        self.shear = [s.mul(self.shear[0], self.forward), s.mul(self.shear[1], self.forward)];
+        self
+    }
+
+    /// As [`Self::of`], of such a point. (The depth apart: for most triangles nobody asks.)
     #[inline(always)]
     pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        let depth = s.mul(z, self.forward);
-        [s.fnma(self.shear[0], depth, x), s.fnma(self.shear[1], depth, y), depth]
+        [s.fnma(self.shear[0], z, x), s.fnma(self.shear[1], z, y), s.mul(z, self.forward)]
     }
 }
 

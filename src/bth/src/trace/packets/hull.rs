@@ -21,6 +21,11 @@ pub(crate) trait Hull<S: Simd> {
     /// For sixteen points, given as rows of x, y and z, the sides on which they lie outside, a bit each. A
     /// triangle whose corners all have a bit in common is missed by all rays.
     fn sides(&self, s: S, rows: [S::F; 3]) -> S::U;
+    /// The axis along which all rays go, as the sheared coordinates of [`Self::spread`] count on it.
+    fn axis(&self) -> usize;
+    /// Of sixteen points relative to where the rays start, given as rows of x, y and z: bounds of |x| and |y| as any ray sees them,
+    /// and |depth|.
+    fn spread(&self, s: S, rows: [S::F; 3]) -> [S::F; 2];
     /// The corners of a child's box, as [`Group::meets`] wants them.
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
 }
@@ -195,6 +200,27 @@ impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
     }
 
     #[inline(always)]
+    fn axis(&self) -> usize {
+        self.axis[2]
+    }
+
+    /// Coordinates sheared by the middle of the slopes' interval, and half its width times the depth. 2^-20 of the depth, and of the
+    /// sum, is more than the roundings here and in the rays' own slopes.
+    #[inline(always)]
+    fn spread(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
+        const UP: f32 = 1.0 / (1 << 20) as f32;
+        let depth = rows[self.axis[2]];
+        let far = s.abs(depth);
+        let mut greatest = s.splat(0.0);
+        for j in 0..2 {
+            let middle = s.abs(s.fnma(self.shear[j], depth, rows[self.axis[j]]));
+            let width = s.add(self.shear_width[j], s.splat(UP));
+            greatest = s.max(s.fma(far, width, middle), greatest);
+        }
+        [s.mul(greatest, s.splat(1.0 + UP)), far]
+    }
+
+    #[inline(always)]
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2] {
         let mut out = [[0.0; 3]; 2];
         for k in 0..3 {
@@ -253,6 +279,16 @@ impl<S: Simd> Hull<S> for SegmentBox<S> {
             out = s.or_u(out, s.select_u(below, s.splat_u(2 << (2 * k)), s.splat_u(0)));
         }
         out
+    }
+
+    #[inline(always)]
+    fn axis(&self) -> usize {
+        0
+    }
+
+    #[inline(always)]
+    fn spread(&self, s: S, _: [S::F; 3]) -> [S::F; 2] {
+        [s.splat(f32::MAX), s.splat(f32::MAX)]
     }
 
     #[inline(always)]

@@ -3,7 +3,7 @@
 //! Points are projected once for a group of sixteen rays. Most triangles are left out by the error bound of the whole
 //! leaf, which is that of [`crate::trace::sight`] for the greatest corner of all; only for the others is it worked out.
 
-use super::group::Group;
+use super::group::{Group, Projection};
 use super::hull::Hull;
 use super::met::{APART, Met};
 use crate::layout::{IndexedLeaf, NONE, RawLeaf, WIDTH};
@@ -64,10 +64,53 @@ impl Relative {
     fn row(&self, axis: usize) -> &[f32; POINTS] {
         self.0[axis].as_flattened().first_chunk().expect("as many")
     }
+
+    /// Bounds of the size and the depth of these points, a bit each, as any ray sees them.
+    #[inline(always)]
+    fn spread<S: Simd, H: Hull<S>>(&self, s: S, hull: &H, parts: usize, used: u64) -> [f32; 2] {
+        let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
+        for part in 0..parts {
+            let m = s.mask((used >> (part * LANES)) as u32 & 0xffff);
+            let [x, y, z] = &self.0;
+            let [own, far] = hull.spread(s, [s.load(&x[part]), s.load(&y[part]), s.load(&z[part])]);
+            size = s.select(m, s.max(own, size), size);
+            depth = s.select(m, s.max(far, depth), depth);
+        }
+        let zero = s.splat(0.0);
+        [-s.least(s.sub(zero, size)), -s.least(s.sub(zero, depth))]
+    }
+}
+
+/// Where the corners of triangles come from, as sixteen rays see them.
+trait Sightings<S: Simd> {
+    fn corner(&self, s: S, point: usize) -> [S::F; 3];
+}
+
+impl<S: Simd> Sightings<S> for Points {
+    #[inline(always)]
+    fn corner(&self, s: S, point: usize) -> [S::F; 3] {
+        self.get(s, point)
+    }
+}
+
+/// Projected where they are asked for: with origins left out of it that takes less than to store and load them.
+struct AtOnce<'a, S: Simd> {
+    rows: [&'a [f32; POINTS]; 3],
+    projection: Projection<S>,
+}
+
+impl<S: Simd> Sightings<S> for AtOnce<'_, S> {
+    #[inline(always)]
+    fn corner(&self, s: S, point: usize) -> [S::F; 3] {
+        let [x, y, z] = self.rows;
+        self.projection.of_relative(s, [s.splat(x[point]), s.splat(y[point]), s.splat(z[point])])
+    }
 }
 
 /// A leaf as points, and triangles between them.
 pub(crate) trait Mesh: Block {
+    /// Rows of sixteen that hold all points.
+    const PARTS: usize;
     /// One coordinate of all points.
     type Row<'a>: Copy
     where
@@ -100,6 +143,7 @@ fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
 const RAW_ROW: usize = 7 * WIDTH;
 
 impl Mesh for IndexedLeaf {
+    const PARTS: usize = 1;
     type Row<'a> = &'a [f32; WIDTH];
     #[inline(always)]
     fn row(&self, axis: usize) -> &[f32; WIDTH] {
@@ -129,6 +173,7 @@ impl Mesh for IndexedLeaf {
 }
 
 impl Mesh for RawLeaf {
+    const PARTS: usize = 3;
     type Row<'a> = &'a [f32; RAW_ROW];
     #[inline(always)]
     fn row(&self, axis: usize) -> &[f32; RAW_ROW] {
@@ -243,18 +288,21 @@ impl<Q: Query> Rays<'_, Q> {
         if triangles == 0 {
             return false;
         }
+        let mut spread = [0.0; 2];
         if H::FROM_POINT {
             leaf.block.relative(s, hull.point(), relative);
+            spread = relative.spread(s, hull, B::PARTS, used);
         }
         let (mut nearer, mut numbers) = (false, [UNKNOWN; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
-                nearer |= self.enter_group::<S, H, B>(
+                nearer |= self.enter_group(
                     s,
+                    hull,
                     group,
                     i,
-                    (points, relative),
+                    (points, relative, spread),
                     leaf,
                     &mut numbers,
                     (triangles, used),
@@ -270,20 +318,29 @@ impl<Q: Query> Rays<'_, Q> {
     fn enter_group<S: Simd, H: Hull<S>, B: Mesh>(
         &mut self,
         s: S,
+        hull: &H,
         group: &mut Group<S>,
         at: usize,
-        (points, relative): (&mut Points, &Relative),
+        (points, relative, spread): (&mut Points, &Relative, [f32; 2]),
         leaf: &Leaf<'_, B>,
         numbers: &mut [u8; WIDTH],
-        (mut triangles, mut used): (u32, u64),
-        mut active: u32,
+        (triangles, mut used): (u32, u64),
+        active: u32,
     ) -> bool {
-        let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
+        let floor = s.splat(f32::MIN_POSITIVE);
         let order = group.common.map_or([0, 1, 2], Common::order);
-        let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
-        let relative = [relative.row(order[0]), relative.row(order[1]), relative.row(order[2])];
         // Copies, which stay in registers where the group itself would be read for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
+        let projection = if H::FROM_POINT { projection.relative(s) } else { projection };
+        let relative = [relative.row(order[0]), relative.row(order[1]), relative.row(order[2])];
+        if H::FROM_POINT && group.common.is_some_and(|common| common.0 == hull.axis()) {
+            let [size, depth] = spread;
+            let error = sight::error(s, s.splat(size + size), s.splat(depth), floor);
+            let corners = AtOnce { rows: relative, projection };
+            return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
+        }
+        let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
+        let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
         while used != 0 {
             let i = used.trailing_zeros() as usize % POINTS;
             used &= used - 1;
@@ -297,16 +354,34 @@ impl<Q: Query> Rays<'_, Q> {
                 if H::FROM_POINT { projection.of_relative(s, point) } else { projection.of(s, point) };
             points.put(s, i, greatest.including(s, point));
         }
-        let floor = s.splat(f32::MIN_POSITIVE);
         let size = s.add(greatest.coordinate, greatest.coordinate);
         let error = sight::error(s, size, greatest.depth, floor);
+        self.test(s, group, at, &*points, error, leaf, numbers, triangles, active)
+    }
+
+    /// Tests triangles, a bit each, for rays of a group; `error` bounds those of weights for all of them.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments)]
+    fn test<S: Simd, B: Mesh>(
+        &mut self,
+        s: S,
+        group: &mut Group<S>,
+        at: usize,
+        corners: &impl Sightings<S>,
+        error: S::F,
+        leaf: &Leaf<'_, B>,
+        numbers: &mut [u8; WIDTH],
+        mut triangles: u32,
+        mut active: u32,
+    ) -> bool {
+        let floor = s.splat(f32::MIN_POSITIVE);
         let minus_error = s.sub(s.splat(0.0), error);
         let mut nearer = false;
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let [a, b, c] = leaf.block.points_of(triangle as usize);
-            let (a, b, c) = (points.get(s, a), points.get(s, b), points.get(s, c));
+            let (a, b, c) = (corners.corner(s, a), corners.corner(s, b), corners.corner(s, c));
             let weight = [sight::cross(s, b, c), sight::cross(s, c, a), sight::cross(s, a, b)];
             let least = s.min(s.min(weight[0], weight[1]), weight[2]);
             let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);

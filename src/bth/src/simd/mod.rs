@@ -31,7 +31,7 @@ pub(crate) trait Kernel {
 }
 
 /// Sixteen lanes. Lane i of a mask is bit i.
-pub(crate) trait Simd: Copy {
+pub(crate) trait Simd: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
     /// u32 lanes.

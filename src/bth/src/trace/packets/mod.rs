@@ -11,7 +11,7 @@ mod tests;
 
 use self::coherence::{Guard, Span, is_same_octant};
 use self::hull::{Beam, Hull, SegmentBox};
-use self::packet::{PACKET, Packets, Room, Use};
+use self::packet::{KeptGroups, PACKET, Packets, Room, Use};
 use crate::layout::NONE;
 use crate::object::ObjectView;
 use crate::rays::Ray;
@@ -37,6 +37,7 @@ pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 10, short: 15 };
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]
 pub(crate) struct PacketScratch {
+    groups: KeptGroups,
     room: Room,
     /// Places of the rays that are left.
     pub(crate) rest: Vec<u32>,
@@ -71,12 +72,12 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         return count;
     }
     let frame = Frame::new(object.header);
-    let PacketScratch { room, rest } = scratch;
+    let PacketScratch { groups, room, rest } = scratch;
     rest.clear();
     let mut runs = Runs { frame: &frame, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };
     // The first apart, so that the packets are made where they stay and only if there are any.
     let Some(mut run) = runs.next::<S, Q>(s) else { return count };
-    let mut packets = Packets::<S, Q>::new(s, object, room, &rays[0]);
+    let mut packets = Packets::<S, Q>::new(object, groups.of(s), room, &rays[0]);
     loop {
         let (at, own) = (run.at, run.rays);
         // So that the next rays are there when this packet is done.

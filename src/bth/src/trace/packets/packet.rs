@@ -18,6 +18,7 @@ use crate::trace::bvh::flight::KEY_SLACK;
 use crate::trace::bvh::nodes::{Wide, prefetch};
 use crate::trace::crossings::{Crossings, SeenFromPoint};
 use crate::trace::query::{Deliver, Query};
+use std::any::Any;
 
 /// Groups of sixteen rays in a packet.
 const GROUPS: usize = 4;
@@ -60,9 +61,23 @@ impl Default for Room {
     }
 }
 
+/// Groups of the instruction set that was last asked for: to clear them for every batch would take as long as to trace a few rays.
+#[derive(Debug, Default)]
+pub(crate) struct KeptGroups(Option<Box<dyn Any>>);
+
+impl KeptGroups {
+    #[inline(always)]
+    pub(crate) fn of<S: Simd>(&mut self, s: S) -> &mut [Group<S>; GROUPS] {
+        if !self.0.as_ref().is_some_and(|groups| groups.is::<[Group<S>; GROUPS]>()) {
+            self.0 = Some(Box::new([Group::vacant(s); GROUPS]));
+        }
+        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("just made")
+    }
+}
+
 /// The rays of a packet, prepared, and what is decided of them.
 pub(crate) struct Packets<'a, S: Simd, Q> {
-    pub(crate) groups: [Group<S>; GROUPS],
+    pub(crate) groups: &'a mut [Group<S>; GROUPS],
     queries: [Q; PACKET],
     pub(crate) room: &'a mut Room,
 }
@@ -78,13 +93,18 @@ pub(crate) enum Use {
 
 impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
     #[inline(always)]
-    pub(crate) fn new(s: S, object: &ObjectView<'_>, room: &'a mut Room, ray: &Ray) -> Self {
+    pub(crate) fn new(
+        object: &ObjectView<'_>,
+        groups: &'a mut [Group<S>; GROUPS],
+        room: &'a mut Room,
+        ray: &Ray,
+    ) -> Self {
         // At every level all children but the one entered wait.
         let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
         if room.stack.len() < entries {
             room.stack.resize(entries, Entry::default());
         }
-        Packets { groups: [Group::vacant(s); GROUPS], queries: [Q::new(ray); PACKET], room }
+        Packets { groups, queries: [Q::new(ray); PACKET], room }
     }
 
     /// Traces rays for which the groups have been prepared, and hands on the place and query of those that hit

@@ -7,6 +7,7 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Reader, settle};
 use crate::trace::crossings::{Crossings, Pairs};
+use crate::trace::prepare::fields;
 use crate::trace::query::{Deliver, Query};
 use crate::trace::sight::Block;
 
@@ -14,7 +15,7 @@ use crate::trace::sight::Block;
 pub(crate) struct Landing {
     count: usize,
     /// Places in the batch.
-    ray: [usize; LANES],
+    ray: [u32; LANES],
     candidate: [Candidate; LANES],
     /// In leaf order.
     place: [u32; LANES],
@@ -67,15 +68,10 @@ impl Landing {
             return flight.hand_on(to);
         }
         let lane = self.count % LANES;
-        let ray = &rays[at];
-        for k in 0..3 {
-            self.pairs.origin[k][lane] = ray.origin[k];
-            self.pairs.direction[k][lane] = ray.direction[k];
-        }
         let note = Note { pairs: &mut self.pairs, lane };
         let Some((place, ())) = candidate.read(object, note) else { return };
         self.place[lane] = place;
-        self.ray[lane] = at;
+        self.ray[lane] = at as u32;
         self.candidate[lane] = candidate;
         self.count = lane + 1;
         if self.count == LANES {
@@ -92,24 +88,34 @@ impl Landing {
         rays: &[Ray],
         to: &mut impl Deliver<Q>,
     ) {
+        if self.count == 0 {
+            return;
+        }
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
+        // Read here, as a block: word by word, as they land, would take twice as long.
+        let [ox, oy, oz, _, dx, dy, dz, _] = fields(s, s.mask(all), rays, s.load_u(&self.ray));
+        let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        for k in 0..3 {
+            s.store(origin[k], &mut self.pairs.origin[k]);
+            s.store(direction[k], &mut self.pairs.direction[k]);
+        }
         let crossings = &mut self.crossings;
         crossings.compute(s, all, &self.pairs);
         for lane in 0..LANES {
             if crossings.certain >> lane & 1 != 0 {
                 let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
-                to.hit(self.ray[lane], object.triangle_ids[self.place[lane] as usize], t, u, v);
+                to.hit(self.ray[lane] as usize, object.triangle_ids[self.place[lane] as usize], t, u, v);
             }
         }
         let mut rest = all & !crossings.certain;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;
-            let ray = &rays[self.ray[lane]];
+            let ray = &rays[self.ray[lane] as usize];
             let mut query = Q::new(ray);
             settle(object, ray, [self.candidate[lane], Candidate::NONE], &mut query);
-            to.query(self.ray[lane], &query);
+            to.query(self.ray[lane] as usize, &query);
         }
     }
 }

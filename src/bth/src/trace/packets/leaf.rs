@@ -1,209 +1,25 @@
 //! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time.
 //!
-//! Points are projected once for a group of sixteen rays. Most triangles are left out by the error bound of the whole
-//! leaf, which is that of [`crate::trace::sight`] for the greatest corner of all; only for the others is it worked out.
+//! Points are projected once for a group of sixteen rays or, where all rays of the packet start at one point, for each triangle that
+//! is tested. Most triangles are left out by the error bound of the whole leaf, which is that of [`crate::trace::sight`] for the
+//! greatest corner of all; only for the others is it worked out.
 
-use super::group::{Group, Projection};
+use super::group::Group;
 use super::hull::Hull;
+use super::mesh::Mesh;
 use super::met::{APART, Met};
-use crate::layout::{IndexedLeaf, NONE, RawLeaf, WIDTH};
+use super::points::{AtOnce, Greatest, POINTS, Points, Relative, Sightings};
+use crate::layout::{NONE, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Settled, settle};
-use crate::trace::crossings::Many;
 use crate::trace::prepare::{Axes, Common};
 use crate::trace::query::Query;
-use crate::trace::sight::{self, Block};
-
-/// Points of a leaf at most.
-const POINTS: usize = 3 * WIDTH;
+use crate::trace::sight;
 
 /// In place of the number of a triangle among those that the packet keeps: it has not been asked for.
 const UNKNOWN: u8 = u8::MAX;
-
-/// Projected points of a leaf, x, y and depth of each as sixteen rays see it.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(crate) struct Points([[Many; 3]; POINTS]);
-
-impl Points {
-    pub(crate) const NONE: Points = Points([[[0.0; LANES]; 3]; POINTS]);
-
-    #[inline(always)]
-    fn put<S: Simd>(&mut self, s: S, i: usize, point: [S::F; 3]) {
-        for k in 0..3 {
-            s.store(point[k], &mut self.0[i][k]);
-        }
-    }
-
-    #[inline(always)]
-    fn get<S: Simd>(&self, s: S, i: usize) -> [S::F; 3] {
-        let [x, y, depth] = &self.0[i];
-        [s.load(x), s.load(y), s.load(depth)]
-    }
-}
-
-/// Points of a leaf relative to the point at which all rays start, a row for each axis.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(crate) struct Relative(pub(crate) [[Many; 3]; 3]);
-
-impl Relative {
-    pub(crate) const NONE: Relative = Relative([[[0.0; LANES]; 3]; 3]);
-
-    /// Sixteen of them.
-    #[inline(always)]
-    fn put<S: Simd>(&mut self, s: S, part: usize, rows: [S::F; 3], from: [f32; 3]) {
-        for k in 0..3 {
-            s.store(s.sub(rows[k], s.splat(from[k])), &mut self.0[k][part]);
-        }
-    }
-
-    #[inline(always)]
-    fn row(&self, axis: usize) -> &[f32; POINTS] {
-        self.0[axis].as_flattened().first_chunk().expect("as many")
-    }
-
-    /// Bounds of the size and the depth of these points, a bit each, as any ray sees them.
-    #[inline(always)]
-    fn spread<S: Simd, H: Hull<S>>(&self, s: S, hull: &H, parts: usize, used: u64) -> [f32; 2] {
-        let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
-        for part in 0..parts {
-            let m = s.mask((used >> (part * LANES)) as u32 & 0xffff);
-            let [x, y, z] = &self.0;
-            let [own, far] = hull.spread(s, [s.load(&x[part]), s.load(&y[part]), s.load(&z[part])]);
-            size = s.select(m, s.max(own, size), size);
-            depth = s.select(m, s.max(far, depth), depth);
-        }
-        let zero = s.splat(0.0);
-        [-s.least(s.sub(zero, size)), -s.least(s.sub(zero, depth))]
-    }
-}
-
-/// Where the corners of triangles come from, as sixteen rays see them.
-trait Sightings<S: Simd> {
-    fn corner(&self, s: S, point: usize) -> [S::F; 3];
-}
-
-impl<S: Simd> Sightings<S> for Points {
-    #[inline(always)]
-    fn corner(&self, s: S, point: usize) -> [S::F; 3] {
-        self.get(s, point)
-    }
-}
-
-/// Projected where they are asked for: with origins left out of it that takes less than to store and load them.
-struct AtOnce<'a, S: Simd> {
-    rows: [&'a [f32; POINTS]; 3],
-    projection: Projection<S>,
-}
-
-impl<S: Simd> Sightings<S> for AtOnce<'_, S> {
-    #[inline(always)]
-    fn corner(&self, s: S, point: usize) -> [S::F; 3] {
-        let [x, y, z] = self.rows;
-        self.projection.of_relative(s, [s.splat(x[point]), s.splat(y[point]), s.splat(z[point])])
-    }
-}
-
-/// A leaf as points, and triangles between them.
-pub(crate) trait Mesh: Block {
-    /// Rows of sixteen that hold all points.
-    const PARTS: usize;
-    /// One coordinate of all points.
-    type Row<'a>: Copy
-    where
-        Self: 'a;
-    fn row(&self, axis: usize) -> Self::Row<'_>;
-    /// That of a point, whose number is below [`POINTS`].
-    fn at(row: Self::Row<'_>, point: usize) -> f32;
-    /// The points of a triangle, below [`POINTS`].
-    fn points_of(&self, triangle: usize) -> [usize; 3];
-    /// All points, relative to one.
-    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative);
-    /// The triangles that have no corner inside, and none on another side of the hull than the others: missed by
-    /// all rays.
-    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32;
-}
-
-/// Lanes that have a bit in common.
-#[inline(always)]
-fn common<S: Simd>(s: S, [a, b, c]: [S::U; 3]) -> u32 {
-    s.mask_bits(s.lt_u(s.splat_u(0), s.and_u(a, s.and_u(b, c))))
-}
-
-/// Three rows of lanes.
-#[inline(always)]
-fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
-    [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
-}
-
-/// From the first corner's row of an axis to the end of the last one's.
-const RAW_ROW: usize = 7 * WIDTH;
-
-impl Mesh for IndexedLeaf {
-    const PARTS: usize = 1;
-    type Row<'a> = &'a [f32; WIDTH];
-    #[inline(always)]
-    fn row(&self, axis: usize) -> &[f32; WIDTH] {
-        &self.vertex[axis]
-    }
-    #[inline(always)]
-    fn at(row: &[f32; WIDTH], point: usize) -> f32 {
-        row[point % WIDTH]
-    }
-    #[inline(always)]
-    fn points_of(&self, triangle: usize) -> [usize; 3] {
-        let at = triangle % WIDTH;
-        let [a, b, c] = &self.corner;
-        [usize::from(a[at]) % WIDTH, usize::from(b[at]) % WIDTH, usize::from(c[at]) % WIDTH]
-    }
-    #[inline(always)]
-    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative) {
-        to.put(s, 0, load(s, &self.vertex), from);
-    }
-    #[inline(always)]
-    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
-        let sides = hull.sides(s, load(s, &self.vertex));
-        let [a, b, c] = &self.corner;
-        let of = [s.load_bytes(a), s.load_bytes(b), s.load_bytes(c)];
-        common(s, [s.lookup_u(sides, of[0]), s.lookup_u(sides, of[1]), s.lookup_u(sides, of[2])])
-    }
-}
-
-impl Mesh for RawLeaf {
-    const PARTS: usize = 3;
-    type Row<'a> = &'a [f32; RAW_ROW];
-    #[inline(always)]
-    fn row(&self, axis: usize) -> &[f32; RAW_ROW] {
-        self.corner.as_flattened().as_flattened()[axis * WIDTH..]
-            .first_chunk()
-            .expect("up to the last corner")
-    }
-    #[inline(always)]
-    fn at(row: &[f32; RAW_ROW], point: usize) -> f32 {
-        // Rows of other axes lie between those of two corners.
-        row[(point + point / WIDTH * (2 * WIDTH)).min(RAW_ROW - 1)]
-    }
-    #[inline(always)]
-    fn points_of(&self, triangle: usize) -> [usize; 3] {
-        let at = triangle % WIDTH;
-        [at, WIDTH + at, 2 * WIDTH + at]
-    }
-    #[inline(always)]
-    fn relative<S: Simd>(&self, s: S, from: [f32; 3], to: &mut Relative) {
-        for c in 0..3 {
-            to.put(s, c, load(s, &self.corner[c]), from);
-        }
-    }
-    #[inline(always)]
-    fn outside<S: Simd, H: Hull<S>>(&self, s: S, hull: &H) -> u32 {
-        let [a, b, c] = &self.corner;
-        let sides = [hull.sides(s, load(s, a)), hull.sides(s, load(s, b)), hull.sides(s, load(s, c))];
-        common(s, sides)
-    }
-}
 
 /// The rays of a packet, and what has been found for them.
 pub(crate) struct Rays<'a, Q> {
@@ -215,22 +31,6 @@ pub(crate) struct Rays<'a, Q> {
     pub(crate) met: &'a mut Met,
     /// Those that are not done.
     pub(crate) alive: u64,
-}
-
-/// Of projected points: |x| or |y|, and |depth|.
-struct Greatest<S: Simd> {
-    coordinate: S::F,
-    depth: S::F,
-}
-
-impl<S: Simd> Greatest<S> {
-    /// Takes in a point, and hands it back.
-    #[inline(always)]
-    fn including(&mut self, s: S, point: [S::F; 3]) -> [S::F; 3] {
-        self.coordinate = s.max_abs(s.max_abs(point[0], self.coordinate), point[1]);
-        self.depth = s.max_abs(point[2], self.depth);
-        point
-    }
 }
 
 /// What groups keep of triangles that wait, lane by lane.

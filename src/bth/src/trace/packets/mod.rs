@@ -4,8 +4,10 @@ pub(crate) mod coherence;
 pub(crate) mod group;
 pub(crate) mod hull;
 pub(crate) mod leaf;
+pub(crate) mod mesh;
 pub(crate) mod met;
 pub(crate) mod packet;
+pub(crate) mod points;
 #[cfg(test)]
 mod tests;
 

@@ -7,8 +7,9 @@
 
 use super::group::Group;
 use super::hull::Hull;
-use super::leaf::{Leaf, Points, Rays, Relative};
+use super::leaf::{Leaf, Rays};
 use super::met::{Looks, Met};
+use super::points::{Points, Relative};
 use crate::layout::{Child, NONE, WIDTH, WideNode};
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;

@@ -116,11 +116,17 @@ impl Span {
         same && spread <= SPREAD * self.main_axis().1
     }
 
-    /// Whether the rays start at one point.
+    /// Whether the rays start at one point, and all go farthest along the main axis.
     #[inline(always)]
     pub(crate) fn is_from_point(&self) -> bool {
         let [[x, to_x], [y, to_y], [z, to_z]] = self.origin;
-        x == to_x && y == to_y && z == to_z
+        let (main, least) = self.main_axis();
+        let mut same = x == to_x && y == to_y && z == to_z;
+        for k in 0..3 {
+            let [from, to] = self.direction[k];
+            same &= k == main || from.abs().max(to.abs()) < least;
+        }
+        same
     }
 
     /// Greatest coordinate of an origin.

@@ -133,7 +133,8 @@ impl<Q: Query> Rays<'_, Q> {
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
         let projection = if H::FROM_POINT { projection.relative(s) } else { projection };
         let relative = [relative.row(order[0]), relative.row(order[1]), relative.row(order[2])];
-        if H::FROM_POINT && group.common.is_some_and(|common| common.0 == hull.axis()) {
+        if H::FROM_POINT {
+            debug_assert_eq!(group.common, Some(Common(hull.axis())), "see `Span::is_from_point`");
             let [size, depth] = spread;
             let error = sight::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = AtOnce { rows: relative, projection };
@@ -144,14 +145,9 @@ impl<Q: Query> Rays<'_, Q> {
         while used != 0 {
             let i = used.trailing_zeros() as usize % POINTS;
             used &= used - 1;
-            let point = if H::FROM_POINT {
-                [s.splat(relative[0][i]), s.splat(relative[1][i]), s.splat(relative[2][i])]
-            } else {
-                [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))]
-            };
+            let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
             let point = if is_common { point } else { mixed.turn(s, point) };
-            let point =
-                if H::FROM_POINT { projection.of_relative(s, point) } else { projection.of(s, point) };
+            let point = projection.of(s, point);
             points.put(s, i, greatest.including(s, point));
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);

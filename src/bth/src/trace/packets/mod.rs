@@ -98,6 +98,8 @@ pub(crate) fn trace<S: Simd, Q: Query>(
                 };
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
+            // Others never are; so this need not be compiled for them.
+            Kind::Short(_) if !Q::ANY => (Use::Refused, &mut runs.short, least.short, &mut count.short),
             Kind::Short(bounds) => {
                 let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &frame, &mut packets, own) {
                     packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to)

@@ -157,9 +157,10 @@ impl<S: Simd> Group<S> {
         }
         if !H::MIXED {
             self.direction = [field[4], field[5], field[6]];
-            self.nearest = s.splat(f32::INFINITY);
-            self.waiting = s.splat_u(NONE);
         }
+        // Groups are kept from batch to batch: what an earlier one found, of another object maybe, must not be taken up.
+        self.nearest = s.splat(f32::INFINITY);
+        self.waiting = s.splat_u(NONE);
         // Each taken over where it is made: merged first, they would all pass through memory once more.
         match self.common {
             Some(common) => self.take::<H>(s, prepare::lanes(s, frame, field, &common)),

@@ -130,6 +130,16 @@ impl Surface {
         Surface { header, lines, ids, points }
     }
 
+    /// One of its indexed leaves as a whole object.
+    fn one_leaf(&self) -> Surface {
+        let line = NODE_LINES * (1 + WIDTH) + RAW_LINES;
+        let lines = self.lines[line..line + INDEXED_LINES].to_vec();
+        let points = self.points[15..30].to_vec();
+        let [lower, upper] = bounds(&points);
+        let header = Object { lower, upper, root: Child::Indexed(0).code(), depth: 0, ..self.header };
+        Surface { header, lines, ids: self.ids.clone(), points }
+    }
+
     fn view(&self) -> ObjectView<'_> {
         ObjectView {
             header: &self.header,
@@ -176,10 +186,23 @@ fn packed<Q: Query>(
     answers: &mut [Q::Answer],
 ) -> (PacketCount, Vec<u32>) {
     let mut scratch = PacketScratch::default();
-    let sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
-    let count = isa.run(Packed { object, rays, scratch: &mut scratch, least, sink });
-    assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
+    let count = packed_in::<Q>(isa, &mut scratch, object, rays, least, answers);
     (count, scratch.rest)
+}
+
+/// In memory that other batches may have used.
+fn packed_in<Q: Query>(
+    isa: Isa,
+    scratch: &mut PacketScratch,
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    least: LeastUse,
+    answers: &mut [Q::Answer],
+) -> PacketCount {
+    let sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
+    let count = isa.run(Packed { object, rays, scratch, least, sink });
+    assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
+    count
 }
 
 fn bits(hit: &Hit) -> [u32; 4] {
@@ -374,5 +397,32 @@ fn packets_that_serve_few_of_their_rays_make_way() {
     }
     for (count, _) in check(&surface, &rays, LEAST_USE) {
         assert!(count.poor > 0 && count.rays < rays.len() / 2, "{count:?}");
+    }
+}
+
+/// What packets keep between batches says nothing about the next object.
+#[test]
+fn nothing_of_a_batch_is_left_for_the_next() {
+    let surface = Surface::new(1.0, 0.0);
+    let leaf = surface.one_leaf();
+    let mut rng = Rng(13);
+    let middle = leaf.points[7];
+    // Through a vertex, so that hits must be decided alone.
+    let rays: Vec<Ray> = (0..128)
+        .map(|_| {
+            let away = [(); 3].map(|()| (rng.below(64) as f32 - 31.5) / 128.0);
+            let origin = [0, 1, 2].map(|k| middle[k] + away[k]);
+            Ray { origin, tmin: 0.0, direction: away.map(|x| -2.0 * x), tmax: 1.0 }
+        })
+        .collect();
+    let before = bundles(&surface, 1.0, false, 14);
+    for isa in Isa::ALL {
+        let mut scratch = PacketScratch::default();
+        let mut hits = vec![Hit::MISS; before.len()];
+        packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, &mut hits);
+        assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 500);
+        let mut found = vec![false; rays.len()];
+        let count = packed_in::<Any>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, &mut found);
+        assert!(count.short == 2 && found.iter().all(|&found| found), "{isa}: {count:?}");
     }
 }

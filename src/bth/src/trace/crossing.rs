@@ -92,10 +92,15 @@ fn vector_product(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The greatest of the sums in all orders: a model and rays that are turned by quarters give the same bits, and of equal hits the
-/// same is nearest.
 #[inline(always)]
 fn scalar_product(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The greatest of the sums in all orders. t is made of these: then a model and rays that are turned by quarters give the same bits
+/// of it, and of two hits that are equal the same is the nearest. (u and v decide nothing.)
+#[inline(always)]
+fn unordered_scalar_product(a: [f64; 3], b: [f64; 3]) -> f64 {
     let [x, y, z] = [a[0] * b[0], a[1] * b[1], a[2] * b[2]];
     greater(greater(x + y + z, y + z + x), z + x + y)
 }
@@ -127,7 +132,7 @@ impl Seen {
     fn with_errors(origin: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> (Seen, [f64; 2]) {
         let (to, second, third) = (minus(a, origin), minus(b, a), minus(c, a));
         let whole = vector_product(second, third);
-        let volume = scalar_product(to, whole);
+        let volume = unordered_scalar_product(to, whole);
         let (far, edge) = (size(to), greater(size(second), size(third)));
         let error = [WEIGHT_ERROR * (edge * (edge + far)), WEIGHT_ERROR * (far * (edge * edge))];
         const AS_WELL: f64 = 1.0 / RATIO_ERROR;
@@ -159,7 +164,7 @@ impl Weighed {
     /// Of a direction of this size.
     #[inline(always)]
     pub(crate) fn new(seen: &Seen, direction: [f64; 3], size: f64) -> Weighed {
-        let whole = scalar_product(direction, seen.whole);
+        let whole = unordered_scalar_product(direction, seen.whole);
         let weight = [scalar_product(direction, seen.second), scalar_product(direction, seen.third), whole];
         let share = 1.0 / whole;
         Weighed { weight, share, t: seen.volume * share, is_good: seen.least * size < whole.abs() }

@@ -13,21 +13,52 @@ pub(crate) trait Hull<S: Simd> {
     const MIXED: bool;
     /// Whether they start at one point, and corners of boxes are given relative to that.
     const FROM_POINT: bool;
-    /// That point.
-    fn point(&self) -> [f32; 3];
+    /// How they look from there, if they do.
+    fn view(&self) -> Option<&View>;
     /// The children of a node that it may meet before a depth, a bit each, and lower bounds of the depth at
     /// which any of the rays enters them.
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
     /// For sixteen points, given as rows of x, y and z, the sides on which they lie outside, a bit each. A
     /// triangle whose corners all have a bit in common is missed by all rays.
     fn sides(&self, s: S, rows: [S::F; 3]) -> S::U;
-    /// The axis along which all rays go, as the sheared coordinates of [`Self::spread`] count on it.
-    fn axis(&self) -> usize;
-    /// Of sixteen points relative to where the rays start, given as rows of x, y and z: bounds of |x| and |y| as any ray sees them,
-    /// and |depth|.
-    fn spread(&self, s: S, rows: [S::F; 3]) -> [S::F; 2];
     /// The corners of a child's box, as [`Group::meets`] wants them.
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
+}
+
+/// What coherent rays have in common, seen from where they start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    /// Where they start, or the middle of that.
+    pub(crate) origin: [f32; 3],
+    /// Two axes, and the one along which they go.
+    axis: [usize; 3],
+    /// The middle of the interval of their slopes along those two, and half its width.
+    shear: [f32; 2],
+    shear_width: [f32; 2],
+}
+
+impl View {
+    /// The axis along which the rays go.
+    #[inline(always)]
+    pub(crate) fn axis(&self) -> usize {
+        self.axis[2]
+    }
+
+    /// Of sixteen points relative to the origin, given as rows of x, y and z: bounds of |x| and |y| as any ray sees them, and
+    /// |depth|. Coordinates sheared by the middle of the slopes' interval, and half its width times the depth; 2^-20 of the
+    /// depth, and of the sum, is more than the roundings here and in the rays' own slopes.
+    #[inline(always)]
+    pub(crate) fn spread<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
+        const UP: f32 = 1.0 / (1 << 20) as f32;
+        let depth = rows[self.axis[2]];
+        let far = s.abs(depth);
+        let mut greatest = s.splat(0.0);
+        for j in 0..2 {
+            let middle = s.abs(s.fnma(s.splat(self.shear[j]), depth, rows[self.axis[j]]));
+            greatest = s.max(s.fma(far, s.splat(self.shear_width[j] + UP), middle), greatest);
+        }
+        [s.mul(greatest, s.splat(1.0 + UP)), far]
+    }
 }
 
 /// Rays into one octant: interval arithmetic over their origins and directions (Wald, Boulos and Shirley, "Ray Tracing
@@ -46,27 +77,18 @@ pub(crate) trait Hull<S: Simd> {
 /// Where all rays start at one point (`POINT`), the intervals of origins, widened by their pads, serve for the single rays, too
 /// ([`Group::meets`]), and those of a are zero.
 pub(crate) struct Beam<S: Simd, const POINT: bool> {
-    /// The middle of the origins.
-    start: [f32; 3],
-    /// As numbers.
-    near_end: [f32; 3],
-    far_end: [f32; 3],
+    view: View,
     /// The end of the origins' interval that is nearest to the planes that are met first, and that nearest to the others.
-    near_origin: [S::F; 3],
-    far_origin: [S::F; 3],
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
     /// Least and greatest reciprocal.
     reciprocal: [[S::F; 2]; 3],
     /// Row of the ends that are met first.
     near: [u32; 3],
     first: S::F,
-    axis: [usize; 3],
-    /// Of the origins.
-    center: [S::F; 3],
-    shear: [S::F; 2],
-    shear_width: [S::F; 2],
     /// What keeps points on the upper side, and on the lower.
-    upper: [S::F; 2],
-    lower: [S::F; 2],
+    upper: [f32; 2],
+    lower: [f32; 2],
 }
 
 impl<S: Simd, const POINT: bool> Beam<S, POINT> {
@@ -118,21 +140,16 @@ impl<S: Simd, const POINT: bool> Beam<S, POINT> {
         s.store(s.least_of_each(ends), &mut least);
         let ends = least;
         let both = |of: usize| [ends[of], -ends[8 + of]];
+        let view = View { origin: center, axis, shear: [0.0; 2], shear_width: [0.0; 2] };
         let mut beam = Beam {
-            start: center,
-            near_end: [0.0; 3],
-            far_end: [0.0; 3],
-            near_origin: [zero; 3],
-            far_origin: [zero; 3],
+            view,
+            near_origin: [0.0; 3],
+            far_origin: [0.0; 3],
             reciprocal: [[zero; 2]; 3],
             near: [0; 3],
             first: s.splat(ends[7]),
-            axis,
-            center: [zero; 3],
-            shear: [zero; 2],
-            shear_width: [zero; 2],
-            upper: [zero; 2],
-            lower: [zero; 2],
+            upper: [0.0; 2],
+            lower: [0.0; 2],
         };
         let pad = 2.0 * PAD as f32 * extent;
         for k in 0..3 {
@@ -140,21 +157,17 @@ impl<S: Simd, const POINT: bool> Beam<S, POINT> {
             beam.reciprocal[k] = [s.splat(least), s.splat(greatest)];
             let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
             let is_negative = span.direction[k][0] < 0.0;
-            let [near, far] = if is_negative { [low, high] } else { [high, low] };
-            (beam.near_end[k], beam.far_end[k]) = (near, far);
-            beam.near_origin[k] = s.splat(near);
-            beam.far_origin[k] = s.splat(far);
+            [beam.near_origin[k], beam.far_origin[k]] = if is_negative { [low, high] } else { [high, low] };
             beam.near[k] = if is_negative { slabs::FAR } else { 0 };
-            beam.center[k] = s.splat(center[k]);
         }
         let pad = 4.0 * PAD as f32 * extent;
         for j in 0..2 {
             let (shear, addend) = (both(3 + j), both(5 + j));
             let middle = 0.5 * (shear[0] + shear[1]);
-            beam.shear[j] = s.splat(middle);
-            beam.shear_width[j] = s.splat((shear[1] - middle).max(middle - shear[0]));
-            beam.upper[j] = s.splat(pad - addend[0]);
-            beam.lower[j] = s.splat(pad + addend[1]);
+            beam.view.shear[j] = middle;
+            beam.view.shear_width[j] = (shear[1] - middle).max(middle - shear[0]);
+            beam.upper[j] = pad - addend[0];
+            beam.lower[j] = pad + addend[1];
         }
         beam
     }
@@ -165,8 +178,8 @@ impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
     const FROM_POINT: bool = POINT;
 
     #[inline(always)]
-    fn point(&self) -> [f32; 3] {
-        self.start
+    fn view(&self) -> Option<&View> {
+        POINT.then_some(&self.view)
     }
 
     #[inline(always)]
@@ -174,9 +187,10 @@ impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
         let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
             let [least, greatest] = self.reciprocal[k];
-            let near = s.sub(s.load(slabs::row(&node.bounds[k], self.near[k])), self.near_origin[k]);
-            let far =
-                s.sub(s.load(slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)), self.far_origin[k]);
+            let near = s.load(slabs::row(&node.bounds[k], self.near[k]));
+            let far = s.load(slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR));
+            let (near, far) =
+                (s.sub(near, s.splat(self.near_origin[k])), s.sub(far, s.splat(self.far_origin[k])));
             enter = s.max(s.min(s.mul(near, least), s.mul(near, greatest)), enter);
             leave = s.min(s.max(s.mul(far, least), s.mul(far, greatest)), leave);
         }
@@ -185,39 +199,20 @@ impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
 
     #[inline(always)]
     fn sides(&self, s: S, rows: [S::F; 3]) -> S::U {
-        let depth = s.sub(rows[self.axis[2]], self.center[self.axis[2]]);
+        let View { origin, axis, shear, shear_width } = &self.view;
+        let depth = s.sub(rows[axis[2]], s.splat(origin[axis[2]]));
         let far = s.abs(depth);
         let mut out = s.splat_u(0);
         for j in 0..2 {
-            let x = s.sub(rows[self.axis[j]], self.center[self.axis[j]]);
-            let x = s.fnma(self.shear[j], depth, x);
-            let above = s.lt(s.fma(far, self.shear_width[j], self.upper[j]), x);
-            let below = s.lt(s.fma(far, self.shear_width[j], s.add(x, self.lower[j])), s.splat(0.0));
+            let x = s.sub(rows[axis[j]], s.splat(origin[axis[j]]));
+            let x = s.fnma(s.splat(shear[j]), depth, x);
+            let width = s.splat(shear_width[j]);
+            let above = s.lt(s.fma(far, width, s.splat(self.upper[j])), x);
+            let below = s.lt(s.fma(far, width, s.add(x, s.splat(self.lower[j]))), s.splat(0.0));
             out = s.or_u(out, s.select_u(above, s.splat_u(1 << (2 * j)), s.splat_u(0)));
             out = s.or_u(out, s.select_u(below, s.splat_u(2 << (2 * j)), s.splat_u(0)));
         }
         out
-    }
-
-    #[inline(always)]
-    fn axis(&self) -> usize {
-        self.axis[2]
-    }
-
-    /// Coordinates sheared by the middle of the slopes' interval, and half its width times the depth. 2^-20 of the depth, and of the
-    /// sum, is more than the roundings here and in the rays' own slopes.
-    #[inline(always)]
-    fn spread(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
-        const UP: f32 = 1.0 / (1 << 20) as f32;
-        let depth = rows[self.axis[2]];
-        let far = s.abs(depth);
-        let mut greatest = s.splat(0.0);
-        for j in 0..2 {
-            let middle = s.abs(s.fnma(self.shear[j], depth, rows[self.axis[j]]));
-            let width = s.add(self.shear_width[j], s.splat(UP));
-            greatest = s.max(s.fma(far, width, middle), greatest);
-        }
-        [s.mul(greatest, s.splat(1.0 + UP)), far]
     }
 
     #[inline(always)]
@@ -227,8 +222,8 @@ impl<S: Simd, const POINT: bool> Hull<S> for Beam<S, POINT> {
             out[0][k] = slabs::row(&node.bounds[k], self.near[k])[slot % WIDTH];
             out[1][k] = slabs::row(&node.bounds[k], self.near[k] ^ slabs::FAR)[slot % WIDTH];
             if POINT {
-                out[0][k] -= self.near_end[k];
-                out[1][k] -= self.far_end[k];
+                out[0][k] -= self.near_origin[k];
+                out[1][k] -= self.far_origin[k];
             }
         }
         out
@@ -256,8 +251,8 @@ impl<S: Simd> Hull<S> for SegmentBox<S> {
     const FROM_POINT: bool = false;
 
     #[inline(always)]
-    fn point(&self) -> [f32; 3] {
-        [0.0; 3]
+    fn view(&self) -> Option<&View> {
+        None
     }
 
     #[inline(always)]
@@ -279,16 +274,6 @@ impl<S: Simd> Hull<S> for SegmentBox<S> {
             out = s.or_u(out, s.select_u(below, s.splat_u(2 << (2 * k)), s.splat_u(0)));
         }
         out
-    }
-
-    #[inline(always)]
-    fn axis(&self) -> usize {
-        0
-    }
-
-    #[inline(always)]
-    fn spread(&self, s: S, _: [S::F; 3]) -> [S::F; 2] {
-        [s.splat(f32::MAX), s.splat(f32::MAX)]
     }
 
     #[inline(always)]

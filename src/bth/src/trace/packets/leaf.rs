@@ -89,9 +89,9 @@ impl<Q: Query> Rays<'_, Q> {
             return false;
         }
         let mut spread = [0.0; 2];
-        if H::FROM_POINT {
-            leaf.block.relative(s, hull.point(), relative);
-            spread = relative.spread(s, hull, B::PARTS, used);
+        if let Some(view) = hull.view() {
+            leaf.block.relative(s, view.origin, relative);
+            spread = relative.spread(s, view, B::PARTS, used);
         }
         let (mut nearer, mut numbers) = (false, [UNKNOWN; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
@@ -128,18 +128,18 @@ impl<Q: Query> Rays<'_, Q> {
         active: u32,
     ) -> bool {
         let floor = s.splat(f32::MIN_POSITIVE);
+        if let Some(view) = hull.view() {
+            let along = Common(view.axis());
+            debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
+            let rows = along.order().map(|axis| relative.row(axis));
+            let [size, depth] = spread;
+            let error = sight::error(s, s.splat(size + size), s.splat(depth), floor);
+            let corners = AtOnce { rows, projection: group.projection.relative(s) };
+            return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
+        }
         let order = group.common.map_or([0, 1, 2], Common::order);
         // Copies, which stay in registers where the group itself would be read for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
-        let projection = if H::FROM_POINT { projection.relative(s) } else { projection };
-        let relative = [relative.row(order[0]), relative.row(order[1]), relative.row(order[2])];
-        if H::FROM_POINT {
-            debug_assert_eq!(group.common, Some(Common(hull.axis())), "see `Span::is_from_point`");
-            let [size, depth] = spread;
-            let error = sight::error(s, s.splat(size + size), s.splat(depth), floor);
-            let corners = AtOnce { rows: relative, projection };
-            return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
-        }
         let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
         while used != 0 {

@@ -1,7 +1,7 @@
 //! Points of a leaf as sixteen rays of a packet see them.
 
 use super::group::Projection;
-use super::hull::Hull;
+use super::hull::View;
 use crate::layout::WIDTH;
 use crate::simd::{LANES, Simd};
 use crate::trace::crossings::Many;
@@ -54,12 +54,12 @@ impl Relative {
 
     /// Bounds of the size and the depth of these points, a bit each, as any ray sees them.
     #[inline(always)]
-    pub(crate) fn spread<S: Simd, H: Hull<S>>(&self, s: S, hull: &H, parts: usize, used: u64) -> [f32; 2] {
+    pub(crate) fn spread<S: Simd>(&self, s: S, view: &View, parts: usize, used: u64) -> [f32; 2] {
         let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));
         for part in 0..parts {
             let m = s.mask((used >> (part * LANES)) as u32 & 0xffff);
             let [x, y, z] = &self.0;
-            let [own, far] = hull.spread(s, [s.load(&x[part]), s.load(&y[part]), s.load(&z[part])]);
+            let [own, far] = view.spread(s, [s.load(&x[part]), s.load(&y[part]), s.load(&z[part])]);
             size = s.select(m, s.max(own, size), size);
             depth = s.select(m, s.max(far, depth), depth);
         }

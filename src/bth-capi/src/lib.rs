@@ -135,8 +135,10 @@ pub unsafe extern "C" fn bth_nearest(
     }
     // SAFETY: not null, `count` elements by contract; any bits are a valid `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
-    // Unwinding must not reach C. A panic would be a defect; the rest then reads as misses, with which tracing begins.
-    let _ = catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits)));
+    // Unwinding must not reach C. Of a panic, which would be a defect, nothing is left but misses.
+    if catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits))).is_err() {
+        hits.fill(Hit::MISS);
+    }
 }
 
 /// Any hits; see `bth.h`.
@@ -178,9 +180,9 @@ fn any_in_parts<const N: usize>(scene: &Scene, rays: &[Ray], from: Option<&[Surf
     for (i, (rays, hit)) in rays.chunks(N).zip(hit.chunks_mut(N)).enumerate() {
         let from = from.map(|f| &f[i * N..i * N + rays.len()]);
         let part = &mut part[..rays.len()];
-        // Of a panic, which would be a defect, nothing is left but misses.
-        part.fill(false);
-        let _ = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, part)));
+        if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, part))).is_err() {
+            part.fill(false);
+        }
         for (out, found) in hit.iter_mut().zip(part) {
             *out = (*found).into();
         }

@@ -1,6 +1,7 @@
 //! A view of one object: the sections of a file as typed slices, zero-copy.
 
 use crate::layout::*;
+use crate::trace::Frame;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// The tetrahedron records, whichever kind the file holds.
@@ -40,6 +41,8 @@ impl Records<'_> {
 pub struct ObjectView<'a> {
     /// Bounds, root and counts.
     pub header: &'a Object,
+    /// What its bounds mean to rays.
+    pub(crate) frame: Frame,
     /// Where coordinates of triangle leaves lie, unless they are `f32`.
     pub grid: Option<Grid>,
     /// Nodes and triangle leaves.

@@ -116,7 +116,7 @@ impl Scene {
     }
 
     /// The only object that rays can meet, where its space is the world's, and the instance it is: no top level is needed then.
-    #[inline]
+    #[inline(always)]
     fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
@@ -172,37 +172,47 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
-        trace::miss_all(hits);
-        if let Some((object, instance)) = self.sole() {
-            return trace::with_scratch(|scratch| {
-                if rays.len() >= trace::FEW {
-                    let from = hints(object, from, instance);
-                    return trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
-                }
+        match self.sole() {
+            Some((object, instance)) if rays.len() < trace::FEW => {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    let from = hint(surface(from, i), instance);
-                    trace::nearest_to(object, ray, from, instance, scratch, hit);
+                    trace::nearest_to(object, ray, hint(surface(from, i), instance), instance, hit);
                 }
+            }
+            sole => self.nearest_many(sole, rays, from, hits),
+        }
+    }
+
+    /// As [`Self::nearest_batch`], for more rays than one would trace one after the other.
+    #[inline(never)]
+    fn nearest_many(
+        &self,
+        sole: Option<(&ObjectView<'_>, u32)>,
+        rays: &[Ray],
+        from: Option<&[Surface]>,
+        hits: &mut [Hit],
+    ) {
+        trace::miss_all(hits);
+        if let Some((object, instance)) = sole {
+            let from = hints(object, from, instance);
+            return trace::with_scratch(|scratch| {
+                trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
             });
         }
         if let Some(world) = &self.world {
             return world.nearest(&self.file, rays, from, hits);
         }
-        trace::with_scratch(|scratch| {
-            for instance in 0..self.object_count() {
-                let object = self.view(instance);
-                for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
-                    // Not `min`, which would make a range of NaN.
-                    let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
-                    let ray = Ray { tmax, ..*ray };
-                    let hit =
-                        trace::nearest(object, &ray, hint(surface(from, i), instance), instance, scratch);
-                    if hit.t < best.t {
-                        *best = hit;
-                    }
+        for instance in 0..self.object_count() {
+            let object = self.view(instance);
+            for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
+                // Not `min`, which would make a range of NaN.
+                let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
+                let ray = Ray { tmax, ..*ray };
+                let hit = trace::nearest(object, &ray, hint(surface(from, i), instance), instance);
+                if hit.t < best.t {
+                    *best = hit;
                 }
             }
-        });
+        }
     }
 
     /// As [`Self::nearest_batch`] without hints, by another test of triangles, each ray on its own and none in packets: to
@@ -226,29 +236,41 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
-        found.fill(false);
-        if let Some((object, instance)) = self.sole() {
-            return trace::with_scratch(|scratch| {
-                if rays.len() >= trace::FEW {
-                    let from = hints(object, from, instance);
-                    return trace::any_batch(object, rays, from.as_deref(), scratch, found);
-                }
+        match self.sole() {
+            Some((object, instance)) if rays.len() < trace::FEW => {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = trace::any(object, ray, hint(surface(from, i), instance), scratch);
+                    *found = trace::any(object, ray, hint(surface(from, i), instance));
                 }
+            }
+            sole => self.any_many(sole, rays, from, found),
+        }
+    }
+
+    /// As [`Self::nearest_many`], of [`Self::any_batch`].
+    #[inline(never)]
+    fn any_many(
+        &self,
+        sole: Option<(&ObjectView<'_>, u32)>,
+        rays: &[Ray],
+        from: Option<&[Surface]>,
+        found: &mut [bool],
+    ) {
+        found.fill(false);
+        if let Some((object, instance)) = sole {
+            let from = hints(object, from, instance);
+            return trace::with_scratch(|scratch| {
+                trace::any_batch(object, rays, from.as_deref(), scratch, found);
             });
         }
         if let Some(world) = &self.world {
             return world.any(&self.file, rays, from, found);
         }
-        trace::with_scratch(|scratch| {
-            for instance in 0..self.object_count() {
-                let object = self.view(instance);
-                for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                    *found = *found || trace::any(object, ray, hint(surface(from, i), instance), scratch);
-                }
+        for instance in 0..self.object_count() {
+            let object = self.view(instance);
+            for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
+                *found = *found || trace::any(object, ray, hint(surface(from, i), instance));
             }
-        });
+        }
     }
 }
 

@@ -13,6 +13,7 @@ use crate::error::{Code, Error, Result};
 use crate::instances::SceneView;
 use crate::layout::*;
 use crate::object::{ObjectView, Records};
+use crate::trace::Frame;
 use buffer::Buffer;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -218,6 +219,7 @@ impl File {
         let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
         Ok(ObjectView {
             header,
+            frame: Frame::new(header),
             grid,
             lines: self.slice(object, kind::LINES),
             triangle_ids: self.slice(object, kind::TRIANGLE_IDS),

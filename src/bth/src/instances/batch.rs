@@ -246,7 +246,7 @@ impl Query for Nearest<'_> {
                 let i = visit.ray as usize;
                 let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
                 let from = round.hint(i, visit.instance);
-                let hit = trace::nearest(object, &ray.ray, from, visit.instance, self.scratch);
+                let hit = trace::nearest(object, &ray.ray, from, visit.instance);
                 self.hits[i] =
                     better(&round.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
             }
@@ -318,7 +318,7 @@ impl Query for Any<'_> {
             for &visit in visits {
                 let i = visit.ray as usize;
                 let (ray, from) = (round.object_ray(visit, self.rays[i].tmax), round.hint(i, visit.instance));
-                self.found[i] |= trace::any(object, &ray.ray, from, self.scratch);
+                self.found[i] |= trace::any(object, &ray.ray, from);
             }
             return;
         }

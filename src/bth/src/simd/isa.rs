@@ -65,6 +65,14 @@ impl FromStr for Isa {
 
 /// 0: not chosen yet; else the place in `ALL`, plus one.
 static CHOSEN: AtomicU8 = AtomicU8::new(0);
+const SCALAR: u8 = Isa::Scalar as u8 + 1;
+const AVX2: u8 = Isa::Avx2 as u8 + 1;
+
+/// Apart, so that what runs kernels stays short.
+#[inline(never)]
+fn plain<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run(Scalar)
+}
 
 impl Isa {
     /// All, the plainest first.
@@ -105,7 +113,9 @@ impl Isa {
     pub fn chosen() -> Isa {
         match CHOSEN.load(Ordering::Relaxed) {
             0 => Isa::choose_first(),
-            n => Isa::ALL[usize::from(n) - 1],
+            SCALAR => Isa::Scalar,
+            AVX2 => Isa::Avx2,
+            _ => Isa::Avx512,
         }
     }
 
@@ -146,7 +156,7 @@ impl Isa {
                 }
             }
         }
-        kernel.run(Scalar)
+        plain(kernel)
     }
 
     /// Runs a kernel with this instruction set unless that is plain code: gives it back then. For kernels that are no

@@ -150,6 +150,19 @@ pub(crate) trait Simd: Copy + 'static {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize;
+    /// As [`Self::compress_far_to_near`], for at least one lane; also returns the lane of the last, the nearest.
+    #[inline(always)]
+    fn sort_far_to_near(
+        self,
+        bits: u32,
+        key: Self::F,
+        a: Self::U,
+        to: &mut [u32; LANES],
+        keys: &mut [f32; LANES],
+    ) -> (usize, usize) {
+        let count = self.compress_far_to_near(bits, key, a, to, keys);
+        (count, keys[count.wrapping_sub(1) % LANES].to_bits() as usize % LANES)
+    }
     /// Drops the elements whose key exceeds the limit, keeping the order. Returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
 

@@ -78,22 +78,32 @@ pub(crate) fn settle<Q: Query>(
     candidates: [Candidate; 2],
     query: &mut Q,
 ) -> Settled {
-    let (origin, direction) = (wide(ray.origin), wide(ray.direction));
     for candidate in candidates {
-        let Some((place, corners)) = candidate.read(object, Corners) else { continue };
-        let crossing = match estimate(origin, direction, corners.map(wide)) {
-            Estimate::Missed => None,
-            Estimate::Crossed(crossing) => Some(crossing),
-            Estimate::Open(_, t) if !query.cares(t) => None,
-            Estimate::Open(..) => open(ray, corners),
-        };
-        if crossing.is_some_and(|crossing| query.offer(Named::place(place, object.triangle_ids), crossing)) {
+        if settle_one(object, ray, candidate, query) {
             return Settled::Enough;
         }
     }
     let limit = query.limit();
     // As far below as the limit lies above.
     query.found().map_or(Settled::Nothing, |t| Settled::Found([2.0 * t - limit, limit]))
+}
+
+/// Offers a candidate of a ray to its query; true if it has what it wants then.
+#[inline(always)]
+pub(crate) fn settle_one<Q: Query>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    candidate: Candidate,
+    query: &mut Q,
+) -> bool {
+    let Some((place, corners)) = candidate.read(object, Corners) else { return false };
+    let crossing = match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
+        Estimate::Missed => None,
+        Estimate::Crossed(crossing) => Some(crossing),
+        Estimate::Open(_, t) if !query.cares(t) => None,
+        Estimate::Open(..) => open(ray, corners),
+    };
+    crossing.is_some_and(|crossing| query.offer(Named::place(place, object.triangle_ids), crossing))
 }
 
 /// What f64 leaves open.

@@ -68,44 +68,29 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
 #[inline]
-pub(crate) fn nearest(
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    from: u32,
-    instance: u32,
-    scratch: &mut Scratch,
-) -> Hit {
+pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
-    nearest_to(object, ray, from, instance, scratch, &mut hit);
+    nearest_to(object, ray, from, instance, &mut hit);
     hit
 }
 
 /// As [`nearest`], put in its place.
-#[inline]
-pub(crate) fn nearest_to(
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    from: u32,
-    instance: u32,
-    scratch: &mut Scratch,
-    to: &mut Hit,
-) {
-    trace::<Nearest, ()>(object, ray, from, instance, scratch, &mut (), to);
+#[inline(always)]
+pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, to: &mut Hit) {
+    trace::<Nearest, ()>(object, ray, from, instance, &mut (), to);
 }
 
 /// As [`nearest`], with a count of the work.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
-    with_scratch(|scratch| {
-        trace::<Nearest, Steps>(object, ray, from, instance, scratch, &mut steps, &mut hit);
-    });
+    trace::<Nearest, Steps>(object, ray, from, instance, &mut steps, &mut hit);
     (hit, steps)
 }
 
 /// Whether a ray in object space hits anything.
-#[inline]
-pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32, scratch: &mut Scratch) -> bool {
+#[inline(always)]
+pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;
-    trace::<Any, ()>(object, ray, from, 0, scratch, &mut (), &mut found);
+    trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);
     found
 }

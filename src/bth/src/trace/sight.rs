@@ -69,6 +69,36 @@ pub(crate) struct Candidates<S: Simd> {
     pub(crate) farthest: S::F,
 }
 
+/// A triangle of a leaf that is certainly hit, and no other nearer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Certain {
+    /// Place in the leaf.
+    pub(crate) triangle: usize,
+    /// Between which depths.
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+}
+
+impl<S: Simd> Candidates<S> {
+    /// Those that may be the nearest, a bit each, and that one if it is certain.
+    #[inline(always)]
+    pub(crate) fn nearest_of_all(&self, s: S) -> (u32, Option<Certain>) {
+        let &Candidates { mut maybe, sure, nearest, farthest } = self;
+        if maybe & (maybe - 1) != 0 && sure != 0 {
+            let least = s.least(s.select(s.mask(sure), farthest, s.splat(f32::MAX)));
+            maybe &= s.mask_bits(s.le(nearest, s.splat(least)));
+        }
+        if maybe & (maybe - 1) != 0 || maybe & sure == 0 {
+            return (maybe, None);
+        }
+        let (mut near, mut far) = ([0.0; WIDTH], [0.0; WIDTH]);
+        s.store(nearest, &mut near);
+        s.store(farthest, &mut far);
+        let triangle = maybe.trailing_zeros() as usize % WIDTH;
+        (maybe, Some(Certain { triangle, near: near[triangle], far: far[triangle] }))
+    }
+}
+
 /// Projected corners, sixteen triangles: `[corner][x, y, depth]`.
 pub(crate) type Corners<S> = [[<S as Simd>::F; 3]; 3];
 
@@ -76,12 +106,25 @@ pub(crate) type Corners<S> = [[<S as Simd>::F; 3]; 3];
 pub(crate) trait Block {
     fn first(&self) -> u32;
     fn triangles(&self) -> u32;
+    /// The number of the triangle is taken modulo [`WIDTH`] here and below.
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3];
-    /// One coordinate of a corner; the number of the triangle is taken modulo [`WIDTH`].
+    /// One coordinate of a corner.
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
     /// The corners as they are: `[corner][x, y, z]`.
     fn points<S: Simd>(&self, s: S) -> Corners<S>;
+}
+
+/// The corners of a triangle. (Not by maps over rows, which are copied for that.)
+#[inline(always)]
+fn corners<B: Block>(block: &B, triangle: usize) -> [[f32; 3]; 3] {
+    let mut out = [[0.0; 3]; 3];
+    for c in 0..3 {
+        for k in 0..3 {
+            out[c][k] = block.coordinate(triangle, c, k);
+        }
+    }
+    out
 }
 
 /// The points at these places.
@@ -120,7 +163,7 @@ impl Block for IndexedLeaf {
     }
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
-        self.corner.map(|row| self.vertex.map(|axis| axis[usize::from(row[triangle]) % WIDTH]))
+        corners(self, triangle)
     }
     #[inline(always)]
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {
@@ -149,7 +192,7 @@ impl Block for RawLeaf {
     }
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
-        self.corner.map(|axes| axes.map(|row| row[triangle]))
+        corners(self, triangle)
     }
     #[inline(always)]
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {

@@ -1,10 +1,9 @@
 //! One ray through an object.
 
-use super::Scratch;
-use super::bvh;
-use super::bvh::flight::Flight;
+use super::bvh::alone::Alone;
 use super::bvh::nodes::{Nodes, Packed, Wide};
-use super::prepare::Frame;
+use super::bvh::walk::walk;
+use super::prepare::Aim;
 use super::query::{Count, Query};
 use super::tets::{Start, enter_tets, start_in_tets};
 use crate::layout::{Child, NONE};
@@ -14,20 +13,19 @@ use crate::simd::{Isa, Kernel, Simd};
 
 /// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with. The answer goes
 /// into `to`.
-#[inline]
+#[inline(always)]
 pub(crate) fn trace<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
     from: u32,
     instance: u32,
-    scratch: &mut Scratch,
     count: &mut C,
     to: &mut Q::Answer,
 ) {
     if from == NONE || object.tet_leaves.is_empty() {
-        return through_bvh::<Q, C>(Single { object, ray, instance, start: None, scratch, count, to });
+        return through_bvh::<Q, C>(object, ray, (Q::new(ray), NONE), instance, count, to);
     }
-    trace_from::<Q, C>(object, ray, from, instance, scratch, count, to);
+    trace_from::<Q, C>(object, ray, from, instance, count, to);
 }
 
 /// As [`trace`], from a triangle that may lie on tetrahedra.
@@ -37,55 +35,48 @@ fn trace_from<Q: Query, C: Count>(
     ray: &Ray,
     from: u32,
     instance: u32,
-    scratch: &mut Scratch,
     count: &mut C,
     to: &mut Q::Answer,
 ) {
     let mut query = Q::new(ray);
-    let walked = match start_in_tets(object, ray, from, &mut query, count) {
-        Start::Done => {
-            *to = query.answer(object.triangle_ids, instance);
-            return;
+    match start_in_tets(object, ray, from, &mut query, count) {
+        Start::Done => {}
+        Start::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}
+        Start::Walked(leaf) => {
+            return through_bvh(object, ray, (query, leaf), instance, count, to);
         }
-        Start::Walked(leaf) => leaf,
-    };
-    if object.header.root == Child::Tets(walked).code() && walked != NONE {
-        *to = query.answer(object.triangle_ids, instance);
-        return;
     }
-    through_bvh(Single { object, ray, instance, start: Some((&query, walked)), scratch, count, to });
+    *to = query.answer(object.triangle_ids, instance);
 }
 
-#[inline]
-fn through_bvh<Q: Query, C: Count>(mut single: Single<'_, Q, C>) {
-    if single.object.header.root == NONE {
-        *single.to = single.query().answer(single.object.triangle_ids, single.instance);
-        return;
+#[inline(always)]
+fn through_bvh<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    (mut query, walked): (Q, u32),
+    instance: u32,
+    count: &mut C,
+    to: &mut Q::Answer,
+) {
+    if object.header.root != NONE {
+        let (query, stack) = (&mut query, &mut Alone::new());
+        Isa::chosen().run(&mut Single { object, ray, query, walked, count, stack });
     }
-    Isa::chosen().run(&mut single);
+    *to = query.answer(object.triangle_ids, instance);
 }
 
+/// A ray and its query, which says afterwards what was found.
 struct Single<'a, Q: Query, C> {
     object: &'a ObjectView<'a>,
     ray: &'a Ray,
-    instance: u32,
-    /// What the query has found in a tet leaf, which is to be left out.
-    start: Option<(&'a Q, u32)>,
-    scratch: &'a mut Scratch,
+    query: &'a mut Q,
+    /// The tet leaf from which the query has what it knows, which is to be left out; or `NONE`.
+    walked: u32,
     count: &'a mut C,
-    to: &'a mut Q::Answer,
+    stack: &'a mut Alone,
 }
 
-impl<Q: Query, C> Single<'_, Q, C> {
-    /// The query as it is before the walk.
-    #[inline(always)]
-    fn query(&self) -> Q {
-        self.start.map_or_else(|| Q::new(self.ray), |(query, _)| *query)
-    }
-}
-
-// By reference, and the query is made, and its answer worked out and put in its place, within the kernel: copies of what was just
-// written word by word stall.
+// By reference: copies of what was just written word by word stall.
 impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
     type Output = ();
     #[inline(always)]
@@ -118,26 +109,16 @@ impl<Q: Query, C: Count> Kernel for AmongPacked<'_, Single<'_, Q, C>> {
 impl<Q: Query, C: Count> Single<'_, Q, C> {
     #[inline(always)]
     fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
-        let (object, ray) = (self.object, self.ray);
-        let query = self.query();
-        let mut flight = Flight::vacant(query);
-        if flight.aim_at(object, &Frame::new(object.header), (0, ray), Some(query)) {
-            if self.start.is_some() {
-                flight.take_over();
-            }
-            self.scratch.stacks.reserve(object, 1);
-            bvh::walk::walk(
-                s,
-                nodes,
-                object,
-                ray,
-                self.start.map_or(NONE, |(_, walked)| walked),
-                &mut flight,
-                &mut self.scratch.stacks,
-                self.count,
-                |leaf, query, count| enter_tets(object, leaf, ray, query, count),
-            );
-        }
-        *self.to = flight.query().answer(object.triangle_ids, self.instance);
+        let Single { object, ray, query, walked, count, stack } = self;
+        let (object, ray) = (*object, *ray);
+        let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
+        let aim = match Aim::of(&object.frame, ray) {
+            Some(aim) => aim,
+            None => match Aim::in_f64(object.header, ray) {
+                Some(aim) => aim,
+                None => return,
+            },
+        };
+        walk(s, nodes, (object, ray), &aim, *walked, *query, stack, *count, tets);
     }
 }

@@ -9,6 +9,7 @@ use crate::layout::{Object, PackedNode, WIDTH, WideNode};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::line::Line;
+use crate::trace::query::Query;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Pad of a plane relative to the greatest coordinate in play. Half of it covers the roundings (reciprocal, product
@@ -96,22 +97,64 @@ impl Slabs {
         ((t * f64::from(self.scale)) as f32).next_up()
     }
 
+    /// Lower bound of the depth of the nearest hit that a query has found.
+    #[inline(always)]
+    pub(crate) fn nearest<Q: Query>(&self, query: &Q) -> f32 {
+        let Some(t) = query.found() else { return f32::INFINITY };
+        // As far below as the limit lies above.
+        (((2.0 * t - query.limit()) * f64::from(self.scale)) as f32).next_down()
+    }
+
     /// From which to which depth a hit certainly lies in the ray's range.
     pub(crate) fn certain_range(&self, ray: &Ray) -> [f32; 2] {
         let depth = |t: f32| (f64::from(t) * f64::from(self.scale)) as f32;
         [depth(ray.tmin).next_up(), depth(ray.tmax.min(f32::MAX)).next_down()]
     }
 
+    /// As [`Planes::children`], for one node.
+    #[inline(always)]
+    pub(crate) fn children<S: Simd, B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        Planes::new(s, self).children(s, node, limit)
+    }
+}
+
+/// [`Slabs`] in lanes, for a ray that goes through many nodes.
+#[derive(Clone, Copy)]
+pub(crate) struct Planes<S: Simd> {
+    reciprocal: [S::F; 3],
+    near_addend: [S::F; 3],
+    far_addend: [S::F; 3],
+    first: S::F,
+    near: [u32; 3],
+}
+
+/// Three numbers in lanes.
+#[inline(always)]
+fn splat<S: Simd>(s: S, [x, y, z]: [f32; 3]) -> [S::F; 3] {
+    [s.splat(x), s.splat(y), s.splat(z)]
+}
+
+impl<S: Simd> Planes<S> {
+    #[inline(always)]
+    pub(crate) fn new(s: S, slabs: &Slabs) -> Self {
+        Planes {
+            reciprocal: splat(s, slabs.reciprocal),
+            near_addend: splat(s, slabs.near_addend),
+            far_addend: splat(s, slabs.far_addend),
+            first: s.splat(slabs.first),
+            near: slabs.near,
+        }
+    }
+
     /// The children of a node whose boxes the ray may meet before `limit`, a bit each, and lower bounds of
     /// their t. Empty slots may be among them when coordinates are too great for f32.
     #[inline(always)]
-    pub(crate) fn children<S: Simd, B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
-        let (mut enter, mut leave) = (s.splat(self.first), s.splat(limit));
+    pub(crate) fn children<B: Boxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
-            let reciprocal = s.splat(self.reciprocal[k]);
             let (first, second) = (node.ends(s, k, self.near[k]), node.ends(s, k, self.near[k] ^ FAR));
-            enter = s.max(s.fma(first, reciprocal, s.splat(self.near_addend[k])), enter);
-            leave = s.min(s.fma(second, reciprocal, s.splat(self.far_addend[k])), leave);
+            enter = s.max(s.fma(first, self.reciprocal[k], self.near_addend[k]), enter);
+            leave = s.min(s.fma(second, self.reciprocal[k], self.far_addend[k]), leave);
         }
         (s.mask_bits(s.le(enter, leave)), enter)
     }

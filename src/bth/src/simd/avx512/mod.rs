@@ -8,7 +8,7 @@ mod rows;
 mod sort;
 
 use self::rows::{COLUMNS5, ROWS5, columns8, quarters, transpose4};
-use self::sort::{sort4, sort8, sort16};
+use self::sort::{far_to_near, nearest_of_four, with_lanes};
 use super::{Kernel, LANES, Simd, assert_within, within};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
@@ -278,33 +278,27 @@ impl Simd for Avx512 {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize {
-        let count = (bits & 0xffff).count_ones() as usize;
-        let m = bits as u16;
-        // SAFETY: `to` and `keys` have room for sixteen lanes, of which 4, 8 or 16 are stored.
+        // SAFETY: `self` proves the features.
+        unsafe { far_to_near(bits as u16, with_lanes(key), a, to, keys) }
+    }
+    #[inline(always)]
+    fn sort_far_to_near(
+        self,
+        bits: u32,
+        key: __m512,
+        a: __m512i,
+        to: &mut [u32; LANES],
+        keys: &mut [f32; LANES],
+    ) -> (usize, usize) {
+        // SAFETY: `self` proves the features.
         unsafe {
-            // The lane goes into the lowest bits of its key, and is sorted with it.
-            let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-            let low = _mm512_set1_epi32(15);
-            let key = _mm512_or_si512(_mm512_andnot_si512(low, _mm512_castps_si512(key)), lane);
-            let least = _mm512_set1_epi32(i32::MIN);
-            if count <= 4 {
-                let key = sort4(_mm512_castsi512_si128(_mm512_mask_compress_epi32(least, m, key)));
-                let a = _mm512_permutexvar_epi32(_mm512_castsi128_si512(key), a);
-                _mm_storeu_ps(keys.as_mut_ptr(), _mm_castsi128_ps(key));
-                _mm_storeu_si128(to.as_mut_ptr().cast(), _mm512_castsi512_si128(a));
-            } else if count <= 8 {
-                let key = sort8(_mm512_castsi512_si256(_mm512_mask_compress_epi32(least, m, key)));
-                let a = _mm512_permutexvar_epi32(_mm512_castsi256_si512(key), a);
-                _mm256_storeu_ps(keys.as_mut_ptr(), _mm256_castsi256_ps(key));
-                _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm512_castsi512_si256(a));
-            } else {
-                let key = sort16(_mm512_mask_mov_epi32(least, m, key));
-                let a = _mm512_permutexvar_epi32(key, a);
-                _mm512_storeu_ps(keys.as_mut_ptr(), _mm512_castsi512_ps(key));
-                _mm512_storeu_si512(to.as_mut_ptr().cast(), a);
-            }
+            let key = with_lanes(key);
+            let count = far_to_near(bits as u16, key, a, to, keys);
+            // A ray alone waits for the nearest.
+            let nearest =
+                if count <= 4 { nearest_of_four(bits as u16, key) } else { keys[count - 1].to_bits() };
+            (count, nearest as usize % LANES)
         }
-        count
     }
     #[inline(always)]
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {

@@ -1,5 +1,6 @@
 //! Sorting networks in registers.
 
+use crate::simd::LANES;
 use std::arch::x86_64::*;
 
 /// Step of a bitonic sorting network, descending: lanes whose bit is set keep the greater of themselves and partner.
@@ -71,5 +72,69 @@ pub(super) unsafe fn sort16(v: __m512i) -> __m512i {
         let v = step!(v, _mm512_shuffle_i32x4::<0b10_11_00_01>(v, v), 0b0000_1111_0000_1111);
         let v = step!(v, _mm512_shuffle_epi32::<0b01_00_11_10>(v), 0b0011_0011_0011_0011);
         step!(v, _mm512_shuffle_epi32::<0b10_11_00_01>(v), 0b0101_0101_0101_0101)
+    }
+}
+
+/// Keys with their lanes in the lowest bits, which are sorted with them.
+///
+/// # Safety
+/// As [`sort4`].
+#[inline(always)]
+pub(super) unsafe fn with_lanes(key: __m512) -> __m512i {
+    // SAFETY: see above.
+    unsafe {
+        let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+        _mm512_or_si512(_mm512_andnot_si512(_mm512_set1_epi32(15), _mm512_castps_si512(key)), lane)
+    }
+}
+
+/// Stores the keys of these lanes, and what belongs to them, from the greatest to the least; returns how many.
+///
+/// # Safety
+/// The machine must have the features of [`super::Avx512`].
+#[inline(always)]
+pub(super) unsafe fn far_to_near(
+    lanes: u16,
+    key: __m512i,
+    a: __m512i,
+    to: &mut [u32; LANES],
+    keys: &mut [f32; LANES],
+) -> usize {
+    let count = lanes.count_ones() as usize;
+    // SAFETY: `to` and `keys` have room for sixteen lanes, of which 4, 8 or 16 are stored.
+    unsafe {
+        let least = _mm512_set1_epi32(i32::MIN);
+        if count <= 4 {
+            let key = sort4(_mm512_castsi512_si128(_mm512_mask_compress_epi32(least, lanes, key)));
+            let a = _mm512_permutexvar_epi32(_mm512_castsi128_si512(key), a);
+            _mm_storeu_ps(keys.as_mut_ptr(), _mm_castsi128_ps(key));
+            _mm_storeu_si128(to.as_mut_ptr().cast(), _mm512_castsi512_si128(a));
+        } else if count <= 8 {
+            let key = sort8(_mm512_castsi512_si256(_mm512_mask_compress_epi32(least, lanes, key)));
+            let a = _mm512_permutexvar_epi32(_mm512_castsi256_si512(key), a);
+            _mm256_storeu_ps(keys.as_mut_ptr(), _mm256_castsi256_ps(key));
+            _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm512_castsi512_si256(a));
+        } else {
+            let key = sort16(_mm512_mask_mov_epi32(least, lanes, key));
+            let a = _mm512_permutexvar_epi32(key, a);
+            _mm512_storeu_ps(keys.as_mut_ptr(), _mm512_castsi512_ps(key));
+            _mm512_storeu_si512(to.as_mut_ptr().cast(), a);
+        }
+    }
+    count
+}
+
+/// The least key of at most four lanes.
+///
+/// # Safety
+/// As [`sort4`].
+#[inline(always)]
+pub(super) unsafe fn nearest_of_four(lanes: u16, key: __m512i) -> u32 {
+    // SAFETY: see above.
+    unsafe {
+        let key = _mm512_mask_compress_epi32(_mm512_set1_epi32(i32::MAX), lanes, key);
+        let key = _mm512_castsi512_si128(key);
+        let key = _mm_min_epi32(key, _mm_shuffle_epi32::<0b01_00_11_10>(key));
+        _mm_cvtsi128_si32(_mm_min_epi32(key, _mm_shuffle_epi32::<0b10_11_00_01>(key))) as u32
     }
 }

@@ -73,7 +73,7 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
             rays,
             waiting,
             root: root(object),
-            frame: Frame::new(object.header),
+            frame: object.frame,
             prepared: Prepared::new(),
             ray: [0; LANES],
             met: [0; LANES],
@@ -128,7 +128,7 @@ impl<Q: Query> Supply<'_, Q> {
                 flight.launch(aim, query);
             } else {
                 let ray = (place, &self.rays[place as usize]);
-                if !flight.aim_at(self.object, &self.frame, ray, query) {
+                if !flight.launch_unprepared(self.object, ray, query) {
                     continue;
                 }
             }

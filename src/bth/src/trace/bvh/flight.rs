@@ -7,17 +7,22 @@ use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, open, settle};
 use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
-use crate::trace::line::Line;
-use crate::trace::prepare::{Aim, Frame, Noted};
+use crate::trace::prepare::{Aim, Noted};
 use crate::trace::query::{Deliver, Named, Query};
 use crate::trace::quick::Test;
-use crate::trace::sight::{Block, Candidates, Sight};
-use crate::trace::slabs::{Boxes, Slabs};
+use crate::trace::sight::{Block, Candidates, Certain};
+use crate::trace::slabs::Boxes;
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less
 /// than the least normal one.
 pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
+
+/// Keys of the stack beyond this are of no interest where nothing beyond a depth is.
+#[inline(always)]
+pub(crate) fn key_limit(last: f32) -> f32 {
+    last + (last.abs() * KEY_SLACK + f32::MIN_POSITIVE)
+}
 
 /// A ray on its way.
 #[derive(Clone, Copy, Debug)]
@@ -42,33 +47,17 @@ pub(crate) enum Found {
 }
 
 impl<Q: Query> Flight<Q> {
-    /// Takes in a ray, and its query if it has one; false if it hits nothing whatever there is: see [`Line::new`], or an empty
-    /// range of t.
-    #[inline(always)]
-    pub(crate) fn aim_at(
+    /// As [`Self::launch`], for a ray that was not prepared; false if it hits nothing whatever there is ([`Aim::in_f64`]).
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn launch_unprepared(
         &mut self,
         object: &ObjectView<'_>,
-        frame: &Frame,
         (place, ray): (u32, &Ray),
         query: Option<Q>,
     ) -> bool {
-        let hits = self.aim.set(frame, ray) || self.aim_in_f64(object, ray);
-        (self.aim.ray, self.aim.noted) = (place, Noted::NOTHING);
-        if let Some(query) = query {
-            self.give(query);
-        }
-        hits
-    }
-
-    /// As [`Self::aim_at`], for rays that f32 can't prepare too.
-    #[cold]
-    #[inline(never)]
-    fn aim_in_f64(&mut self, object: &ObjectView<'_>, ray: &Ray) -> bool {
-        let Some(line) = Line::new(ray) else { return false };
-        let slabs = Slabs::new(ray, &line, object.header);
-        let sight = Sight::new(ray, &line, &slabs, object.header);
-        self.aim = Aim::new(slabs, sight);
-        ray.tmin <= ray.tmax
+        let aim = Aim::of(&object.frame, ray).or_else(|| Aim::in_f64(object.header, ray));
+        aim.map(|aim| self.launch(&Aim { ray: place, ..aim }, query)).is_some()
     }
 
     /// A place for a ray.
@@ -93,12 +82,6 @@ impl<Q: Query> Flight<Q> {
     #[inline(always)]
     pub(crate) fn ray(&self) -> usize {
         self.aim.ray as usize
-    }
-
-    /// The query of a ray that was given one.
-    #[inline(always)]
-    pub(crate) fn query(&mut self) -> &mut Q {
-        &mut self.query
     }
 
     /// Hands on what has been found, but for what waits to be computed.
@@ -126,14 +109,9 @@ impl<Q: Query> Flight<Q> {
 
     /// Takes over what the query has found meanwhile.
     pub(crate) fn take_over(&mut self) {
-        let limit = self.query.limit();
-        self.aim.slabs.last = self.aim.slabs.limit(limit);
-        if Q::DEFERS
-            && let Some(t) = self.query.found()
-        {
-            // As far below as the limit lies above.
-            self.aim.noted.nearest =
-                (((2.0 * t - limit) * f64::from(self.aim.slabs.scale)) as f32).next_down();
+        self.aim.slabs.last = self.aim.slabs.limit(self.query.limit());
+        if Q::DEFERS {
+            self.aim.noted.nearest = self.aim.slabs.nearest(&self.query);
         }
     }
 
@@ -157,7 +135,7 @@ impl<Q: Query> Flight<Q> {
     /// Keys of the stack beyond this are of no interest any more.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
-        self.aim.slabs.last + (self.aim.slabs.last.abs() * KEY_SLACK + f32::MIN_POSITIVE)
+        key_limit(self.aim.slabs.last)
     }
 
     /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
@@ -172,35 +150,9 @@ impl<Q: Query> Flight<Q> {
         write_children::<S, Q, B>(s, node, (bits, enter), to)
     }
 
-    /// The child of a node to enter next, of those that the ray may meet, and how many others there are: those are written,
-    /// the nearest last. Which is next is found beside the sorting of the others, not after it.
-    #[inline(always)]
-    pub(crate) fn nearest_child<S: Simd, B: Boxes>(
-        &self,
-        s: S,
-        node: &B,
-        (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
-    ) -> Option<(u32, usize)> {
-        let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
-        if bits == 0 {
-            return None;
-        }
-        let first = bits.trailing_zeros() as usize;
-        if bits & (bits - 1) == 0 {
-            return Some((node.child()[first % WIDTH], 0));
-        }
-        let children = s.load_u(node.child());
-        if Q::ANY {
-            return Some((node.child()[first % WIDTH], s.compress(bits & (bits - 1), children, codes)));
-        }
-        let nearest = nearest_lane(s, bits, enter) % WIDTH;
-        let others = bits & !(1 << nearest);
-        Some((node.child()[nearest], s.compress_far_to_near(others, enter, children, codes, keys)))
-    }
-
     /// Tests the triangles of a leaf with this code. Of the rays of the batch only its own is looked up, and only if it must be.
     #[inline(always)]
-    pub(crate) fn enter_leaf<S: Simd, B: Block, const DEFER: bool>(
+    pub(crate) fn enter_leaf<S: Simd, B: Block>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
@@ -215,14 +167,10 @@ impl<Q: Query> Flight<Q> {
             return Found::Nothing;
         }
         if Q::ANY && found.sure != 0 {
-            if DEFER {
-                self.aim.noted.decided = Noted::ACCEPTED;
-            } else {
-                self.query.accept();
-            }
+            self.aim.noted.decided = Noted::ACCEPTED;
             return Found::Enough;
         }
-        if DEFER && Q::DEFERS {
+        if Q::DEFERS {
             return self.defer(s, object, rays, (block, code), found);
         }
         self.decide(s, object, &rays[self.ray()], block, found.maybe)
@@ -238,28 +186,20 @@ impl<Q: Query> Flight<Q> {
         (block, code): (&B, u32),
         found: Candidates<S>,
     ) -> Found {
-        let Candidates { mut maybe, sure, nearest, farthest } = found;
-        if maybe & (maybe - 1) != 0 && sure != 0 {
-            let least = s.least(s.select(s.mask(sure), farthest, s.splat(f32::MAX)));
-            maybe &= s.mask_bits(s.le(nearest, s.splat(least)));
-        }
-        if maybe & (maybe - 1) == 0 && maybe & sure != 0 {
-            let (mut near, mut far) = ([0.0; WIDTH], [0.0; WIDTH]);
-            s.store(nearest, &mut near);
-            s.store(farthest, &mut far);
-            let triangle = maybe.trailing_zeros() as usize % WIDTH;
-            if far[triangle] < self.aim.noted.nearest {
-                let place = (block.first() as usize).wrapping_add(triangle);
-                s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
-                let noted = &mut self.aim.noted;
-                (noted.nearest, noted.leaf, noted.triangle) = (near[triangle], code, triangle as u16);
-                let nearer = far[triangle] < self.aim.slabs.last;
-                if nearer {
-                    self.aim.slabs.last = far[triangle];
-                    return Found::Nearer;
-                }
-                return Found::Nothing;
+        let (maybe, certain) = found.nearest_of_all(s);
+        if let Some(Certain { triangle, near, far }) = certain
+            && far < self.aim.noted.nearest
+        {
+            let place = (block.first() as usize).wrapping_add(triangle);
+            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
+            let noted = &mut self.aim.noted;
+            (noted.nearest, noted.leaf, noted.triangle) = (near, code, triangle as u16);
+            let nearer = far < self.aim.slabs.last;
+            if nearer {
+                self.aim.slabs.last = far;
+                return Found::Nearer;
             }
+            return Found::Nothing;
         }
         let ray = &rays[self.ray()];
         self.settle(object, ray);
@@ -294,26 +234,10 @@ impl<Q: Query> Flight<Q> {
         object: &ObjectView<'_>,
         ray: &Ray,
         block: &B,
-        mut bits: u32,
+        bits: u32,
     ) -> Found {
-        self.ask(ray);
-        let (origin, direction) = (wide(ray.origin), wide(ray.direction));
-        while bits != 0 {
-            let i = bits.trailing_zeros() as usize % WIDTH;
-            bits &= bits - 1;
-            let corners = block.corners(i);
-            let crossing = match estimate(origin, direction, corners.map(wide)) {
-                Estimate::Missed => None,
-                Estimate::Crossed(crossing) => Some(crossing),
-                Estimate::Open(_, t) if !self.query.cares(t) => None,
-                Estimate::Open(..) => open(ray, corners),
-            };
-            let Some(crossing) = crossing else { continue };
-            let place = block.first() + i as u32;
-            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
-            if self.query.offer(Named::place(place, object.triangle_ids), crossing) {
-                return Found::Enough;
-            }
+        if decide(s, object, ray, block, bits, self.ask(ray)) {
+            return Found::Enough;
         }
         self.settled(Found::Nothing)
     }
@@ -331,6 +255,37 @@ impl<Q: Query> Flight<Q> {
     }
 }
 
+/// Offers triangles of a leaf, a bit each, to a query, as f64 and exact arithmetic see them; true if it has what it wants then.
+#[inline(always)]
+pub(crate) fn decide<S: Simd, Q: Query, B: Block>(
+    s: S,
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    block: &B,
+    mut bits: u32,
+    query: &mut Q,
+) -> bool {
+    let (origin, direction) = (wide(ray.origin), wide(ray.direction));
+    while bits != 0 {
+        let i = bits.trailing_zeros() as usize % WIDTH;
+        bits &= bits - 1;
+        let corners = block.corners(i);
+        let crossing = match estimate(origin, direction, corners.map(wide)) {
+            Estimate::Missed => None,
+            Estimate::Crossed(crossing) => Some(crossing),
+            Estimate::Open(_, t) if !query.cares(t) => None,
+            Estimate::Open(..) => open(ray, corners),
+        };
+        let Some(crossing) = crossing else { continue };
+        let place = block.first() + i as u32;
+        s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
+        if query.offer(Named::place(place, object.triangle_ids), crossing) {
+            return true;
+        }
+    }
+    false
+}
+
 /// Writes the children of a node whose bits are set, the nearest last; returns how many.
 #[inline(always)]
 pub(crate) fn write_children<S: Simd, Q: Query, B: Boxes>(
@@ -345,15 +300,4 @@ pub(crate) fn write_children<S: Simd, Q: Query, B: Boxes>(
     } else {
         s.compress_far_to_near(bits, enter, children, codes, keys)
     }
-}
-
-/// The lane of the least key among those whose bit is set, but for the lowest bits of keys. Negative keys may seem in any
-/// order.
-#[inline(always)]
-fn nearest_lane<S: Simd>(s: S, bits: u32, key: S::F) -> usize {
-    const LANE: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-    let low = WIDTH as u32 - 1;
-    let key = s.or_u(s.and_u(s.bits(key), s.splat_u(!low)), s.load_u(&LANE));
-    let key = s.select(s.mask(bits), s.floats(key), s.splat(f32::MAX));
-    (s.least(key).to_bits() & low) as usize
 }

@@ -215,17 +215,17 @@ impl<'a, Q: Query> Flights<'a, Q> {
             let flight = &mut slots[at].0;
             let (code, top) = (tops.code[at], tops.place[at]);
             let found = if let Some(leaf) = ground.indexed_leaf(code) {
-                flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+                flight.enter_leaf(s, object, rays, (leaf, code))
             } else {
                 let (mut indexed, mut raw) = (None, None);
                 match Child::from_code(code) {
                     Some(Child::Indexed(index)) => {
                         let leaf = object.indexed(index, &mut indexed);
-                        flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+                        flight.enter_leaf(s, object, rays, (leaf, code))
                     }
                     Some(Child::Raw(index)) => {
                         let leaf = object.raw(index, &mut raw);
-                        flight.enter_leaf::<S, _, true>(s, object, rays, (leaf, code))
+                        flight.enter_leaf(s, object, rays, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, flight, top, stacks),
                     _ => Found::Nothing,

@@ -11,8 +11,6 @@ pub(crate) trait Nodes: Copy {
     type Node: Boxes;
     /// Lines of one.
     const LINES: usize;
-    /// Whether a child is one.
-    fn is(child: Child) -> bool;
     /// The node that the code of a child leads to.
     fn node(ground: Ground<'_>, code: u32) -> &Self::Node;
 }
@@ -29,10 +27,6 @@ impl Nodes for Wide {
     type Node = WideNode;
     const LINES: usize = NODE_LINES;
     #[inline(always)]
-    fn is(child: Child) -> bool {
-        matches!(child, Child::Node(_))
-    }
-    #[inline(always)]
     fn node(ground: Ground<'_>, code: u32) -> &WideNode {
         ground.node(code)
     }
@@ -41,10 +35,6 @@ impl Nodes for Wide {
 impl Nodes for Packed {
     type Node = PackedNode;
     const LINES: usize = PACKED_NODE_LINES;
-    #[inline(always)]
-    fn is(child: Child) -> bool {
-        matches!(child, Child::Packed(_))
-    }
     #[inline(always)]
     fn node(ground: Ground<'_>, code: u32) -> &PackedNode {
         ground.packed_node(code & !Child::PACKED_BIT)

@@ -1,14 +1,19 @@
-//! The walk of one ray through the wide BVH.
+//! The walk of one ray through the wide BVH. There is nothing to overlap with, so what matters is how long one step waits for
+//! the one before: hits are noted as f32 bounds them, and computed in f64 only when the walk has ended.
 
-use super::flight::{Flight, Found};
+use super::alone::Alone;
+use super::flight::key_limit;
 use super::nodes::{Nodes, prefetch};
-use super::stack::Stacks;
-use crate::layout::{Child, NONE};
+use crate::layout::{Child, NONE, WIDTH};
 use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
+use crate::trace::candidate::{Candidate, Settled, settle, settle_one};
+use crate::trace::prepare::Aim;
 use crate::trace::query::{Count, Query};
-use std::slice::from_ref;
+use crate::trace::sight::{Block, Certain};
+use crate::trace::slabs::{Boxes, Planes};
+use std::hint::black_box;
 
 /// What a tet leaf made of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,78 +24,190 @@ pub(crate) enum TetOutcome {
     GoOn,
 }
 
-/// Walks from the root. Tet leaves without a subtree are handed to `tets` with their row; `walked` is left out.
+/// What a ray has come upon. Kept apart from the query, so that it stays in registers.
+struct Walk<'a> {
+    object: &'a ObjectView<'a>,
+    ray: &'a Ray,
+    aim: &'a Aim,
+    /// Nothing whose depth certainly exceeds this matters any more.
+    last: f32,
+    /// Lower bound of the depth of the nearest hit so far.
+    nearest: f32,
+    /// That hit, if it has still to be computed.
+    waiting: Candidate,
+}
+
+impl Walk<'_> {
+    /// The ray as it was prepared, in memory: compilers would rather make sixteen of each of its numbers before the walk, and
+    /// store those.
+    #[inline(always)]
+    fn aim(&self) -> &Aim {
+        black_box(self.aim)
+    }
+
+    /// Tests the triangles of a leaf with this code; true if the query has what it wants.
+    #[inline(always)]
+    fn enter_leaf<S: Simd, Q: Query, B: Block>(
+        &mut self,
+        s: S,
+        (block, code): (&B, u32),
+        query: &mut Q,
+    ) -> bool {
+        let aim = self.aim();
+        let found = aim.sight.candidates(s, block, aim.slabs.first, self.last);
+        if found.maybe == 0 {
+            return false;
+        }
+        if Q::ANY {
+            if found.sure != 0 {
+                query.accept();
+                return true;
+            }
+            return self.decide(code, found.maybe, query);
+        }
+        let (maybe, certain) = found.nearest_of_all(s);
+        if let Some(Certain { triangle, near, far }) = certain
+            && far < self.nearest
+        {
+            let place = (block.first() as usize).wrapping_add(triangle);
+            s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
+            self.nearest = near;
+            self.waiting = Candidate { leaf: code, triangle: triangle as u32 };
+            self.last = if far < self.last { far } else { self.last };
+            return false;
+        }
+        self.decide(code, maybe, query)
+    }
+
+    /// Computes what waits and these triangles of a leaf, a bit each; true if the query has what it wants.
+    #[inline(always)]
+    fn decide<Q: Query>(&mut self, leaf: u32, mut maybe: u32, query: &mut Q) -> bool {
+        let (object, ray) = (self.object, self.ray);
+        let mut candidates = [self.waiting, Candidate::NONE];
+        self.waiting = Candidate::NONE;
+        let mut done = false;
+        while !done && (maybe != 0 || candidates[0] != Candidate::NONE) {
+            if maybe != 0 {
+                candidates[1] = Candidate { leaf, triangle: maybe.trailing_zeros() };
+            }
+            done = matches!(settle(object, ray, candidates, query), Settled::Enough);
+            candidates[0] = Candidate::NONE;
+            maybe &= maybe.wrapping_sub(1);
+        }
+        self.take_over(query);
+        done
+    }
+
+    /// Computes what waits.
+    #[inline(always)]
+    fn settle<Q: Query>(&mut self, query: &mut Q) {
+        if self.waiting.leaf != NONE {
+            settle_one(self.object, self.ray, self.waiting, query);
+            self.waiting = Candidate::NONE;
+        }
+    }
+
+    /// Takes over what the query has found meanwhile.
+    #[inline(always)]
+    fn take_over<Q: Query>(&mut self, query: &Q) {
+        if !Q::ANY {
+            self.last = self.aim.slabs.limit(query.limit());
+            self.nearest = self.aim.slabs.nearest(query);
+        }
+    }
+}
+
+/// Walks from the root. Tet leaves without a subtree are handed to `tets` with their row; `walked`, from which the query has what
+/// it knows, is left out.
 #[inline(always)]
 #[expect(clippy::too_many_arguments)]
 pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     s: S,
     nodes: N,
-    object: &ObjectView<'_>,
-    ray: &Ray,
+    (object, ray): (&ObjectView<'_>, &Ray),
+    aim: &Aim,
     walked: u32,
-    flight: &mut Flight<Q>,
-    stacks: &mut Stacks,
+    query: &mut Q,
+    stack: &mut Alone,
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
-    // The code of what is entered next stays out of memory: reading back what was just stored is the longest wait of a step.
-    // Its place on the stack is `top`.
+    let mut walk =
+        Walk { object, ray, aim, last: aim.slabs.last, nearest: f32::INFINITY, waiting: Candidate::NONE };
+    if walked != NONE {
+        walk.take_over(query);
+    }
+    let ground = object.ground();
     let mut code = object.header.root;
-    let mut top = stacks.start(0, code);
+    let mut stack = stack.start(code);
     loop {
-        let found = match Child::from_code(code) {
-            Some(child) if N::is(child) => {
-                count.node();
-                match flight.nearest_child(s, N::node(object.ground(), code), stacks.room(top)) {
-                    Some((nearest, others)) => {
-                        code = nearest;
-                        top = stacks.replaced(top, others + 1);
-                        // A ray alone has nothing to do while it waits for that one.
-                        if others > 0 {
-                            prefetch(s, nodes, object.ground(), stacks.code(top.below()));
-                        }
+        // In registers for as long as no leaf is entered.
+        let planes = Planes::new(s, &walk.aim().slabs);
+        let limit = key_limit(walk.last);
+        while code & Child::LEAF_BIT == 0 {
+            count.node();
+            let node = N::node(ground, code);
+            let (bits, enter) = planes.children(s, node, walk.last);
+            if bits & bits.wrapping_sub(1) == 0 {
+                if bits != 0 {
+                    code = node.child()[bits.trailing_zeros() as usize % WIDTH];
+                } else {
+                    code = stack.pop::<Q>(limit);
+                }
+                continue;
+            }
+            let room = stack.room();
+            let children = s.load_u(node.child());
+            if Q::ANY {
+                code = node.child()[bits.trailing_zeros() as usize % WIDTH];
+                let others = s.compress(bits & (bits - 1), children, room.codes);
+                room.keep(others + 1);
+            } else {
+                let (count, nearest) = s.sort_far_to_near(bits, enter, children, room.codes, room.keys);
+                code = node.child()[nearest % WIDTH];
+                room.keep(count);
+            }
+            // A ray alone has nothing to do while it waits for that one.
+            prefetch(s, nodes, ground, stack.below());
+        }
+        let done = if let Some(leaf) = ground.indexed_leaf(code) {
+            count.leaf();
+            count.triangles(leaf.triangles);
+            walk.enter_leaf(s, (leaf, code), query)
+        } else {
+            let (mut indexed, mut raw) = (None, None);
+            match Child::from_code(code) {
+                Some(Child::Indexed(at)) => {
+                    let leaf = object.indexed(at, &mut indexed);
+                    count.leaf();
+                    count.triangles(leaf.triangles);
+                    walk.enter_leaf(s, (leaf, code), query)
+                }
+                Some(Child::Raw(at)) => {
+                    let leaf = object.raw(at, &mut raw);
+                    count.leaf();
+                    count.triangles(leaf.triangles);
+                    walk.enter_leaf(s, (leaf, code), query)
+                }
+                Some(Child::Tets(row)) if row != walked => {
+                    let subtree = object.tet_leaves[row as usize].subtree;
+                    if subtree != NONE {
+                        code = subtree;
                         continue;
                     }
-                    None => Found::Nothing,
+                    count.leaf();
+                    walk.decide(NONE, 0, query);
+                    let done = tets(row, query, count) == TetOutcome::Done;
+                    walk.take_over(query);
+                    done
                 }
+                _ => stack.is_empty(),
             }
-            Some(Child::Indexed(at)) => {
-                let mut room = None;
-                let leaf = object.indexed(at, &mut room);
-                count.leaf();
-                count.triangles(leaf.triangles);
-                flight.enter_leaf::<S, _, false>(s, object, from_ref(ray), (leaf, code))
-            }
-            Some(Child::Raw(at)) => {
-                let mut room = None;
-                let leaf = object.raw(at, &mut room);
-                count.leaf();
-                count.triangles(leaf.triangles);
-                flight.enter_leaf::<S, _, false>(s, object, from_ref(ray), (leaf, code))
-            }
-            Some(Child::Tets(row)) if row != walked => {
-                let subtree = object.tet_leaves[row as usize].subtree;
-                if subtree != NONE {
-                    code = subtree;
-                    continue;
-                }
-                count.leaf();
-                let outcome = tets(row, flight.query(), count);
-                if outcome == TetOutcome::Done { Found::Enough } else { flight.settled(Found::Nothing) }
-            }
-            Some(Child::Tets(_) | Child::Node(_) | Child::Packed(_)) | None => Found::Nothing,
         };
-        top = top.below();
-        match found {
-            Found::Nothing | Found::Again => {}
-            // Any-hit queries keep no keys, so nothing can be told of what waits.
-            Found::Nearer if Q::ANY => {}
-            Found::Nearer => top = stacks.keep_up_to(s, stacks.bottom(0), top, flight.key_limit()),
-            Found::Enough => return,
+        if done {
+            break;
         }
-        if top <= stacks.bottom(0) {
-            return;
-        }
-        code = stacks.code(top);
+        code = stack.pop::<Q>(key_limit(walk.last));
     }
+    walk.settle(query);
 }

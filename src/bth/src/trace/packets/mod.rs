@@ -73,7 +73,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     {
         return count;
     }
-    let frame = Frame::new(object.header);
+    let frame = object.frame;
     let PacketScratch { groups, room, rest } = scratch;
     rest.clear();
     let mut runs = Runs { frame: &frame, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };

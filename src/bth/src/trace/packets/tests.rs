@@ -8,9 +8,9 @@ use crate::simd::{Isa, Kernel, Simd};
 use crate::testing::Rng;
 use crate::trace::batch::Sink;
 use crate::trace::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
+use crate::trace::prepare::Frame;
 use crate::trace::query::{Any, Nearest, Query};
 use crate::trace::single;
-use crate::trace::with_scratch;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Quads of the surface along x and y, and of a leaf.
@@ -143,6 +143,7 @@ impl Surface {
     fn view(&self) -> ObjectView<'_> {
         ObjectView {
             header: &self.header,
+            frame: Frame::new(&self.header),
             grid: None,
             lines: &self.lines,
             triangle_ids: &self.ids,
@@ -213,15 +214,13 @@ fn bits(hit: &Hit) -> [u32; 4] {
 fn check(surface: &Surface, rays: &[Ray], least: LeastUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
-    let expected: Vec<(Hit, bool)> = with_scratch(|scratch| {
-        let mut trace = |ray: &Ray| {
-            let (mut hit, mut found) = (Hit::MISS, false);
-            single::trace::<Nearest, ()>(&object, ray, NONE, 0, scratch, &mut (), &mut hit);
-            single::trace::<Any, ()>(&object, ray, NONE, 0, scratch, &mut (), &mut found);
-            (hit, found)
-        };
-        rays.iter().map(&mut trace).collect()
-    });
+    let alone = |ray: &Ray| {
+        let (mut hit, mut found) = (Hit::MISS, false);
+        single::trace::<Nearest, ()>(&object, ray, NONE, 0, &mut (), &mut hit);
+        single::trace::<Any, ()>(&object, ray, NONE, 0, &mut (), &mut found);
+        (hit, found)
+    };
+    let expected: Vec<(Hit, bool)> = rays.iter().map(alone).collect();
     for isa in Isa::ALL {
         let mut hits = vec![Hit::MISS; rays.len()];
         let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);

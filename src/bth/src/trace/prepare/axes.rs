@@ -68,7 +68,9 @@ impl Common {
     /// The axes in the order of the projection.
     #[inline(always)]
     pub(crate) fn order(self) -> [usize; 3] {
-        [[1, 2, 0], [2, 0, 1], [0, 1, 2]][self.0]
+        // Not a constant, which would be copied for that.
+        static ORDER: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        ORDER[self.0]
     }
 }
 

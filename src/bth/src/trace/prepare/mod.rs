@@ -10,11 +10,13 @@ mod tests;
 
 pub(crate) use self::axes::{Axes, Common, Mixed};
 pub(crate) use self::lanes::{Lanes, fields, fields_of, lanes};
+use super::line::Line;
 use super::sight::{self, Sight};
 use super::slabs::{self, Slabs};
 use crate::layout::{NONE, Object};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use glam::{Vec3A, Vec4};
 use std::mem::offset_of;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -28,8 +30,8 @@ const UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 /// What is the same for all rays through an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
-    lower: [f32; 3],
-    upper: [f32; 3],
+    lower: Vec3A,
+    upper: Vec3A,
     farthest: f32,
 }
 
@@ -39,16 +41,22 @@ fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// The lesser; `b` where either is NaN.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
 impl Frame {
     pub(crate) fn new(object: &Object) -> Frame {
         let corners = object.lower.iter().chain(&object.upper);
         let farthest = corners.fold(0.0, |m: f32, x| greater(x.abs(), m));
-        Frame { lower: object.lower, upper: object.upper, farthest }
+        Frame { lower: object.lower.into(), upper: object.upper.into(), farthest }
     }
 
     /// The frame of boxes whose coordinates do not exceed this.
     pub(crate) fn around(farthest: f32) -> Frame {
-        Frame { lower: [-farthest; 3], upper: [farthest; 3], farthest }
+        Frame { lower: Vec3A::splat(-farthest), upper: Vec3A::splat(farthest), farthest }
     }
 
     /// The greatest coordinate in play for origins whose coordinates do not exceed this, seen from any of them.
@@ -110,66 +118,70 @@ impl Aim {
         Aim { slabs, ray: 0, sight, noted: Noted::NOTHING }
     }
 
-    /// A single ray, to the same bounds as [`Prepared::fill`]; false where f32 can't prepare it. Written in place: copies of
-    /// what was just written word by word stall.
+    /// A single ray, to the same bounds as [`Prepared::fill`]; none where f32 can't prepare it.
     #[inline(always)]
-    pub(crate) fn set(&mut self, frame: &Frame, ray: &Ray) -> bool {
-        let (o, d) = (&ray.origin, &ray.direction);
-        let size = [d[0].abs(), d[1].abs(), d[2].abs()];
+    pub(crate) fn of(frame: &Frame, ray: &Ray) -> Option<Aim> {
+        let [start, end]: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
+        let ([.., tmin], [dx, dy, dz, tmax]) = (start, end);
+        let (o, d) = (Vec3A::from_vec4(Vec4::from_array(start)), Vec3A::from_vec4(Vec4::from_array(end)));
+        let (size, start) = (d.abs(), o.abs());
+        let far = (frame.lower - o).abs().max((frame.upper - o).abs());
+        let (greatest, reach) = (size.max_element(), far.max_element());
+        let extent = frame.extent(start.max_element());
+        // Each by itself, because the greater of NaN and a number may be the number.
+        let finite = size.cmplt(Vec3A::splat(LARGEST)) & start.cmplt(Vec3A::splat(LARGEST));
+        let in_range = (greatest > 1.0 / LARGEST) & (SMALLEST < extent) & (extent < LARGEST);
+        if !(finite.all() & in_range & (tmin <= tmax)) {
+            return None;
+        }
+        let least = Vec3A::splat(greatest * slabs::LEAST_COMPONENT as f32);
+        let magnitude = Vec3A::splat(greatest) / size.max(least);
+        let reciprocal = magnitude.copysign(d);
+        let (middle, pad) = (o * reciprocal, magnitude * (extent * slabs::PAD as f32));
         // Without branches, which rays of all directions would mislead.
-        let is_x = (size[0] > size[1]) & (size[0] > size[2]);
-        let z = if is_x { 0 } else { 2 - usize::from(size[1] > size[2]) };
-        let greatest = greater(greater(size[0], size[1]), size[2]);
-        let (mut reach, mut farthest) = (0f32, 0f32);
-        for k in 0..3 {
-            let (low, high) = ((frame.lower[k] - o[k]).abs(), (frame.upper[k] - o[k]).abs());
-            reach = greater(greater(low, high), reach);
-            farthest = greater(o[k].abs(), farthest);
-        }
-        let extent = frame.extent(farthest);
-        // Sums, because the greater of NaN and a number may be the number.
-        let finite = reach + (o[0] + o[1] + o[2]).abs() + (size[0] + size[1] + size[2]);
-        if !(greatest > 1.0 / LARGEST
-            && finite < LARGEST
-            && SMALLEST < extent
-            && extent < LARGEST
-            && ray.tmin <= ray.tmax)
-        {
-            return false;
-        }
-        let pad = extent * slabs::PAD as f32;
-        let least = greatest * slabs::LEAST_COMPONENT as f32;
-        let Aim { slabs, sight, .. } = self;
-        for k in 0..3 {
-            let magnitude = greatest / greater(size[k], least);
-            let reciprocal = magnitude.copysign(d[k]);
-            let (middle, pad) = (o[k] * reciprocal, pad * magnitude);
-            slabs.reciprocal[k] = reciprocal;
-            slabs.near_addend[k] = -(middle + pad);
-            slabs.far_addend[k] = pad - middle;
-            slabs.near[k] = (d[k].to_bits() >> 31) * slabs::FAR;
-        }
+        let z = (size.cmpeq(Vec3A::splat(greatest)).bitmask().trailing_zeros() as usize).min(2);
         let [x, y, _] = Common(z).order();
-        let inverse = 1.0 / greatest;
-        let forward = if d[z] < 0.0 { -1.0 } else { 1.0 };
+        let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
         // Not a denormal number on the way: those cost a hundred cycles.
         let least = (greatest + 1.0) * f32::MIN_POSITIVE;
         let slack = |t: f32| t.abs() * (4.0 / (1 << 24) as f32) + least;
-        let first = (ray.tmin * greatest).max(-f32::MAX);
-        let limit = ray.tmax * greatest;
-        let last = (ray.tmax.min(f32::MAX) * greatest).min(f32::MAX);
-        slabs.scale = greatest;
-        slabs.first = first - slack(first);
-        slabs.last = limit + slack(limit);
-        sight.axis = [x as u32, y as u32, z as u32];
-        [sight.error_slope, sight.error_floor] = sight::errors(reach);
-        sight.origin = [o[x], o[y]];
-        sight.shear = [d[x] * inverse, d[y] * inverse];
-        sight.forward = forward;
-        sight.start = -o[z] * forward;
-        sight.first = first + slack(first);
-        sight.last = last - slack(last);
-        true
+        let first = greater(tmin * greatest, -f32::MAX);
+        let limit = tmax * greatest;
+        let last = lesser(lesser(tmax, f32::MAX) * greatest, f32::MAX);
+        let [error_slope, error_floor] = sight::errors(reach);
+        let row = |d: f32| (d.to_bits() >> 31) * slabs::FAR;
+        let slabs = Slabs {
+            reciprocal: reciprocal.to_array(),
+            scale: greatest,
+            near_addend: (-(middle + pad)).to_array(),
+            first: first - slack(first),
+            far_addend: (pad - middle).to_array(),
+            last: limit + slack(limit),
+            near: [row(dx), row(dy), row(dz)],
+        };
+        let sight = Sight {
+            axis: [x as u32, y as u32, z as u32],
+            error_floor,
+            origin: [ray.origin[x], ray.origin[y]],
+            shear: [ray.direction[x] * inverse, ray.direction[y] * inverse],
+            forward,
+            start: -ray.origin[z] * forward,
+            first: first + slack(first),
+            last: last - slack(last),
+            error_slope,
+        };
+        Some(Aim::new(slabs, sight))
+    }
+
+    /// As [`Self::of`], for rays that f32 can't prepare too; none if the ray hits nothing whatever there is: see [`Line::new`], or an
+    /// empty range of t.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn in_f64(object: &Object, ray: &Ray) -> Option<Aim> {
+        let line = Line::new(ray)?;
+        let slabs = Slabs::new(ray, &line, object);
+        let sight = Sight::new(ray, &line, &slabs, object);
+        (ray.tmin <= ray.tmax).then(|| Aim::new(slabs, sight))
     }
 }
 

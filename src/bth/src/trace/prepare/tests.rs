@@ -84,10 +84,8 @@ impl Kernel for Together<'_> {
 fn aims(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<Aim> {
     let slabs = Slabs::new(ray, line, object);
     let mut aims = vec![Aim::new(slabs, Sight::new(ray, line, &slabs, object))];
-    let mut aim = Aim::new_zeroed();
-    if aim.set(&Frame::new(object), ray) {
-        aims.push(aim);
-    }
+    aims.extend(Aim::of(&Frame::new(object), ray));
+    aims.extend(Aim::in_f64(object, ray));
     let mut others = [Ray { origin: [f32::NAN; 3], ..*ray }; LANES];
     others[lane] = *ray;
     for isa in Isa::ALL {

@@ -162,23 +162,24 @@ pub unsafe extern "C" fn bth_any(
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
     // `bool` has invalid bit patterns, so the caller's memory is not passed on as one. A ray alone need not pay for room
     // that it has no use for.
-    if count <= FEW {
-        any_in_parts::<FEW>(scene, rays, from, hit);
+    if let [hit] = hit {
+        let mut found = [false];
+        let traced = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut found)));
+        *hit = (traced.is_ok() && found[0]).into();
     } else {
-        any_in_parts::<PART>(scene, rays, from, hit);
+        any_in_parts(scene, rays, from, hit);
     }
 }
 
 /// Rays that are traced together by [`bth_any`].
 const PART: usize = 1024;
-/// As many at most go without room for a [`PART`].
-const FEW: usize = 16;
 
-/// Any hits, `N` rays at a time.
-fn any_in_parts<const N: usize>(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
-    let mut part = [false; N];
-    for (i, (rays, hit)) in rays.chunks(N).zip(hit.chunks_mut(N)).enumerate() {
-        let from = from.map(|f| &f[i * N..i * N + rays.len()]);
+/// Any hits, a [`PART`] at a time.
+#[inline(never)]
+fn any_in_parts(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
+    let mut part = [false; PART];
+    for (i, (rays, hit)) in rays.chunks(PART).zip(hit.chunks_mut(PART)).enumerate() {
+        let from = from.map(|f| &f[i * PART..i * PART + rays.len()]);
         let part = &mut part[..rays.len()];
         if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, part))).is_err() {
             part.fill(false);

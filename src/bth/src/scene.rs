@@ -172,17 +172,15 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
-        match self.sole() {
-            Some((object, instance)) if rays.len() < trace::FEW => {
-                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    trace::nearest_to(object, ray, hint(surface(from, i), instance), instance, hit);
-                }
+        match (self.sole(), rays, &mut *hits) {
+            (Some((object, instance)), [ray], [hit]) => {
+                trace::nearest_to(object, ray, hint(surface(from, 0), instance), instance, hit);
             }
-            sole => self.nearest_many(sole, rays, from, hits),
+            (sole, ..) => self.nearest_many(sole, rays, from, hits),
         }
     }
 
-    /// As [`Self::nearest_batch`], for more rays than one would trace one after the other.
+    /// As [`Self::nearest_batch`], for more rays than one, or more objects.
     #[inline(never)]
     fn nearest_many(
         &self,
@@ -193,6 +191,12 @@ impl Scene {
     ) {
         trace::miss_all(hits);
         if let Some((object, instance)) = sole {
+            if rays.len() < trace::FEW {
+                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                    *hit = trace::nearest(object, ray, hint(surface(from, i), instance), instance);
+                }
+                return;
+            }
             let from = hints(object, from, instance);
             return trace::with_scratch(|scratch| {
                 trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
@@ -236,13 +240,11 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
-        match self.sole() {
-            Some((object, instance)) if rays.len() < trace::FEW => {
-                for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = trace::any(object, ray, hint(surface(from, i), instance));
-                }
+        match (self.sole(), rays, &mut *found) {
+            (Some((object, instance)), [ray], [found]) => {
+                *found = trace::any(object, ray, hint(surface(from, 0), instance));
             }
-            sole => self.any_many(sole, rays, from, found),
+            (sole, ..) => self.any_many(sole, rays, from, found),
         }
     }
 
@@ -257,6 +259,12 @@ impl Scene {
     ) {
         found.fill(false);
         if let Some((object, instance)) = sole {
+            if rays.len() < trace::FEW {
+                for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
+                    *found = trace::any(object, ray, hint(surface(from, i), instance));
+                }
+                return;
+            }
             let from = hints(object, from, instance);
             return trace::with_scratch(|scratch| {
                 trace::any_batch(object, rays, from.as_deref(), scratch, found);

@@ -101,9 +101,16 @@ pub(crate) fn settle_one<Q: Query>(
         Estimate::Missed => None,
         Estimate::Crossed(crossing) => Some(crossing),
         Estimate::Open(_, t) if !query.cares(t) => None,
-        Estimate::Open(..) => open(ray, corners),
+        Estimate::Open(..) => open_candidate(object, ray, candidate),
     };
     crossing.is_some_and(|crossing| query.offer(Named::place(place, object.triangle_ids), crossing))
+}
+
+/// What f64 leaves open of a candidate. It is read again, so that what is common needs no corners in memory.
+#[cold]
+#[inline(never)]
+fn open_candidate(object: &ObjectView<'_>, ray: &Ray, candidate: Candidate) -> Option<Crossing> {
+    open(ray, candidate.read(object, Corners)?.1)
 }
 
 /// What f64 leaves open.

@@ -193,21 +193,24 @@ pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]
     if inside && weighed.is_good {
         return Estimate::Crossed(weighed.crossing());
     }
-    let t = if inside { t_range(&weighed, [bound, error[1]]) } else { [f64::NEG_INFINITY, f64::INFINITY] };
+    let t = if inside {
+        t_range(weighed.t, whole, [bound, error[1]])
+    } else {
+        [f64::NEG_INFINITY, f64::INFINITY]
+    };
     Estimate::Open(Doubt { weighed, weight: [first, second, third], bound }, t)
 }
 
-/// Between which t a line crosses a triangle, given the errors of the sum of its weights, whose sign is certain, and of the volume:
+/// Between which t a line crosses a triangle, given t, the sum of its weights and the errors of that, whose sign is certain, and of the volume:
 /// (V+p)/(W+q) - V/W = (p - q·V/W)/(W+q).
 #[inline(never)]
-fn t_range(weighed: &Weighed, error: [f64; 2]) -> [f64; 2] {
+fn t_range(t: f64, whole: f64, error: [f64; 2]) -> [f64; 2] {
     /// More than the roundings of this and of t itself.
     const ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
-    let whole = weighed.weight[2].abs();
+    let whole = whole.abs();
     if whole <= 2.0 * error[0] {
         return [f64::NEG_INFINITY, f64::INFINITY];
     }
-    let t = weighed.t;
     let shift = (error[1] + t.abs() * error[0]) / (whole - error[0]);
     let shift = shift + (shift + t.abs()) * ROUNDING;
     [t - shift, t + shift]

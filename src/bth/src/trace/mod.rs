@@ -67,7 +67,7 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
-#[inline]
+#[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     nearest_to(object, ray, from, instance, &mut hit);

@@ -38,13 +38,6 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// The ray as it was prepared, in memory: compilers would rather make sixteen of each of its numbers before the walk, and
-    /// store those.
-    #[inline(always)]
-    fn aim(&self) -> &Aim {
-        black_box(self.aim)
-    }
-
     /// Tests the triangles of a leaf with this code; true if the query has what it wants.
     #[inline(always)]
     fn enter_leaf<S: Simd, Q: Query, B: Block>(
@@ -53,7 +46,7 @@ impl Walk<'_> {
         (block, code): (&B, u32),
         query: &mut Q,
     ) -> bool {
-        let aim = self.aim();
+        let aim = self.aim;
         let found = aim.sight.candidates(s, block, aim.slabs.first, self.last);
         if found.maybe == 0 {
             return false;
@@ -132,6 +125,8 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
+    // In memory: compilers would rather make sixteen of each of its numbers before the walk, and store those.
+    let aim = black_box(aim);
     let mut walk =
         Walk { object, ray, aim, last: aim.slabs.last, nearest: f32::INFINITY, waiting: Candidate::NONE };
     if walked != NONE {
@@ -140,10 +135,11 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     let ground = object.ground();
     let mut code = object.header.root;
     let mut stack = stack.start(code);
+    // Keys of the stack beyond this are of no interest any more.
+    let mut limit = key_limit(walk.last);
     loop {
         // In registers for as long as no leaf is entered.
-        let planes = Planes::new(s, &walk.aim().slabs);
-        let limit = key_limit(walk.last);
+        let planes = Planes::new(s, &aim.slabs);
         while code & Child::LEAF_BIT == 0 {
             count.node();
             let node = N::node(ground, code);
@@ -207,7 +203,8 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         if done {
             break;
         }
-        code = stack.pop::<Q>(key_limit(walk.last));
+        limit = key_limit(walk.last);
+        code = stack.pop::<Q>(limit);
     }
     walk.settle(query);
 }

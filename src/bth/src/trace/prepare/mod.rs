@@ -84,6 +84,14 @@ pub(crate) struct Aim {
     pub(crate) noted: Noted,
 }
 
+/// The first line of an [`Aim`].
+#[derive(FromBytes)]
+#[repr(C)]
+struct FirstLine {
+    slabs: Slabs,
+    _ray: u32,
+}
+
 const _: () = assert!(offset_of!(Aim, sight) == 64 && size_of::<Aim>() == 128);
 
 /// What the walk of a ray has come upon.
@@ -149,16 +157,15 @@ impl Aim {
         let limit = tmax * greatest;
         let last = lesser(lesser(tmax, f32::MAX) * greatest, f32::MAX);
         let [error_slope, error_floor] = sight::errors(reach);
-        let row = |d: f32| (d.to_bits() >> 31) * slabs::FAR;
-        let slabs = Slabs {
-            reciprocal: reciprocal.to_array(),
-            scale: greatest,
-            near_addend: (-(middle + pad)).to_array(),
-            first: first - slack(first),
-            far_addend: (pad - middle).to_array(),
-            last: limit + slack(limit),
-            near: [row(dx), row(dy), row(dz)],
-        };
+        let row = |d: f32| f32::from_bits((d.to_bits() >> 31) * slabs::FAR);
+        // Whole rows are stored.
+        let slabs: [[f32; 4]; 4] = [
+            reciprocal.extend(greatest).to_array(),
+            (-(middle + pad)).extend(first - slack(first)).to_array(),
+            (pad - middle).extend(limit + slack(limit)).to_array(),
+            [row(dx), row(dy), row(dz), 0.0],
+        ];
+        let FirstLine { slabs, .. } = zerocopy::transmute!(slabs);
         let sight = Sight {
             axis: [x as u32, y as u32, z as u32],
             error_floor,

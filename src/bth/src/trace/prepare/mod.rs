@@ -150,19 +150,22 @@ impl Aim {
         let z = (size.cmpeq(Vec3A::splat(greatest)).bitmask().trailing_zeros() as usize).min(2);
         let [x, y, _] = Common(z).order();
         let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
+        // Depths of tmin and tmax, twice: bounds of all that matters, and of what is certain to be in range.
+        const LEAST: Vec4 = Vec4::splat(-f32::MAX);
+        const GREATEST: Vec4 = Vec4::new(f32::MAX, f32::INFINITY, f32::MAX, f32::MAX);
+        let depths = Vec4::new(tmin, tmax, tmin, lesser(tmax, f32::MAX)) * greatest;
+        let depths = depths.max(LEAST).min(GREATEST);
         // Not a denormal number on the way: those cost a hundred cycles.
-        let least = (greatest + 1.0) * f32::MIN_POSITIVE;
-        let slack = |t: f32| t.abs() * (4.0 / (1 << 24) as f32) + least;
-        let first = greater(tmin * greatest, -f32::MAX);
-        let limit = tmax * greatest;
-        let last = lesser(lesser(tmax, f32::MAX) * greatest, f32::MAX);
+        let slack = depths.abs() * (4.0 / (1 << 24) as f32) + (greatest + 1.0) * f32::MIN_POSITIVE;
+        let [first, last, certain_first, certain_last] =
+            (depths + slack * Vec4::new(-1.0, 1.0, 1.0, -1.0)).to_array();
         let [error_slope, error_floor] = sight::errors(reach);
         let row = |d: f32| f32::from_bits((d.to_bits() >> 31) * slabs::FAR);
         // Whole rows are stored.
         let slabs: [[f32; 4]; 4] = [
             reciprocal.extend(greatest).to_array(),
-            (-(middle + pad)).extend(first - slack(first)).to_array(),
-            (pad - middle).extend(limit + slack(limit)).to_array(),
+            (-(middle + pad)).extend(first).to_array(),
+            (pad - middle).extend(last).to_array(),
             [row(dx), row(dy), row(dz), 0.0],
         ];
         let FirstLine { slabs, .. } = zerocopy::transmute!(slabs);
@@ -173,8 +176,8 @@ impl Aim {
             shear: [ray.direction[x] * inverse, ray.direction[y] * inverse],
             forward,
             start: -ray.origin[z] * forward,
-            first: first + slack(first),
-            last: last - slack(last),
+            first: certain_first,
+            last: certain_last,
             error_slope,
         };
         Some(Aim::new(slabs, sight))

@@ -337,7 +337,7 @@ mod tests {
                 continue;
             }
             let exact = line.exact_crossing(corners);
-            let [low, high] = t_range(&weighed, [error[0] * size, error[1]]);
+            let [low, high] = t_range(weighed.t, whole, [error[0] * size, error[1]]);
             assert!(low <= exact.t && exact.t <= high, "round {round}: {} is not {low} to {high}", exact.t);
             bounded += usize::from(high - low < exact.t.abs());
             if weighed.is_good {

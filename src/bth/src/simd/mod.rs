@@ -140,8 +140,8 @@ pub(crate) trait Simd: Copy + 'static {
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
     /// As [`Self::compress`].
     fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
-    /// As [`Self::compress`], the greatest key first; keys are compared, and stored, but for their four lowest
-    /// bits. Negative keys may come in any order.
+    /// As [`Self::compress`], the greatest key first; the four lowest bits of keys are not compared, and hold the lane where
+    /// keys are stored. Negative keys may come in any order.
     fn compress_far_to_near(
         self,
         bits: u32,

@@ -58,13 +58,14 @@ fn compress<T: Copy>(bits: u32, a: &[T; LANES], to: &mut [T; LANES]) -> usize {
 pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: &mut F) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
-        let key = f32::from_bits(key[lane].to_bits() & !15);
+        // The lane goes into the lowest bits of its key; as integers, because that makes NaN of an infinity.
+        let key = key[lane].to_bits() & !15 | lane as u32;
         let mut at = count % LANES;
-        while at > 0 && keys[at - 1] < key {
+        while at > 0 && (keys[at - 1].to_bits() as i32) < key as i32 {
             (keys[at], to[at]) = (keys[at - 1], to[at - 1]);
             at -= 1;
         }
-        (keys[at], to[at]) = (key, a[lane]);
+        (keys[at], to[at]) = (f32::from_bits(key), a[lane]);
         count += 1;
     }
     count

@@ -64,6 +64,16 @@ impl Kernel for Everything<'_> {
             keys[..sorted].iter().zip(&codes).map(|(k, &c)| (k.to_bits() & !15, c)).collect();
         assert!(pairs.is_sorted_by(|p, q| p.0 >= q.0), "far to near: {pairs:?}");
         pairs.sort_unstable();
+        for key in [ordered, self.a.map(|x| if x.is_nan() { -0.5 } else { x })] {
+            let (count, nearest) = s.sort_far_to_near(self.bits, s.load(&key), x, &mut codes, &mut keys);
+            assert_eq!(count, sorted);
+            // The one that comes last, whatever the order of negative keys is.
+            if let Some(last) = count.checked_sub(1) {
+                assert_eq!(nearest, keys[last].to_bits() as usize % LANES, "of {key:?}");
+                assert_eq!(codes[last], self.u[nearest]);
+                assert!(self.bits >> nearest & 1 != 0);
+            }
+        }
         let (mut kept_codes, mut kept_keys) = (self.u.repeat(2), self.a.repeat(2));
         let kept = s.keep_up_to(&mut kept_codes[..19], &mut kept_keys[..19], self.b[3]);
         let mut square = [a; LANES];

@@ -112,3 +112,62 @@ impl Room<'_> {
         *self.top += count.wrapping_sub(1) % LANES;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Rng;
+    use crate::trace::query::{Any, Nearest};
+
+    /// Random steps, against a vector of codes and keys.
+    fn steps<Q: Query>(rng: &mut Rng) {
+        let mut stack = Alone::new();
+        let mut stack = stack.start(7);
+        let mut expected = vec![(BOTTOM, f32::NEG_INFINITY), (7, f32::NEG_INFINITY)];
+        for step in 0.. {
+            if stack.is_empty() {
+                break;
+            }
+            if step < 100 && rng.below(5) < 3 && expected.len() + LANES <= SIZE {
+                let count = 1 + rng.below(LANES as u64) as usize;
+                let room = stack.room();
+                expected.pop();
+                for i in 0..count {
+                    let entry = (rng.below(1 << 20) as u32, rng.below(100) as f32);
+                    (room.codes[i], room.keys[i]) = entry;
+                    expected.push(entry);
+                }
+                room.keep(count);
+                assert_eq!(stack.below(), expected[expected.len() - 2].0);
+            } else {
+                let limit = rng.below(100) as f32;
+                expected.pop();
+                while !Q::ANY && expected.last().is_some_and(|&(_, key)| key > limit) {
+                    expected.pop();
+                }
+                assert_eq!(stack.pop::<Q>(limit), expected.last().expect("the bottom stays").0);
+            }
+            assert_eq!(stack.is_empty(), expected.len() == 1);
+        }
+        assert_eq!(stack.pop::<Q>(0.0), BOTTOM);
+    }
+
+    #[test]
+    fn what_waits_comes_back_in_order_but_for_what_lies_beyond_the_limit() {
+        let mut rng = Rng(3);
+        for _ in 0..if cfg!(miri) { 3 } else { 200 } {
+            steps::<Any>(&mut rng);
+            steps::<Nearest>(&mut rng);
+        }
+    }
+
+    #[test]
+    #[should_panic = "deeper than its header says"]
+    fn a_deeper_tree_panics_and_writes_nothing_outside() {
+        let mut stack = Alone::new();
+        let mut stack = stack.start(1);
+        for _ in 0..SIZE {
+            stack.room().keep(LANES);
+        }
+    }
+}

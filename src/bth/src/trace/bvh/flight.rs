@@ -234,10 +234,26 @@ impl<Q: Query> Flight<Q> {
         object: &ObjectView<'_>,
         ray: &Ray,
         block: &B,
-        bits: u32,
+        mut bits: u32,
     ) -> Found {
-        if decide(s, object, ray, block, bits, self.ask(ray)) {
-            return Found::Enough;
+        self.ask(ray);
+        let (origin, direction) = (wide(ray.origin), wide(ray.direction));
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize % WIDTH;
+            bits &= bits - 1;
+            let corners = block.corners(i);
+            let crossing = match estimate(origin, direction, corners.map(wide)) {
+                Estimate::Missed => None,
+                Estimate::Crossed(crossing) => Some(crossing),
+                Estimate::Open(_, t) if !self.query.cares(t) => None,
+                Estimate::Open(..) => open(ray, corners),
+            };
+            let Some(crossing) = crossing else { continue };
+            let place = block.first() + i as u32;
+            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
+            if self.query.offer(Named::place(place, object.triangle_ids), crossing) {
+                return Found::Enough;
+            }
         }
         self.settled(Found::Nothing)
     }
@@ -253,37 +269,6 @@ impl<Q: Query> Flight<Q> {
         self.take_over();
         if self.aim.slabs.last < limit { Found::Nearer } else { otherwise }
     }
-}
-
-/// Offers triangles of a leaf, a bit each, to a query, as f64 and exact arithmetic see them; true if it has what it wants then.
-#[inline(always)]
-pub(crate) fn decide<S: Simd, Q: Query, B: Block>(
-    s: S,
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    block: &B,
-    mut bits: u32,
-    query: &mut Q,
-) -> bool {
-    let (origin, direction) = (wide(ray.origin), wide(ray.direction));
-    while bits != 0 {
-        let i = bits.trailing_zeros() as usize % WIDTH;
-        bits &= bits - 1;
-        let corners = block.corners(i);
-        let crossing = match estimate(origin, direction, corners.map(wide)) {
-            Estimate::Missed => None,
-            Estimate::Crossed(crossing) => Some(crossing),
-            Estimate::Open(_, t) if !query.cares(t) => None,
-            Estimate::Open(..) => open(ray, corners),
-        };
-        let Some(crossing) = crossing else { continue };
-        let place = block.first() + i as u32;
-        s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
-        if query.offer(Named::place(place, object.triangle_ids), crossing) {
-            return true;
-        }
-    }
-    false
 }
 
 /// Writes the children of a node whose bits are set, the nearest last; returns how many.

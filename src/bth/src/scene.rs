@@ -170,6 +170,7 @@ impl Scene {
     ///
     /// # Panics
     /// If the slices differ in length.
+    #[inline]
     pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
         match (self.sole(), rays, &mut *hits) {
@@ -238,6 +239,7 @@ impl Scene {
     ///
     /// # Panics
     /// If the slices differ in length.
+    #[inline]
     pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
         match (self.sole(), rays, &mut *found) {

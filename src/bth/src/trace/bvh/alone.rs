@@ -54,7 +54,8 @@ impl Waiting<'_> {
     #[inline(always)]
     fn code(&self, at: usize) -> u32 {
         debug_assert!(at <= self.top);
-        // SAFETY: called for places up to the top only, which have been written and lie within.
+        // SAFETY: called for places up to the top only. Those have been written: the first two by `Alone::start`, the others by
+        // `Self::room`, which clears all it lends, and a top is the first two's or lies among what was lent; so it is within.
         unsafe { self.codes.get_unchecked(at).assume_init() }
     }
 

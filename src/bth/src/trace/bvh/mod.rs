@@ -1,5 +1,6 @@
-//! Rays through the wide BVH: batches ([`batch`]) with many on their way at once ([`flights`]), or one ray ([`walk`], with a
-//! stack of its own, [`alone`]), by the same steps ([`flight`]); where many end is computed together ([`landing`]).
+//! Rays through the wide BVH: batches ([`batch`]) with many on their way at once ([`flights`]), each by the steps of [`flight`],
+//! and where many end computed together ([`landing`]); or one ray alone ([`walk`]), with a stack of its own ([`alone`]). Both
+//! test the same boxes and triangles, and note hits alike.
 
 pub(crate) mod alone;
 pub(crate) mod batch;

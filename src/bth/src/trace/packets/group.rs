@@ -10,17 +10,17 @@ use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::crossings::{Crossings, Pairs};
-use crate::trace::prepare::{self, Common, Frame, Mixed};
+use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
 use crate::trace::sight::Block;
 
 /// How sixteen rays see points.
 #[derive(Clone, Copy)]
 pub(crate) struct Projection<S: Simd> {
-    origin: [S::F; 2],
+    pub(crate) origin: [S::F; 2],
     /// Slopes of the rays: how far they go along the plane's axes while they go 1 along the third, whichever way.
     pub(crate) shear: [S::F; 2],
     pub(crate) forward: S::F,
-    start: S::F,
+    pub(crate) start: S::F,
 }
 
 impl<S: Simd> Projection<S> {
@@ -62,6 +62,8 @@ pub(crate) struct Group<S: Simd> {
     pub(crate) first: S::F,
     /// or certainly exceeds this.
     pub(crate) limit: S::F,
+    /// Greatest coordinate of the object's box, seen from the origin.
+    pub(crate) reach: S::F,
     pub(crate) mixed: Mixed<S>,
     /// The axis along the rays, if it is the same for all.
     pub(crate) common: Option<Common>,
@@ -97,6 +99,7 @@ impl<S: Simd> Group<S> {
             scale: zero,
             first: zero,
             limit: zero,
+            reach: zero,
             mixed: Mixed { is_x: no, is_y: no },
             common: None,
             projection: Projection { origin: [zero; 2], shear: [zero; 2], forward: zero, start: zero },
@@ -173,11 +176,10 @@ impl<S: Simd> Group<S> {
     fn take<H: Hull<S>>(&mut self, s: S, lanes: prepare::Lanes<S>) -> bool {
         self.reciprocal = lanes.reciprocal;
         if !H::FROM_POINT {
+            self.reach = lanes.reach;
+            self.negative = lanes.negative;
             self.near_addend = lanes.near_addend;
             self.far_addend = lanes.far_addend;
-        }
-        if H::MIXED {
-            self.negative = lanes.negative;
         }
         self.scale = lanes.scale;
         [self.first, self.limit] = lanes.depths;
@@ -188,6 +190,27 @@ impl<S: Simd> Group<S> {
             (self.projection.origin, self.projection.start) = (origin, start);
         }
         s.mask_bits(lanes.usable) == 0xffff
+    }
+
+    /// What the rays are prepared to, where they do not start at one point.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, s: S) -> prepare::Lanes<S> {
+        prepare::Lanes {
+            reciprocal: self.reciprocal,
+            near_addend: self.near_addend,
+            far_addend: self.far_addend,
+            negative: self.negative,
+            scale: self.scale,
+            depths: [self.first, self.limit],
+            certain: self.certain,
+            axis: self.mixed.axes(s),
+            origin: self.projection.origin,
+            shear: self.projection.shear,
+            forward: self.projection.forward,
+            start: self.projection.start,
+            reach: self.reach,
+            usable: s.mask(0xffff),
+        }
     }
 
     /// The rays that may meet a box within their range. Where all go into the same octant ([`Hull::MIXED`] is false) the corners

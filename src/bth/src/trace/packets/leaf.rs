@@ -4,6 +4,7 @@
 //! is tested. Most triangles are left out by the error bound of the whole leaf, which is that of [`crate::trace::sight`] for the
 //! greatest corner of all; only for the others is it worked out.
 
+use super::few::{FEW, Lone};
 use super::group::Group;
 use super::hull::Hull;
 use super::mesh::Mesh;
@@ -28,6 +29,8 @@ pub(crate) struct Rays<'a, Q> {
     /// Queries of rays for which anything has been decided, where their bit is set.
     pub(crate) queries: &'a mut [Q],
     pub(crate) asked: u64,
+    /// The rays, one by one.
+    pub(crate) lone: &'a mut Lone,
     pub(crate) met: &'a mut Met,
     /// Those that are not done.
     pub(crate) alive: u64,
@@ -75,8 +78,21 @@ impl<Q: Query> Rays<'_, Q> {
         groups: &mut [Group<S>],
         (points, relative): (&mut Points, &mut Relative),
         leaf: &Leaf<'_, B>,
-        rays: u64,
+        mut rays: u64,
     ) -> bool {
+        // (Rays of which the nearest hit is asked are packets only if they go together to the last.)
+        if Q::ANY {
+            for (i, group) in groups.iter().enumerate() {
+                let active = (rays >> (i * LANES)) as u32 & 0xffff;
+                if active.count_ones() <= FEW {
+                    rays &= !(0xffff << (i * LANES));
+                    self.enter_few::<S, H, B>(s, group, i, leaf, active);
+                }
+            }
+            if rays == 0 {
+                return false;
+            }
+        }
         let count = leaf.block.triangles().min(WIDTH as u32);
         let triangles = !leaf.block.outside(s, hull) & ((1 << count) - 1);
         let (mut used, mut rest) = (0u64, triangles);
@@ -111,6 +127,31 @@ impl<Q: Query> Rays<'_, Q> {
             }
         }
         nearer
+    }
+
+    /// Tests the triangles of a leaf for rays of a group one at a time: whether they hit any.
+    #[inline(always)]
+    fn enter_few<S: Simd, H: Hull<S>, B: Mesh>(
+        &mut self,
+        s: S,
+        group: &Group<S>,
+        at: usize,
+        leaf: &Leaf<'_, B>,
+        mut active: u32,
+    ) {
+        while active != 0 {
+            let lane = active.trailing_zeros() as usize;
+            active &= active - 1;
+            let found = self.lone.candidates::<S, H>(s, group, (at, lane), leaf.block);
+            let ray = at * LANES + lane;
+            let (mut hit, mut maybe) = (found.sure != 0, found.maybe);
+            while !hit && maybe != 0 {
+                let candidate = Candidate { leaf: leaf.code, triangle: maybe.trailing_zeros() };
+                maybe &= maybe - 1;
+                hit = matches!(self.settle_one(ray, [candidate, Candidate::NONE]), Settled::Enough);
+            }
+            self.alive &= !(u64::from(hit) << ray);
+        }
     }
 
     #[inline(always)]

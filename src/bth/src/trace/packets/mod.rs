@@ -1,6 +1,7 @@
 //! Which rays of a batch go in packets.
 
 pub(crate) mod coherence;
+pub(crate) mod few;
 pub(crate) mod group;
 pub(crate) mod hull;
 pub(crate) mod leaf;
@@ -34,7 +35,7 @@ pub(crate) struct LeastUse {
 }
 
 /// By measurement.
-pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 10, short: 15 };
+pub(crate) const LEAST_USE: LeastUse = LeastUse { coherent: 10, short: 8 };
 
 /// Memory kept from one batch to the next.
 #[derive(Debug, Default)]

@@ -5,6 +5,7 @@
 //! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
 //! be computed at the end; what is not certain is decided at once ([`crate::trace::candidate`]).
 
+use super::few::{FEW_OF_ALL, Lone};
 use super::group::Group;
 use super::hull::Hull;
 use super::leaf::{Leaf, Rays};
@@ -22,7 +23,7 @@ use crate::trace::query::{Deliver, Query};
 use std::any::Any;
 
 /// Groups of sixteen rays in a packet.
-const GROUPS: usize = 4;
+pub(crate) const GROUPS: usize = 4;
 /// Rays in a packet at most.
 pub(crate) const PACKET: usize = GROUPS * LANES;
 
@@ -30,12 +31,12 @@ pub(crate) const PACKET: usize = GROUPS * LANES;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
     /// Rays that entered the parent; of those that go into different octants, and are asked at once, which meet the box.
-    rays: u64,
+    pub(crate) rays: u64,
     /// Line of the parent, and the slot there.
-    parent: u32,
-    slot: u32,
+    pub(crate) parent: u32,
+    pub(crate) slot: u32,
     /// Lower bound of the depth at which any ray enters it.
-    key: f32,
+    pub(crate) key: f32,
 }
 
 /// Memory that packets need, kept from one batch to the next.
@@ -44,6 +45,7 @@ pub(crate) struct Room {
     stack: Vec<Entry>,
     points: Points,
     relative: Relative,
+    lone: Lone,
     pub(crate) met: Met,
     seen: SeenFromPoint,
     crossings: [Crossings; GROUPS],
@@ -55,6 +57,7 @@ impl Default for Room {
             stack: Vec::new(),
             points: Points::NONE,
             relative: Relative::NONE,
+            lone: Lone::NONE,
             met: Met::NONE,
             seen: SeenFromPoint::NONE,
             crossings: [Crossings::NONE; GROUPS],
@@ -120,17 +123,17 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         to: &mut impl Deliver<Q>,
     ) -> Use {
         let Packets { groups, queries, room } = self;
-        let Room { stack, points, relative, met, seen, crossings } = &mut **room;
+        let Room { stack, points, relative, lone, met, seen, crossings } = &mut **room;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
-        let mut rays = Rays { object, rays, queries, met, asked: 0, alive: all };
+        lone.clear();
+        let mut rays = Rays { object, rays, queries, lone, met, asked: 0, alive: all };
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray hold nothing up.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
             group.limit = s.select(valid, group.limit, s.splat(f32::MIN));
         }
         let mut limit = farthest_limit(s, groups);
-        let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
         let (mut code, mut mask, mut top) = (object.header.root, all, 0);
         let (mut steps, mut used) = (0u32, 0);
         'steps: loop {
@@ -139,24 +142,12 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             match Child::from_code(code) {
                 Some(Child::Node(line)) => {
                     let node = object.node(line);
-                    let (bits, keys) = hull.children(s, node, limit);
-                    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
-                    let count = if Q::ANY {
-                        s.compress(bits, slots, &mut slot)
+                    let room = stack[top..].first_chunk_mut().expect("as many levels as the header says");
+                    top += if H::MIXED && mask.count_ones() <= FEW_OF_ALL {
+                        rays.lone.children(s, groups, mask, (line, node), room)
                     } else {
-                        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
+                        children::<S, H, Q>(s, hull, groups, mask, (line, node), limit, room)
                     };
-                    let room: &mut [Entry; WIDTH] =
-                        stack[top..].first_chunk_mut().expect("as many levels as the header says");
-                    let mut some = 0;
-                    for i in 0..count {
-                        let slot = slot[i];
-                        let rays =
-                            if H::MIXED { mask & meeting(s, hull, groups, mask, node, slot) } else { mask };
-                        room[some % WIDTH] = Entry { rays, parent: line, slot, key: key[i] };
-                        some += usize::from(rays != 0);
-                    }
-                    top += some;
                 }
                 Some(Child::Indexed(line)) => {
                     let mut room = None;
@@ -211,6 +202,36 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         let steps = u64::from(steps);
         Use::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
+}
+
+/// Writes the children of a node that rays of the packet may meet together before a depth, the nearest last, and of rays that go into
+/// different octants which ones do; returns how many.
+#[inline(always)]
+fn children<S: Simd, H: Hull<S>, Q: Query>(
+    s: S,
+    hull: &H,
+    groups: &[Group<S>],
+    rays: u64,
+    (parent, node): (u32, &WideNode),
+    limit: f32,
+    to: &mut [Entry; WIDTH],
+) -> usize {
+    let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+    let (bits, keys) = hull.children(s, node, limit);
+    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
+    let count = if Q::ANY {
+        s.compress(bits, slots, &mut slot)
+    } else {
+        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
+    };
+    let mut some = 0;
+    for i in 0..count {
+        let slot = slot[i];
+        let rays = if H::MIXED { rays & meeting(s, hull, groups, rays, node, slot) } else { rays };
+        to[some % WIDTH] = Entry { rays, parent, slot, key: key[i] };
+        some += usize::from(rays != 0);
+    }
+    some
 }
 
 /// Which of these rays, a bit each, meet the box of a child. Groups none of whose rays is asked about are left out.

@@ -45,7 +45,7 @@ pub(crate) struct Lanes<S: Simd> {
     pub(crate) shear: [S::F; 2],
     pub(crate) forward: S::F,
     pub(crate) start: S::F,
-    reach: S::F,
+    pub(crate) reach: S::F,
     /// Rays that this is good for.
     pub(crate) usable: S::M,
 }

@@ -18,6 +18,7 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use glam::{Vec3A, Vec4};
 use std::mem::offset_of;
+use std::ops::Range;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Directions of this size or its inverse, and coordinates up to it, are prepared in f32.
@@ -205,7 +206,7 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    pub(crate) fn new() -> Prepared {
+    pub(crate) const fn new() -> Prepared {
         Prepared { aim: [[[0.0; LANES]; 2]; LANES], ready: 0 }
     }
 
@@ -229,8 +230,15 @@ impl Prepared {
         let wanted = s.mask(((1u64 << count) - 1) as u32);
         let field = fields(s, wanted, rays, s.load_u(at));
         let lanes = lanes(s, frame, field, &Mixed::of(s, [field[4], field[5], field[6]]));
-        let aim = lanes.rows(s, s.load_u(at));
-        for half in 0..2 {
+        self.write(s, &lanes, s.load_u(at), 0..2);
+        self.ready &= s.mask_bits(wanted);
+    }
+
+    /// Takes in rays that are prepared in lanes, and their places in the batch: these cache lines of their [`Aim`]s.
+    #[inline(always)]
+    pub(crate) fn write<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, at: S::U, lines: Range<usize>) {
+        let aim = lanes.rows(s, at);
+        for half in lines {
             let mut rows = [s.splat(0.0); LANES];
             for i in 0..LANES {
                 rows[i] = aim[half * LANES + i];
@@ -240,6 +248,6 @@ impl Prepared {
                 s.store(rows[lane], &mut self.aim[lane][half]);
             }
         }
-        self.ready = s.mask_bits(s.and(wanted, lanes.usable));
+        self.ready = s.mask_bits(lanes.usable);
     }
 }

@@ -107,24 +107,22 @@ pub(crate) trait Block {
     fn first(&self) -> u32;
     fn triangles(&self) -> u32;
     /// The number of the triangle is taken modulo [`WIDTH`] here and below.
-    fn corners(&self, triangle: usize) -> [[f32; 3]; 3];
+    #[inline(always)]
+    fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
+        // Not by maps over rows, which are copied for that.
+        let mut out = [[0.0; 3]; 3];
+        for c in 0..3 {
+            for k in 0..3 {
+                out[c][k] = self.coordinate(triangle, c, k);
+            }
+        }
+        out
+    }
     /// One coordinate of a corner.
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
     /// The corners as they are: `[corner][x, y, z]`.
     fn points<S: Simd>(&self, s: S) -> Corners<S>;
-}
-
-/// The corners of a triangle. (Not by maps over rows, which are copied for that.)
-#[inline(always)]
-fn corners<B: Block>(block: &B, triangle: usize) -> [[f32; 3]; 3] {
-    let mut out = [[0.0; 3]; 3];
-    for c in 0..3 {
-        for k in 0..3 {
-            out[c][k] = block.coordinate(triangle, c, k);
-        }
-    }
-    out
 }
 
 /// The points at these places.
@@ -162,10 +160,6 @@ impl Block for IndexedLeaf {
         self.triangles
     }
     #[inline(always)]
-    fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
-        corners(self, triangle)
-    }
-    #[inline(always)]
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {
         self.vertex[axis][usize::from(self.corner[corner][triangle % WIDTH]) % WIDTH]
     }
@@ -189,10 +183,6 @@ impl Block for RawLeaf {
     #[inline(always)]
     fn triangles(&self) -> u32 {
         self.triangles
-    }
-    #[inline(always)]
-    fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
-        corners(self, triangle)
     }
     #[inline(always)]
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32 {

@@ -52,7 +52,7 @@ pub(super) const DOUBT: u32 = FACE_BIT | 1 << 30;
 /// Names of the u32 of a lane.
 pub(super) mod word {
     /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link, or
-    /// the tetrahedron and [`DOUBT`].
+    /// the tetrahedron and [`super::DOUBT`].
     pub(crate) const TET: usize = 0;
     /// The vertex that the link hither named.
     pub(crate) const APEX: usize = 1;

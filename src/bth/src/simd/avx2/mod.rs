@@ -4,6 +4,11 @@
 //! the intrinsics need, so each may be executed. Blocks that go through pointers say more.
 #![allow(unsafe_code)]
 
+mod packing;
+mod rows;
+
+use self::packing::{compression, expansion};
+use self::rows::{ALL, columns8, transpose4, transpose8};
 use super::{Kernel, LANES, Simd, assert_within, scalar, within};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
@@ -93,100 +98,6 @@ fn split<T>(from: &[T; LANES]) -> [*const T; 2] {
 fn split_mut<T>(to: &mut [T; LANES]) -> [*mut T; 2] {
     let (low, high) = to.split_at_mut(8);
     [low.as_mut_ptr(), high.as_mut_ptr()]
-}
-
-/// Transposes four by four lanes within each half.
-///
-/// # Safety
-/// The machine must have the features of [`Avx2`].
-#[inline(always)]
-unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
-    // SAFETY: see above; registers only.
-    unsafe {
-        let (a, b) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-        let (c, d) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-        [
-            _mm256_shuffle_ps::<0b01_00_01_00>(a, c),
-            _mm256_shuffle_ps::<0b11_10_11_10>(a, c),
-            _mm256_shuffle_ps::<0b01_00_01_00>(b, d),
-            _mm256_shuffle_ps::<0b11_10_11_10>(b, d),
-        ]
-    }
-}
-
-/// Transposes eight by eight lanes.
-///
-/// # Safety
-/// As [`transpose4`].
-#[inline(always)]
-unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
-    let mut out = rows;
-    // SAFETY: see `transpose4`.
-    unsafe {
-        // Columns 0 to 3 and 4 to 7 of the first four rows, and of the last.
-        let low = transpose4([rows[0], rows[1], rows[2], rows[3]]);
-        let high = transpose4([rows[4], rows[5], rows[6], rows[7]]);
-        for k in 0..4 {
-            out[k] = _mm256_permute2f128_ps::<0x20>(low[k], high[k]);
-            out[4 + k] = _mm256_permute2f128_ps::<0x31>(low[k], high[k]);
-        }
-    }
-    out
-}
-
-/// For each lane of eight whose bit is set, how many set bits lie below it: where its element is in a packed row.
-///
-/// # Safety
-/// The machine must have the features of [`Avx2`].
-#[inline(always)]
-unsafe fn expansion(bits: u8) -> __m256i {
-    // SAFETY: see above; registers only.
-    unsafe {
-        // A byte a lane: ones where the bit is set.
-        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
-        let places = _pdep_u64(0x0706_0504_0302_0100, bytes);
-        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
-    }
-}
-
-/// Places of the lanes of eight whose bit is set, in order: the inverse of [`expansion`].
-///
-/// # Safety
-/// As [`expansion`].
-#[inline(always)]
-unsafe fn compression(bits: u8) -> __m256i {
-    // SAFETY: see above; registers only.
-    unsafe {
-        let bytes = _pdep_u64(bits.into(), 0x0101_0101_0101_0101) * 0xff;
-        let places = _pext_u64(0x0706_0504_0302_0100, bytes);
-        _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(places as i64))
-    }
-}
-
-/// All rows in order.
-const ALL: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-
-/// These rows by their columns.
-///
-/// # Safety
-/// All of them must be readable.
-#[inline(always)]
-unsafe fn columns8(simd: Avx2, from: *const [u32; 8], row: [u32; LANES]) -> [U; 8] {
-    let mut out = [simd.splat_u(0); 8];
-    // SAFETY: see above; unaligned loads.
-    unsafe {
-        for half in 0..2 {
-            let mut rows = [simd.splat(0.0)[0]; 8];
-            for i in 0..8 {
-                rows[i] = _mm256_loadu_ps(from.add(row[8 * half + i] as usize).cast());
-            }
-            let columns = transpose8(rows);
-            for k in 0..8 {
-                out[k][half] = _mm256_castps_si256(columns[k]);
-            }
-        }
-    }
-    out
 }
 
 impl Simd for Avx2 {

@@ -1,4 +1,4 @@
-//! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time.
+//! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time, unless few rays are left ([`super::few`]).
 //!
 //! Points are projected once for a group of sixteen rays or, where all rays of the packet start at one point, for each triangle that
 //! is tested. Most triangles are left out by the error bound of the whole leaf, which is that of [`crate::trace::sight`] for the
@@ -80,7 +80,7 @@ impl<Q: Query> Rays<'_, Q> {
         leaf: &Leaf<'_, B>,
         mut rays: u64,
     ) -> bool {
-        // (Rays of which the nearest hit is asked are packets only if they go together to the last.)
+        // Nearest hits are asked in packets only of coherent rays, of which seldom few are left.
         if Q::ANY {
             for (i, group) in groups.iter().enumerate() {
                 let active = (rays >> (i * LANES)) as u32 & 0xffff;

@@ -3,7 +3,7 @@
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
-use bth_compile::mesh::{Keep, import_bytes};
+use bth_import::{Keep, import_bytes};
 use std::path::Path;
 
 /// Small generator of pseudo-random numbers (SplitMix64), so that an input always does the same.

@@ -3,7 +3,7 @@
 #![no_main]
 use bth_compile::write::FileBuilder;
 
-fn write(file: &bth::File) -> Vec<u8> {
+fn write(file: &bth_format::File) -> Vec<u8> {
     let mut builder = FileBuilder::new();
     for section in file.sections() {
         let e = section.entry;
@@ -17,9 +17,9 @@ fn write(file: &bth::File) -> Vec<u8> {
 }
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let Ok(first) = bth::File::from_bytes(bytes) else { return };
+    let Ok(first) = bth_format::File::from_bytes(bytes) else { return };
     let written = write(&first);
-    let second = bth::File::from_bytes(&written).expect("what is written can be read");
+    let second = bth_format::File::from_bytes(&written).expect("what is written can be read");
     assert!(write(&second) == written);
     let kept: Vec<_> = first.sections().filter(|s| s.entry.stride != 0).collect();
     assert_eq!(kept.len(), second.sections().len());

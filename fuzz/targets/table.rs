@@ -2,7 +2,7 @@
 //! sections of arbitrary content that fit their strides, so that the checks of contents are reached often.
 #![no_main]
 use arbitrary::Arbitrary;
-use bth::layout::*;
+use bth_format::layout::*;
 use libfuzzer_sys::fuzz_target;
 use zerocopy::IntoBytes;
 
@@ -40,7 +40,7 @@ fn file(layout: &mut Layout) -> Vec<u8> {
     let mut bytes = vec![0; end];
     let mut entries = Vec::new();
     for s in sections.iter() {
-        let stride = match bth::file::kind_stride(kind(s)) {
+        let stride = match bth_format::file::kind_stride(kind(s)) {
             Some(0) => [16, 20, 32][usize::from(s.object) % 3],
             Some(stride) => stride,
             None => 1 + usize::from(s.object),

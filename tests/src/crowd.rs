@@ -1,8 +1,8 @@
 //! Many instances of one small object, for measurements of the top level.
 
 use crate::rng::Rng;
-use bth::layout::*;
 use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
+use bth_format::layout::*;
 use zerocopy::IntoBytes;
 
 /// A file of so many instances that all move: every node has a track of its own, or only the root has one.

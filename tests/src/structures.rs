@@ -1,10 +1,10 @@
 //! A model compiled into every structure and record.
 
 use bth::Scene;
-use bth::layout::RecordKind;
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;
 use bth_compile::pipeline::{Options, Structure, compile};
+use bth_format::layout::RecordKind;
 use bth_scenes::Model;
 
 /// A structure compiled from a model.

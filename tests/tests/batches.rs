@@ -1,10 +1,10 @@
 //! Batches with hints against the same rays one at a time, bit for bit, on every instruction set.
 
-use bth::layout::RecordKind;
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Hinted, Isa, Scene, Test};
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure, compile};
+use bth_format::layout::RecordKind;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{assorted, onward};
 use bth_tests::rng::Rng;

@@ -10,11 +10,11 @@ fn folder(name: &str) -> PathBuf {
 
 /// Opens, checks and verifies; the code of the first error.
 fn code(bytes: &[u8]) -> Option<String> {
-    let file = match bth::File::from_bytes(bytes) {
+    let file = match bth_format::File::from_bytes(bytes) {
         Ok(file) => file,
         Err(e) => return Some(e.code().to_string()),
     };
-    bth::verify::verify(&file).err().map(|all| all[0].code().to_string())
+    bth_format::verify::verify(&file).err().map(|all| all[0].code().to_string())
 }
 
 fn assert_committed(name: &str, cases: &[Case]) {
@@ -75,10 +75,10 @@ fn every_invariant_has_an_invalid_file() {
 fn files_read_and_mapped_hold_the_same() {
     for case in valid() {
         let path = folder("valid").join(format!("{}.bth", case.name));
-        let read = bth::File::read(&path).unwrap();
+        let read = bth_format::File::read(&path).unwrap();
         // SAFETY: nobody changes the committed files while the test runs.
         #[allow(unsafe_code)]
-        let mapped = unsafe { bth::File::map(&path) }.unwrap();
+        let mapped = unsafe { bth_format::File::map(&path) }.unwrap();
         assert_eq!(read.bytes(), mapped.bytes());
         assert_eq!(read.content_id(), mapped.content_id());
     }
@@ -87,9 +87,9 @@ fn files_read_and_mapped_hold_the_same() {
 #[test]
 fn errors_name_file_section_byte_and_hint() {
     let path = folder("invalid").join("F113-17-triangles.bth");
-    let file = bth::File::read(&path).unwrap();
+    let file = bth_format::File::read(&path).unwrap();
     let error = file.check(0).unwrap_err();
-    let section = file.section(0, bth::layout::kind::LINES).unwrap().entry.offset;
+    let section = file.section(0, bth_format::layout::kind::LINES).unwrap().entry.offset;
     assert_eq!(error.offset(), Some(section + 1152 + 580));
     let text = error.to_string();
     assert!(
@@ -97,8 +97,8 @@ fn errors_name_file_section_byte_and_hint() {
         "{text}"
     );
 
-    let missing = bth::File::read("no/such/file.bth").unwrap_err();
+    let missing = bth_format::File::read("no/such/file.bth").unwrap_err();
     assert_eq!(missing.code().as_str(), "BTH-O001");
     assert!(missing.to_string().starts_with("no/such/file.bth: BTH-O001: "), "{missing}");
-    assert_eq!(bth::File::read(env!("CARGO_MANIFEST_DIR")).unwrap_err().code().as_str(), "BTH-O001");
+    assert_eq!(bth_format::File::read(env!("CARGO_MANIFEST_DIR")).unwrap_err().code().as_str(), "BTH-O001");
 }

@@ -1,9 +1,9 @@
 //! What the compiler writes is what the specification demands, to the last reader.
 #![allow(clippy::print_stdout)] // a test that cannot run says so
 
-use bth::layout::RecordKind;
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure, compile};
+use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -46,8 +46,9 @@ fn compiled_files_verify() {
                 continue;
             }
             let Some(bytes) = compiled(&model, &options) else { return };
-            let file = bth::File::from_bytes(&bytes).unwrap();
-            let report = bth::verify::verify(&file).unwrap_or_else(|e| panic!("{options:?}: {}", e[0]));
+            let file = bth_format::File::from_bytes(&bytes).unwrap();
+            let report =
+                bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{options:?}: {}", e[0]));
             assert_eq!(report.triangles + report.dropped, model.triangles.len() as u64);
             assert_eq!(report.compared_with_source, 1);
             if options.structure == Structure::Tets {

@@ -68,7 +68,7 @@ fn python_reader_hashes_as_blake3_does() {
     let lengths = [0, 1, 63, 64, 65, 1023, 1024, 1025, 2048, 3073, 5000];
     assert_eq!(hashes.lines().count(), lengths.len(), "{}", String::from_utf8_lossy(&output.stderr));
     for (line, n) in hashes.lines().zip(lengths) {
-        let hex: String = bth::file::hash128(&data[..n]).iter().map(|b| format!("{b:02x}")).collect();
+        let hex: String = bth_format::file::hash128(&data[..n]).iter().map(|b| format!("{b:02x}")).collect();
         assert!(line.starts_with(&hex), "{n} bytes");
     }
 }

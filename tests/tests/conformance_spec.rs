@@ -1,7 +1,7 @@
 //! The specification says what the code does: byte tables, kinds, invariants and the worked hexdump.
 
-use bth::error::kind_name;
-use bth::layout::*;
+use bth_format::error::kind_name;
+use bth_format::layout::*;
 use std::collections::BTreeMap;
 use std::mem::offset_of;
 use std::path::PathBuf;
@@ -117,7 +117,7 @@ fn kinds_have_the_names_and_strides_of_the_table() {
     for row in rows {
         let kind = row[0].parse().unwrap();
         assert_eq!(kind_name(kind), row[1]);
-        let stride = bth::file::kind_stride(kind).unwrap();
+        let stride = bth_format::file::kind_stride(kind).unwrap();
         assert!(stride == 0 && kind == kind::TETS || stride.to_string() == row[3], "stride of {}", row[1]);
         assert_eq!(row[5] == "yes", kind::is_required(kind), "{}", row[1]);
         assert_eq!(row[4] == "file", kind == kind::PROVENANCE || kind::is_scene(kind), "{}", row[1]);

@@ -5,13 +5,14 @@
 #[allow(dead_code)]
 mod corpus_support;
 
-use bth::layout::{GridBits, RecordKind};
 use bth::rays::{Hit, Ray, Surface};
-use bth::{File, Isa, Scene};
+use bth::{Isa, Scene};
 use bth_compile::coordinates::Options;
-use bth_compile::mesh::{self, Keep, Mesh};
 use bth_compile::pipeline::{Structure, compile};
 use bth_compile::{Silent, pipeline};
+use bth_format::File;
+use bth_format::layout::{GridBits, RecordKind};
+use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, knot, soup};
 use bth_tests::oracle;
 use bth_tests::structures::bits;
@@ -36,7 +37,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 /// Every corner of every stored triangle against its source, and the share of the bytes that traversal reads.
 fn check_file(path: &Path, mesh: &Mesh, grid: GridBits) -> f64 {
     let file = compiled(path, Some(grid), plain());
-    let verified = bth::verify::verify(&file).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
+    let verified = bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
     assert_eq!(verified.compared_with_source, 1);
     let object = file.check(0).unwrap();
     let most = f64::from(object.header.displacement);
@@ -70,7 +71,7 @@ fn no_vertex_is_farther_from_its_source_than_the_file_says() {
         paths.extend(["teapot.ply", "fandisk.ply"].map(|name| data.join("static").join(name)));
     }
     for (i, path) in paths.iter().enumerate() {
-        let (mesh, _) = mesh::import(path, Keep::None, &Silent).unwrap();
+        let (mesh, _) = bth_import::import(path, Keep::None, &Silent).unwrap();
         let shares = [GridBits::B21, GridBits::B16].map(|grid| check_file(path, &mesh, grid));
         // What is promised of closed meshes, and kept by triangles that share nothing too.
         if i < ours {
@@ -93,7 +94,7 @@ fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
             }
             for options in structures {
                 let file = compiled(&path, Some(grid), options);
-                bth::verify::verify(&file).unwrap();
+                bth_format::verify::verify(&file).unwrap();
                 let scene = bth::from_bytes(file.bytes()).unwrap();
                 check_answers(&scene);
             }

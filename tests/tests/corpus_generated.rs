@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use bth_compile::mesh::Mesh;
 use bth_compile::{Silent, bvh, marks};
+use bth_import::Mesh;
 use bth_scenes::{Model, catalogue, planted};
 
 /// The compiler's mesh of a model: bit-equal positions welded.

@@ -4,7 +4,7 @@ use bth_tests::conformance::{Editor, Seal, valid};
 
 /// Opens a file and checks all objects; true if it passes.
 fn passes(bytes: &[u8]) -> bool {
-    let Ok(file) = bth::File::from_bytes(bytes) else { return false };
+    let Ok(file) = bth_format::File::from_bytes(bytes) else { return false };
     let good = (0..file.object_count()).all(|i| file.check(i).is_ok());
     // A scene that opens can be moved to any time and traced, or says why not.
     if let Ok(mut scene) = bth::from_bytes(bytes)
@@ -20,7 +20,7 @@ fn passes(bytes: &[u8]) -> bool {
     }
     if good {
         // Verifying must end too; it may find fault.
-        let _ = bth::verify::verify(&file);
+        let _ = bth_format::verify::verify(&file);
     }
     good
 }
@@ -40,8 +40,8 @@ fn every_flipped_byte_is_found() {
         let mut bytes = case.bytes.clone();
         for i in 0..bytes.len() {
             bytes[i] ^= 0xff;
-            let found =
-                bth::File::from_bytes(&bytes).map_or(true, |file| bth::verify::verify(&file).is_err());
+            let found = bth_format::File::from_bytes(&bytes)
+                .map_or(true, |file| bth_format::verify::verify(&file).is_err());
             assert!(found, "{} with byte {i} flipped", case.name);
             bytes[i] ^= 0xff;
         }

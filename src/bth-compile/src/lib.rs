@@ -8,15 +8,11 @@ pub mod bvh;
 pub mod cached;
 pub mod coordinates;
 pub mod costs;
-pub mod error;
 pub mod jobs;
 pub mod marks;
-pub mod mesh;
-pub mod monitor;
 pub mod pipeline;
 pub mod scene;
 pub mod tets;
 pub mod write;
 
-pub use error::{Error, Result};
-pub use monitor::{Monitor, Silent};
+pub use bth_import::{Error, Monitor, Place, Result, Silent, error, monitor};

@@ -1,7 +1,7 @@
 //! The triangles of a compiled object, collected from its leaves.
 
-use bth::layout::Child;
-use bth::object::ObjectView;
+use bth_format::layout::Child;
+use bth_format::object::ObjectView;
 
 /// A triangle of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]

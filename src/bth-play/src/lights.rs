@@ -54,7 +54,7 @@ impl Lights {
         let mut lights = Vec::new();
         if let Some(view) = scene.description() {
             let strength =
-                |l: &bth::layout::Light| l.intensity * l.color.iter().fold(0.0f64, |m, c| m.max(*c));
+                |l: &bth_format::layout::Light| l.intensity * l.color.iter().fold(0.0f64, |m, c| m.max(*c));
             let brightest = |far: bool| {
                 let same = view.lights.iter().filter(|l| (l.kind == 0) == far);
                 same.map(strength).fold(0.0f64, f64::max)

@@ -7,8 +7,8 @@ use crate::inside;
 use crate::sampling::sphere;
 use crate::surface::wide;
 use bth::Scene;
-use bth::layout::NONE;
 use bth::rays::Ray;
+use bth_format::layout::NONE;
 use glam::DVec3;
 use std::path::Path;
 

@@ -2,8 +2,8 @@
 
 use crate::failure::Failure;
 use bth::Scene;
-use bth::object::ObjectView;
 use bth::rays::{Hit, Surface};
+use bth_format::object::ObjectView;
 use glam::DVec3;
 use std::path::Path;
 

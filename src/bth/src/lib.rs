@@ -13,28 +13,16 @@
 //! ```
 #![warn(missing_docs)]
 
-pub mod check;
-pub mod error;
-mod expansion;
-pub mod file;
-pub mod instances;
-pub mod layout;
-pub mod limits;
+mod instances;
 mod motion;
-pub mod object;
 pub mod rays;
 mod scene;
 mod simd;
-#[cfg(test)]
-mod testing;
 mod trace;
-mod unpack;
-pub mod verify;
 
-pub use error::{Code, Error};
-pub use file::File;
+pub use bth_format::{Code, Error};
 pub use instances::Update;
-pub use motion::InstanceView;
+pub use motion::{InstanceView, check_first_frame};
 pub use scene::{Scene, from_bytes, map, open};
 pub use simd::{Isa, IsaError};
 pub use trace::{Hinted, Steps, Test};

@@ -1,8 +1,8 @@
 //! What moves in a scene: time, instances, nodes.
 
-use crate::error::Error;
-use crate::instances::{SceneView, Update};
+use crate::instances::{Update, World};
 use crate::scene::Scene;
+use bth_format::{Error, File, SceneView};
 
 /// An instance at the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,15 @@ pub struct InstanceView {
     pub to_world: [[f64; 4]; 3],
     /// Whether rays can meet it.
     pub visible: bool,
+}
+
+/// Checks that everything that is seen at a file's first frame can be placed; looks at nothing of the objects but their
+/// headers.
+///
+/// # Errors
+/// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` with the node.
+pub fn check_first_frame(file: &File) -> Result<(), Error> {
+    World::new(file).map(drop)
 }
 
 impl Scene {
@@ -69,7 +78,12 @@ impl Scene {
             assert!(instance < self.object_count(), "an instance below instance_count");
             let row = |k: usize| std::array::from_fn(|j| f64::from(u8::from(j == k)));
             let to_world = [row(0), row(1), row(2)];
-            return InstanceView { object: instance, node: crate::layout::NONE, to_world, visible: true };
+            return InstanceView {
+                object: instance,
+                node: bth_format::layout::NONE,
+                to_world,
+                visible: true,
+            };
         };
         let visible = world.placed[instance as usize].is_some();
         let row = self.file().instances()[instance as usize];
@@ -103,7 +117,7 @@ impl Scene {
     pub fn instance_bounds(&self, instance: u32) -> Option<([f32; 3], [f32; 3])> {
         let Some(world) = self.world() else {
             let object = self.object(instance).header;
-            return (object.root != crate::layout::NONE).then_some((object.lower, object.upper));
+            return (object.root != bth_format::layout::NONE).then_some((object.lower, object.upper));
         };
         world.bounds(self.file(), instance)
     }

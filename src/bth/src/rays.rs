@@ -2,7 +2,7 @@
 //!
 //! These types are those of the C interface (`bth.h`), bit for bit.
 
-use crate::layout::NONE;
+use bth_format::layout::NONE;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// A ray, world space: the points `origin + t * direction` with `tmin <= t <= tmax`.

@@ -1,12 +1,12 @@
 //! A scene: what callers open and trace.
 
-use crate::error::Error;
-use crate::file::File;
 use crate::instances::World;
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::trace::{self, Steps, Test};
+use bth_format::error::Error;
+use bth_format::file::File;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 use std::path::Path;
 
 /// An open file, ready to trace. A file with a scene shows its instances at a time (see
@@ -29,7 +29,7 @@ pub struct Scene {
 }
 
 /// Reads a compiled file into memory and checks every index, so that tracing is safe whatever the
-/// file holds. Costs O(file); hashes and geometry are [`mod@crate::verify`]'s business.
+/// file holds. Costs O(file); hashes and geometry are [`mod@bth_format::verify`]'s business.
 ///
 /// # Errors
 /// `BTH-O…` when it cannot be read, `BTH-F0…` when header or table, `BTH-F1…` when contents break the

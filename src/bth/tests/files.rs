@@ -82,8 +82,8 @@ fn trace(scene: &bth::Scene) -> usize {
 fn every_valid_file_opens_verifies_and_is_traced() {
     let mut hits = 0;
     for (name, bytes) in VALID {
-        let file = bth::File::from_bytes(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
-        bth::verify::verify(&file).unwrap_or_else(|e| panic!("{name}: {}", e[0]));
+        let file = bth_format::File::from_bytes(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
+        bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{name}: {}", e[0]));
         let mut scene = bth::from_bytes(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
         hits += trace(&scene);
         if scene.description().is_some() {
@@ -99,7 +99,7 @@ fn every_valid_file_opens_verifies_and_is_traced() {
 #[cfg(target_endian = "big")]
 fn big_endian_machines_get_the_documented_error() {
     for (name, bytes) in VALID {
-        let error = bth::File::from_bytes(bytes).unwrap_err();
+        let error = bth_format::File::from_bytes(bytes).unwrap_err();
         assert_eq!(error.code().as_str(), "BTH-O002", "{name}");
         assert!(error.to_string().contains("big-endian"), "{error}");
         assert!(bth::from_bytes(bytes).is_err());
@@ -116,8 +116,8 @@ fn damaged_files_are_refused() {
             assert!(bth::from_bytes(&bytes[..at]).is_err(), "{name} cut to {at} bytes");
             let mut damaged = bytes.to_vec();
             damaged[at] ^= 0x55;
-            let refused =
-                bth::File::from_bytes(&damaged).map_or(true, |file| bth::verify::verify(&file).is_err());
+            let refused = bth_format::File::from_bytes(&damaged)
+                .map_or(true, |file| bth_format::verify::verify(&file).is_err());
             assert!(refused, "{name} with byte {at} flipped");
         }
     }

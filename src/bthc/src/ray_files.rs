@@ -2,8 +2,8 @@
 //! elements. Little-endian.
 
 use crate::failure::Failure;
-use bth::layout::NONE;
 use bth::rays::{Hit, Ray, Surface};
+use bth_format::layout::NONE;
 use std::path::Path;
 
 const HEADER: usize = 16;
@@ -59,7 +59,7 @@ pub(crate) fn answer(any: bool) -> Hit {
 }
 
 /// The bytes of a `.tris` file: 9 f32 per triangle.
-pub(crate) fn triangles(mesh: &bth_compile::mesh::Mesh) -> Vec<u8> {
+pub(crate) fn triangles(mesh: &bth_import::Mesh) -> Vec<u8> {
     let mut bytes = header(b"TRIS", mesh.triangles.len(), 36);
     for triangle in 0..mesh.triangles.len() as u32 {
         for value in mesh.corners(triangle).into_iter().flatten() {

@@ -1,7 +1,7 @@
 //! Changes bytes of a valid file and makes its hashes right again, so that one rule is broken alone.
 
-use bth::file::{content_id, hash128};
-use bth::layout::*;
+use bth_format::file::{content_id, hash128};
+use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::{FromBytes, IntoBytes};
 

@@ -1,7 +1,7 @@
 //! Files that break one rule each.
 
 use super::{Case, Editor, Seal, valid};
-use bth::layout::*;
+use bth_format::layout::*;
 use std::mem::offset_of;
 
 /// Files that fail when they are opened, checked or verified, by the code that they fail with.

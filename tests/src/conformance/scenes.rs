@@ -2,8 +2,8 @@
 
 use super::valid::{CORNERS, bounds, indexed, lines};
 use super::{Case, Editor, Seal};
-use bth::layout::*;
 use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
+use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
 

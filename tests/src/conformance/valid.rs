@@ -1,10 +1,10 @@
 //! Small valid files.
 
 use super::Case;
-use bth::layout::*;
 use bth_compile::bvh::Wide;
 use bth_compile::coordinates::pack;
 use bth_compile::write::{FileBuilder, ObjectParts, Source, object};
+use bth_format::layout::*;
 use zerocopy::IntoBytes;
 
 /// Every valid file.

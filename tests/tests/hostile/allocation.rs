@@ -2,7 +2,7 @@
 #![allow(unsafe_code, reason = "an allocator that measures")]
 
 use bth_compile::Silent;
-use bth_compile::mesh::{Keep, import_bytes};
+use bth_import::{Keep, import_bytes};
 use bth_tests::conformance::{Editor, Seal, valid};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -67,8 +67,8 @@ fn opening_a_damaged_file_allocates_no_more_than_a_few_times_its_bytes() {
                 editor.put(at, &word.to_le_bytes());
                 let bytes = editor.seal(Seal::Sections);
                 let most = largest(|| {
-                    if let Ok(file) = bth::File::from_bytes(&bytes) {
-                        let _ = bth::verify::verify(&file);
+                    if let Ok(file) = bth_format::File::from_bytes(&bytes) {
+                        let _ = bth_format::verify::verify(&file);
                     }
                     let _ = bth::from_bytes(&bytes);
                 });

@@ -42,7 +42,7 @@ fn compiled_objects_are_taken_as_they_are() {
     let (scene, report) = compiled(&manifest(text), folder.path());
     assert_eq!(report.objects.iter().map(|o| o.copied).collect::<Vec<_>>(), [true, false]);
     let copied = scene.instance(0).object;
-    let original = bth::File::from_bytes(&single.bytes).unwrap();
+    let original = bth_format::File::from_bytes(&single.bytes).unwrap();
     for section in original.sections().filter(|s| s.entry.object == 0) {
         let found = scene.file().section(copied, section.entry.kind).unwrap();
         assert!(found.bytes == section.bytes, "section {}", section.entry.kind);

@@ -36,8 +36,8 @@ pub(crate) fn imported(path: &Path) -> (Manifest, ImportReport) {
 pub(crate) fn compiled(manifest: &Manifest, folder: &Path) -> (bth::Scene, SceneReport) {
     let (compiled, report) = scene::compile(manifest, folder, Path::new("x"), &options(), &Silent)
         .unwrap_or_else(|e| panic!("{e}"));
-    let file = bth::File::from_bytes(&compiled.bytes).unwrap();
-    bth::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
+    let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
+    bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
     (bth::from_bytes(&compiled.bytes).unwrap(), report)
 }
 

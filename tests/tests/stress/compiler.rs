@@ -20,8 +20,8 @@ fn check(name: &str, model: &Model) {
         options.tets.minimum = 1;
         let (compiled, report) = compile(&path, &options, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(report.mesh.triangles, model.triangles.len() as u64, "{name}");
-        let file = bth::File::from_bytes(&compiled.bytes).unwrap();
-        bth::verify::verify(&file).unwrap_or_else(|e| panic!("{name}: {}", e[0]));
+        let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
+        bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{name}: {}", e[0]));
         bth::from_bytes(&compiled.bytes).unwrap()
     };
     let (bth, bvh) = (scene(Structure::Bth), scene(Structure::Bvh));

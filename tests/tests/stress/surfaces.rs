@@ -1,8 +1,8 @@
 //! Hard rays on hard surfaces, checked exactly; `bth-bench stress` traces many more of them.
 
-use bth::layout::RecordKind;
 use bth::rays::{Hit, Surface};
 use bth_compile::pipeline::Structure;
+use bth_format::layout::RecordKind;
 use bth_tests::stress::{Kind, Tally, rays, run, shapes};
 use bth_tests::structures::{Traced, compiled, every_structure, options};
 

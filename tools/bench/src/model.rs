@@ -1,7 +1,7 @@
 //! The models that are measured: files, or models that `bth-scenes` makes by name.
 
 use anyhow::{Context, Result, anyhow};
-use bth_compile::mesh::{self, Mesh};
+use bth_import::{self, Mesh};
 use bth_scenes::{catalogue, write};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ impl Model {
     }
 
     fn import(name: String, path: PathBuf, folder: Option<TempDir>) -> Result<Model> {
-        let (mesh, _) = mesh::import(&path, mesh::Keep::None, &bth_compile::Silent)?;
+        let (mesh, _) = bth_import::import(&path, bth_import::Keep::None, &bth_compile::Silent)?;
         anyhow::ensure!(!mesh.triangles.is_empty(), "{name}: no triangles");
         Ok(Model { name, path, mesh, _folder: folder })
     }

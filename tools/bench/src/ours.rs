@@ -3,11 +3,11 @@
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Context, Result};
-use bth::layout::{GridBits, RecordKind};
 use bth::rays::{Hit, Surface};
 use bth::{Scene, Test};
 use bth_compile::coordinates::{self, Boxes};
 use bth_compile::pipeline::{self, Options, Structure};
+use bth_format::layout::{GridBits, RecordKind};
 use std::sync::Arc;
 use std::time::Instant;
 

@@ -4,13 +4,13 @@ use super::bounds::Bounds;
 
 use super::{BinaryBvh, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
 use crate::error::{Error, Result};
-use crate::mesh::{Mesh, is_zero_area};
 use crate::monitor::Monitor;
+use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// Edges on the longest path of a binary BVH that [`build`] makes; below `bth::limits::MAX_DEPTH`,
+/// Edges on the longest path of a binary BVH that [`build`] makes; below `bth_format::limits::MAX_DEPTH`,
 /// since a wide node takes at least one level of the binary tree.
 pub const MAX_LEVELS: u32 = 90;
 
@@ -126,7 +126,7 @@ impl Split {
 ///
 /// # Errors
 /// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
-/// [`Error::Limit`] beyond `bth::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
+/// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
 pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
     build_with(mesh, &options.quality.effort(), monitor)
 }
@@ -197,13 +197,13 @@ pub fn reinsert(
 
 fn check_mesh(mesh: &Mesh) -> Result<()> {
     let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
-    if mesh.triangles.len() > bth::limits::MAX_TRIANGLES as usize {
+    if mesh.triangles.len() > bth_format::limits::MAX_TRIANGLES as usize {
         return Err(Error::Limit {
             code: "BTH-L201",
             message: format!(
                 "the mesh has {} triangles; an object can have {}",
                 mesh.triangles.len(),
-                bth::limits::MAX_TRIANGLES
+                bth_format::limits::MAX_TRIANGLES
             ),
         });
     }

@@ -5,9 +5,9 @@ use super::plan::{Costs, Decision, Plan, Planner, Role, children};
 use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
-use bth::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES};
+use bth_format::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES};
+use bth_import::Mesh;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -150,13 +150,13 @@ fn check_cut(bvh: &BinaryBvh, cut: &[u32]) -> Result<()> {
 }
 
 fn check_depth(depth: u32) -> Result<()> {
-    const { assert!(MAX_LEVELS as usize <= bth::limits::MAX_DEPTH) };
-    if depth as usize <= bth::limits::MAX_DEPTH {
+    const { assert!(MAX_LEVELS as usize <= bth_format::limits::MAX_DEPTH) };
+    if depth as usize <= bth_format::limits::MAX_DEPTH {
         return Ok(());
     }
     Err(Error::Limit {
         code: "BTH-L203",
-        message: format!("the BVH is {depth} nodes deep; {} can be traversed", bth::limits::MAX_DEPTH),
+        message: format!("the BVH is {depth} nodes deep; {} can be traversed", bth_format::limits::MAX_DEPTH),
     })
 }
 

@@ -3,7 +3,7 @@ use super::super::validate::validate_wide;
 use super::super::{Options, Plan, Quality, Rule, build};
 use super::*;
 use crate::monitor::Silent;
-use bth::layout::{IndexedLeaf, RawLeaf, WideNode};
+use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
 use proptest::prelude::*;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -104,7 +104,7 @@ fn too_many_lines_or_levels_are_refused() {
 fn chains_collapse_within_the_depth_limit() {
     let mesh = exponential(3000);
     let (wide, _) = collapsed(&mesh, &built(&mesh, Quality::Best), &[], false);
-    assert!(wide.depth as usize <= bth::limits::MAX_DEPTH);
+    assert!(wide.depth as usize <= bth_format::limits::MAX_DEPTH);
 }
 
 #[test]

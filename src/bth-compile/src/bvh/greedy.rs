@@ -5,7 +5,7 @@
 use super::BinaryBvh;
 use super::plan::{Decision, Planner, Role, Vertices};
 use crate::error::Result;
-use bth::layout::{INDEXED_LINES, NODE_LINES, WIDTH};
+use bth_format::layout::{INDEXED_LINES, NODE_LINES, WIDTH};
 
 /// Decides for all nodes; returns the cost as [`Planner::run`] does.
 pub(super) fn decide(planner: &Planner<'_>, cut: &[u32], decisions: &mut [Decision]) -> Result<f32> {

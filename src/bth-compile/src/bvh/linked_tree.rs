@@ -2,7 +2,7 @@
 
 use super::bounds::Bounds;
 use super::{BinaryBvh, MAX_LEVELS, Node};
-use bth::layout::NONE;
+use bth_format::layout::NONE;
 
 /// Node of a [`LinkedTree`].
 #[derive(Clone, Copy)]

@@ -7,9 +7,9 @@
 use super::bounds::Bounds;
 use super::{BinaryBvh, Node, greedy};
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
-use bth::layout::{INDEXED_LINES, NODE_LINES, RAW_LINES, WIDTH};
+use bth_format::layout::{INDEXED_LINES, NODE_LINES, RAW_LINES, WIDTH};
+use bth_import::Mesh;
 
 /// Costs of a ray's visits, relative to that of a wide node. A visit's probability is the node's area over the root's.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use super::bounds::Bounds;
 use super::linked_tree::LinkedTree;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use bth::layout::NONE;
+use bth_format::layout::NONE;
 use rayon::prelude::*;
 
 /// Size of the first batch, which holds the largest nodes, whose moves matter most to each other.

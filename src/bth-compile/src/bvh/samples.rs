@@ -1,6 +1,6 @@
 //! Meshes for tests.
 
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 use std::collections::HashMap;
 use std::path::PathBuf;
 

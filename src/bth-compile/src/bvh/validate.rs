@@ -1,8 +1,8 @@
 //! Slow, obvious checks of both trees against the mesh: the oracle of the tests.
 
 use super::{BinaryBvh, Wide};
-use crate::mesh::{Mesh, is_zero_area};
-use bth::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode};
+use bth_format::layout::{Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, RAW_LINES, RawLeaf, WideNode};
+use bth_import::{Mesh, is_zero_area};
 use std::collections::BTreeSet;
 use zerocopy::{FromBytes, IntoBytes};
 

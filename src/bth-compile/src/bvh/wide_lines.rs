@@ -1,8 +1,8 @@
 //! Contents of the wide BVH's nodes and leaves.
 
 use super::Node;
-use crate::mesh::Mesh;
-use bth::layout::{IndexedLeaf, Line, NONE, RawLeaf, WIDTH, WideNode};
+use bth_format::layout::{IndexedLeaf, Line, NONE, RawLeaf, WIDTH, WideNode};
+use bth_import::Mesh;
 use zerocopy::{Immutable, IntoBytes};
 
 /// Writes a structure at a line.

@@ -5,10 +5,10 @@
 
 use super::{MeshFacts, SourceDigest};
 use crate::bvh;
-use crate::mesh::{Keep, Mesh};
 use crate::pipeline::{Options, Structure};
 use crate::write::SceneParts;
 use bth_cache::{Digest, Key};
+use bth_import::{Keep, Mesh};
 use serde::Serialize;
 use std::path::Path;
 use zerocopy::{Immutable, IntoBytes};
@@ -164,7 +164,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
         ("collapse", format!("{:?}", options.collapse.costs)),
         ("bvh version", BVH.to_owned()),
         ("collapse version", COLLAPSE.to_owned()),
-        ("file version", format!("{FILE}.{}", bth::layout::WRITER_VERSION)),
+        ("file version", format!("{FILE}.{}", bth_format::layout::WRITER_VERSION)),
     ];
     if options.collapse.plan != Default::default() {
         all.push(("plan", format!("{:?}", options.collapse.plan)));

@@ -99,10 +99,11 @@ impl<'a> Cache<'a> {
     }
 
     /// The content of a record as a file, of which nothing but its hash, header and table has been checked.
-    pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth::File> {
+    pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth_format::File> {
         let store = self.store?;
-        let copy = |bytes: &[u8]| bth::File::from_bytes(bytes).ok();
-        let file = store.read_as(record, |path| bth::File::read(path).ok(), copy, bth::File::bytes);
+        let copy = |bytes: &[u8]| bth_format::File::from_bytes(bytes).ok();
+        let file =
+            store.read_as(record, |path| bth_format::File::read(path).ok(), copy, bth_format::File::bytes);
         notes(store, monitor);
         file
     }

@@ -3,9 +3,9 @@
 use super::rows::{Parts, Rows};
 use super::{Stored, keys};
 use crate::marks::Marks;
-use crate::mesh::{self, Attributes, Mesh};
 use crate::tets::{Behind, Face, TetMesh};
 use bth_cache::Digest;
+use bth_import::{self as mesh, Attributes, Mesh};
 use serde::{Deserialize, Serialize};
 
 /// What is known of a mesh without having it.

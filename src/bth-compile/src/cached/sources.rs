@@ -1,8 +1,8 @@
 //! The files that a model consists of, and what they contain.
 
 use crate::error::{Error, Result};
-use crate::mesh::gltf_buffer::external_files;
 use bth_cache::Digest;
+use bth_import::gltf::external_files;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -55,7 +55,7 @@ pub fn files(path: &Path) -> Result<Vec<PathBuf>> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut files = vec![path.to_owned()];
     if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(external_files(path, &crate::mesh::read_file(path)?));
+        files.extend(external_files(path, &bth_import::read_file(path)?));
     }
     Ok(files)
 }

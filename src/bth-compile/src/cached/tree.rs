@@ -3,7 +3,7 @@
 use super::Stored;
 use super::rows::{Parts, Rows};
 use crate::bvh::{BinaryBvh, Node};
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 
 /// What cannot be told from the mesh.
 #[derive(Clone, Debug, Default, PartialEq)]

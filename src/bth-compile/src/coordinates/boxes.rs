@@ -1,6 +1,6 @@
 //! Boxes of a node in bytes: no box becomes smaller, and none grows by more than a step on a side.
 
-use bth::layout::{NONE, PackedNode, WIDTH, WideNode};
+use bth_format::layout::{NONE, PackedNode, WIDTH, WideNode};
 
 /// The greatest number of steps.
 const MOST: f64 = 255.0;

@@ -1,8 +1,8 @@
 //! Which grid: the finest that so many bits reach over the object's box.
 
 use crate::error::{Error, Place, Result};
-use crate::mesh::Mesh;
-use bth::layout::{Grid, GridBits};
+use bth_format::layout::{Grid, GridBits};
+use bth_import::Mesh;
 use serde::{Serialize, Serializer};
 use std::path::Path;
 use std::str::FromStr;

@@ -3,7 +3,7 @@
 use super::boxes::packed_node;
 use crate::bvh::Wide;
 use crate::error::{Error, Result};
-use bth::layout::*;
+use bth_format::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// A block of the lines.

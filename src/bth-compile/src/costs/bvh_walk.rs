@@ -3,7 +3,7 @@
 
 use super::rays::{SampleRay, corners, cross, dot, enters, sub};
 use crate::bvh::BinaryBvh;
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 
 /// What a ray met.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,9 +10,9 @@ use super::{Weighting, top_down};
 use crate::bvh::BinaryBvh;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
-use bth::layout::RecordKind;
+use bth_format::layout::RecordKind;
+use bth_import::Mesh;
 use std::time::Instant;
 
 /// How the tetrahedra will be stored, and beside what.

@@ -11,7 +11,7 @@ use super::rays::{self, SampleRay, along};
 use super::subtree_sums::Sums;
 use super::{Start, Weighting};
 use crate::bvh::BinaryBvh;
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 
 /// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of 32 on the bunny.
 const SHORT_STEPS: f64 = 0.6;

@@ -1,7 +1,7 @@
 //! What tetrahedralizations of a size cost: time of rays, bytes, and time to make them.
 
 use super::{Options, Start, Walk, profile::TetCosts};
-use bth::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
+use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
 /// Tetrahedra and their vertices for each triangle, with free-space points: measured on scans.
 const TETS: f64 = 3.35;

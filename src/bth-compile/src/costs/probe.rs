@@ -14,9 +14,9 @@ use super::tet_walk::TetWalker;
 use super::{Weighting, subtree_sums::half_area};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
 use crate::tets::TetMesh;
+use bth_import::Mesh;
 use serde::Serialize;
 
 /// Rays of all leaves together, and of one leaf at least and at most.

@@ -1,7 +1,7 @@
 //! What tracing costs on a machine, as `bthc calibrate` measures it.
 
 use crate::error::{Error, Place, Result};
-use bth::layout::RecordKind;
+use bth_format::layout::RecordKind;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use crate::bvh::{BinaryBvh, Node};
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 
 /// A sampled ray, object space.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,10 +4,10 @@ use super::testing::{marks_beyond, tree};
 use super::*;
 use crate::bvh::{self, BinaryBvh};
 use crate::marks::Marks;
-use crate::mesh::Mesh;
 use crate::monitor::Silent;
 use crate::tets::{Behind, TetMesh};
-use bth::layout::RecordKind;
+use bth_format::layout::RecordKind;
+use bth_import::Mesh;
 
 const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true, plain_bytes: None };
 const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false, plain_bytes: None };

@@ -3,8 +3,8 @@
 use super::collide::{After, Gathered};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_import::Mesh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 

@@ -4,8 +4,8 @@
 use super::triangle_contact::{Triangle, in_bad_contact};
 use crate::bvh::{BinaryBvh, Node};
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_import::Mesh;
 use rayon::prelude::*;
 
 /// Steps of a traversal between two looks at whether the user asked to stop.

@@ -1,7 +1,7 @@
 //! What the tests of this stage share: meshes, planted contacts and a plain BVH.
 
 use crate::bvh::{BinaryBvh, Node};
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 use std::collections::HashMap;
 
 /// SplitMix64 (Steele et al. 2014).

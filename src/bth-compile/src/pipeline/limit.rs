@@ -6,8 +6,9 @@ use crate::coordinates::OnGrid;
 use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::{bvh, mesh, tets};
-use bth::layout::Object as Header;
+use crate::{bvh, tets};
+use bth_format::layout::Object as Header;
+use bth_import as mesh;
 
 /// Tetrahedralizations by their node.
 type Built = Vec<(u32, tets::TetMesh)>;

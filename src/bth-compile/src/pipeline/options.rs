@@ -1,7 +1,8 @@
 //! The options of a compilation.
 
-use crate::{bvh, coordinates, costs, mesh, tets};
-use bth::layout::RecordKind;
+use crate::{bvh, coordinates, costs, tets};
+use bth_format::layout::RecordKind;
+use bth_import as mesh;
 use serde::Serialize;
 
 /// What to build.

@@ -3,7 +3,7 @@
 use super::{Object, Options};
 use crate::error::Result;
 use crate::write;
-use bth::layout::Object as Header;
+use bth_format::layout::Object as Header;
 
 /// The bytes of a file with one object, checked as a reader will, and how many of them tracing reads.
 pub(super) fn file(object: &Object, provenance: String, options: &Options) -> Result<(Vec<u8>, u64)> {

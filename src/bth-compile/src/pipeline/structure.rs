@@ -3,7 +3,8 @@
 use super::{Options, Structure};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
-use crate::{bvh, costs, marks, mesh, tets};
+use crate::{bvh, costs, marks, tets};
+use bth_import as mesh;
 use std::path::Path;
 
 /// The nodes to tetrahedralize, in ascending order.

@@ -342,7 +342,7 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
     let mut outline = FileBuilder::new();
     objects.outline(&mut outline)?;
     write::scene(&mut outline, parts)?;
-    let first_frame = |bytes: &[u8]| bth::File::from_bytes(bytes)?.check_first_frame();
+    let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
     // Places in messages are those in the whole file.
     let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
     first_frame(&outline.finish()).map_err(|e| refused(name, &whole(e)))

@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::write::SceneParts;
-use bth::layout as on_disk;
-use bth::layout::NONE;
+use bth_format::layout as on_disk;
+use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, Transform};
 use std::collections::HashMap;
 
@@ -162,8 +162,8 @@ fn check_limits(manifest: &Manifest) -> Result<()> {
     let nodes = manifest.nodes.iter().map(|n| &n.name);
     let names = nodes.chain(manifest.cameras.iter().map(|c| &c.name));
     let mut names = names.chain(manifest.lights.iter().map(|l| &l.name));
-    if let Some(long) = names.find(|name| name.len() > bth::limits::MAX_NAME as usize) {
-        let (start, most) = (long.chars().take(40).collect::<String>(), bth::limits::MAX_NAME);
+    if let Some(long) = names.find(|name| name.len() > bth_format::limits::MAX_NAME as usize) {
+        let (start, most) = (long.chars().take(40).collect::<String>(), bth_format::limits::MAX_NAME);
         let message =
             format!("a name may have {most} bytes; the one that starts \"{start}\" has {}", long.len());
         return Err(Error::Limit { code: "BTH-L050", message });

@@ -5,8 +5,8 @@ use super::objects::content;
 use super::sources::File;
 use crate::cached::{self, MeshFacts, Miss};
 use crate::error::Result;
-use crate::mesh::{self, Mesh};
 use bth_cache::Key;
+use bth_import::{self as mesh, Mesh};
 
 /// A mesh, or what is known of one that the cache has.
 pub(super) struct Found {

@@ -3,8 +3,6 @@
 mod at_once;
 mod compile;
 mod encode;
-mod import;
-mod import_tracks;
 mod meshes;
 mod object;
 mod objects;
@@ -15,7 +13,7 @@ mod stored;
 mod visible;
 mod weights;
 
+pub use bth_import::gltf::Chosen;
+pub use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
 pub use compile::{Keep, Place, SceneReport, compile, compile_cached, compile_objects, foresee};
-pub use import::{ImportOptions, ImportReport, import};
-pub use import_tracks::Chosen;
 pub use objects::ObjectReport;

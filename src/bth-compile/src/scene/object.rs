@@ -20,7 +20,7 @@ const MEMORY_AT_LEAST: u64 = 4 << 20;
 
 /// An object with its sections, every index of which has been checked.
 pub(super) struct Built {
-    pub(super) file: bth::File,
+    pub(super) file: bth_format::File,
     pub(super) facts: Facts,
 }
 

@@ -13,8 +13,8 @@ use crate::error::{Error, Place, Result};
 use crate::pipeline::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
-use bth::layout::{self, SectionEntry, kind};
 use bth_cache::Digest;
+use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -253,7 +253,7 @@ fn copy(
         message: format!("expected a compiled file that can be used: {e}"),
         hint: "compile it again".to_owned(),
     };
-    let read = Arc::new(bth::File::read(path).map_err(|e| unusable(&e))?);
+    let read = Arc::new(bth_format::File::read(path).map_err(|e| unusable(&e))?);
     for (part, rows) in &file.parts {
         let object = part.unwrap_or(0);
         let view = read.check(object).map_err(|e| {

@@ -4,8 +4,8 @@
 use super::objects::ObjectReport;
 use crate::cached::{Parts, Rows, Stored};
 use crate::tets::WorkerStatus;
-use bth::layout as on_disk;
-use bth::layout::ALIGNMENT;
+use bth_format::layout as on_disk;
+use bth_format::layout::ALIGNMENT;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 

@@ -5,8 +5,8 @@ use super::compile::Context;
 use super::outline::{Outline, SectionRow};
 use crate::cached;
 use crate::write::{Bytes, HEADER, are_zeros, name};
-use bth::file::hash128;
 use bth_cache::{Digest, Opened};
+use bth_format::file::hash128;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -5,7 +5,7 @@ use super::previous::Previous;
 use crate::error::Result;
 use crate::tets;
 use crate::write::{Bytes, FileBuilder, Known};
-use bth::layout::{self, SectionEntry, kind};
+use bth_format::layout::{self, SectionEntry, kind};
 use std::sync::Arc;
 use zerocopy::FromBytes;
 
@@ -13,7 +13,7 @@ use zerocopy::FromBytes;
 pub(super) enum Stored {
     /// In a file that was read.
     Read {
-        file: Arc<bth::File>,
+        file: Arc<bth_format::File>,
         object: u32,
         /// What is known of it, unless it was copied from a file of the user: then the hashes of the sections are not known to
         /// be right, either.
@@ -25,8 +25,11 @@ pub(super) enum Stored {
 
 impl Stored {
     /// Its sections in a file that was read; kinds that we do not know may mean what we would break.
-    fn sections(file: &bth::File, object: u32) -> impl Iterator<Item = bth::file::SectionView<'_>> {
-        let known = |e: &SectionEntry| bth::file::kind_stride(e.kind).is_some();
+    fn sections(
+        file: &bth_format::File,
+        object: u32,
+    ) -> impl Iterator<Item = bth_format::file::SectionView<'_>> {
+        let known = |e: &SectionEntry| bth_format::file::kind_stride(e.kind).is_some();
         file.sections().filter(move |s| s.entry.object == object && known(s.entry))
     }
 
@@ -36,7 +39,7 @@ impl Stored {
             Self::Read { file, object, made } => {
                 for section in Self::sections(file, *object) {
                     let e = section.entry;
-                    let hash = if made.is_some() { e.hash } else { bth::file::hash128(section.bytes) };
+                    let hash = if made.is_some() { e.hash } else { bth_format::file::hash128(section.bytes) };
                     let known = Known { kind: e.kind, object: number, stride: e.stride, hash };
                     let range = e.offset as usize..(e.offset + e.length) as usize;
                     builder.known_section(known, self.coordinates(e.kind), Bytes::In(file.clone(), range))?;

@@ -4,8 +4,8 @@
 use crate::costs::{Random, SampleRay, Weighting};
 use crate::error::{Error, Place, Result};
 use bth::Scene;
-use bth::layout::{Camera, Light};
 use bth::rays::{Hit, Ray, Surface};
+use bth_format::layout::{Camera, Light};
 use std::path::Path;
 
 /// Frames at most, evenly over the range, and rays of a camera at each, in a grid of so many columns and rows.

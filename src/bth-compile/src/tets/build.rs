@@ -7,8 +7,8 @@ use std::time::Instant;
 use crate::bvh::BinaryBvh;
 use crate::cached::Cache;
 use crate::error::{Error, Result};
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_import::Mesh;
 
 use super::kept::tetrahedralize;
 use super::node::Done;
@@ -143,7 +143,7 @@ fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<(
     report.workers_started = results.workers_started;
     report.nodes = results.nodes.into_values().collect();
     report.seconds = start.elapsed().as_secs_f64();
-    let limit = u64::from(bth::limits::MAX_TETS);
+    let limit = u64::from(bth_format::limits::MAX_TETS);
     if report.tets > limit || report.vertices > limit {
         let message =
             format!("{} tetrahedra, {} vertices, expected at most {limit}", report.tets, report.vertices);

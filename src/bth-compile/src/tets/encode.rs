@@ -1,6 +1,6 @@
 //! The file's sections for tet leaves: rows numbered across all leaves, links in the chosen record.
 
-use bth::layout::{
+use bth_format::layout::{
     FACE_BIT, HullFace, Link, Link32, NONE, RecordKind, Tet16, Tet20, Tet32, TetFace, TetLeaf, TetVertex,
 };
 use zerocopy::IntoBytes;

@@ -1,7 +1,7 @@
 //! The triangles of a node with their own vertices, and the box around them.
 
 use crate::bvh::BinaryBvh;
-use crate::mesh::Mesh;
+use bth_import::Mesh;
 
 use super::report::Trouble;
 

@@ -3,8 +3,8 @@
 use crate::bvh::BinaryBvh;
 use crate::cached::{Cache, decode, encode, tets_of_node};
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_import::Mesh;
 
 use super::gather::{Input, gather};
 use super::node::{self, Done};

@@ -6,8 +6,8 @@ use bth_tetgen_protocol::{Job, Request};
 
 use crate::bvh::{BinaryBvh, Node};
 use crate::error::Result;
-use crate::mesh::Mesh;
 use crate::monitor::Monitor;
+use bth_import::Mesh;
 
 use super::gather::{Input, SIDES, gather};
 use super::pool::Slot;

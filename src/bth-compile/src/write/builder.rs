@@ -3,8 +3,8 @@
 
 use super::content::{Bytes, Content};
 use crate::error::{Error, Result};
-use bth::file::{content_id, hash128};
-use bth::layout::*;
+use bth_format::file::{content_id, hash128};
+use bth_format::layout::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use zerocopy::IntoBytes;
@@ -110,7 +110,7 @@ impl<'a> FileBuilder<'a> {
     /// # Errors
     /// `BTH-L032` with more sections than the format allows.
     pub fn check_limits(&self) -> Result<()> {
-        let (count, most) = (self.sections.len(), bth::limits::MAX_SECTIONS);
+        let (count, most) = (self.sections.len(), bth_format::limits::MAX_SECTIONS);
         if count <= most as usize {
             return Ok(());
         }
@@ -249,14 +249,14 @@ mod tests {
     fn a_section_of_unassigned_kind_0_stays_optional() {
         let mut builder = FileBuilder::new();
         builder.section(0, NONE, 1, b"a".as_slice()).unwrap();
-        assert_eq!(bth::File::from_bytes(&builder.finish()).unwrap().table()[0].flags, 0);
+        assert_eq!(bth_format::File::from_bytes(&builder.finish()).unwrap().table()[0].flags, 0);
     }
 
     #[test]
     fn file_without_sections_opens() {
         let bytes = FileBuilder::new().finish();
         assert_eq!(bytes.len(), 128);
-        assert_eq!(bth::File::from_bytes(&bytes).unwrap().object_count(), 0);
+        assert_eq!(bth_format::File::from_bytes(&bytes).unwrap().object_count(), 0);
     }
 
     #[test]

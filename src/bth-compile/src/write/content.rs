@@ -13,7 +13,7 @@ pub(crate) enum Bytes<'a> {
     /// Here.
     Here(Cow<'a, [u8]>),
     /// In a file that was read.
-    In(Arc<bth::File>, Range<usize>),
+    In(Arc<bth_format::File>, Range<usize>),
     /// In a file that was opened.
     Old(Arc<Opened>, Range<u64>),
 }
@@ -103,7 +103,7 @@ impl Content {
     fn fill(&mut self) {
         let pad = std::mem::take(&mut self.pad);
         if pad > 0 {
-            self.append(&[0; bth::layout::ALIGNMENT][..pad]);
+            self.append(&[0; bth_format::layout::ALIGNMENT][..pad]);
         }
     }
 
@@ -142,7 +142,7 @@ impl Content {
             }
             at += piece.length();
         }
-        out.write_all(&[0; bth::layout::ALIGNMENT][..self.pad])?;
+        out.write_all(&[0; bth_format::layout::ALIGNMENT][..self.pad])?;
         match used {
             Some(file) if !file.is_unchanged() => {
                 Err(Error::other("the file that was there was changed meanwhile; compile again"))

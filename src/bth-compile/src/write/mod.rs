@@ -23,8 +23,8 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// `BTH-X030`: what was written is not what the format demands, a defect of the compiler.
-pub fn checked(bytes: &[u8]) -> Result<bth::File> {
-    let file = bth::File::from_bytes(bytes).map_err(defect)?;
+pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
+    let file = bth_format::File::from_bytes(bytes).map_err(defect)?;
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
     file.check_scene().map_err(defect)?;
     Ok(file)
@@ -37,7 +37,7 @@ pub fn checked(bytes: &[u8]) -> Result<bth::File> {
 pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
     let file = checked(bytes)?;
     if deep {
-        return bth::verify::verify(&file).map(drop).map_err(|mut all| defect(all.swap_remove(0)));
+        return bth_format::verify::verify(&file).map(drop).map_err(|mut all| defect(all.swap_remove(0)));
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::FileBuilder;
 use super::builder::defect;
 use crate::error::{Error, Result};
-use bth::layout::*;
+use bth_format::layout::*;
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -65,10 +65,10 @@ pub struct Source<'a> {
 /// `BTH-L031` when a path has more nodes than the format allows; `BTH-X031` when the parts do not fit together.
 pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts<'a>) -> Result<()> {
     let depth = depth(parts)?;
-    if depth > bth::limits::MAX_DEPTH as u32 {
+    if depth > bth_format::limits::MAX_DEPTH as u32 {
         let message = format!(
             "the hierarchy has {depth} nodes on a path; the format allows {}",
-            bth::limits::MAX_DEPTH
+            bth_format::limits::MAX_DEPTH
         );
         return Err(Error::Limit { code: "BTH-L031", message });
     }

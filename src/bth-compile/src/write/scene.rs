@@ -2,7 +2,7 @@
 
 use super::FileBuilder;
 use crate::error::Result;
-use bth::layout::*;
+use bth_format::layout::*;
 
 /// The rows of the scene sections.
 #[derive(Clone, Debug)]

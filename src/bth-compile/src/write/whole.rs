@@ -1,11 +1,11 @@
 //! What names a file without reading all of it, and whether all of it is what the name says.
 
-use bth::file::hash128;
 use bth_cache::Digest;
+use bth_format::file::hash128;
 use std::path::Path;
 
 /// Bytes that name a file: its header.
-pub(crate) const HEADER: usize = size_of::<bth::layout::Header>();
+pub(crate) const HEADER: usize = size_of::<bth_format::layout::Header>();
 
 /// What names a file: the hash of its header, which has that of the section table, which has those of the sections. Between
 /// them there are zeros.
@@ -15,7 +15,7 @@ pub(crate) fn name(head: &[u8]) -> Digest {
 
 /// What names a compiled file, if every byte of it is what the name says.
 pub fn name_if_whole(path: &Path) -> Option<Digest> {
-    let file = bth::File::read(path).ok()?;
+    let file = bth_format::File::read(path).ok()?;
     let bytes = file.bytes();
     let mut end = HEADER + size_of_val(file.table());
     for section in file.sections() {
@@ -36,7 +36,7 @@ pub(crate) fn are_zeros(bytes: &[u8]) -> bool {
 mod tests {
     use super::*;
     use crate::write::FileBuilder;
-    use bth::layout::NONE;
+    use bth_format::layout::NONE;
 
     #[test]
     fn every_changed_added_or_lost_byte_is_noticed() {

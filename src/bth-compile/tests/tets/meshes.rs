@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use bth_compile::bvh::{BinaryBvh, Node};
-use bth_compile::mesh::Mesh;
+use bth_import::Mesh;
 
 /// A small generator of random numbers (PCG).
 pub(crate) struct Random(pub(crate) u64);

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use bth_compile::Silent;
-use bth_compile::mesh::Mesh;
 use bth_compile::tets::build;
+use bth_import::Mesh;
 
 use crate::meshes::{bvh, weld};
 use crate::oracle::assert_holds;

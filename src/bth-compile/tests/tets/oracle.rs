@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use bth_compile::bvh::BinaryBvh;
-use bth_compile::mesh::Mesh;
 use bth_compile::tets::{Behind, TetMesh};
+use bth_import::Mesh;
 use robust::{Coord3D, orient3d};
 
 use crate::meshes::Random;

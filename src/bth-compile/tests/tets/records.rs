@@ -1,8 +1,8 @@
 //! Records decode to what was encoded.
 
-use bth::layout::{FACE_BIT, Link32, NONE, RecordKind, Tet16, Tet20, Tet32};
 use bth_compile::Silent;
 use bth_compile::tets::{Behind, Encoded, Face, TetMesh, build, encode};
+use bth_format::layout::{FACE_BIT, Link32, NONE, RecordKind, Tet16, Tet20, Tet32};
 use zerocopy::FromBytes;
 
 use crate::meshes::{bvh, nodes_of_at_most, torus};

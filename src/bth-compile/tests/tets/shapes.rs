@@ -1,8 +1,8 @@
 //! Made-up shapes through the whole stage.
 
 use bth_compile::Silent;
-use bth_compile::mesh::Mesh;
 use bth_compile::tets::{Options, Outcome, TetMesh, WorkerStatus, build};
+use bth_import::Mesh;
 
 use crate::meshes::{bumps, bvh, cube, grid, nodes_of_at_most, torus, weld};
 use crate::oracle::{assert_covers_once, assert_holds};

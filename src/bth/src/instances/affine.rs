@@ -1,8 +1,8 @@
 //! Affine transforms in f64, and their inverses for rays.
 
-use crate::layout::Node;
 use crate::rays::Ray;
 use crate::simd::LANES;
+use bth_format::layout::Node;
 
 /// Transforms whose condition number (in the maximum norm) exceeds this count as singular: the rounding of
 /// rays to f32 in object space, 2^-24, would then be as large as the object.
@@ -220,7 +220,7 @@ impl Inverse {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Rng;
+    use bth_random::Rng;
 
     fn unit(rng: &mut Rng) -> f64 {
         rng.below(1 << 40) as f64 / (1u64 << 39) as f64 - 1.0
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn inverses_undo_sheared_and_mirrored_transforms_at_any_scale() {
-        let mut rng = Rng(1);
+        let mut rng = Rng::new(1);
         let mut checked = 0;
         for round in 0..2000 {
             let scale = [1.0, 1e-30, 1e30, 1e-5, 1e4][round % 5];
@@ -277,7 +277,7 @@ mod tests {
 
     #[test]
     fn rays_keep_their_t_whatever_the_scale() {
-        let mut rng = Rng(5);
+        let mut rng = Rng::new(5);
         for round in 0..2000 {
             let scale = [1.0, 1e-25, 1e25, 3.0, 1e-3][round % 5];
             let mut affine = random(&mut rng, scale);
@@ -303,7 +303,7 @@ mod tests {
 
     #[test]
     fn sixteen_rays_at_once_are_the_same_to_the_bit() {
-        let mut rng = Rng(9);
+        let mut rng = Rng::new(9);
         let mut plain = 0;
         for round in 0..500 {
             let scale = [1.0, 1e-12, 1e12, 1e25, 1e-25, 3.0][rng.below(6) as usize];

@@ -8,12 +8,12 @@ use super::packets::Packets;
 use super::placed::Placed;
 use super::visits::{Visit, Visits};
 use super::walk::Walks;
-use crate::file::File;
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::trace::{self, Deliver, Query as _, Scratch, Steps};
+use bth_format::file::File;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 use std::cell::RefCell;
 
 /// Rays that are under way together.

@@ -4,7 +4,7 @@ use super::super::affine::Affine;
 use super::super::placed::Parts;
 use super::*;
 use crate::scene::Scene;
-use crate::testing::Rng;
+use bth_random::Rng;
 
 const FILES: [&[u8]; 2] = [
     include_bytes!("../../../../format-spec/conformance/valid/two-objects.bth"),
@@ -89,7 +89,7 @@ fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
 
 #[test]
 fn the_top_level_and_hints_change_no_answer() {
-    let mut rng = Rng(11);
+    let mut rng = Rng::new(11);
     let (mut hits_seen, mut far_hits, mut all) = (0, 0, 0);
     for round in 0..600 {
         let file = File::from_bytes(FILES[round % 2]).unwrap();
@@ -125,7 +125,7 @@ fn the_top_level_and_hints_change_no_answer() {
 #[test]
 fn rays_without_a_line_hit_nothing() {
     let file = File::from_bytes(FILES[0]).unwrap();
-    let world = world(&file, &mut Rng(3), 50).0;
+    let world = world(&file, &mut Rng::new(3), 50).0;
     let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
     for ray in [
         Ray { origin: [f32::NAN, 0.0, 0.0], ..good },
@@ -162,7 +162,7 @@ fn bundle(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
 
 #[test]
 fn packets_through_the_top_level_change_no_answer() {
-    let mut rng = Rng(23);
+    let mut rng = Rng::new(23);
     let (mut in_packets, mut all, mut hits_seen, mut refused) = (0, 0, 0, 0);
     for round in 0..200 {
         let file = File::from_bytes(FILES[round % 2]).unwrap();
@@ -191,7 +191,7 @@ fn packets_through_the_top_level_change_no_answer() {
 
 #[test]
 fn the_only_instance_is_traced_as_one_of_many() {
-    let mut rng = Rng(31);
+    let mut rng = Rng::new(31);
     let (mut hits_seen, mut all) = (0, 0);
     for round in 0..60 {
         let file = File::from_bytes(FILES[round % 2]).unwrap();

@@ -3,10 +3,10 @@
 use super::affine::{ObjectRay, RayLanes};
 use super::batch::Round;
 use super::visits::Visit;
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 
 /// Rays that go through an object together, in the order of their visits.
 #[derive(Default)]

@@ -12,11 +12,9 @@ mod placed;
 mod pose;
 mod top_level;
 mod tracks;
-mod view;
 mod visits;
 mod walk;
 mod world;
 
-pub use view::SceneView;
 pub use world::Update;
 pub(crate) use world::World;

@@ -5,10 +5,11 @@
 
 use super::top_level::{INSTANCE, TopLevel};
 use super::walk::limit;
-use crate::layout::WIDTH;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::{BOTTOM, Beam, Frame, Group, Guard, Hull, PACKET, Span, is_same_octant};
+use crate::trace::{BOTTOM, Beam, Group, Guard, Hull, PACKET, Span, is_same_octant};
+use bth_format::layout::WIDTH;
+use bth_format::object::ObjectBounds;
 
 /// Groups of sixteen rays in a packet.
 const GROUPS: usize = PACKET / LANES;
@@ -71,7 +72,7 @@ impl Packets {
         self.items.clear();
         self.packets.clear();
         rest.clear();
-        let frame = Frame::around(top.farthest());
+        let bounds = ObjectBounds::around(top.farthest());
         let mut groups = None;
         for (i, own) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;
@@ -79,7 +80,7 @@ impl Packets {
             let mut listed = Listed::Apart;
             if own.len() >= FEWEST && is_same_octant(&own[0], &own[own.len() - 1]) && self.guard.is_open() {
                 let groups = groups.get_or_insert_with(|| [Group::vacant(s); GROUPS]);
-                listed = self.list(s, top, &frame, groups, own);
+                listed = self.list(s, top, &bounds, groups, own);
                 if listed != Listed::Apart {
                     self.guard.learn(listed == Listed::All);
                 }
@@ -99,7 +100,7 @@ impl Packets {
         &mut self,
         s: S,
         top: &TopLevel,
-        frame: &Frame,
+        bounds: &ObjectBounds,
         groups: &mut [Group<S>; GROUPS],
         rays: &[Ray],
     ) -> Listed {
@@ -110,11 +111,11 @@ impl Packets {
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
-            if !group.prepare::<Beam<S, false>>(s, frame, &rays[i * LANES..end]) {
+            if !group.prepare::<Beam<S, false>>(s, bounds, &rays[i * LANES..end]) {
                 return Listed::Apart;
             }
         }
-        let beam = Beam::<S, false>::new(s, frame, &span, groups);
+        let beam = Beam::<S, false>::new(s, bounds, &span, groups);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
         let mut waiting = [0; MOST_NODES];

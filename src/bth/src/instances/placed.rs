@@ -1,8 +1,8 @@
 //! An instance in the world: its inverse and a conservative box.
 
 use super::affine::{Affine, Inverse};
-use crate::layout::{NONE, Object, WIDTH};
-use crate::object::ObjectView;
+use bth_format::layout::{NONE, Object, WIDTH};
+use bth_format::object::ObjectView;
 use std::num::NonZeroU32;
 
 /// How far rounding may move a ray against the instance that it is traced in, relative to what is in play:
@@ -128,12 +128,12 @@ const _: () = assert!(size_of::<Option<Placed>>() == 128);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Rng;
+    use bth_random::Rng;
     use zerocopy::FromZeros;
 
     #[test]
     fn world_boxes_hold_all_parts_and_fit_no_worse_than_the_whole() {
-        let mut rng = Rng(7);
+        let mut rng = Rng::new(7);
         let mut tighter = 0;
         for round in 0..500 {
             let mut unit = || rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0;

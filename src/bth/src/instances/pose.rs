@@ -2,10 +2,10 @@
 //!
 //! Values of tracks are not kept: what moved is found by the keys around both times, and only that is evaluated.
 
-use super::SceneView;
 use super::affine::Affine;
 use super::tracks;
-use crate::layout::*;
+use bth_format::SceneView;
+use bth_format::layout::*;
 
 /// State of a node: it moved in the last update.
 const MOVED: u8 = 1;

@@ -1,7 +1,7 @@
 //! The value of a track at a time (glTF 2.0 specification, appendix C).
 
-use super::SceneView;
-use crate::layout::*;
+use bth_format::SceneView;
+use bth_format::layout::*;
 
 /// The value of a checked track; of its four numbers as many count as the property is wide. A quaternion is not
 /// normalized.

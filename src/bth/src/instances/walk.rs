@@ -4,10 +4,11 @@
 
 use super::top_level::{INSTANCE, TopLevel};
 use super::visits::Visit;
-use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::{BOTTOM, Frame, KEY_SLACK, Place, Prepared, Slabs, Stacks};
+use crate::trace::{BOTTOM, KEY_SLACK, Place, Prepared, Slabs, Stacks};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectBounds;
 
 /// Rays that take turns: few enough that what they need stays in the innermost cache.
 const BLOCK: usize = 64;
@@ -73,14 +74,14 @@ impl Walks {
         if self.ways.len() < rays.len() {
             self.ways.resize(rays.len(), nowhere);
         }
-        let frame = Frame::around(top.farthest());
+        let bounds = ObjectBounds::around(top.farthest());
         let mut prepared = Prepared::new();
         let mut at = [0; LANES];
         let mut kept = 0;
         for first in (0..active.len()).step_by(LANES) {
             let count = LANES.min(active.len() - first);
             at[..count].copy_from_slice(&active[first..first + count]);
-            prepared.fill(s, &frame, rays, &at, count);
+            prepared.fill(s, &bounds, rays, &at, count);
             for (lane, &number) in at[..count].iter().enumerate() {
                 let number = number as usize;
                 let ray = &rays[number];

@@ -1,13 +1,13 @@
 //! The instances of a scene at a time.
 
-#[cfg(test)]
-use super::SceneView;
 use super::placed::{Misplaced, Parts, Placed};
 use super::pose::Pose;
 use super::top_level::TopLevel;
-use crate::error::{Code, Error, Result};
-use crate::file::File;
-use crate::layout::*;
+#[cfg(test)]
+use bth_format::SceneView;
+use bth_format::error::{Code, Error, Result};
+use bth_format::file::File;
+use bth_format::layout::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 

@@ -1,7 +1,7 @@
 //! Every instruction set against plain code, on random lanes.
 
 use super::*;
-use crate::testing::Rng;
+use bth_random::Rng;
 
 fn floats(rng: &mut Rng) -> [f32; LANES] {
     std::array::from_fn(|_| match rng.below(12) {
@@ -169,7 +169,7 @@ impl Kernel for Fused<'_> {
 
 #[test]
 fn every_instruction_set_does_what_plain_code_does() {
-    let mut rng = Rng(31);
+    let mut rng = Rng::new(31);
     for _ in 0..3_000 {
         let (a, b) = (floats(&mut rng), floats(&mut rng));
         let [u, v] = [(); 2].map(|()| std::array::from_fn(|_| rng.below(1 << 32) as u32));
@@ -186,7 +186,7 @@ fn every_instruction_set_does_what_plain_code_does() {
 
 #[test]
 fn fused_or_not_the_product_sums_agree_to_a_rounding() {
-    let mut rng = Rng(32);
+    let mut rng = Rng::new(32);
     for _ in 0..3_000 {
         let mut draw = || std::array::from_fn(|_| (rng.below(1 << 24) as f32 - (1 << 23) as f32) / 4096.0);
         let (a, b, c) = (draw(), draw(), draw());

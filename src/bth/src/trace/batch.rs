@@ -15,10 +15,10 @@ use super::tets::batch::Walk;
 use super::tets::records::LaneRecords;
 use super::tets::{enter_tets, leaf_of_face};
 use super::{FEW, Scratch};
-use crate::layout::{Child, NONE};
-use crate::object::ObjectView;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
+use bth_format::layout::{Child, NONE};
+use bth_format::object::ObjectView;
 use std::marker::PhantomData;
 
 /// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.

@@ -1,12 +1,12 @@
 //! A triangle that f32 says may be hit, and what f64 and exact arithmetic say of it later.
 
-use crate::layout::{Child, NONE};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
 use crate::trace::line::Line;
 use crate::trace::query::{Named, Query};
 use crate::trace::sight::Block;
+use bth_format::layout::{Child, NONE};
+use bth_format::object::ObjectView;
 
 /// A triangle that a ray may hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

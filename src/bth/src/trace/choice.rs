@@ -120,7 +120,7 @@ pub(crate) fn now() -> Option<Instant> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Rng;
+    use bth_random::Rng;
 
     /// Batches that took tets, of so many, at such costs; every twentieth is interrupted.
     fn tets_taken(choice: &mut Choice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_faster_way_is_taken_whatever_interrupts() {
         for seed in 0..50 {
-            let mut rng = Rng(seed);
+            let mut rng = Rng::new(seed);
             let mut choice = Choice::new();
             let taken = tets_taken(&mut choice, &mut rng, 4000, [100e-9, 200e-9]);
             assert!((4..160).contains(&taken), "the slower way takes {taken} of 4000");
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_change_is_noticed() {
-        let mut rng = Rng(7);
+        let mut rng = Rng::new(7);
         let mut choice = Choice::new();
         tets_taken(&mut choice, &mut rng, 2000, [100e-9, 150e-9]);
         assert_eq!(choice.best(), Way::Bvh);

@@ -4,7 +4,7 @@
 //! With o + t·d = a + u·(b-a) + v·(c-a), Cramer's rule gives t, u and v as quotients of determinants (Möller and Trumbore,
 //! "Fast, Minimum Storage Ray/Triangle Intersection", JGT 1997), here with the products in such an order that all but three
 //! scalar products with d is the same for every ray from one point ([`Seen`]). f64 decides; where its error bound leaves a sign,
-//! or a digit, open, exact sums decide ([`crate::expansion`]).
+//! or a digit, open, exact sums decide ([`bth_format::exact`]).
 //!
 //! **Errors.** u = 2^-53; r, m and D are the greatest coordinates of a-o, of the two edges, and of d. Differences are off by u of
 //! themselves. A component of a vector product of two of them has two products, each off by three roundings, and a difference: 8u times
@@ -13,7 +13,7 @@
 //! Products of three differences of f32 values, and of three such with bounds, lie far from f64's limits.
 
 use super::line::Line;
-use crate::expansion::{EDGE, Expansion, VOLUME};
+use bth_format::exact::{EDGE, Expansion, VOLUME};
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32: u and v relative to 1, t to itself.
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
@@ -275,7 +275,7 @@ impl Line {
 mod tests {
     use super::*;
     use crate::rays::Ray;
-    use crate::testing::Rng;
+    use bth_random::Rng;
 
     /// Miri takes a thousand times as long.
     const ROUNDS: usize = if cfg!(miri) { 200 } else { 40_000 };
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn weights_and_volumes_are_off_by_less_than_their_bounds_and_good_ones_by_less_than_they_say() {
-        let mut rng = Rng(17);
+        let mut rng = Rng::new(17);
         let (mut good, mut open, mut bounded) = (0, 0, 0);
         for round in 0..ROUNDS {
             let Some((line, corners)) = draw(&mut rng, round) else { continue };

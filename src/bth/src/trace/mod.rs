@@ -27,14 +27,14 @@ pub(crate) use packets::coherence::{Guard, Span, is_same_octant};
 pub(crate) use packets::group::Group;
 pub(crate) use packets::hull::{Beam, Hull};
 pub(crate) use packets::packet::PACKET;
-pub(crate) use prepare::{Frame, Prepared};
+pub(crate) use prepare::Prepared;
 pub use query::Steps;
 pub(crate) use query::{Any, Deliver, Nearest, Query};
 pub use quick::Test;
 pub(crate) use slabs::Slabs;
 
-use crate::object::ObjectView;
 use crate::rays::{Hit, Ray};
+use bth_format::object::ObjectView;
 use choice::Choices;
 use packets::PacketScratch;
 use single::trace;

@@ -3,9 +3,9 @@
 use super::crossing::Crossing;
 use super::crossings::Crossings;
 use super::quick::Test;
-use crate::layout::NONE;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{LANES, Simd};
+use bth_format::layout::NONE;
 
 /// Where answers go. Rays that are not spoken of hit nothing.
 pub(crate) trait Deliver<Q> {

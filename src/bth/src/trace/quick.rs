@@ -3,9 +3,9 @@
 use super::crossing::Crossing;
 use super::query::{Named, Nearest, Query, Sixteen};
 use super::sight::{Block, Corners, Sight, cross};
-use crate::layout::WIDTH;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{LANES, Simd};
+use bth_format::layout::WIDTH;
 use std::marker::PhantomData;
 
 /// How triangles are decided.

@@ -18,9 +18,9 @@
 
 use super::line::Line;
 use super::slabs::Slabs;
-use crate::layout::{IndexedLeaf, Object, RawLeaf, WIDTH};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use bth_format::layout::{IndexedLeaf, Object, RawLeaf, WIDTH};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 const _: () = assert!(WIDTH == LANES);
@@ -267,7 +267,7 @@ pub(crate) struct Weighed<S: Simd> {
     pub(crate) out: S::M,
     /// Certainly hit, in range or not.
     pub(crate) certain: S::M,
-    /// Bounds of the depth of a hit.
+    /// ObjectBounds of the depth of a hit.
     pub(crate) nearest: S::F,
     pub(crate) farthest: S::F,
 }

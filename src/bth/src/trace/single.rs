@@ -6,10 +6,10 @@ use super::bvh::walk::walk;
 use super::prepare::Aim;
 use super::query::{Count, Query};
 use super::tets::{Start, enter_tets, start_in_tets};
-use crate::layout::{Child, NONE};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
+use bth_format::layout::{Child, NONE};
+use bth_format::object::ObjectView;
 
 /// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with. The answer goes
 /// into `to`.
@@ -112,7 +112,7 @@ impl<Q: Query, C: Count> Single<'_, Q, C> {
         let Single { object, ray, query, walked, count, stack } = self;
         let (object, ray) = (*object, *ray);
         let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-        let aim = match Aim::of(&object.frame, ray) {
+        let aim = match Aim::of(&object.bounds, ray) {
             Some(aim) => aim,
             None => match Aim::in_f64(object.header, ray) {
                 Some(aim) => aim,

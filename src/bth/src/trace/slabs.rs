@@ -5,11 +5,11 @@
 //! direction components, so a box that the ray meets is never lost. t is measured as **depth**: in units of the
 //! greatest component of the direction, so that it has the size of coordinates.
 
-use crate::layout::{Object, PackedNode, WIDTH, WideNode};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::line::Line;
 use crate::trace::query::Query;
+use bth_format::layout::{Object, PackedNode, WIDTH, WideNode};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Pad of a plane relative to the greatest coordinate in play. Half of it covers the roundings (reciprocal, product

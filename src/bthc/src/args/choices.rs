@@ -1,6 +1,6 @@
 //! Options that are one of a few words, and what the compiler calls them.
 
-use bth_compile::mesh::Keep;
+use bth_import::Keep;
 use clap::ValueEnum;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -94,7 +94,7 @@ impl From<Attributes> for Keep {
     }
 }
 
-impl From<Record> for bth::layout::RecordKind {
+impl From<Record> for bth_format::layout::RecordKind {
     fn from(record: Record) -> Self {
         match record {
             Record::Link32 => Self::Link32,

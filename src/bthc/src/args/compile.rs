@@ -4,7 +4,7 @@ use super::cache::Keeping;
 use super::choices::*;
 use super::jobs::Jobs;
 use super::{EXIT_CODES, threads};
-use bth::layout::GridBits;
+use bth_format::layout::GridBits;
 use clap::Args as Group;
 use std::path::PathBuf;
 

@@ -1,8 +1,8 @@
 //! From times and steps to costs.
 
 use super::subject::{Timed, Times};
-use bth::layout::RecordKind;
 use bth_compile::costs::{self, BvhCosts, Profile, TetCosts, Walk};
+use bth_format::layout::RecordKind;
 use std::collections::BTreeMap;
 
 /// What was measured on models whose tetrahedra fit the caches, on models whose don't, and on a model of a

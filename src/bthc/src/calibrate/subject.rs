@@ -3,12 +3,12 @@
 use crate::failure::Failure;
 use crate::measure::{Rays, Run, Way, nanoseconds};
 use bth::Scene;
-use bth::layout::RecordKind;
 use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
-use bth_compile::mesh::Mesh;
 use bth_compile::pipeline::{self, Options, Structure};
 use bth_compile::tets::WorkerStatus;
 use bth_compile::{Error, Monitor, bvh, tets};
+use bth_format::layout::RecordKind;
+use bth_import::Mesh;
 use std::time::Instant;
 
 /// Rays of each kind to a small model: they and the model stay in the caches nearest to the core however the system places

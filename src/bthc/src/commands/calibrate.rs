@@ -9,9 +9,9 @@ use crate::progress::Progress;
 use crate::table::{Table, bytes};
 use bth::Scene;
 use bth_compile::costs::Profile;
-use bth_compile::mesh::{self, Keep, Mesh};
 use bth_compile::pipeline::{self, Options};
 use bth_compile::{Monitor, bvh, costs, write};
+use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
 
@@ -29,7 +29,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     let mut models: Vec<(String, Mesh)> =
         own.into_iter().map(|(name, model)| (name.to_owned(), of(model))).collect();
     for path in &args.models {
-        let (mesh, _) = mesh::import(path, Keep::None, &progress)?;
+        let (mesh, _) = bth_import::import(path, Keep::None, &progress)?;
         models.push((path.display().to_string(), mesh));
     }
     let subjects = models

@@ -4,12 +4,12 @@ use crate::args::Diff;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::bytes;
-use bth::layout::{NONE, SectionEntry};
+use bth_format::layout::{NONE, SectionEntry};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 pub(crate) fn run(args: &Diff) -> Result<(), Failure> {
-    let (first, second) = (bth::File::read(&args.first)?, bth::File::read(&args.second)?);
+    let (first, second) = (bth_format::File::read(&args.first)?, bth_format::File::read(&args.second)?);
     let sections = sections(&first, &second);
     let options = options(&provenance(&first), &provenance(&second));
     let same_content = first.content_id() == second.content_id();
@@ -49,7 +49,7 @@ struct Difference {
 
 impl Difference {
     fn name(&self) -> String {
-        let kind = bth::error::kind_name(self.kind).to_owned();
+        let kind = bth_format::error::kind_name(self.kind).to_owned();
         if self.object == NONE { kind } else { format!("object {}, {kind}", self.object) }
     }
 
@@ -65,7 +65,7 @@ impl Difference {
 }
 
 /// The sections that differ: by the hashes that the files give, which `bthc verify` checks.
-fn sections(first: &bth::File, second: &bth::File) -> Vec<Difference> {
+fn sections(first: &bth_format::File, second: &bth_format::File) -> Vec<Difference> {
     let mut all: BTreeMap<(u32, u32), [Option<SectionEntry>; 2]> = BTreeMap::new();
     for (side, file) in [first, second].into_iter().enumerate() {
         for entry in file.table() {
@@ -79,7 +79,7 @@ fn sections(first: &bth::File, second: &bth::File) -> Vec<Difference> {
         .collect()
 }
 
-fn provenance(file: &bth::File) -> Value {
+fn provenance(file: &bth_format::File) -> Value {
     file.provenance().and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
 }
 

@@ -8,8 +8,8 @@ use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::costs::{self, Verdict};
-use bth_compile::mesh::Keep;
-use bth_compile::{Error, Monitor, bvh, marks, mesh, pipeline, tets, write};
+use bth_compile::{Error, Monitor, bvh, marks, pipeline, tets, write};
+use bth_import::Keep;
 use serde_json::{Value, json};
 use std::cmp::Reverse;
 
@@ -18,7 +18,7 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     args.selection.apply(&mut options)?;
     let progress = Progress::new(args.json);
     let ((mesh, tree), (choice, report)) = with_threads(args.threads, || -> bth_compile::Result<_> {
-        let (mesh, _) = mesh::import(&args.model, Keep::None, &progress)?;
+        let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
         let (tree, _) = bvh::build(&mesh, &options.bvh, &progress)?;
         let (marks, _) = marks::mark(&mesh, &tree, &progress)?;
         let storage = pipeline::storage(&mesh, &tree, &options, &progress)?;

@@ -4,10 +4,11 @@ use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
 use crate::table::{Table, bytes, count};
-use bth::error::kind_name;
-use bth::layout::{NONE, RecordKind};
-use bth::object::ObjectView;
-use bth::{File, Isa};
+use bth::Isa;
+use bth_format::File;
+use bth_format::error::kind_name;
+use bth_format::layout::{NONE, RecordKind};
+use bth_format::object::ObjectView;
 use serde_json::{Value, json};
 
 pub(crate) fn run(args: &Info) -> Result<(), Failure> {
@@ -40,7 +41,7 @@ fn provenance(file: &File) -> Value {
 }
 
 fn describe(file: &File) -> Result<Value, Failure> {
-    let section = |s: bth::file::SectionView<'_>| {
+    let section = |s: bth_format::file::SectionView<'_>| {
         let e = s.entry;
         let object = (e.object != NONE).then_some(e.object);
         json!({"kind": kind_name(e.kind), "object": object, "offset": e.offset, "bytes": e.length,

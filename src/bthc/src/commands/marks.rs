@@ -6,14 +6,14 @@ use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::table::count;
 use crate::{output, ray_files};
-use bth_compile::mesh::Keep;
-use bth_compile::{bvh, marks, mesh, write};
+use bth_compile::{bvh, marks, write};
+use bth_import::Keep;
 use serde_json::json;
 
 pub(crate) fn run(args: &Marks) -> Result<(), Failure> {
     let progress = Progress::new(args.json);
     let (mesh, contacts) = with_threads(args.threads, || -> bth_compile::Result<_> {
-        let (mesh, _) = mesh::import(&args.model, Keep::None, &progress)?;
+        let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
         // The contacts do not depend on the tree; the quickest one will do.
         let options = bvh::Options { quality: bvh::Quality::Fast };
         let (tree, _) = bvh::build(&mesh, &options, &progress)?;

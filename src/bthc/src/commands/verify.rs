@@ -4,12 +4,12 @@ use crate::args::Verify;
 use crate::failure::{Failure, runtime_json};
 use crate::output;
 use crate::table::{Table, bytes, count};
-use bth::verify::Report;
+use bth_format::verify::Report;
 use serde_json::json;
 
 pub(crate) fn run(args: &Verify) -> Result<(), Failure> {
-    let result = match bth::File::read(&args.file) {
-        Ok(file) => bth::verify::verify(&file),
+    let result = match bth_format::File::read(&args.file) {
+        Ok(file) => bth_format::verify::verify(&file),
         Err(error) if error.code() == bth::Code::Read => return Err(error.into()),
         Err(error) => Err(vec![error]),
     };

@@ -8,8 +8,8 @@ pub(crate) use picture::picture;
 
 use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::{Choice, Options};
-use bth_compile::mesh::Mesh;
 use bth_compile::tets::TetMesh;
+use bth_import::Mesh;
 
 /// A model and what was decided on it.
 pub(crate) struct Explained<'a> {

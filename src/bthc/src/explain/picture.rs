@@ -148,7 +148,7 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     let from = Surface { instance: 0, triangle: hit.surface.triangle };
     let (_, steps) = of.compiled.nearest_counted(&ray, from);
     let costs = &of.costs.profile;
-    let walk = costs.record(bth::layout::RecordKind::Link32).surface;
+    let walk = costs.record(bth_format::layout::RecordKind::Link32).surface;
     let tets =
         if steps.tets > 0 { walk.cost(f64::from(steps.tets), 0.5, costs.bytes[0], costs.bytes) } else { 0.0 };
     Some(

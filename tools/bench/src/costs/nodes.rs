@@ -8,12 +8,12 @@ use crate::progress::Progress;
 use crate::rounds::least;
 use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
-use bth::layout::RecordKind;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
-use bth_compile::mesh::Mesh;
 use bth_compile::pipeline::{self, Options, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
+use bth_format::layout::RecordKind;
+use bth_import::Mesh;
 use std::collections::HashMap;
 use std::time::Instant;
 

@@ -3,7 +3,7 @@
 use crate::rivals::embree::Place;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Ray;
-use bth_compile::mesh::Mesh;
+use bth_import::Mesh;
 use serde::Serialize;
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -9,8 +9,8 @@ use super::walk::{End, Plane, crosses};
 use crate::tracer::{Batch, Tracer};
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::bvh::BinaryBvh;
-use bth_compile::mesh::Mesh;
 use bth_compile::tets::TetMesh;
+use bth_import::Mesh;
 
 /// Most triangles of a leaf (pbrt's default).
 const LEAF: u32 = 4;

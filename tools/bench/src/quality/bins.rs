@@ -2,7 +2,7 @@
 
 use super::boxes::{Box3, parts};
 use super::spatial::Reference;
-use bth_compile::mesh::Mesh;
+use bth_import::Mesh;
 
 /// Slabs per axis.
 const SLABS: usize = 32;

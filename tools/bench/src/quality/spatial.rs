@@ -8,7 +8,7 @@
 use super::bins::{self, Plane};
 use super::boxes::{Box3, parts};
 use bth_compile::bvh::{BinaryBvh, Node};
-use bth_compile::mesh::{Mesh, is_zero_area};
+use bth_import::{Mesh, is_zero_area};
 
 /// Least common area of both halves, as a share of the root's, for which a plane is looked for.
 const OVERLAP: f64 = 1e-5;

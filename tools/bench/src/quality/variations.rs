@@ -6,8 +6,8 @@ use crate::clock::Clock;
 use anyhow::Result;
 use bth_compile::Silent;
 use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Costs, Effort, Plan, Quality, Rule};
-use bth_compile::mesh::Mesh;
 use bth_compile::write::{self, FileBuilder, ObjectParts};
+use bth_import::Mesh;
 use std::collections::HashSet;
 
 /// How the binary BVH is made.

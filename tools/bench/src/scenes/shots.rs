@@ -5,8 +5,8 @@ use crate::rays::{Camera, LIFT, Random, ray};
 use crate::tracer::Batch;
 use anyhow::{Context, Result, ensure};
 use bth::Scene;
-use bth::layout::NONE;
 use bth::rays::{Hit, Ray, Surface};
+use bth_format::layout::NONE;
 use glam::DVec3;
 
 /// Times that light is reflected, as `bth-play --mode path` does by default.

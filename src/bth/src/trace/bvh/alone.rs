@@ -2,10 +2,10 @@
 #![allow(unsafe_code)] // Clearing it would cost more than most rays.
 
 use super::stack::BOTTOM;
-use crate::layout::WIDTH;
-use crate::limits::MAX_DEPTH;
 use crate::simd::LANES;
 use crate::trace::query::Query;
+use bth_format::layout::WIDTH;
+use bth_format::limits::MAX_DEPTH;
 use std::mem::MaybeUninit;
 
 /// Entries: at every level all children but the one entered wait, and whole vectors are written at the top.
@@ -117,8 +117,8 @@ impl Room<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::Rng;
     use crate::trace::query::{Any, Nearest};
+    use bth_random::Rng;
 
     /// Random steps, against a vector of codes and keys.
     fn steps<Q: Query>(rng: &mut Rng) {
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn what_waits_comes_back_in_order_but_for_what_lies_beyond_the_limit() {
-        let mut rng = Rng(3);
+        let mut rng = Rng::new(3);
         for _ in 0..if cfg!(miri) { 3 } else { 200 } {
             steps::<Any>(&mut rng);
             steps::<Nearest>(&mut rng);

@@ -5,12 +5,13 @@ use super::flights::{Flights, IN_FLIGHT};
 use super::landing::Landing;
 use super::nodes::Nodes;
 use super::stack::{Place, Stacks};
-use crate::layout::{Child, NONE};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::prepare::{Frame, Prepared};
+use crate::trace::prepare::Prepared;
 use crate::trace::query::{Deliver, Query};
+use bth_format::layout::{Child, NONE};
+use bth_format::object::ObjectBounds;
+use bth_format::object::ObjectView;
 
 /// The rays still to be traced.
 pub(crate) struct Waiting<'a, Q> {
@@ -47,7 +48,7 @@ struct Supply<'a, Q> {
     waiting: Waiting<'a, Q>,
     /// Where rays start.
     root: u32,
-    frame: Frame,
+    bounds: ObjectBounds,
     /// Lanes of rays that meet any, and how many of these are gone.
     lane: [u8; LANES],
     filled: usize,
@@ -73,7 +74,7 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
             rays,
             waiting,
             root: root(object),
-            frame: object.frame,
+            bounds: object.bounds,
             prepared: Prepared::new(),
             ray: [0; LANES],
             met: [0; LANES],
@@ -160,7 +161,7 @@ impl<Q: Query> Supply<'_, Q> {
         if count == 0 {
             return false;
         }
-        self.prepared.fill(s, &self.frame, self.rays, &self.ray, count);
+        self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
         let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.ground(), self.root));
         for lane in 0..count {
             let mut meets = true;

@@ -1,8 +1,6 @@
 //! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
-use crate::layout::{NONE, WIDTH};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, open, settle};
@@ -12,6 +10,8 @@ use crate::trace::query::{Deliver, Named, Query};
 use crate::trace::quick::Test;
 use crate::trace::sight::{Block, Candidates, Certain};
 use crate::trace::slabs::Boxes;
+use bth_format::layout::{NONE, WIDTH};
+use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
 
 /// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less
@@ -56,7 +56,7 @@ impl<Q: Query> Flight<Q> {
         (place, ray): (u32, &Ray),
         query: Option<Q>,
     ) -> bool {
-        let aim = Aim::of(&object.frame, ray).or_else(|| Aim::in_f64(object.header, ray));
+        let aim = Aim::of(&object.bounds, ray).or_else(|| Aim::in_f64(object.header, ray));
         aim.map(|aim| self.launch(&Aim { ray: place, ..aim }, query)).is_some()
     }
 

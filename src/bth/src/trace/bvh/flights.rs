@@ -4,12 +4,12 @@
 use super::flight::{Flight, Found, write_children};
 use super::nodes::{Nodes, prefetch};
 use super::stack::{BOTTOM, Place, Stacks};
-use crate::layout::Child;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::query::Query;
 use crate::trace::slabs::Boxes;
+use bth_format::layout::Child;
+use bth_format::object::ObjectView;
 
 /// Rays on their way at once.
 pub(super) const IN_FLIGHT: usize = 32;

@@ -1,8 +1,6 @@
 //! Rays at the end of their way whose nearest hit is certain, and where it is still to be computed: sixteen at a time.
 
 use super::flight::Flight;
-use crate::layout::{NONE, WIDTH};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Reader, settle};
@@ -10,6 +8,8 @@ use crate::trace::crossings::{Crossings, Pairs};
 use crate::trace::prepare::fields;
 use crate::trace::query::{Deliver, Query};
 use crate::trace::sight::Block;
+use bth_format::layout::{NONE, WIDTH};
+use bth_format::object::ObjectView;
 
 /// Rays that have ended, up to sixteen.
 pub(crate) struct Landing {

@@ -1,9 +1,9 @@
 //! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
 
-use crate::layout::{Child, INDEXED_LINES, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
-use crate::object::Ground;
 use crate::simd::Simd;
 use crate::trace::slabs::Boxes;
+use bth_format::layout::{Child, INDEXED_LINES, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode};
+use bth_format::object::Ground;
 
 /// A kind of nodes.
 pub(crate) trait Nodes: Copy {

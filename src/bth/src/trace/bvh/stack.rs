@@ -1,10 +1,10 @@
 //! Stacks of children that wait to be entered, for many rays in one piece of memory.
 #![allow(unsafe_code)] // Places are checked when they are made, once a step, and not again when they are used.
 
-use crate::layout::WIDTH;
-use crate::limits::MAX_DEPTH;
-use crate::object::ObjectView;
 use crate::simd::{LANES, Simd};
+use bth_format::layout::WIDTH;
+use bth_format::limits::MAX_DEPTH;
+use bth_format::object::ObjectView;
 
 /// The code at the bottom of a stack: of no child, like `NONE`, but its line can be prefetched (an address that is not
 /// mapped costs a walk through the page tables).

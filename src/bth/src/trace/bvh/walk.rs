@@ -4,8 +4,6 @@
 use super::alone::Alone;
 use super::flight::key_limit;
 use super::nodes::{Nodes, prefetch};
-use crate::layout::{Child, NONE, WIDTH};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, Settled, settle, settle_one};
@@ -13,6 +11,8 @@ use crate::trace::prepare::Aim;
 use crate::trace::query::{Count, Query};
 use crate::trace::sight::{Block, Certain};
 use crate::trace::slabs::{Boxes, Planes};
+use bth_format::layout::{Child, NONE, WIDTH};
+use bth_format::object::ObjectView;
 use std::hint::black_box;
 
 /// What a tet leaf made of a ray.

@@ -2,8 +2,8 @@
 
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::prepare::Frame;
 use crate::trace::slabs::PAD;
+use bth_format::object::ObjectBounds;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Floats of a [`Ray`].
@@ -144,7 +144,12 @@ impl Span {
     /// An end of a segment, o + t·d, is off by at most 3u(|o| + |t·d|) for its roundings (u = 2^-24), and by
     /// u|t·d| for those of the reported t; the pad is 16u(|o| + the extent of the box).
     #[inline(always)]
-    pub(crate) fn segments<S: Simd>(&self, s: S, frame: &Frame, rays: &[Ray]) -> Option<[[f32; 3]; 2]> {
+    pub(crate) fn segments<S: Simd>(
+        &self,
+        s: S,
+        bounds: &ObjectBounds,
+        rays: &[Ray],
+    ) -> Option<[[f32; 3]; 2]> {
         if !(self.range[0] >= f32::MIN && self.range[1] <= f32::MAX) {
             return None;
         }
@@ -168,22 +173,22 @@ impl Span {
         s.store(least, &mut low);
         s.store(greatest, &mut high);
         s.store(longest, &mut long);
-        let (mut extent, mut length, mut bounds) = (0f32, 0f32, [[0.0; 3]; 2]);
+        let (mut extent, mut length, mut segments) = (0f32, 0f32, [[0.0; 3]; 2]);
         for k in 0..3 {
             let [lower, upper] = both(&low, &high, k);
             extent = extent.max(upper - lower);
             length = length.max(long[k]).max(long[k + FLOATS]);
-            (bounds[0][k], bounds[1][k]) = (lower, upper);
+            (segments[0][k], segments[1][k]) = (lower, upper);
         }
-        if !(extent <= LOOSENESS * length && extent <= SHORT * frame.size()) {
+        if !(extent <= LOOSENESS * length && extent <= SHORT * bounds.size()) {
             return None;
         }
         let pad = PAD as f32 * (self.farthest_origin() + extent) + f32::MIN_POSITIVE;
         for k in 0..3 {
-            bounds[0][k] -= pad;
-            bounds[1][k] += pad;
+            segments[0][k] -= pad;
+            segments[1][k] += pad;
         }
-        Some(bounds)
+        Some(segments)
     }
 }
 

@@ -6,11 +6,11 @@
 use super::group::Group;
 use super::hull::Hull;
 use super::packet::{Entry, GROUPS};
-use crate::layout::{WIDTH, WideNode};
 use crate::simd::{LANES, Simd};
 use crate::trace::crossings::Many;
 use crate::trace::prepare::{Aim, Prepared};
 use crate::trace::sight::{Block, Candidates};
+use bth_format::layout::{WIDTH, WideNode};
 
 /// Rays of a group that are few before a leaf, by measurement,
 pub(crate) const FEW: u32 = 6;
@@ -110,13 +110,13 @@ impl Lone {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::NONE;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel};
-    use crate::testing::Rng;
     use crate::trace::packets::hull::SegmentBox;
     use crate::trace::packets::packet::PACKET;
-    use crate::trace::prepare::Frame;
+    use bth_format::layout::NONE;
+    use bth_format::object::ObjectBounds;
+    use bth_random::Rng;
 
     /// What rays meet, a bit each, of each child.
     struct Children<'a>(&'a [Ray], &'a WideNode, u64);
@@ -127,7 +127,7 @@ mod tests {
             let Children(rays, node, few) = self;
             let mut groups = [Group::vacant(s); GROUPS];
             for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
-                assert!(group.prepare::<SegmentBox<S>>(s, &Frame::around(8.0), rays));
+                assert!(group.prepare::<SegmentBox<S>>(s, &ObjectBounds::around(8.0), rays));
             }
             let groups = &groups[..rays.len().div_ceil(LANES)];
             let (mut lone, mut to) = (Lone::NONE, [Entry::default(); WIDTH]);
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn children_are_met_by_the_rays_that_f64_says() {
-        let mut rng = Rng(31);
+        let mut rng = Rng::new(31);
         let mut unit = || rng.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
         let (mut met, mut missed) = (0, 0);
         for round in 0..120 {

@@ -6,12 +6,13 @@
 use super::hull::Hull;
 use super::leaf::Leaf;
 use super::met::{APART, Looks};
-use crate::layout::NONE;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::crossings::{Crossings, Pairs};
-use crate::trace::prepare::{self, Axes, Common, Frame, Mixed};
+use crate::trace::prepare::{self, Axes, Common, Mixed};
 use crate::trace::sight::Block;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectBounds;
 
 /// How sixteen rays see points.
 #[derive(Clone, Copy)]
@@ -139,7 +140,7 @@ impl<S: Simd> Group<S> {
     /// Prepares the first sixteen of rays; the last fills up lanes that are too many. False if one of them can't be
     /// prepared.
     #[inline(always)]
-    pub(crate) fn prepare<H: Hull<S>>(&mut self, s: S, frame: &Frame, rays: &[Ray]) -> bool {
+    pub(crate) fn prepare<H: Hull<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
         let mut field = match rays.first_chunk() {
             Some(rays) => prepare::fields_of(s, rays),
             None => {
@@ -166,8 +167,8 @@ impl<S: Simd> Group<S> {
         self.waiting = s.splat_u(NONE);
         // Each taken over where it is made: merged first, they would all pass through memory once more.
         match self.common {
-            Some(common) => self.take::<H>(s, prepare::lanes(s, frame, field, &common)),
-            None => self.take::<H>(s, prepare::lanes(s, frame, field, &self.mixed)),
+            Some(common) => self.take::<H>(s, prepare::lanes(s, bounds, field, &common)),
+            None => self.take::<H>(s, prepare::lanes(s, bounds, field, &self.mixed)),
         }
     }
 

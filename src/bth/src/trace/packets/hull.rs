@@ -2,10 +2,11 @@
 
 use super::coherence::Span;
 use super::group::Group;
-use crate::layout::{WIDTH, WideNode};
 use crate::simd::{LANES, Simd};
-use crate::trace::prepare::Frame;
+use crate::trace::prepare;
 use crate::trace::slabs::{self, PAD};
+use bth_format::layout::{WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
 
 /// A set that contains every point at which rays of a packet can hit something.
 pub(crate) trait Hull<S: Simd> {
@@ -94,9 +95,9 @@ pub(crate) struct Beam<S: Simd, const POINT: bool> {
 impl<S: Simd, const POINT: bool> Beam<S, POINT> {
     /// Of a coherent run ([`Span::is_coherent`]).
     #[inline(always)]
-    pub(crate) fn new(s: S, frame: &Frame, span: &Span, groups: &[Group<S>]) -> Self {
+    pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[Group<S>]) -> Self {
         let zero = s.splat(0.0);
-        let extent = frame.extent(span.farthest_origin());
+        let extent = prepare::extent(bounds, span.farthest_origin());
         let (main, _) = span.main_axis();
         let axis = [(main + 1) % 3, (main + 2) % 3, main];
         let mut center = [0.0; 3];

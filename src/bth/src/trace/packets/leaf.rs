@@ -10,14 +10,14 @@ use super::hull::Hull;
 use super::mesh::Mesh;
 use super::met::{APART, Met};
 use super::points::{AtOnce, Greatest, POINTS, Points, Relative, Sightings};
-use crate::layout::{NONE, WIDTH};
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Settled, settle};
 use crate::trace::prepare::{Axes, Common};
 use crate::trace::query::Query;
 use crate::trace::sight;
+use bth_format::layout::{NONE, WIDTH};
+use bth_format::object::ObjectView;
 
 /// In place of the number of a triangle among those that the packet keeps: it has not been asked for.
 const UNKNOWN: u8 = u8::MAX;

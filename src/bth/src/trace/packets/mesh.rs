@@ -2,9 +2,9 @@
 
 use super::hull::Hull;
 use super::points::Relative;
-use crate::layout::{IndexedLeaf, RawLeaf, WIDTH};
 use crate::simd::Simd;
 use crate::trace::sight::Block;
+use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 
 /// A leaf as points, and triangles between them.
 pub(crate) trait Mesh: Block {

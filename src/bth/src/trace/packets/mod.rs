@@ -15,12 +15,12 @@ mod tests;
 use self::coherence::{Guard, Span, is_same_octant};
 use self::hull::{Beam, Hull, SegmentBox};
 use self::packet::{KeptGroups, PACKET, Packets, Room, Use};
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::prepare::Frame;
 use crate::trace::query::{Deliver, Offset, Query};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectBounds;
+use bth_format::object::ObjectView;
 
 /// Rays in a line of the cache.
 const RAYS_A_LINE: usize = 64 / size_of::<Ray>();
@@ -74,10 +74,10 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     {
         return count;
     }
-    let frame = object.frame;
+    let bounds = object.bounds;
     let PacketScratch { groups, room, rest } = scratch;
     rest.clear();
-    let mut runs = Runs { frame: &frame, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };
+    let mut runs = Runs { bounds: &bounds, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };
     // The first apart, so that the packets are made where they stay and only if there are any.
     let Some(mut run) = runs.next::<S, Q>(s) else { return count };
     let mut packets = Packets::<S, Q>::new(object, groups.of(s), room, &rays[0]);
@@ -93,17 +93,17 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             Kind::Coherent(span) => {
                 // Whether any hit will do is most often asked on the way to a light, from different points.
                 let outcome = if !Q::ANY && span.is_from_point() {
-                    beam::<S, Q, true>(s, object, &frame, &span, &mut packets, own, &mut to)
+                    beam::<S, Q, true>(s, object, &bounds, &span, &mut packets, own, &mut to)
                 } else {
-                    beam::<S, Q, false>(s, object, &frame, &span, &mut packets, own, &mut to)
+                    beam::<S, Q, false>(s, object, &bounds, &span, &mut packets, own, &mut to)
                 };
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
             // Others never are; so this need not be compiled for them.
             Kind::Short(_) if !Q::ANY => (Use::Refused, &mut runs.short, least.short, &mut count.short),
-            Kind::Short(bounds) => {
-                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &frame, &mut packets, own) {
-                    packets.trace(s, object, &SegmentBox::new(s, bounds), own, &mut to)
+            Kind::Short(segments) => {
+                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, own) {
+                    packets.trace(s, object, &SegmentBox::new(s, segments), own, &mut to)
                 } else {
                     Use::Refused
                 };
@@ -141,7 +141,7 @@ enum Kind {
 
 /// The runs of a batch.
 struct Runs<'a, 'b> {
-    frame: &'b Frame,
+    bounds: &'b ObjectBounds,
     rays: &'a [Ray],
     /// Where the next begins.
     at: usize,
@@ -159,7 +159,7 @@ impl<'a> Runs<'a, '_> {
             let at = self.at;
             let rays = &self.rays[at..self.rays.len().min(at + PACKET)];
             self.at = at + PACKET;
-            if let Some(kind) = choose::<S, Q>(s, self.frame, rays, &mut self.coherent, &mut self.short) {
+            if let Some(kind) = choose::<S, Q>(s, self.bounds, rays, &mut self.coherent, &mut self.short) {
                 return Some(Run { at, rays, kind });
             }
             self.leave(at, rays.len());
@@ -176,7 +176,7 @@ impl<'a> Runs<'a, '_> {
 #[inline(always)]
 fn choose<S: Simd, Q: Query>(
     s: S,
-    frame: &Frame,
+    bounds: &ObjectBounds,
     rays: &[Ray],
     coherent: &mut Guard,
     short: &mut Guard,
@@ -194,7 +194,7 @@ fn choose<S: Simd, Q: Query>(
         return Some(Kind::Coherent(span));
     }
     if try_short {
-        return span.segments(s, frame, rays).map(Kind::Short);
+        return span.segments(s, bounds, rays).map(Kind::Short);
     }
     None
 }
@@ -204,16 +204,16 @@ fn choose<S: Simd, Q: Query>(
 fn beam<S: Simd, Q: Query, const POINT: bool>(
     s: S,
     object: &ObjectView<'_>,
-    frame: &Frame,
+    bounds: &ObjectBounds,
     span: &Span,
     packets: &mut Packets<'_, S, Q>,
     rays: &[Ray],
     to: &mut impl Deliver<Q>,
 ) -> Use {
-    if !prepare::<S, Q, Beam<S, POINT>>(s, frame, packets, rays) {
+    if !prepare::<S, Q, Beam<S, POINT>>(s, bounds, packets, rays) {
         return Use::Refused;
     }
-    let beam = Beam::<S, POINT>::new(s, frame, span, &packets.groups[..rays.len().div_ceil(LANES)]);
+    let beam = Beam::<S, POINT>::new(s, bounds, span, &packets.groups[..rays.len().div_ceil(LANES)]);
     packets.room.met.clear(s, POINT);
     packets.trace(s, object, &beam, rays, to)
 }
@@ -222,13 +222,13 @@ fn beam<S: Simd, Q: Query, const POINT: bool>(
 #[inline(always)]
 fn prepare<S: Simd, Q: Query, H: Hull<S>>(
     s: S,
-    frame: &Frame,
+    bounds: &ObjectBounds,
     packets: &mut Packets<'_, S, Q>,
     rays: &[Ray],
 ) -> bool {
     let mut ready = true;
     for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
-        ready &= group.prepare::<H>(s, frame, rays);
+        ready &= group.prepare::<H>(s, bounds, rays);
     }
     ready
 }

@@ -11,15 +11,15 @@ use super::hull::Hull;
 use super::leaf::{Leaf, Rays};
 use super::met::{Looks, Met};
 use super::points::{Points, Relative};
-use crate::layout::{Child, NONE, WIDTH, WideNode};
-use crate::limits::MAX_DEPTH;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
 use crate::trace::bvh::nodes::{Wide, prefetch};
 use crate::trace::crossings::{Crossings, SeenFromPoint};
 use crate::trace::query::{Deliver, Query};
+use bth_format::layout::{Child, NONE, WIDTH, WideNode};
+use bth_format::limits::MAX_DEPTH;
+use bth_format::object::ObjectView;
 use std::any::Any;
 
 /// Groups of sixteen rays in a packet.

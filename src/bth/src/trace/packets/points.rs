@@ -2,9 +2,9 @@
 
 use super::group::Projection;
 use super::hull::View;
-use crate::layout::WIDTH;
 use crate::simd::{LANES, Simd};
 use crate::trace::crossings::Many;
+use bth_format::layout::WIDTH;
 
 /// Points of a leaf at most.
 pub(crate) const POINTS: usize = 3 * WIDTH;
@@ -52,7 +52,7 @@ impl Relative {
         self.0[axis].as_flattened().first_chunk().expect("as many")
     }
 
-    /// Bounds of the size and the depth of these points, a bit each, as any ray sees them.
+    /// ObjectBounds of the size and the depth of these points, a bit each, as any ray sees them.
     #[inline(always)]
     pub(crate) fn spread<S: Simd>(&self, s: S, view: &View, parts: usize, used: u64) -> [f32; 2] {
         let (mut size, mut depth) = (s.splat(0.0), s.splat(0.0));

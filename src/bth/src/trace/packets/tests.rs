@@ -1,16 +1,18 @@
 //! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
 
-use crate::layout::{Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf};
-use crate::layout::{WIDTH, WideNode};
-use crate::object::{ObjectView, Records};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::testing::Rng;
 use crate::trace::batch::Sink;
 use crate::trace::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
-use crate::trace::prepare::Frame;
 use crate::trace::query::{Any, Nearest, Query};
 use crate::trace::single;
+use bth_format::layout::{
+    Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
+};
+use bth_format::layout::{WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
+use bth_format::object::{ObjectView, Records};
+use bth_random::Rng;
 use zerocopy::{FromZeros, IntoBytes};
 
 /// Quads of the surface along x and y, and of a leaf.
@@ -56,7 +58,7 @@ fn node(children: &[([[f32; 3]; 2], u32)]) -> WideNode {
 impl Surface {
     /// Heights are small integers; then all is scaled and moved along x.
     fn new(scale: f32, away: f32) -> Surface {
-        let mut rng = Rng(5);
+        let mut rng = Rng::new(5);
         let height: Vec<f32> = (0..(QUADS[0] + 1) * (QUADS[1] + 1)).map(|_| rng.below(5) as f32).collect();
         let point = |x: usize, y: usize| {
             let z = height[y * (QUADS[0] + 1) + x];
@@ -143,7 +145,7 @@ impl Surface {
     fn view(&self) -> ObjectView<'_> {
         ObjectView {
             header: &self.header,
-            frame: Frame::new(&self.header),
+            bounds: ObjectBounds::new(&self.header),
             grid: None,
             lines: &self.lines,
             triangle_ids: &self.ids,
@@ -247,7 +249,7 @@ fn unit(rng: &mut Rng) -> f32 {
 /// Rays from near an eye to near a place of the surface, in runs of 64: exactly from the eye and to points of the surface
 /// where `exact`.
 fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut rays = vec![];
     for _ in 0..40 {
         let start = rng.below(surface.points.len() as u64 - 64) as usize;
@@ -269,7 +271,7 @@ fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
 
 /// Short rays from places near a point, all ways.
 fn short(surface: &Surface, scale: f32, seed: u64) -> Vec<Ray> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut rays = vec![];
     for _ in 0..40 {
         let point = surface.points[rng.below(surface.points.len() as u64) as usize];
@@ -307,7 +309,7 @@ fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
 /// Packets of rays from one point that hit a few triangles, or more than are kept, or some of each.
 #[test]
 fn views_from_one_point_are_traced_to_the_same_bits() {
-    let mut rng = Rng(12);
+    let mut rng = Rng::new(12);
     let surface = Surface::new(1.0, 0.0);
     let eye = [30.3, 60.1, 90.7];
     let mut rays = vec![];
@@ -347,7 +349,7 @@ fn short_bundles_are_traced_to_the_same_bits() {
 fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
     let surface = Surface::new(1.0, 0.0);
     let (coherent, short) = (bundles(&surface, 1.0, false, 4), short(&surface, 1.0, 5));
-    let mut rng = Rng(6);
+    let mut rng = Rng::new(6);
     let mut rays = vec![];
     for (i, (a, b)) in coherent.chunks(64).zip(short.chunks(64)).enumerate() {
         rays.extend_from_slice(if i % 2 == 0 { a } else { b });
@@ -387,7 +389,7 @@ fn packets_that_serve_few_of_their_rays_make_way() {
     // Every other ray of a run passes far from the others, so hardly any step serves half of them.
     let surface = Surface::new(1.0, 0.0);
     let mut rays = bundles(&surface, 1.0, false, 8);
-    let mut rng = Rng(9);
+    let mut rng = Rng::new(9);
     for ray in &mut rays {
         let point = surface.points[rng.below(surface.points.len() as u64) as usize];
         ray.origin = [point[0] - 400.0, point[1] - 300.0, point[2] + 500.0];
@@ -404,7 +406,7 @@ fn packets_that_serve_few_of_their_rays_make_way() {
 fn nothing_of_a_batch_is_left_for_the_next() {
     let surface = Surface::new(1.0, 0.0);
     let leaf = surface.one_leaf();
-    let mut rng = Rng(13);
+    let mut rng = Rng::new(13);
     let middle = leaf.points[7];
     // Through a vertex, so that hits must be decided alone.
     let rays: Vec<Ray> = (0..128)

@@ -1,11 +1,12 @@
 //! Sixteen rays prepared in lanes: what [`Aim`]s say of them, before they are turned into those.
 
 use super::axes::Axes;
-use super::{Aim, Frame, LARGEST, Noted, SMALLEST, UP};
+use super::{Aim, LARGEST, Noted, SMALLEST, UP};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::sight;
 use crate::trace::slabs;
+use bth_format::object::ObjectBounds;
 use std::mem::offset_of;
 
 /// The floats of rays, a row of lanes for each.
@@ -36,7 +37,7 @@ pub(crate) struct Lanes<S: Simd> {
     pub(crate) far_addend: [S::F; 3],
     pub(crate) negative: [S::M; 3],
     pub(crate) scale: S::F,
-    /// Bounds of the depths that matter,
+    /// ObjectBounds of the depths that matter,
     pub(crate) depths: [S::F; 2],
     /// and of those that certainly do.
     pub(crate) certain: [S::F; 2],
@@ -52,7 +53,7 @@ pub(crate) struct Lanes<S: Simd> {
 
 /// Prepares sixteen rays, given their own floats.
 #[inline(always)]
-pub(crate) fn lanes<S: Simd>(s: S, frame: &Frame, field: [S::F; 8], axes: &impl Axes<S>) -> Lanes<S> {
+pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes: &impl Axes<S>) -> Lanes<S> {
     let [ox, oy, oz, tmin, dx, dy, dz, tmax] = field;
     let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
     let size = [s.abs(dx), s.abs(dy), s.abs(dz)];
@@ -65,14 +66,14 @@ pub(crate) fn lanes<S: Simd>(s: S, frame: &Frame, field: [S::F; 8], axes: &impl 
     let (mut from, mut along) = (zero, zero);
     for k in 0..3 {
         let far =
-            s.max(s.abs(s.sub(s.splat(frame.lower[k]), o[k])), s.abs(s.sub(s.splat(frame.upper[k]), o[k])));
+            s.max(s.abs(s.sub(s.splat(bounds.lower[k]), o[k])), s.abs(s.sub(s.splat(bounds.upper[k]), o[k])));
         reach = s.max(far, reach);
         let coordinate = s.abs(o[k]);
         farthest = s.max(coordinate, farthest);
         from = s.add(coordinate, from);
         along = s.add(size[k], along);
     }
-    let extent = s.mul(s.add(s.splat(frame.farthest), farthest), s.splat(UP));
+    let extent = s.mul(s.add(s.splat(bounds.greatest), farthest), s.splat(UP));
     let large = s.splat(LARGEST);
     let finite = s.and(
         s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(along, large)),

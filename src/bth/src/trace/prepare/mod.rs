@@ -13,9 +13,10 @@ pub(crate) use self::lanes::{Lanes, fields, fields_of, lanes};
 use super::line::Line;
 use super::sight::{self, Sight};
 use super::slabs::{self, Slabs};
-use crate::layout::{NONE, Object};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use bth_format::layout::{NONE, Object};
+use bth_format::object::ObjectBounds;
 use glam::{Vec3A, Vec4};
 use std::mem::offset_of;
 use std::ops::Range;
@@ -28,49 +29,17 @@ const SMALLEST: f32 = slabs::SMALLEST_EXTENT as f32;
 /// What lower bounds of a few f32 roundings are multiplied by, to bound from above.
 const UP: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
-/// What is the same for all rays through an object.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
-    lower: Vec3A,
-    upper: Vec3A,
-    farthest: f32,
-}
-
-/// The greater; `b` where either is NaN. One instruction, which `f32::max` is not.
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
 /// The lesser; `b` where either is NaN.
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-impl Frame {
-    pub(crate) fn new(object: &Object) -> Frame {
-        let corners = object.lower.iter().chain(&object.upper);
-        let farthest = corners.fold(0.0, |m: f32, x| greater(x.abs(), m));
-        Frame { lower: object.lower.into(), upper: object.upper.into(), farthest }
-    }
-
-    /// The frame of boxes whose coordinates do not exceed this.
-    pub(crate) fn around(farthest: f32) -> Frame {
-        Frame { lower: Vec3A::splat(-farthest), upper: Vec3A::splat(farthest), farthest }
-    }
-
-    /// The greatest coordinate in play for origins whose coordinates do not exceed this, seen from any of them.
-    #[inline(always)]
-    pub(crate) fn extent(&self, farthest_origin: f32) -> f32 {
-        (self.farthest + farthest_origin) * UP
-    }
-
-    /// The longest side of the object's box.
-    #[inline(always)]
-    pub(crate) fn size(&self) -> f32 {
-        (0..3).fold(0.0, |m: f32, k| m.max(self.upper[k] - self.lower[k]))
-    }
+/// Upper bound of |coordinate of the box| + |coordinate of an origin|, for origins whose coordinates do not exceed
+/// `greatest_origin`.
+#[inline(always)]
+pub(crate) fn extent(bounds: &ObjectBounds, greatest_origin: f32) -> f32 {
+    (bounds.greatest + greatest_origin) * UP
 }
 
 /// A ray prepared for boxes and for triangles, and what its walk notes: a cache line for steps through nodes and one for leaves,
@@ -129,14 +98,15 @@ impl Aim {
 
     /// A single ray, to the same bounds as [`Prepared::fill`]; none where f32 can't prepare it.
     #[inline(always)]
-    pub(crate) fn of(frame: &Frame, ray: &Ray) -> Option<Aim> {
+    pub(crate) fn of(bounds: &ObjectBounds, ray: &Ray) -> Option<Aim> {
         let [start, end]: [[f32; 4]; 2] = zerocopy::transmute!(*ray);
         let ([.., tmin], [dx, dy, dz, tmax]) = (start, end);
         let (o, d) = (Vec3A::from_vec4(Vec4::from_array(start)), Vec3A::from_vec4(Vec4::from_array(end)));
         let (size, start) = (d.abs(), o.abs());
-        let far = (frame.lower - o).abs().max((frame.upper - o).abs());
+        let [lower, upper] = [bounds.lower, bounds.upper].map(|p| Vec3A::from_vec4(Vec4::from_array(p)));
+        let far = (lower - o).abs().max((upper - o).abs());
         let (greatest, reach) = (size.max_element(), far.max_element());
-        let extent = frame.extent(start.max_element());
+        let extent = extent(bounds, start.max_element());
         // Each by itself, because the greater of NaN and a number may be the number.
         let finite = size.cmplt(Vec3A::splat(LARGEST)) & start.cmplt(Vec3A::splat(LARGEST));
         let in_range = (greatest > 1.0 / LARGEST) & (SMALLEST < extent) & (extent < LARGEST);
@@ -222,14 +192,14 @@ impl Prepared {
     pub(crate) fn fill<S: Simd>(
         &mut self,
         s: S,
-        frame: &Frame,
+        bounds: &ObjectBounds,
         rays: &[Ray],
         at: &[u32; LANES],
         count: usize,
     ) {
         let wanted = s.mask(((1u64 << count) - 1) as u32);
         let field = fields(s, wanted, rays, s.load_u(at));
-        let lanes = lanes(s, frame, field, &Mixed::of(s, [field[4], field[5], field[6]]));
+        let lanes = lanes(s, bounds, field, &Mixed::of(s, [field[4], field[5], field[6]]));
         self.write(s, &lanes, s.load_u(at), 0..2);
         self.ready &= s.mask_bits(wanted);
     }

@@ -1,15 +1,16 @@
 //! However a ray is prepared, and on every instruction set, f32 leaves out nothing that exact arithmetic accepts, and is
 //! sure of nothing that it does not.
 
-use super::{Aim, Frame, Prepared};
-use crate::layout::{IndexedLeaf, NONE, Object, WIDTH, WideNode};
+use super::{Aim, Prepared};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
-use crate::testing::Rng;
 use crate::trace::crossing::Crossing;
 use crate::trace::line::Line;
 use crate::trace::sight::Sight;
 use crate::trace::slabs::Slabs;
+use bth_format::layout::{IndexedLeaf, NONE, Object, WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
+use bth_random::Rng;
 use zerocopy::FromZeros;
 
 /// One triangle: its node, its leaf, and the object whose bounds it has.
@@ -75,7 +76,7 @@ impl Kernel for Together<'_> {
     fn run<S: Simd>(self, s: S) -> Prepared {
         let mut prepared = Prepared::new();
         let at = std::array::from_fn(|i| i as u32);
-        prepared.fill(s, &Frame::new(self.1), self.0, &at, LANES);
+        prepared.fill(s, &ObjectBounds::new(self.1), self.0, &at, LANES);
         prepared
     }
 }
@@ -84,7 +85,7 @@ impl Kernel for Together<'_> {
 fn aims(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<Aim> {
     let slabs = Slabs::new(ray, line, object);
     let mut aims = vec![Aim::new(slabs, Sight::new(ray, line, &slabs, object))];
-    aims.extend(Aim::of(&Frame::new(object), ray));
+    aims.extend(Aim::of(&ObjectBounds::new(object), ray));
     aims.extend(Aim::in_f64(object, ray));
     let mut others = [Ray { origin: [f32::NAN; 3], ..*ray }; LANES];
     others[lane] = *ray;
@@ -105,7 +106,7 @@ fn in_range(ray: &Ray, crossing: &Option<Crossing>) -> bool {
 
 #[test]
 fn nothing_is_lost_that_the_line_crosses_and_sure_hits_are_hits() {
-    let mut rng = Rng(3);
+    let mut rng = Rng::new(3);
     let (mut crossings, mut missed, mut sure, mut prepared) = (0, 0, 0, 0);
     for round in 0..60_000 {
         let unit = |rng: &mut Rng| (rng.below(1 << 24) as f32 / (1 << 23) as f32) - 1.0;

@@ -6,12 +6,12 @@ use super::lanes::{three, word};
 use super::queue::{Queue, Ready};
 use super::records::{Entered, LaneRecords};
 use super::walk::{Outcome, Place};
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::line::Line;
 use crate::trace::query::Query;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Hits that wait to be looked at in f64 together.

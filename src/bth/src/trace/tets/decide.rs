@@ -6,12 +6,12 @@
 
 use super::batch::{Batch, Reached, Start, Walk};
 use super::lanes::DOUBT;
-use super::records::Entered;
+use super::records::{Entered, ReadRecords};
 use super::walk::{Outcome, Place, TetSpace};
 use super::{leaf_of_face, space};
-use crate::layout::{FACE_BIT, NONE, TetFace};
 use crate::trace::line::Line;
 use crate::trace::query::Query;
+use bth_format::layout::{FACE_BIT, NONE, TetFace};
 
 /// A ray that went back to the lanes so often is walked to its end in f64.
 const MOST_RETURNS: u8 = 16;

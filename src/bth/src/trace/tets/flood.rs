@@ -6,11 +6,11 @@
 //! hold it, so nothing that the line touches is left out, and each is visited once: it
 //! ends, and it finds every constrained face that the exact test can accept.
 
-use super::records::Entered;
+use super::records::{Entered, ReadRecords};
 use super::walk::{Outcome, TetSpace};
-use crate::layout::{FACE_BIT, NONE};
 use crate::trace::line::{Projected, Sign};
 use crate::trace::query::{Count, Query};
+use bth_format::layout::{FACE_BIT, NONE};
 use std::collections::HashSet;
 
 /// Tetrahedra that a flood has been in: mostly some ten around a vertex, but all of a fan where that is the vertex.

@@ -15,8 +15,8 @@
 //! signs, so those of the face ahead are certain too.
 
 use super::records::{EnteredLanes, LaneRecords};
-use crate::layout::{FACE_BIT, NONE};
 use crate::simd::Simd;
+use bth_format::layout::{FACE_BIT, NONE};
 
 /// 2^-24.
 const U: f32 = 1.0 / (1 << 24) as f32;
@@ -300,9 +300,9 @@ mod tests {
     use super::*;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel, LANES};
-    use crate::testing::Rng;
     use crate::trace::line::Line;
     use crate::trace::tets::queue::Ready;
+    use bth_random::Rng;
 
     /// For each of sixteen rays: cross products of three points in turn, their bound, and which rays lanes can take.
     struct Crosses<'a>(&'a [Ray], &'a [[f32; 4]]);
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn cross_products_are_off_by_less_than_their_bound_at_any_scale() {
-        let mut rng = Rng(51);
+        let mut rng = Rng::new(51);
         let (mut certain, mut tried) = (0, 0);
         for round in 0..4_000 {
             let scale = 2f32.powi(rng.below(180) as i32 - 95);

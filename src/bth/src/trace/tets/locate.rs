@@ -1,10 +1,10 @@
 //! Where a ray that starts on a known surface is among the tetrahedra: a walk from the surface's
 //! own tetrahedron towards the origin, usually of no step or one.
 
-use super::records::Entered;
+use super::records::{Entered, ReadRecords};
 use super::walk::{Place, TetSpace};
-use crate::layout::{FACE_BIT, TetFace};
 use crate::trace::line::{Line, Projected, Sign};
+use bth_format::layout::{FACE_BIT, TetFace};
 
 /// Steps after which the surface counts as a bad hint and the ray is traced without it.
 const MOST_STEPS: u32 = 64;

@@ -11,12 +11,12 @@ pub(crate) mod rounds;
 pub(crate) mod walk;
 
 use self::walk::{Outcome, TetSpace};
-use crate::layout::NONE;
-use crate::object::ObjectView;
 use crate::rays::Ray;
 use crate::trace::bvh::walk::TetOutcome;
 use crate::trace::line::Line;
 use crate::trace::query::{Count, Query};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 
 /// What became of a ray where it starts.
 pub(crate) enum Start {

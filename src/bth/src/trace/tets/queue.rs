@@ -1,10 +1,10 @@
 //! Rays made ready to walk, in wait for lanes that are free.
 
 use super::lanes::{Extent, Lanes, cross, float, three, word};
-use crate::layout::{HullFace, NONE, TetFace};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::prepare;
+use bth_format::layout::{HullFace, NONE, TetFace};
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or
@@ -269,7 +269,7 @@ impl<S: Simd> Ready<S> {
         // The face turns around for those that go against its normal.
         lanes.words[word::TET] = s.select_u(up, above, below);
         lanes.words[word::APEX] = s.select_u(up, apex_above, apex_below);
-        lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(crate::layout::FACE_BIT));
+        lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(bth_format::layout::FACE_BIT));
         lanes.words[word::FACE + 1] = s.select_u(up, v1, v2);
         lanes.words[word::FACE + 2] = s.select_u(up, v2, v1);
         for k in [float::X, float::Y, float::DEPTH] {

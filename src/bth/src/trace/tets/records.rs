@@ -3,9 +3,9 @@
 //! Records are reached through a face: its three vertices are known, and what lies behind it.
 //! The rest follows: the fourth vertex, and what lies behind the other faces.
 
-use crate::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
-use crate::object::Records;
 use crate::simd::Simd;
+use bth_format::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
+use bth_format::object::Records;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// A tetrahedron as entered through a face.
@@ -87,10 +87,17 @@ impl Record for Tet16 {
     }
 }
 
-impl Records<'_> {
+/// Reads tetrahedra of an object, whichever record it keeps.
+pub(crate) trait ReadRecords {
     /// [`Record::apex`] of a tetrahedron.
+    fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32;
+    /// [`Record::link`] of a tetrahedron.
+    fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link;
+}
+
+impl ReadRecords for Records<'_> {
     #[inline(always)]
-    pub(crate) fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32 {
+    fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32 {
         match self {
             Records::Link32(_) => carried,
             Records::Tet32(records) => records[tet as usize].apex(face, carried),
@@ -100,9 +107,8 @@ impl Records<'_> {
         }
     }
 
-    /// [`Record::link`] of a tetrahedron.
     #[inline(always)]
-    pub(crate) fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link {
+    fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link {
         match self {
             Records::Link32(records) => records[tet as usize].link(at, vertex),
             Records::Tet32(records) => records[tet as usize].link(at, vertex),

@@ -7,9 +7,9 @@ use super::batch::{Batch, Start, vertices};
 use super::lanes::{Lanes, Step, float, word};
 use super::queue::Queue;
 use super::records::Entered;
-use crate::layout::NONE;
 use crate::simd::{Kernel, LANES, Simd};
 use crate::trace::query::Query;
+use bth_format::layout::NONE;
 
 /// Idle lanes of a group that are worth a refill.
 const WORTH_A_REFILL: u32 = 6;

@@ -6,11 +6,11 @@
 //! rounding hides a sign (the line meets an edge or vertex, within rounding) the walk gives up, and
 //! `tet_flood` visits everything that the line can touch instead.
 
-use super::records::Entered;
-use crate::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
-use crate::object::{ObjectView, Records};
+use super::records::{Entered, ReadRecords};
 use crate::trace::line::{Line, Projected, Sign};
 use crate::trace::query::{Count, Named, Query};
+use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
+use bth_format::object::{ObjectView, Records};
 
 /// The parts of a tet leaf that a walk reads, and what it knows about the ray.
 pub(crate) struct TetSpace<'a> {

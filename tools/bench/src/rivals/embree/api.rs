@@ -4,8 +4,8 @@
 use crate::rivals::library;
 use crate::tracer::Batch;
 use anyhow::Result;
-use bth::layout::NONE;
 use bth::rays::{Hit, Ray, Surface};
+use bth_format::layout::NONE;
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::OnceLock;
 

@@ -1,0 +1,307 @@
+//! Why a file was refused: one stable code per numbered invariant of `format-spec/`.
+
+use crate::layout::{NONE, kind};
+use std::path::{Path, PathBuf};
+
+/// Result of opening and checking.
+pub type Result<T> = std::result::Result<T, Error>;
+
+macro_rules! codes {
+    ($($name:ident $text:literal $rule:literal)*) => {
+        /// What was violated. Codes never change their meaning; new ones may be added.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
+        pub enum Code {
+            $(#[doc = $rule] $name,)*
+        }
+        impl Code {
+            /// All codes, in order.
+            pub const ALL: &'static [Code] = &[$(Code::$name),*];
+
+            /// The stable code, such as `BTH-F012`.
+            pub const fn as_str(self) -> &'static str {
+                match self { $(Code::$name => concat!("BTH-", $text),)* }
+            }
+            /// The invariant in words, as the specification states it.
+            pub const fn rule(self) -> &'static str {
+                match self { $(Code::$name => $rule,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    Read "O001" "The file can be read."
+    Host "O002" "The machine is little-endian."
+    NoSuchObject "O003" "The object that is asked for exists."
+
+    HeaderSize "F001" "The file holds a whole header of 128 bytes."
+    Identifier "F002" "The file starts with the 16 bytes of the identifier."
+    Version "F003" "Both versions have major 1, and the minimum reader version is at most the writer's and at most the reader's."
+    HeaderHash "F004" "The header hash is that of the first 112 bytes."
+    Length "F005" "The file length in the header is that of the file."
+    Reserved "F006" "Reserved fields of the header and the section table are zero."
+    Features "F007" "The reader knows every required feature bit."
+    Table "F008" "The section table starts at 128, has at most 2^20 entries and lies within the file."
+    TableHash "F009" "The table hash is that of the section table."
+    Order "F010" "Section entries ascend strictly by (object, kind)."
+    Alignment "F011" "Alignments are 64 and offsets are multiples of it."
+    Bounds "F012" "Sections lie behind the section table, within the file, in ascending order, and do not overlap."
+    Count "F013" "A section's length is its stride times its count."
+    Stride "F014" "A section of a known kind has the stride of that kind."
+    UnknownKind "F015" "A section of an unknown kind does not have flag bit 0."
+    Flags "F016" "Flag bits of a section other than bit 0 are zero."
+    Objects "F017" "Objects are numbered from 0 without gaps, each with one OBJECT row; sections of the whole file have object 2^32-1."
+    ContentId "F018" "The content id is that of the section table."
+    Tail "F019" "The file ends where its last section does, rounded up to 64 bytes."
+    Gap "F020" "Bytes between the table, the sections and the end of the file are zero."
+    SectionHash "F021" "A section's hash is that of its bytes."
+    Limit "F022" "Triangles and tetrahedra of an object number at most 2^30, lines at most 2^29."
+
+    Record "F101" "The record kind is known, fits the TETS section, and is 0 only without tet leaves."
+    Counts "F102" "Tables per triangle have as many rows as the object has triangles; no more triangles are dropped than there are."
+    ObjectBounds "F103" "Object bounds are finite with lower <= upper; without a root they are zero."
+    Coordinates "F104" "Coordinates of an object's triangle leaves are f32, with zeros in the fields of the grid, or of 16 or 21 bits on a grid all of whose points are f32, with a finite displacement; the header's features announce grids and packed nodes."
+    ChildCode "F105" "Child codes are NONE or of an assigned kind, nodes all packed or none; below a subtree of a tet leaf there are no tet leaves."
+    ChildRange "F106" "The block or row that a child code leads to lies within its section."
+    ChildOrder "F107" "Nodes and triangle leaves lie behind the node that refers to them."
+    Overlap "F108" "Blocks do not overlap and have one reference each."
+    Unclaimed "F109" "Every line belongs to a block; on a grid its first half does, and a second half that does not is zero."
+    Depth "F110" "No path has more wide nodes than the object's depth, which is at most 96."
+    Slots "F111" "A node's used slots come first and there is at least one; empty slots hold the empty box; reserved fields of packed nodes are zero."
+    ChildBounds "F112" "Child boxes are finite with lower <= upper; those of packed nodes have steps that are powers of two and an origin from which every end is an f32."
+    LeafCounts "F113" "A triangle leaf has 1 to 16 triangles, an indexed one 1 to 16 vertices."
+    Corner "F114" "Corners of an indexed leaf are below its number of vertices."
+    LeafIds "F115" "A leaf's rows lie within TRIANGLE_IDS."
+    TriangleId "F116" "Rows of TRIANGLE_IDS are below the number of triangles."
+    LeafVertices "F117" "Vertices of leaves are finite."
+    LeafUnused "F118" "Unused slots of leaves are filled as specified and reserved fields are zero."
+    TetBox "F120" "The box of a tet leaf is finite with lower < upper, and its flags are zero."
+    TetRanges "F121" "The ranges of successive tet leaves follow each other, lie within their sections and together cover them."
+    TetCounts "F122" "A tet leaf has at least one tetrahedron, four vertices, one constrained face and four hull faces."
+    TetReferences "F123" "Every tet leaf is the child of exactly one node, or the root."
+    TetVertices "F124" "Vertices of tetrahedra are finite with a reserved field of zero."
+    HullFace "F125" "A hull face names four distinct vertices and a tetrahedron of its leaf with exactly these, which has no neighbour there; every face without a neighbour is named once."
+    TetFace "F126" "A constrained face names three distinct vertices of its leaf and the tetrahedron and fourth vertex on either side; both refer to it, and no other does."
+    Link "F127" "A link is NONE, a tetrahedron of the same leaf or a constrained face of the same leaf."
+    Neighbour "F128" "Neighbours share three vertices and refer to each other."
+    TetRecord "F129" "Vertices and exclusive ors of a record are those of its tetrahedron; opposite vertices are those of the neighbour."
+    Unreached "F130" "Every tetrahedron of a leaf is reached from its first hull face."
+    Homes "F131" "TRIANGLE_HOMES is empty without tet leaves; else it leads from each triangle of a constrained face to that face, and from others to NONE."
+    SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
+    Positions "F141" "Positions are finite."
+    Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and zeros."
+    Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
+    NodeTransform "F152" "A node's transform is finite; one of parts has a quaternion that is not zero and ends with zeros."
+    Name "F153" "Names lie within NAMES, are UTF-8 and have at most 4,096 bytes."
+    Instance "F154" "Instances refer to nodes and objects of the file; their other fields are zero."
+    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist, visibility changes in steps, of a node with a matrix only visibility, and reserved fields are zero."
+    TrackRanges "F156" "A track has at least one key; the ranges of successive tracks follow each other, lie within TIMES and VALUES and together cover them."
+    TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions among them not zero, and of visibility 0 or 1."
+    Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are such as the scene manifest allows, and its reserved fields are zero."
+    Light "F159" "A light's node and kind exist; its color, intensity, range and angles are such as the scene manifest allows, and its reserved fields are zero."
+
+    LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
+    FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
+    Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
+    Containment "F204" "The object's bounds and each child box contain the triangles below."
+    TetContainment "F205" "The box of a tet leaf contains its vertices."
+    Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
+    ZeroArea "F207" "Exactly the triangles of zero area are dropped."
+    Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object says."
+
+    Singular "S001" "The transform of an instance that is seen can be inverted."
+    NotFinite "S002" "The transform and the world box of an instance that is seen are finite."
+}
+
+impl Code {
+    fn hint(self) -> &'static str {
+        match self {
+            Code::Read => "check the path and its permissions",
+            Code::Host => "big-endian machines are not supported",
+            Code::NoSuchObject => "objects are numbered from 0",
+            Code::HeaderSize | Code::Identifier => "this is not a BTH file, or a transfer changed or cut it",
+            Code::Version | Code::Features | Code::UnknownKind => {
+                "a newer version of this library can read the file"
+            }
+            Code::Length | Code::Tail => "the file was cut or appended to; copy or compile it again",
+            Code::HeaderHash | Code::TableHash | Code::SectionHash | Code::Gap | Code::ContentId => {
+                "the file was damaged; copy or compile it again"
+            }
+            Code::Singular => {
+                "scale by 0 to hide; else keep the scales of one node within 2^24 of each other"
+            }
+            Code::NotFinite => "keep translations and scales within the range of 32-bit numbers",
+            _ => "the program that wrote the file has a defect; compile it again with bthc",
+        }
+    }
+}
+
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// The section that an error is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// One of [`kind`].
+    pub kind: u32,
+    /// Object, or `NONE` for the whole file.
+    pub object: u32,
+}
+
+/// Why a file cannot be used.
+#[derive(Debug)]
+pub struct Error {
+    code: Code,
+    section: Option<Section>,
+    offset: Option<u64>,
+    expected: String,
+    found: String,
+    path: Option<PathBuf>,
+    source: Option<std::io::Error>,
+}
+
+impl Error {
+    /// An error about the file as a whole, at a byte of it.
+    pub fn at(code: Code, offset: u64, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        let (expected, found) = (expected.into(), found.into());
+        Self { code, section: None, offset: Some(offset), expected, found, path: None, source: None }
+    }
+    /// An error within a section; `offset` counts from the section's start until [`Self::move_by`] is called.
+    pub fn within(
+        code: Code,
+        kind: u32,
+        offset: u64,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        let section = Some(Section { kind, object: 0 });
+        Self { section, ..Self::at(code, offset, expected, found) }
+    }
+    /// As [`Self::within`], in a section of the whole file.
+    pub fn within_file(
+        code: Code,
+        kind: u32,
+        offset: u64,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::within(code, kind, offset, expected, found).in_object(NONE)
+    }
+    /// An error of the system.
+    pub fn io(path: &Path, source: std::io::Error) -> Self {
+        let found = source.to_string();
+        Self {
+            offset: None,
+            path: Some(path.to_owned()),
+            source: Some(source),
+            ..Self::at(Code::Read, 0, "a readable file", found)
+        }
+    }
+    /// The same error with the object that its section belongs to.
+    pub fn in_object(mut self, object: u32) -> Self {
+        if let Some(section) = &mut self.section {
+            section.object = object;
+        }
+        self
+    }
+    /// The same error with its offset moved from the section's start to the file's.
+    pub fn move_by(mut self, start: u64) -> Self {
+        self.offset = self.offset.map(|o| o.saturating_add(start));
+        self
+    }
+    /// The same error with the path of its file.
+    pub fn in_file(mut self, path: &Path) -> Self {
+        self.path.get_or_insert_with(|| path.to_owned());
+        self
+    }
+
+    /// What was violated.
+    pub fn code(&self) -> Code {
+        self.code
+    }
+    /// The section, where the error is about one.
+    pub fn section(&self) -> Option<Section> {
+        self.section
+    }
+    /// Byte of the file, from 0. Errors of [`crate::check::object`] count from the section's start.
+    pub fn offset(&self) -> Option<u64> {
+        self.offset
+    }
+    /// What should be there.
+    pub fn expected(&self) -> &str {
+        &self.expected
+    }
+    /// What is there.
+    pub fn found(&self) -> &str {
+        &self.found
+    }
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        self.code.hint()
+    }
+    /// The file, where it is known.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+}
+
+impl std::fmt::Display for Error {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(path) = &self.path {
+            write!(f, "{}: ", path.display())?;
+        }
+        write!(f, "{}: ", self.code)?;
+        if let Some(Section { kind, object }) = self.section {
+            write!(f, "{}", kind_name(kind))?;
+            if object != NONE {
+                write!(f, " of object {object}")?;
+            }
+            write!(f, ", ")?;
+        }
+        if let Some(offset) = self.offset {
+            write!(f, "byte {offset}: ")?;
+        }
+        write!(f, "expected {}, found {} (hint: {})", self.expected, self.found, self.hint())
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        self.source.as_ref().map(|e| e as _)
+    }
+}
+
+/// Name of a section kind, as in the specification; `unknown` for others.
+pub fn kind_name(code: u32) -> &'static str {
+    match code {
+        kind::OBJECT => "OBJECT",
+        kind::LINES => "LINES",
+        kind::TRIANGLE_IDS => "TRIANGLE_IDS",
+        kind::TET_LEAVES => "TET_LEAVES",
+        kind::TETS => "TETS",
+        kind::TET_VERTICES => "TET_VERTICES",
+        kind::TET_FACES => "TET_FACES",
+        kind::HULL_FACES => "HULL_FACES",
+        kind::TRIANGLE_HOMES => "TRIANGLE_HOMES",
+        kind::POSITIONS => "POSITIONS",
+        kind::TRIANGLES => "TRIANGLES",
+        kind::CORNERS => "CORNERS",
+        kind::NORMALS => "NORMALS",
+        kind::UVS => "UVS",
+        kind::PROVENANCE => "PROVENANCE",
+        kind::SCENE => "SCENE",
+        kind::NODES => "NODES",
+        kind::INSTANCES => "INSTANCES",
+        kind::TRACKS => "TRACKS",
+        kind::TIMES => "TIMES",
+        kind::VALUES => "VALUES",
+        kind::CAMERAS => "CAMERAS",
+        kind::LIGHTS => "LIGHTS",
+        kind::NAMES => "NAMES",
+        _ => "unknown",
+    }
+}

@@ -1,0 +1,238 @@
+//! Exact sums of products of f32 values, for the few decisions that f64 rounding leaves open.
+//!
+//! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+//! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
+//! three f32 values lie between 2^-447 and 2^384, so nothing here over- or underflows.
+
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    (sum, (a - (sum - b_part)) + (b - b_part))
+}
+
+/// Exact product as a rounded value and its error (Dekker's splitting: no fused
+/// multiply-add, which not every target has in hardware).
+fn two_product(a: f64, b: f64) -> (f64, f64) {
+    fn split(x: f64) -> (f64, f64) {
+        let c = 134_217_729.0 * x;
+        let high = c - (c - x);
+        (high, x - high)
+    }
+    let product = a * b;
+    let ((ah, al), (bh, bl)) = (split(a), split(b));
+    (product, al * bl - (((product - ah * bh) - al * bh) - ah * bl))
+}
+
+/// Room for [`Expansion::add_edge`]: 18 products, two additions each, of which each makes at most one part more.
+pub const EDGE: usize = 36;
+/// Room for [`Expansion::add_volume`].
+pub const VOLUME: usize = 48;
+
+/// An exact sum.
+pub struct Expansion<const PARTS: usize> {
+    part: [f64; PARTS],
+    len: usize,
+}
+
+/// p - o, where f64 holds it exactly: most often, as f32 coordinates of one scene seldom differ by a factor of 2^29.
+fn seen_from(o: [f64; 3], p: [f64; 3]) -> Option<[f64; 3]> {
+    let differences = [0, 1, 2].map(|k| two_sum(p[k], -o[k]));
+    differences.iter().all(|(_, error)| *error == 0.0).then(|| differences.map(|(difference, _)| difference))
+}
+
+impl<const PARTS: usize> Expansion<PARTS> {
+    /// The sum of nothing.
+    pub fn new() -> Self {
+        Expansion { part: [0.0; PARTS], len: 0 }
+    }
+
+    /// Adds one number.
+    pub fn add(&mut self, x: f64) {
+        if x == 0.0 {
+            return;
+        }
+        let (mut carry, mut kept) = (x, 0);
+        for i in 0..self.len {
+            let (sum, error) = two_sum(carry, self.part[i]);
+            carry = sum;
+            if error != 0.0 {
+                self.part[kept] = error;
+                kept += 1;
+            }
+        }
+        if carry != 0.0 {
+            self.part[kept] = carry;
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    /// Adds a·b·c for values of f32 precision (a·b is then exact in f64).
+    pub fn add_product(&mut self, a: f64, b: f64, c: f64) {
+        let (product, error) = two_product(a * b, c);
+        self.add(error);
+        self.add(product);
+    }
+
+    /// Adds a·b·c for any values whose products are far from the least number.
+    fn add_long_product(&mut self, a: f64, b: f64, c: f64) {
+        let (product, error) = two_product(a, b);
+        for part in [error, product] {
+            if part != 0.0 {
+                let (product, error) = two_product(part, c);
+                self.add(error);
+                self.add(product);
+            }
+        }
+    }
+
+    /// Adds det[a, b, c] of differences.
+    fn add_long_determinant(&mut self, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+        for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+            self.add_long_product(a[i], b[j], c[k]);
+            self.add_long_product(-a[i], b[k], c[j]);
+        }
+    }
+
+    /// Adds sign · det[a, b, c].
+    pub fn add_determinant(&mut self, sign: f64, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+        for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
+            self.add_product(sign * a[i], b[j], c[k]);
+            self.add_product(-sign * a[i], b[k], c[j]);
+        }
+    }
+
+    /// Adds another sum.
+    pub fn add_sum<const OTHER: usize>(&mut self, other: &Expansion<OTHER>) {
+        other.part[..other.len].iter().for_each(|&part| self.add(part));
+    }
+
+    /// Adds det[d, a-o, b-o]; where the differences are not exact, multiplied out so that each product is of three inputs.
+    pub fn add_edge(&mut self, o: [f64; 3], d: [f64; 3], a: [f64; 3], b: [f64; 3]) {
+        if let (Some(a), Some(b)) = (seen_from(o, a), seen_from(o, b)) {
+            return self.add_long_determinant(d, a, b);
+        }
+        self.add_determinant(1.0, d, a, b);
+        self.add_determinant(-1.0, d, o, b);
+        self.add_determinant(-1.0, d, a, o);
+    }
+
+    /// Adds det[a-o, b-o, c-o].
+    pub fn add_volume(&mut self, o: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+        if let (Some(a), Some(b), Some(c)) = (seen_from(o, a), seen_from(o, b), seen_from(o, c)) {
+            return self.add_long_determinant(a, b, c);
+        }
+        self.add_determinant(1.0, a, b, c);
+        self.add_determinant(-1.0, o, b, c);
+        self.add_determinant(-1.0, a, o, c);
+        self.add_determinant(-1.0, a, b, o);
+    }
+
+    /// The sum, rounded; its sign is exact.
+    pub fn value(&self) -> f64 {
+        self.part[..self.len].iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth_random::Rng;
+
+    /// Miri takes a thousand times as long.
+    const ROUNDS: u32 = if cfg!(miri) { 200 } else { 20_000 };
+
+    fn wide(v: [f32; 3]) -> [f64; 3] {
+        v.map(f64::from)
+    }
+
+    #[test]
+    fn products_are_exact_where_integers_can_tell() {
+        let mut rng = Rng::new(7);
+        for _ in 0..ROUNDS / 2 {
+            let [a, b, c] = [(); 3].map(|()| rng.below(1 << 24) as f64 - (1 << 23) as f64);
+            let mut e = Expansion::<2>::new();
+            e.add_product(a, b, c);
+            let want = a as i128 * b as i128 * c as i128;
+            let got: i128 = e.part[..e.len].iter().map(|&x| x as i128).sum();
+            assert_eq!(got, want);
+        }
+    }
+
+    #[test]
+    fn edge_signs_agree_with_integer_arithmetic() {
+        let mut rng = Rng::new(11);
+        let mut zeros = 0;
+        for round in 0..ROUNDS {
+            let range = if round % 2 == 0 { 5 } else { 1 << 22 };
+            let mut draw = || [(); 3].map(|()| rng.below(2 * range) as i64 as f32 - range as f32);
+            let [o, d, a, b] = [draw(), draw(), draw(), draw()];
+            let int = |v: [f32; 3]| v.map(|x| x as i128);
+            let sub = |p: [i128; 3], q: [i128; 3]| [0, 1, 2].map(|k| p[k] - q[k]);
+            let (p, q, d1) = (sub(int(a), int(o)), sub(int(b), int(o)), int(d));
+            let want: i128 = (0..3)
+                .map(|i| {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    d1[i] * (p[j] * q[k] - p[k] * q[j])
+                })
+                .sum();
+            let mut e = Expansion::<EDGE>::new();
+            e.add_edge(wide(o), wide(d), wide(a), wide(b));
+            assert_eq!(e.value().partial_cmp(&0.0), Some(want.cmp(&0)));
+            zeros += (want == 0) as u32;
+        }
+        assert!(zeros > ROUNDS / 200, "the degenerate case must be among the tests");
+    }
+
+    #[test]
+    fn volume_signs_agree_with_orient3d() {
+        let mut rng = Rng::new(13);
+        for round in 0..ROUNDS {
+            let range = if round % 2 == 0 { 3 } else { 1 << 24 };
+            let mut draw = || [(); 3].map(|()| (rng.below(2 * range) as i64 - range as i64) as f32);
+            let [o, a, b, c] = [draw(), draw(), draw(), draw()];
+            let mut e = Expansion::<VOLUME>::new();
+            e.add_volume(wide(o), wide(a), wide(b), wide(c));
+            let p = |v: [f32; 3]| robust::Coord3D { x: v[0], y: v[1], z: v[2] };
+            // robust's orient3d(a, b, c, o) is det[a-o, b-o, c-o].
+            assert_eq!(
+                e.value().partial_cmp(&0.0),
+                robust::orient3d(p(a), p(b), p(c), p(o)).partial_cmp(&0.0)
+            );
+        }
+    }
+
+    /// Coordinates of every size, so that differences are exact for some and not for others: the two ways of adding up
+    /// agree on the sum.
+    #[test]
+    fn differences_and_products_of_inputs_add_up_alike() {
+        let mut rng = Rng::new(17);
+        let mut ways = [0; 2];
+        for _ in 0..ROUNDS {
+            let spread = rng.below(60) + 1;
+            let mut draw = || {
+                [(); 3].map(|()| {
+                    let bits = rng.below(1 << 24) as f64 - (1 << 23) as f64;
+                    // A power of two, without the error that powi may have.
+                    bits * f64::from_bits((993 + rng.below(spread)) << 52)
+                })
+            };
+            let [o, d, a, b, c] = [draw(), draw(), draw(), draw(), draw()];
+            ways[usize::from(seen_from(o, a).is_some() && seen_from(o, b).is_some())] += 1;
+            let mut edge = Expansion::<{ 2 * EDGE }>::new();
+            edge.add_edge(o, d, a, b);
+            edge.add_determinant(-1.0, d, a, b);
+            edge.add_determinant(1.0, d, o, b);
+            edge.add_determinant(1.0, d, a, o);
+            assert_eq!(edge.len, 0);
+            let mut volume = Expansion::<{ 2 * VOLUME }>::new();
+            volume.add_volume(o, a, b, c);
+            volume.add_determinant(-1.0, a, b, c);
+            volume.add_determinant(1.0, o, b, c);
+            volume.add_determinant(1.0, a, o, c);
+            volume.add_determinant(1.0, a, b, o);
+            assert_eq!(volume.len, 0);
+        }
+        assert!(ways.iter().all(|&n| n > ROUNDS / 20), "{ways:?}");
+    }
+}

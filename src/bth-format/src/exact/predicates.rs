@@ -1,0 +1,94 @@
+//! Signs that are right whatever the rounding: f64 first, exact sums where it leaves them open.
+
+use super::expansion::{Expansion, VOLUME};
+use std::cmp::Ordering;
+
+/// On which side of the plane through a, b, c the point d lies: `Greater` where (b-a)x(c-a) points to,
+/// `Equal` on the plane. Exact for finite points.
+pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
+    let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] as f64 - a[k] as f64));
+    let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (u[i] * v[j], u[j] * v[i]));
+    let det: f64 = (0..3).map(|k| (minors[k].0 - minors[k].1) * w[k]).sum();
+    let size: f64 = (0..3).map(|k| (minors[k].0.abs() + minors[k].1.abs()) * w[k].abs()).sum();
+    // Each of the six products has at most 7 roundings (3 differences, 2 products, 2 sums); 16 is ample.
+    if det.abs() > 16.0 * f64::EPSILON * size {
+        return det.total_cmp(&0.0);
+    }
+    let mut volume = Expansion::<VOLUME>::new();
+    let [a, b, c, d] = [a, b, c, d].map(|p| p.map(f64::from));
+    volume.add_volume(d, a, b, c);
+    // det[a-d, b-d, c-d] is positive behind the plane.
+    0.0f64.total_cmp(&(volume.value() + 0.0))
+}
+
+/// Whether a triangle has exactly zero area: its projections along the axes all have.
+pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
+    [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
+        let mut sum = Expansion::<12>::new();
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            sum.add_product(p[i], q[j], 1.0);
+            sum.add_product(-p[j], q[i], 1.0);
+        }
+        sum.value() == 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn robust_side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
+        let [a, b, c, d] =
+            [a, b, c, d].map(|p| robust::Coord3D { x: p[0] as f64, y: p[1] as f64, z: p[2] as f64 });
+        // Shewchuk's sign is positive where d lies below the plane.
+        0.0f64.total_cmp(&(robust::orient3d(a, b, c, d) + 0.0))
+    }
+
+    fn point() -> impl Strategy<Value = [f32; 3]> {
+        let any = prop_oneof![
+            -1e6f32..1e6,
+            (-4i32..4).prop_map(|x| x as f32),
+            -1e-20f32..1e-20,
+            Just(0.1),
+            Just(-0.0)
+        ];
+        [any.clone(), any.clone(), any]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn side_agrees_with_shewchuk(a in point(), b in point(), c in point(), d in point()) {
+            prop_assert_eq!(side(a, b, c, d), robust_side(a, b, c, d));
+        }
+
+        #[test]
+        fn side_of_nearly_coplanar_points_agrees_with_shewchuk(a in point(), b in point(), c in point(), s in 0f32..1.0, t in 0f32..1.0) {
+            let d = [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * s + (c[k] - a[k]) * t);
+            prop_assert_eq!(side(a, b, c, d), robust_side(a, b, c, d));
+        }
+    }
+
+    #[test]
+    fn ends_of_the_range_are_exact() {
+        let (tiny, huge) = (f32::from_bits(1), f32::MAX);
+        let o = [0.0; 3];
+        assert_eq!(side(o, [huge, 0.0, 0.0], [0.0, huge, 0.0], [0.0, 0.0, huge]), Ordering::Greater);
+        assert_eq!(side(o, [tiny, 0.0, 0.0], [0.0, tiny, 0.0], [0.0, 0.0, -tiny]), Ordering::Less);
+        assert_eq!(side([huge; 3], [-huge; 3], [huge, -huge, huge], [tiny, tiny, tiny]), Ordering::Equal);
+        assert_eq!(
+            side([huge; 3], [-huge; 3], [huge, -huge, huge], [tiny, 0.0, 0.0]),
+            side([1.0; 3], [-1.0; 3], [1.0, -1.0, 1.0], [1e-3, 0.0, 0.0])
+        );
+    }
+
+    #[test]
+    fn zero_area_is_exact() {
+        assert!(is_zero_area([[0.1, 0.1, 0.1], [0.2, 0.2, 0.2], [0.4, 0.4, 0.4]]));
+        assert!(is_zero_area([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [4.0, 5.0, 7.0]]));
+        assert!(!is_zero_area([[0.0; 3], [1.0, 3.0, 0.0], [1.0 / 3.0, 1.0, 0.0]]), "a third is not an f32");
+        assert!(!is_zero_area([[0.0; 3], [f32::from_bits(1), 0.0, 0.0], [0.0, f32::from_bits(1), 0.0]]));
+    }
+}

@@ -1,0 +1,321 @@
+//! A BTH file in memory: read or mapped, its header and section table checked.
+//!
+//! Opening costs O(sections) beyond reading the bytes. It does not look into the sections:
+//! [`crate::check`] does that for an object, [`crate::verify`] for everything.
+
+mod buffer;
+mod table;
+
+pub use table::{content_id, hash128, kind_stride};
+
+use crate::check;
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::object::ObjectBounds;
+use crate::object::{ObjectView, Records};
+use crate::scene_view::SceneView;
+use buffer::Buffer;
+use std::path::Path;
+use std::sync::OnceLock;
+use zerocopy::{FromBytes, Immutable, KnownLayout};
+
+/// An open file. The header and the section table hold what `format-spec/` demands of them.
+#[derive(Debug)]
+pub struct File {
+    buffer: Buffer,
+    /// Per object and kind the row of the section table, or `NONE`.
+    rows: Vec<[u32; OBJECT_KINDS]>,
+    /// Views of the objects that have been asked for. They borrow from `buffer`, not from `'static`: see [`File::view`].
+    views: Vec<OnceLock<ObjectView<'static>>>,
+}
+
+/// Kinds that belong to objects are below this.
+const OBJECT_KINDS: usize = kind::PROVENANCE as usize;
+
+/// A section: its table entry and its bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct SectionView<'a> {
+    /// The table entry.
+    pub entry: &'a SectionEntry,
+    /// The bytes, starting at a multiple of 64.
+    pub bytes: &'a [u8],
+}
+
+impl File {
+    /// Reads a file into memory of its own and checks header and table.
+    ///
+    /// # Errors
+    /// `BTH-O001` when the file cannot be read, `BTH-F001` to `BTH-F019` when it does not hold
+    /// what it should.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        Buffer::read(path).and_then(Self::new).map_err(|e| e.in_file(path))
+    }
+
+    /// Copies the bytes of a file and checks header and table.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        Self::new(Buffer::copy(bytes)?)
+    }
+
+    /// Maps a file and checks header and table; pages are read when they are used.
+    ///
+    /// # Safety
+    /// Until the `File` is dropped nobody, in this process or another, may write to the file,
+    /// truncate it or punch holes into it. Replacing it by renaming another over it, or removing
+    /// its name, is fine: the mapping keeps the old content.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    #[allow(unsafe_code)]
+    pub unsafe fn map(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        // SAFETY: the caller promises what `Buffer::map` demands, in the same words.
+        let buffer = unsafe { Buffer::map(path) };
+        buffer.and_then(Self::new).map_err(|e| e.in_file(path))
+    }
+
+    fn new(buffer: Buffer) -> Result<Self> {
+        if cfg!(target_endian = "big") {
+            return Err(Error::at(Code::Host, 0, "a little-endian machine", "a big-endian one"));
+        }
+        let objects = table::check(buffer.bytes())?;
+        let views = (0..objects).map(|_| OnceLock::new()).collect();
+        let mut file = Self { buffer, rows: vec![[NONE; OBJECT_KINDS]; objects as usize], views };
+        let mut rows = std::mem::take(&mut file.rows);
+        for (row, entry) in file.table().iter().enumerate() {
+            let object = rows.get_mut(entry.object as usize);
+            if let Some(slot) = object.and_then(|kinds| kinds.get_mut(entry.kind as usize)) {
+                *slot = row as u32;
+            }
+        }
+        file.rows = rows;
+        Ok(file)
+    }
+
+    /// All bytes of the file.
+    pub fn bytes(&self) -> &[u8] {
+        self.buffer.bytes()
+    }
+
+    /// The header.
+    pub fn header(&self) -> &Header {
+        let (header, _) = Header::ref_from_prefix(self.bytes()).expect("checked when opened");
+        header
+    }
+
+    /// The section table, sorted by object and kind.
+    pub fn table(&self) -> &[SectionEntry] {
+        table::entries(self.bytes(), self.header())
+    }
+
+    /// The sections, in the order of the table, which is that of their offsets.
+    pub fn sections(&self) -> impl ExactSizeIterator<Item = SectionView<'_>> {
+        let bytes = self.bytes();
+        self.table().iter().map(move |entry| SectionView {
+            entry,
+            bytes: &bytes[entry.offset as usize..(entry.offset + entry.length) as usize],
+        })
+    }
+
+    /// The section of this kind; `object` is `NONE` for sections of the whole file.
+    pub fn section(&self, object: u32, kind: u32) -> Option<SectionView<'_>> {
+        let table = self.table();
+        let entry = match self.rows.get(object as usize).and_then(|kinds| kinds.get(kind as usize)) {
+            Some(&row) => table.get(row as usize)?,
+            None => &table[table.binary_search_by_key(&(object, kind), |e| (e.object, e.kind)).ok()?],
+        };
+        Some(SectionView {
+            entry,
+            bytes: &self.bytes()[entry.offset as usize..(entry.offset + entry.length) as usize],
+        })
+    }
+
+    /// Objects in the file.
+    pub fn object_count(&self) -> u32 {
+        self.rows.len() as u32
+    }
+
+    /// BLAKE3 of what the file says, without how it came about: equal for equal content.
+    pub fn content_id(&self) -> [u8; 32] {
+        self.header().content_id
+    }
+
+    /// The provenance as UTF-8 JSON, if the file has some and it is UTF-8.
+    pub fn provenance(&self) -> Option<&str> {
+        std::str::from_utf8(self.section(NONE, kind::PROVENANCE)?.bytes).ok()
+    }
+
+    /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
+    pub fn resident_bytes(&self) -> u64 {
+        let traced = kind::OBJECT..=kind::TRIANGLE_HOMES;
+        self.table().iter().filter(|e| e.object != NONE && traced.contains(&e.kind)).map(|e| e.length).sum()
+    }
+
+    /// The sections of an object, **unchecked inside**: use [`Self::check`] before tracing.
+    ///
+    /// # Errors
+    /// `BTH-O003` when there is no such object, `BTH-F101` when its tetrahedron records are of another kind
+    /// than it says, `BTH-F104` when its coordinates are.
+    pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
+        self.view(object).copied()
+    }
+
+    /// Whether what is not in memory yet is read from the file when it is used.
+    pub fn is_mapped(&self) -> bool {
+        matches!(self.buffer, Buffer::Mapped(_))
+    }
+
+    /// As [`Self::object`], made only once.
+    #[inline]
+    pub fn view(&self, object: u32) -> Result<&ObjectView<'_>> {
+        // Asked for by every query.
+        match self.views.get(object as usize).and_then(OnceLock::get) {
+            Some(view) => Ok(view),
+            None => self.first_view(object),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    #[allow(unsafe_code)]
+    fn first_view(&self, object: u32) -> Result<&ObjectView<'_>> {
+        let view = self.make_view(object)?;
+        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`: memory on the heap or mapped, which
+        // does not move when `self` does, is never written to or replaced, and lives until `self` is dropped. What
+        // this function returns borrows from `self`, and `views` is private, so no view outlives `self`; dropping one
+        // does nothing.
+        let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
+        Ok(self.views[object as usize].get_or_init(|| view))
+    }
+
+    fn make_view(&self, object: u32) -> Result<ObjectView<'_>> {
+        if object >= self.object_count() {
+            let expected = format!("an object below {}", self.object_count());
+            return Err(Error::at(Code::NoSuchObject, 0, expected, object.to_string()));
+        }
+        let header: &[Object] = self.slice(object, kind::OBJECT);
+        let header = &header[0];
+        let entry = self.section(object, kind::TETS).map(|s| *s.entry);
+        let stride = entry.map_or(0, |e| e.stride as usize);
+        let records = match RecordKind::from_code(header.record) {
+            Some(record) if entry.is_some() && record.stride() == stride => match record {
+                RecordKind::Link32 => Records::Link32(self.slice(object, kind::TETS)),
+                RecordKind::Tet32 => Records::Tet32(self.slice(object, kind::TETS)),
+                RecordKind::Tet20 => Records::Tet20(self.slice(object, kind::TETS)),
+                RecordKind::Tet16 => Records::Tet16(self.slice(object, kind::TETS)),
+            },
+            None if header.record == 0 && entry.is_none_or(|e| e.count == 0) => Records::None,
+            _ => {
+                let found = format!("record kind {} and a TETS stride of {stride}", header.record);
+                let offset = std::mem::offset_of!(Object, record) as u64;
+                let error =
+                    Error::within(Code::Record, kind::OBJECT, offset, "a record kind that fits TETS", found);
+                return Err(self.locate(error, object));
+            }
+        };
+        let grid = self.grid(header).map_err(|e| self.locate(e, object))?;
+        Ok(ObjectView {
+            header,
+            bounds: ObjectBounds::new(header),
+            grid,
+            lines: self.slice(object, kind::LINES),
+            triangle_ids: self.slice(object, kind::TRIANGLE_IDS),
+            tet_leaves: self.slice(object, kind::TET_LEAVES),
+            records,
+            tet_vertices: self.slice(object, kind::TET_VERTICES),
+            tet_faces: self.slice(object, kind::TET_FACES),
+            hull_faces: self.slice(object, kind::HULL_FACES),
+            triangle_homes: self.slice(object, kind::TRIANGLE_HOMES),
+            positions: self.slice(object, kind::POSITIONS),
+            triangles: self.slice(object, kind::TRIANGLES),
+            corners: self.slice(object, kind::CORNERS),
+            normals: self.slice(object, kind::NORMALS),
+            uvs: self.slice(object, kind::UVS),
+        })
+    }
+
+    /// The grid of an object, which the file must announce.
+    fn grid(&self, object: &Object) -> Result<Option<Grid>> {
+        let at = std::mem::offset_of!(Object, coordinates) as u64;
+        let wrong = |expected: &str, found: String| {
+            Error::within(Code::Coordinates, kind::OBJECT, at, expected.to_owned(), found)
+        };
+        let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
+        let grid = Grid::of(object).map_err(|what| wrong(expected, what.to_owned()))?;
+        let features = self.header().required_features;
+        if grid.is_some() && features & FEATURE_GRID == 0 {
+            return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
+        }
+        if object.coordinates & PACKED_NODES != 0 && features & FEATURE_PACKED_NODES == 0 {
+            let found = format!("{:#x}", object.coordinates);
+            return Err(wrong("no packed nodes, as the header announces none", found));
+        }
+        Ok(grid)
+    }
+
+    /// The sections of an object with every index checked: tracing it neither reads out of bounds nor loops.
+    /// Costs O(bytes of the object).
+    ///
+    /// # Errors
+    /// As [`Self::object`], and `BTH-F101` to `BTH-F141`.
+    pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
+        let view = self.object(object)?;
+        check::object(&view).map_err(|e| self.locate(e, object))?;
+        Ok(view)
+    }
+
+    /// The OBJECT row of an object that exists.
+    pub fn object_header(&self, object: u32) -> &Object {
+        let rows: &[Object] = self.slice(object, kind::OBJECT);
+        &rows[0]
+    }
+
+    /// The instances of the scene, unchecked inside.
+    pub fn instances(&self) -> &[Instance] {
+        self.slice(NONE, kind::INSTANCES)
+    }
+
+    /// The scene sections, **unchecked inside**; `None` when the file has none of them.
+    pub fn scene(&self) -> Option<SceneView<'_>> {
+        // Sections of the whole file come last.
+        let of_file = self.table().iter().rev().take_while(|e| e.object == NONE);
+        of_file.map(|e| e.kind).find(|kind| kind::is_scene(*kind))?;
+        Some(SceneView {
+            scene: self.slice(NONE, kind::SCENE),
+            nodes: self.slice(NONE, kind::NODES),
+            instances: self.slice(NONE, kind::INSTANCES),
+            tracks: self.slice(NONE, kind::TRACKS),
+            times: self.slice(NONE, kind::TIMES),
+            values: self.slice(NONE, kind::VALUES),
+            cameras: self.slice(NONE, kind::CAMERAS),
+            lights: self.slice(NONE, kind::LIGHTS),
+            names: self.slice(NONE, kind::NAMES),
+        })
+    }
+
+    /// The scene sections, checked: instances and tracks lead nowhere but to what is there. Costs
+    /// O(bytes of these sections).
+    ///
+    /// # Errors
+    /// `BTH-F150` to `BTH-F159`.
+    pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
+        let Some(view) = self.scene() else { return Ok(None) };
+        check::scene(&view, self.object_count()).map_err(|e| self.locate(e, NONE))?;
+        Ok(Some(view))
+    }
+
+    /// Turns an offset within a section into one within the file.
+    pub fn locate(&self, error: Error, object: u32) -> Error {
+        let start = error.section().and_then(|s| self.section(object, s.kind)).map_or(0, |s| s.entry.offset);
+        error.in_object(object).move_by(start)
+    }
+
+    /// A section as a slice of its elements; empty when the file lacks it.
+    fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
+        let Some(section) = self.section(object, kind) else { return &[] };
+        <[T]>::ref_from_bytes(section.bytes).expect("the table's check made length, stride and alignment fit")
+    }
+}

@@ -1,0 +1,189 @@
+//! Reads a model: finds its format, reads, welds and reports.
+
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::mesh::{Keep, Mesh, Report};
+use crate::monitor::Monitor;
+use crate::raw::{Raw, Row, check_rows, check_triangles};
+use crate::source::{NON_FINITE, Source, input_error};
+use crate::{attributes, gltf, obj, off, ply, stl, topology, weld};
+
+/// Formats that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Obj,
+    Gltf,
+    Ply,
+    Stl,
+    Off,
+}
+
+/// Reads an OBJ, glTF, GLB, PLY, STL or OFF file, by its extension or else by its content. Triangle
+/// ids are the source's face order after fan triangulation. A model without faces is an empty mesh.
+///
+/// # Errors
+/// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
+/// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
+/// [`Error::Cancelled`].
+pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+    import_bytes(path, &read_file(path)?, keep, monitor)
+}
+
+/// As [`import`], from the bytes of a file; `name` tells the format by its extension, stands in messages, and says
+/// beside what a glTF file's external buffers lie.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+    monitor.stage("import", Some(data.len() as u64));
+    let source = Source::new(name, data, monitor);
+    let raw = match format(&source)? {
+        Format::Obj => obj::read(&source, keep)?,
+        Format::Gltf => gltf::read(&source, keep)?,
+        Format::Ply => ply::read(&source, keep)?,
+        Format::Stl => stl::read(&source)?,
+        Format::Off => off::read(&source)?,
+    };
+    source.progress(data.len())?;
+    finish(raw, keep, monitor)
+}
+
+/// Reads meshes of a glTF or GLB file, by number, each in its own space and without the nodes that use it.
+///
+/// # Errors
+/// As [`import`]; also when the file is no glTF or a mesh does not exist.
+pub fn import_gltf_meshes(
+    path: &Path,
+    meshes: &[u32],
+    keep: Keep,
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Mesh, Report)>> {
+    let data = read_file(path)?;
+    monitor.stage("import", Some(data.len() as u64));
+    let source = Source::new(path, &data, monitor);
+    if format(&source)? != Format::Gltf {
+        let message = "expected a glTF or GLB file, of which single meshes can be named";
+        return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
+    }
+    let supported = [gltf::SUPPORTED.as_slice(), &gltf::SCENE_EXTENSIONS].concat();
+    let (root, binary) = gltf::document(&source, &supported)?;
+    let one =
+        |mesh: &u32| finish(gltf::read_mesh(&source, &root, binary, *mesh as usize, keep)?, keep, monitor);
+    meshes.iter().map(one).collect()
+}
+
+/// All bytes of a source.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read.
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    })
+}
+
+/// Welds what was read and counts.
+fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+    check_triangles(raw.triangles.len() as u64)?;
+    check_rows(raw.positions.len() as u64)?;
+    let attributes = attributes::collect(&raw, keep)?;
+    let mut triangles = std::mem::take(&mut raw.triangles);
+    let welded = weld::weld(&raw.positions, &mut triangles).map_err(|row| {
+        input_error(
+            NON_FINITE,
+            (raw.locate)(Row::Position, row),
+            format!("expected finite coordinates, found {:?} (as 32-bit numbers)", raw.positions[row]),
+            "remove the vertex and the faces that use it, or export the model again",
+        )
+    })?;
+    if welded.non_finite_unused > 0 {
+        let count = welded.non_finite_unused;
+        monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
+    }
+    monitor.check()?;
+    let mesh = Mesh { positions: welded.positions, triangles, attributes };
+    let counts = topology::topology(&mesh);
+    monitor.check()?;
+    let report = Report {
+        format: raw.format.to_owned(),
+        triangles: mesh.triangles.len() as u64,
+        positions_read: raw.positions.len() as u64,
+        positions: mesh.positions.len() as u64,
+        polygons: raw.polygons,
+        skipped: raw.skipped,
+        degenerate: counts.degenerate,
+        duplicate: counts.duplicate,
+        boundary_edges: counts.boundary_edges,
+        non_manifold_edges: counts.non_manifold_edges,
+        components: counts.components,
+        non_finite_unused: welded.non_finite_unused,
+    };
+    Ok((mesh, report))
+}
+
+/// The format by extension, else by content.
+fn format(source: &Source<'_>) -> Result<Format> {
+    source.fetched()?;
+    let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let by_name = match extension.as_deref() {
+        Some("obj") => Some(Format::Obj),
+        Some("gltf" | "glb") => Some(Format::Gltf),
+        Some("ply") => Some(Format::Ply),
+        Some("stl") => Some(Format::Stl),
+        Some("off") => Some(Format::Off),
+        _ => None,
+    };
+    by_name.or_else(|| sniff(source.data)).ok_or_else(|| {
+        source.error(
+            "BTH-I001",
+            "expected a model in OBJ, glTF, GLB, PLY, STL or OFF format, found something else",
+            "give the file its format's extension if it is one of these, or convert it",
+        )
+    })
+}
+
+/// The format by content, if it is plain.
+fn sniff(data: &[u8]) -> Option<Format> {
+    let text = data.trim_ascii_start();
+    let first_word = text.split(|c| c.is_ascii_whitespace()).next().unwrap_or_default();
+    if data.starts_with(b"glTF") || text.starts_with(b"{") {
+        Some(Format::Gltf)
+    } else if first_word == b"ply" {
+        Some(Format::Ply)
+    } else if first_word == b"solid" || stl::is_binary_size(data) {
+        Some(Format::Stl)
+    } else if off::is_keyword(first_word) {
+        Some(Format::Off)
+    } else if obj::looks_like_obj(data) {
+        Some(Format::Obj)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_format_is_found_by_content() {
+        let mut binary_stl = vec![7; 84];
+        binary_stl[80..].copy_from_slice(&0u32.to_le_bytes());
+        for (data, format) in [
+            (&b"glTF\x02\0\0\0"[..], Some(Format::Gltf)),
+            (b"\n{\"asset\":{}}", Some(Format::Gltf)),
+            (b"ply\r\nformat ascii 1.0", Some(Format::Ply)),
+            (b"solid name", Some(Format::Stl)),
+            (&binary_stl, Some(Format::Stl)),
+            (b"COFF\n3 1 0", Some(Format::Off)),
+            (b"# comment\n\nv 1 2 3\n", Some(Format::Obj)),
+            (b"PK\x03\x04", None),
+            (b"", None),
+        ] {
+            assert_eq!(sniff(data), format, "{}", String::from_utf8_lossy(data));
+        }
+    }
+}

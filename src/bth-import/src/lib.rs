@@ -1,0 +1,29 @@
+//! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
+//!
+//! A reader for each format turns a file into a [`raw`](self) mesh with the source's own rows; `weld` merges its positions,
+//! `attributes` its shading rows, and `topology` counts what the report tells. [`import()`] is the way in;
+//! [`gltf::scene`] reads nodes, animations, cameras and lights.
+#![warn(missing_docs)]
+
+mod attributes;
+pub mod error;
+pub mod gltf;
+mod import;
+mod mesh;
+pub mod monitor;
+mod number;
+mod obj;
+mod off;
+mod ply;
+mod raw;
+mod source;
+mod stl;
+mod topology;
+mod weld;
+mod zero_area;
+
+pub use error::{Error, Place, Result};
+pub use import::{import, import_bytes, import_gltf_meshes, read_file};
+pub use mesh::{Attributes, Keep, Mesh, Report};
+pub use monitor::{Monitor, Silent};
+pub use zero_area::is_zero_area;

@@ -1,0 +1,261 @@
+//! Wavefront OBJ: polygons only; materials, groups and smoothing are left out.
+
+use std::borrow::Cow;
+
+use crate::error::Result;
+use crate::mesh::Keep;
+use crate::number::{Lines, float, integer, shown, words};
+use crate::raw::{NONE, Raw, Row, check_rows};
+use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
+
+const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
+
+/// Keywords that do not change the polygons.
+const KNOWN: [&[u8]; 30] = [
+    b"g",
+    b"s",
+    b"o",
+    b"mg",
+    b"usemtl",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"lod",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
+    b"vp",
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"vn",
+    b"vt",
+];
+
+/// Whether the first statement of a text is one of OBJ.
+pub(super) fn looks_like_obj(data: &[u8]) -> bool {
+    let mut keywords = Lines::new(data).filter_map(|(_, line)| words(line).next());
+    let first = keywords.find(|word| !word.starts_with(b"#"));
+    first.is_some_and(|word| [&b"v"[..], b"f"].contains(&word) || KNOWN.contains(&word))
+}
+
+/// A use of a row that was not there yet; allowed if it comes later.
+struct Forward {
+    kind: Row,
+    index: u32,
+    line: u64,
+}
+
+struct Reader<'a, 's> {
+    source: &'a Source<'s>,
+    raw: Raw<'a>,
+    normals: bool,
+    uvs: bool,
+    forward: Vec<Forward>,
+    face: Vec<u32>,
+    face_normals: Vec<u32>,
+    face_uvs: Vec<u32>,
+}
+
+/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or
+/// surface; points count each.
+pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
+    if let Some(byte) = source.data.iter().take(4096).position(|&c| c == 0) {
+        let hint = "save it as UTF-8 or ASCII text, or give it the extension of its format";
+        return Err(source.error_at_byte(UNSUPPORTED, byte, "expected text, found a zero byte", hint));
+    }
+    let locate = |kind, row| source.line(line_of_row(source.data, kind, row));
+    let mut reader = Reader {
+        source,
+        raw: Raw::new("obj", Box::new(locate)),
+        normals: keep != Keep::None,
+        uvs: keep == Keep::All,
+        forward: Vec::new(),
+        face: Vec::new(),
+        face_normals: Vec::new(),
+        face_uvs: Vec::new(),
+    };
+    let mut unknown: Option<(u64, String, u64)> = None;
+    let mut lines = Lines::new(source.data);
+    while let Some((number, line)) = next_statement(&mut lines) {
+        source.tick(number, lines.position())?;
+        let mut words = words(&line).take_while(|word| !word.starts_with(b"#"));
+        match words.next() {
+            None => {}
+            Some(b"v") => {
+                let position = reader.numbers(number, &mut words, 3)?;
+                reader.raw.positions.push(position);
+            }
+            Some(b"vn") if reader.normals => {
+                let normal = reader.numbers(number, &mut words, 3)?;
+                reader.raw.normals.push(normal);
+            }
+            Some(b"vt") if reader.uvs => {
+                let [u, v, _] = reader.numbers(number, &mut words, 1)?;
+                reader.raw.uvs.push([u, v]);
+            }
+            Some(b"f" | b"fo") => reader.face(number, words)?,
+            Some(b"p") => reader.raw.skipped += words.count() as u64,
+            Some(b"l" | b"curv" | b"curv2" | b"surf") => reader.raw.skipped += 1,
+            Some(keyword) if KNOWN.contains(&keyword) => {}
+            Some(keyword) => {
+                unknown.get_or_insert_with(|| (number, shown(keyword), 0)).2 += 1;
+            }
+        }
+    }
+    reader.check_forward()?;
+    check_rows(reader.raw.positions.len() as u64)?;
+    if let Some((line, keyword, count)) = unknown {
+        let message = format!(
+            "{count} lines with unknown keywords are ignored; the first is \"{keyword}\" in line {line}"
+        );
+        source.monitor.warn(&message);
+    }
+    let mut raw = reader.raw;
+    if raw.normals.is_empty() {
+        raw.normal_rows.clear();
+    }
+    if raw.uvs.is_empty() {
+        raw.uv_rows.clear();
+    }
+    Ok(raw)
+}
+
+impl Reader<'_, '_> {
+    /// Up to three numbers, of which the first `needed` must be there; the others default to 0.
+    fn numbers<'w>(
+        &self,
+        line: u64,
+        words: &mut impl Iterator<Item = &'w [u8]>,
+        needed: usize,
+    ) -> Result<[f32; 3]> {
+        let mut numbers = [0.0; 3];
+        for (k, number) in numbers.iter_mut().enumerate() {
+            let word = match words.next() {
+                None if k >= needed => break,
+                word => word.unwrap_or_default(),
+            };
+            *number = float(word).ok_or_else(|| {
+                let message = format!("expected {needed} or more numbers, found \"{}\"", shown(word));
+                self.source.error_at_line(MALFORMED, line, message, MALFORMED_HINT)
+            })?;
+        }
+        Ok(numbers)
+    }
+
+    fn face<'w>(&mut self, line: u64, words: impl Iterator<Item = &'w [u8]>) -> Result<()> {
+        self.face.clear();
+        self.face_normals.clear();
+        self.face_uvs.clear();
+        for word in words {
+            // v, v/vt, v//vn or v/vt/vn; a part may be empty.
+            let mut parts = word.split(|&c| c == b'/');
+            let position = self.index(line, Row::Position, word, parts.next().unwrap_or_default())?;
+            self.face.push(position);
+            let (uv, normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+            if self.uvs {
+                let uv = if uv.is_empty() { NONE } else { self.index(line, Row::Uv, word, uv)? };
+                self.face_uvs.push(uv);
+            }
+            if self.normals {
+                let normal =
+                    if normal.is_empty() { NONE } else { self.index(line, Row::Normal, word, normal)? };
+                self.face_normals.push(normal);
+            }
+        }
+        crate::raw::fan(&mut self.raw.normal_rows, &self.face_normals);
+        crate::raw::fan(&mut self.raw.uv_rows, &self.face_uvs);
+        self.raw.push_face(&self.face)
+    }
+
+    /// The row that an index names: from 1, or negative to count back from the last row so far.
+    #[inline]
+    fn index(&mut self, line: u64, kind: Row, word: &[u8], index: &[u8]) -> Result<u32> {
+        let rows = self.rows(kind);
+        let Some(number) = integer(index) else {
+            let message = format!("expected a face corner such as 1/2/3, found \"{}\"", shown(word));
+            return Err(self.source.error_at_line(MALFORMED, line, message, MALFORMED_HINT));
+        };
+        let row = if number > 0 { number - 1 } else { rows as i64 + number };
+        if number == 0 || row < 0 || row >= i64::from(NONE) {
+            return Err(self.out_of_range(line, kind, number));
+        }
+        if row >= rows as i64 {
+            self.forward.push(Forward { kind, index: row as u32, line });
+        }
+        Ok(row as u32)
+    }
+
+    fn rows(&self, kind: Row) -> usize {
+        match kind {
+            Row::Position => self.raw.positions.len(),
+            Row::Normal => self.raw.normals.len(),
+            Row::Uv => self.raw.uvs.len(),
+        }
+    }
+
+    #[cold]
+    fn out_of_range(&self, line: u64, kind: Row, number: i64) -> crate::Error {
+        let name = match kind {
+            Row::Position => "v",
+            Row::Normal => "vn",
+            Row::Uv => "vt",
+        };
+        let rows = self.rows(kind);
+        let message = if number < 0 {
+            format!("expected an index of one of the {rows} {name} lines above, found {number}")
+        } else {
+            format!("expected an index of a {name} line, from 1 to {rows}, found {number}")
+        };
+        let hint = if kind == Row::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
+        self.source.error_at_line(INDEX, line, message, hint)
+    }
+
+    /// Fails for the first use of a row that never came.
+    fn check_forward(&self) -> Result<()> {
+        match self.forward.iter().find(|f| f.index as usize >= self.rows(f.kind)) {
+            Some(f) => Err(self.out_of_range(f.line, f.kind, i64::from(f.index) + 1)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The next line, joined with those after it while it ends in a backslash; the number is the first line's.
+#[inline]
+fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
+    let (number, line) = lines.next()?;
+    if line.last() != Some(&b'\\') {
+        return Some((number, Cow::Borrowed(line)));
+    }
+    let mut joined = line.to_vec();
+    while joined.last() == Some(&b'\\') {
+        joined.pop();
+        joined.push(b' ');
+        joined.extend_from_slice(lines.next().map_or(&b""[..], |(_, line)| line));
+    }
+    Some((number, Cow::Owned(joined)))
+}
+
+fn line_of_row(data: &[u8], kind: Row, row: usize) -> u64 {
+    let keyword = match kind {
+        Row::Position => &b"v"[..],
+        Row::Normal => b"vn",
+        Row::Uv => b"vt",
+    };
+    let mut lines = Lines::new(data);
+    let statements = std::iter::from_fn(|| next_statement(&mut lines));
+    let mut found = statements.filter(|(_, line)| words(line).next() == Some(keyword));
+    found.nth(row).map_or(0, |(number, _)| number)
+}

@@ -1,0 +1,118 @@
+//! A mesh as a reader found it: the source's own rows, not welded.
+
+use crate::error::{Error, Place, Result};
+use bth_format::limits::MAX_TRIANGLES;
+
+/// Row of an attribute that a corner does not have.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Which rows a place is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Row {
+    /// Of `positions`.
+    Position,
+    /// Of `normals`.
+    Normal,
+    /// Of `uvs`.
+    Uv,
+}
+
+/// Tells where in the source a row stands; slow, for messages.
+pub(super) type Locate<'a> = Box<dyn Fn(Row, usize) -> Place + 'a>;
+
+/// A mesh as in the source. Readers have checked that all indices are in range.
+pub(super) struct Raw<'a> {
+    /// Name of the format.
+    pub(super) format: &'static str,
+    /// All positions, finite or not.
+    pub(super) positions: Vec<[f32; 3]>,
+    /// All faces, fan-triangulated: rows of `positions`.
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Normals, if there are some and they were asked for.
+    pub(super) normals: Vec<[f32; 3]>,
+    /// Per triangle rows of `normals` or [`NONE`]; empty without normals.
+    pub(super) normal_rows: Vec<[u32; 3]>,
+    /// Texture coordinates, if there are some and they were asked for.
+    pub(super) uvs: Vec<[f32; 2]>,
+    /// Per triangle rows of `uvs` or [`NONE`]; empty without texture coordinates.
+    pub(super) uv_rows: Vec<[u32; 3]>,
+    /// Faces of more than three corners.
+    pub(super) polygons: u64,
+    /// Points, lines and faces of fewer than three corners.
+    pub(super) skipped: u64,
+    /// Where rows stand.
+    pub(super) locate: Locate<'a>,
+}
+
+impl<'a> Raw<'a> {
+    /// A mesh without faces.
+    pub(super) fn new(format: &'static str, locate: Locate<'a>) -> Self {
+        Raw {
+            format,
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            normals: Vec::new(),
+            normal_rows: Vec::new(),
+            uvs: Vec::new(),
+            uv_rows: Vec::new(),
+            polygons: 0,
+            skipped: 0,
+            locate,
+        }
+    }
+
+    /// Appends a face as a fan around its first corner, or counts it as skipped.
+    #[inline]
+    pub(super) fn push_face(&mut self, face: &[u32]) -> Result<()> {
+        self.count_face(face.len());
+        fan(&mut self.triangles, face);
+        check_triangles(self.triangles.len() as u64)
+    }
+
+    /// Counts polygons and faces that are too short.
+    #[inline]
+    pub(super) fn count_face(&mut self, corners: usize) {
+        self.polygons += u64::from(corners > 3);
+        self.skipped += u64::from(corners < 3);
+    }
+}
+
+/// Appends a polygon's fan: (0, k-1, k) for k from 2.
+#[inline]
+pub(super) fn fan(triangles: &mut Vec<[u32; 3]>, face: &[u32]) {
+    if let [first, rest @ ..] = face {
+        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+/// Refuses more triangles than a file can hold.
+#[inline]
+pub(super) fn check_triangles(count: u64) -> Result<()> {
+    if count <= u64::from(MAX_TRIANGLES) {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        code: "BTH-L001",
+        message: format!("a model may have up to {MAX_TRIANGLES} triangles; this one has {count} or more"),
+    })
+}
+
+/// Refuses more rows than 32-bit indices reach.
+pub(super) fn check_rows(count: u64) -> Result<()> {
+    if count < u64::from(NONE) {
+        return Ok(());
+    }
+    Err(Error::Limit {
+        code: "BTH-L002",
+        message: format!("a model may have up to {} vertices; this one has {count} or more", NONE - 1),
+    })
+}
+
+/// Triangles of a strip in the order of OpenGL and glTF: every second one turned around. Those that
+/// repeat a corner are kept, so that an id is the triangle's place in the strip.
+pub(super) fn strip(indices: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    indices
+        .windows(3)
+        .enumerate()
+        .map(|(k, w)| if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
+}

@@ -1,0 +1,115 @@
+//! STL, text and binary.
+
+use crate::error::Result;
+use crate::number::{Lines, float, shown, words};
+use crate::raw::{Raw, Row, check_triangles};
+use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
+
+/// Bytes before the first facet: a free header and the count.
+const HEADER: usize = 84;
+/// Bytes of a facet: normal, three corners, two bytes that some programs use for colour.
+const FACET: usize = 50;
+
+/// The count in a binary header, if the file is long enough to have one.
+fn binary_count(data: &[u8]) -> Option<u32> {
+    Some(u32::from_le_bytes(data.get(80..HEADER)?.try_into().ok()?))
+}
+
+/// Whether the file has exactly the length that its binary header implies. This tells binary files
+/// from text ones also when their free header begins with "solid".
+pub(super) fn is_binary_size(data: &[u8]) -> bool {
+    binary_count(data).is_some_and(|n| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(n))
+}
+
+/// Reads an STL file. Facet normals are not shading attributes and are left out.
+pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+    let data = source.data;
+    let text = !is_binary_size(data)
+        && data.trim_ascii_start().starts_with(b"solid")
+        && !data[..data.len().min(1024)].contains(&0);
+    if text { read_text(source) } else { read_binary(source) }
+}
+
+fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+    let data = source.data;
+    let Some(count) = binary_count(data) else {
+        let message = format!("expected a header of {HEADER} bytes, found {} bytes in all", data.len());
+        return Err(source.error_at_byte(TRUNCATED, data.len(), message, TRUNCATED_HINT));
+    };
+    let body = &data[HEADER..];
+    if (body.len() / FACET) < count as usize {
+        let found = body.len() / FACET;
+        let message = format!("expected {count} facets as the header says, found {found}");
+        return Err(source.error_at_byte(TRUNCATED, data.len(), message, TRUNCATED_HINT));
+    }
+    check_triangles(u64::from(count))?;
+    let extra = body.len() - count as usize * FACET;
+    if extra > 0 {
+        source.monitor.warn(&format!("{extra} bytes after the last facet are ignored"));
+    }
+    let locate = |_: Row, row: usize| source.byte(HEADER + row / 3 * FACET + 12 + row % 3 * 12);
+    let mut raw = Raw::new("stl", Box::new(locate));
+    raw.positions.reserve_exact(3 * count as usize);
+    for (row, facet) in body.chunks_exact(FACET).take(count as usize).enumerate() {
+        source.tick(row as u64, HEADER + row * FACET)?;
+        let (numbers, _) = facet[12..48].as_chunks::<4>();
+        let (corners, _) = numbers.as_chunks::<3>();
+        raw.positions.extend(corners.iter().map(|corner| corner.map(f32::from_le_bytes)));
+    }
+    raw.triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Ok(raw)
+}
+
+fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
+    let mut raw = Raw::new("stl", Box::new(|_, row| source.line(line_of_vertex(source.data, row))));
+    let mut lines = Lines::new(source.data);
+    let mut in_solid = false;
+    // Rows of the loop that is open.
+    let mut open: Option<Vec<u32>> = None;
+    while let Some((number, line)) = lines.next() {
+        source.tick(number, lines.position())?;
+        let mut words = words(line);
+        let Some(keyword) = words.next() else { continue };
+        let malformed = |message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
+        match (keyword.to_ascii_lowercase().as_slice(), &mut open) {
+            (b"solid", None) if !in_solid => in_solid = true,
+            (b"endsolid", None) if in_solid => in_solid = false,
+            (b"facet" | b"endfacet", None) if in_solid => {}
+            (b"outer", None) if in_solid => open = Some(Vec::with_capacity(3)),
+            (b"vertex", Some(corners)) => {
+                let mut position = [0.0; 3];
+                for x in &mut position {
+                    let word = words.next().unwrap_or_default();
+                    *x = float(word).ok_or_else(|| {
+                        malformed(format!("expected three numbers, found \"{}\"", shown(word)))
+                    })?;
+                }
+                crate::raw::check_rows(raw.positions.len() as u64 + 1)?;
+                corners.push(raw.positions.len() as u32);
+                raw.positions.push(position);
+            }
+            (b"endloop", Some(corners)) => {
+                raw.push_face(corners)?;
+                open = None;
+            }
+            _ => {
+                let expected = match (&open, in_solid) {
+                    (Some(_), _) => "vertex or endloop",
+                    (None, true) => "facet, outer loop, endfacet or endsolid",
+                    (None, false) => "solid",
+                };
+                return Err(malformed(format!("expected {expected}, found \"{}\"", shown(keyword))));
+            }
+        }
+    }
+    if in_solid {
+        let message = "expected endsolid, found the end of the file";
+        return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
+    }
+    Ok(raw)
+}
+
+fn line_of_vertex(data: &[u8], row: usize) -> u64 {
+    let is_vertex = |line: &[u8]| words(line).next().is_some_and(|w| w.eq_ignore_ascii_case(b"vertex"));
+    Lines::new(data).filter(|(_, line)| is_vertex(line)).nth(row).map_or(0, |(number, _)| number)
+}

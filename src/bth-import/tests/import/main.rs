@@ -1,0 +1,124 @@
+//! Import of models: what each format yields, what is refused and where, and the collected test models.
+
+mod data;
+mod gltf;
+mod obj;
+mod off;
+mod ply;
+mod stl;
+
+use std::sync::Mutex;
+
+use bth_import::error::{Error, Place, Result};
+use bth_import::{Keep, Mesh, Report, import};
+use bth_import::{Monitor, Silent};
+
+/// The outcome of importing bytes from a file of this name.
+fn import_bytes(name: &str, bytes: &[u8], keep: Keep) -> Result<(Mesh, Report)> {
+    import_with(name, bytes, keep, &Silent)
+}
+
+fn import_with(name: &str, bytes: &[u8], keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    import(&path, keep, monitor)
+}
+
+/// Code, place (without the file's name) and message of the error that these bytes give.
+#[track_caller]
+fn refused(name: &str, bytes: &[u8]) -> (&'static str, String, String) {
+    let error = import_bytes(name, bytes, Keep::All).expect_err("this should be refused");
+    let Error::Input { code, place, message, hint } = &error else { panic!("{error:?}") };
+    assert!(!hint.is_empty(), "{error}");
+    let place = match place {
+        Place::File(_) => "file".to_owned(),
+        Place::Line(_, line) => format!("line {line}"),
+        Place::Byte(_, byte) => format!("byte {byte}"),
+        Place::Part(_, part) => part.clone(),
+    };
+    (code, place, message.clone())
+}
+
+#[track_caller]
+fn assert_refused(name: &str, bytes: &[u8], code: &str, place: &str, message_part: &str) {
+    let found = refused(name, bytes);
+    assert_eq!((found.0, found.1.as_str()), (code, place), "{}", found.2);
+    assert!(found.2.contains(message_part), "{}", found.2);
+}
+
+/// Collects warnings.
+#[derive(Default)]
+struct Listener(Mutex<Vec<String>>);
+
+impl Monitor for Listener {
+    fn warn(&self, message: &str) {
+        self.0.lock().unwrap().push(message.to_owned());
+    }
+}
+
+impl Listener {
+    fn heard(&self, part: &str) -> bool {
+        self.0.lock().unwrap().iter().any(|warning| warning.contains(part))
+    }
+}
+
+/// Two triangles of a unit square in the plane z = 0.
+const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+
+#[test]
+fn a_missing_file_is_a_file_error() {
+    let error = import(std::path::Path::new("no/such/model.obj"), Keep::None, &Silent).unwrap_err();
+    assert!(matches!(error, Error::File { code: "BTH-O001", .. }), "{error}");
+}
+
+#[test]
+fn content_of_no_format_is_refused() {
+    assert_refused("model.bin", b"PK\x03\x04 something", "BTH-I001", "file", "found something else");
+}
+
+#[test]
+fn a_format_is_found_without_its_extension() {
+    let (mesh, report) = import_bytes("model", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Keep::None).unwrap();
+    assert_eq!((mesh.triangles.len(), report.format.as_str()), (1, "obj"));
+}
+
+#[test]
+fn a_cancelled_import_stops() {
+    struct Stop;
+    impl Monitor for Stop {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let error = import_with("a.obj", b"v 0 0 0\n", Keep::None, &Stop).unwrap_err();
+    assert!(matches!(error, Error::Cancelled));
+}
+
+#[test]
+fn the_report_counts_what_was_read_and_found() {
+    let text = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 -0\nv nan 0 0\n\
+        f 1 2 3 4\nf 5 3 2\nf 1 2 2\nf 1 2\nl 1 2 3\np 1 2\n";
+    let listener = Listener::default();
+    let (mesh, report) = import_with("a.obj", text, Keep::None, &listener).unwrap();
+    assert_eq!(mesh.positions, SQUARE);
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 1, 1]]);
+    assert_eq!(
+        report,
+        Report {
+            format: "obj".into(),
+            triangles: 4,
+            positions_read: 6,
+            positions: 4,
+            polygons: 1,
+            skipped: 4,
+            degenerate: 1,
+            duplicate: 1,
+            boundary_edges: 2,
+            non_manifold_edges: 1,
+            components: 1,
+            non_finite_unused: 1,
+        }
+    );
+    assert!(listener.heard("1 positions are not finite"));
+}

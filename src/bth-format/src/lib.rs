@@ -20,3 +20,4 @@ pub use error::{Code, Error};
 pub use file::File;
 pub use object::ObjectView;
 pub use scene_view::SceneView;
+pub use unpack::Room;

@@ -25,4 +25,4 @@ pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use scene::{Scene, from_bytes, map, open};
 pub use simd::{Isa, IsaError};
-pub use trace::{Hinted, Steps, Test};
+pub use trace::{Hinted, Steps};

@@ -2,7 +2,7 @@
 
 use crate::instances::World;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Steps, Test};
+use crate::trace::{self, Steps};
 use bth_format::error::Error;
 use bth_format::file::File;
 use bth_format::layout::NONE;
@@ -218,21 +218,6 @@ impl Scene {
                 }
             }
         }
-    }
-
-    /// As [`Self::nearest_batch`] without hints, by another test of triangles, each ray on its own and none in packets: to
-    /// measure what exact answers cost. With `Test::Exact` the answers are those of [`Self::nearest_batch`]; with the others
-    /// they are not exact and depend on the instruction set. In scenes, files of several objects and of packed nodes every test is exact.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn nearest_batch_by(&self, test: Test, rays: &[Ray], hits: &mut [Hit]) {
-        check_lengths(rays, None, hits.len());
-        if self.world.is_some() || self.object_count() != 1 {
-            return self.nearest_batch(rays, None, hits);
-        }
-        trace::miss_all(hits);
-        trace::with_scratch(|scratch| trace::nearest_batch_by(self.view(0), rays, test, scratch, hits));
     }
 
     /// Whether each of many rays hits anything.

@@ -6,11 +6,11 @@ use super::affine::ObjectRay;
 use super::entry::Batch;
 use super::packets::Packets;
 use super::placed::Placed;
-use super::visits::{Visit, Visits};
+use super::visits::Visits;
 use super::walk::Walks;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::trace::{self, Deliver, Query as _, Scratch, Steps};
+use crate::trace::{self, SceneRays, Scratch, Sink, Steps, Visit, better};
 use bth_format::file::File;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -220,22 +220,6 @@ struct Nearest<'a> {
     batch: Batch,
 }
 
-/// t of the world from t of an object; its own where they are the same.
-fn world_t(t: f32, scale: f32) -> f32 {
-    if scale == 1.0 { t } else { t * scale }
-}
-
-/// The better of two hits: least t, then least instance. A t that scaling moved out of the range is none.
-fn better(ray: &Ray, best: &Hit, hit: &Hit, scale: f32) -> Option<Hit> {
-    if !hit.is_hit() {
-        return None;
-    }
-    let hit = Hit { t: world_t(hit.t, scale), ..*hit };
-    let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
-    let nearer = hit.t < best.t || hit.t == best.t && hit.surface.instance < best.surface.instance;
-    (in_range && nearer).then_some(hit)
-}
-
 impl Query for Nearest<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
@@ -253,52 +237,9 @@ impl Query for Nearest<'_> {
             return;
         }
         self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax.min(self.hits[ray].t));
-        let ids = object.triangle_ids;
-        let mut to = Arrivals { round, visits, t_scale: &self.batch.t_scale, ids, answers: &mut *self.hits };
+        let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
+        let mut to = Sink::<trace::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
         trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
-    }
-}
-
-/// Takes in what rays hit in an object, by the place of their visits.
-struct Arrivals<'a, A> {
-    round: &'a Round<'a>,
-    visits: &'a [Visit],
-    t_scale: &'a [f32],
-    /// Of the object.
-    ids: &'a [u32],
-    /// Of all rays.
-    answers: &'a mut [A],
-}
-
-impl Arrivals<'_, Hit> {
-    #[inline(always)]
-    fn take(&mut self, visit: usize, hit: &Hit) {
-        let (i, scale) = (self.visits[visit].ray as usize, self.t_scale[visit]);
-        let best = &mut self.answers[i];
-        *best = better(&self.round.rays[i], best, hit, scale).unwrap_or(*best);
-    }
-}
-
-impl Deliver<trace::Nearest> for Arrivals<'_, Hit> {
-    #[inline(always)]
-    fn query(&mut self, visit: usize, query: &trace::Nearest) {
-        self.take(visit, &query.answer(self.ids, self.visits[visit].instance));
-    }
-    #[inline(always)]
-    fn hit(&mut self, visit: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        let instance = self.visits[visit].instance;
-        self.take(visit, &Hit { t, u, v, surface: Surface { instance, triangle } });
-    }
-}
-
-impl Deliver<trace::Any> for Arrivals<'_, bool> {
-    #[inline(always)]
-    fn query(&mut self, visit: usize, query: &trace::Any) {
-        self.answers[self.visits[visit].ray as usize] |= query.answer(self.ids, self.visits[visit].instance);
-    }
-    #[inline(always)]
-    fn hit(&mut self, visit: usize, _: u32, _: f32, _: f32, _: f32) {
-        self.answers[self.visits[visit].ray as usize] = true;
     }
 }
 
@@ -323,8 +264,8 @@ impl Query for Any<'_> {
             return;
         }
         self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax);
-        let ids = object.triangle_ids;
-        let mut to = Arrivals { round, visits, t_scale: &self.batch.t_scale, ids, answers: &mut *self.found };
+        let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
+        let mut to = Sink::<trace::Any>::of_scene(object.triangle_ids, self.found, scene);
         trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
     }
 }

@@ -2,9 +2,9 @@
 
 use super::affine::{ObjectRay, RayLanes};
 use super::batch::Round;
-use super::visits::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::trace::Visit;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 

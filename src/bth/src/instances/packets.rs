@@ -78,7 +78,11 @@ impl Packets {
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
             let mut listed = Listed::Apart;
-            if own.len() >= FEWEST && is_same_octant(&own[0], &own[own.len() - 1]) && self.guard.is_open() {
+            if S::HAS_VECTORS
+                && own.len() >= FEWEST
+                && is_same_octant(&own[0], &own[own.len() - 1])
+                && self.guard.is_open()
+            {
                 let groups = groups.get_or_insert_with(|| [Group::vacant(s); GROUPS]);
                 listed = self.list(s, top, &bounds, groups, own);
                 if listed != Listed::Apart {

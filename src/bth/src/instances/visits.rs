@@ -1,11 +1,6 @@
 //! Which ray goes through which instance next.
 
-/// A ray that is to be traced through an instance in this round.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Visit {
-    pub(super) ray: u32,
-    pub(super) instance: u32,
-}
+use crate::trace::Visit;
 
 /// What rays are to be traced through.
 #[derive(Default)]

@@ -3,9 +3,9 @@
 //! All rays take a step each in turn, so that none waits for another's, and rest where they come to an instance.
 
 use super::top_level::{INSTANCE, TopLevel};
-use super::visits::Visit;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
+use crate::trace::Visit;
 use crate::trace::{BOTTOM, KEY_SLACK, Place, Prepared, Slabs, Stacks};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;

@@ -1,4 +1,7 @@
-//! Sixteen lanes in plain arrays: for machines without vector code, and what the others are tested against.
+//! AnswerLanes lanes in plain arrays: for machines without vector code, and what the other instruction sets are tested against.
+//!
+//! Each operation is a small function of its own that loops over the lanes. Inlined, the loops of a kernel would be unrolled
+//! into hundreds of kilobytes; apart, compilers turn each into what vectors the target has at least.
 
 use super::{LANES, Simd};
 use std::array::from_fn;
@@ -9,19 +12,12 @@ pub(crate) struct Scalar;
 
 type F = [f32; LANES];
 type U = [u32; LANES];
+/// All bits of a lane, or none.
+type M = [u32; LANES];
 
 #[inline(always)]
-fn compare(mut test: impl FnMut(usize) -> bool) -> u32 {
-    let mut bits = 0;
-    for i in 0..LANES {
-        bits |= u32::from(test(i)) << i;
-    }
-    bits
-}
-
-#[inline(always)]
-fn set(bits: u32, lane: usize) -> bool {
-    bits >> lane & 1 != 0
+fn all_bits(test: bool) -> u32 {
+    if test { u32::MAX } else { 0 }
 }
 
 /// The lanes that are set.
@@ -34,17 +30,26 @@ pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-#[inline(always)]
-fn expand<T: Copy>(a: [T; LANES], bits: u32, from: &[T; LANES]) -> [T; LANES] {
-    let mut out = a;
-    for (next, lane) in lanes(bits).enumerate() {
+#[inline(never)]
+fn mask_bits(m: &M) -> u32 {
+    let mut bits = 0;
+    for i in 0..LANES {
+        bits |= m[i] & 1 << i;
+    }
+    bits
+}
+
+#[inline(never)]
+fn expand(a: &U, m: &M, from: &U) -> U {
+    let mut out = *a;
+    for (next, lane) in lanes(mask_bits(m)).enumerate() {
         out[lane] = from[next];
     }
     out
 }
 
-#[inline(always)]
-fn compress<T: Copy>(bits: u32, a: &[T; LANES], to: &mut [T; LANES]) -> usize {
+#[inline(never)]
+fn compress(bits: u32, a: &U, to: &mut U) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
         to[count % LANES] = a[lane];
@@ -72,8 +77,8 @@ pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: 
 }
 
 /// [`Simd::transpose`] in plain code.
-#[inline(always)]
-pub(super) fn transpose(rows: [F; LANES]) -> [F; LANES] {
+#[inline(never)]
+fn transpose(rows: &[F; LANES]) -> [F; LANES] {
     let mut out = [[0.0; LANES]; LANES];
     for (i, row) in rows.iter().enumerate() {
         for lane in 0..LANES {
@@ -94,12 +99,22 @@ pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usi
     kept
 }
 
+#[inline(never)]
+fn sort(bits: u32, key: &F, a: &U, to: &mut U, keys: &mut F) -> usize {
+    compress_far_to_near(bits, key, a, to, keys)
+}
+
+#[inline(never)]
+fn filter(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
+    keep_up_to(codes, keys, limit)
+}
+
 /// Rows by their columns.
-#[inline(always)]
-fn columns<T: Copy + Default, const N: usize>(m: u32, from: &[[T; N]], row: U) -> [[T; LANES]; N] {
+#[inline(never)]
+fn columns<T: Copy + Default, const N: usize>(m: &M, from: &[[T; N]], row: &U) -> [[T; LANES]; N] {
     let mut out = [[T::default(); LANES]; N];
     for i in 0..LANES {
-        if set(m, i) {
+        if m[i] != 0 {
             let row = &from[row[i] as usize];
             for k in 0..N {
                 out[k][i] = row[k];
@@ -109,10 +124,131 @@ fn columns<T: Copy + Default, const N: usize>(m: u32, from: &[[T; N]], row: U) -
     out
 }
 
+#[inline(never)]
+fn gather(m: &M, from: &[u32], at: &U) -> U {
+    from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { 0 })
+}
+
+#[inline(never)]
+fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
+    let pair: [[u32; 2]; LANES] = from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { [0; 2] });
+    (pair.map(|p| p[0]), pair.map(|p| p[1]))
+}
+
+/// Functions of whole vectors, a loop over the lanes each.
+macro_rules! loops {
+    ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $lane:expr;)*) => { $(
+        #[inline(never)]
+        fn $name($($arg: &$of),*) -> $out {
+            from_fn(|i| {
+                $(let $arg = $arg[i];)*
+                $lane
+            })
+        }
+    )* };
+}
+
+/// The same as methods.
+macro_rules! methods {
+    ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty;)*) => { $(
+        #[inline(always)]
+        fn $name(self, $($arg: $of),*) -> $out {
+            $name($(&$arg),*)
+        }
+    )* };
+}
+
+loops! {
+    add(a: F, b: F) -> F = a + b;
+    sub(a: F, b: F) -> F = a - b;
+    mul(a: F, b: F) -> F = a * b;
+    div(a: F, b: F) -> F = a / b;
+    fma(a: F, b: F, c: F) -> F = a * b + c;
+    fnma(a: F, b: F, c: F) -> F = c - a * b;
+    min(a: F, b: F) -> F = if a < b { a } else { b };
+    max(a: F, b: F) -> F = if a > b { a } else { b };
+    abs(a: F) -> F = a.abs();
+    max_abs(a: F, b: F) -> F = if a.abs() > b.abs() { a.abs() } else { b.abs() };
+    lt(a: F, b: F) -> M = all_bits(a < b);
+    le(a: F, b: F) -> M = all_bits(a <= b);
+    select_u(m: M, a: U, b: U) -> U = a & m | b & !m;
+    add_u(a: U, b: U) -> U = a.wrapping_add(b);
+    add_where(a: U, m: M, b: U) -> U = a.wrapping_add(b & m);
+    and_u(a: U, b: U) -> U = a & b;
+    or_u(a: U, b: U) -> U = a | b;
+    xor_u(a: U, b: U) -> U = a ^ b;
+    eq_u(a: U, b: U) -> M = all_bits(a == b);
+    lt_u(a: U, b: U) -> M = all_bits(a < b);
+    and_not_u(a: M, b: M) -> M = a & !b;
+    numbers(a: U) -> F = a as f32;
+}
+
+#[inline(never)]
+fn lookup(table: &U, at: &U) -> U {
+    from_fn(|i| table[at[i] as usize % LANES])
+}
+
+#[inline(never)]
+fn shl(a: &U, by: u32) -> U {
+    from_fn(|i| a[i] << by)
+}
+
+#[inline(never)]
+fn mask(bits: u32) -> M {
+    from_fn(|i| all_bits(bits >> i & 1 != 0))
+}
+
+#[inline(never)]
+fn least(a: &F) -> f32 {
+    a.iter().fold(f32::INFINITY, |m, &x| if x < m { x } else { m })
+}
+
+#[inline(never)]
+fn columns_of_all(rows: &[[u32; 8]; LANES]) -> [U; 8] {
+    from_fn(|k| from_fn(|i| rows[i][k]))
+}
+
+#[inline(always)]
+fn words(a: F) -> U {
+    zerocopy::transmute!(a)
+}
+
+#[inline(always)]
+fn floats(a: U) -> F {
+    zerocopy::transmute!(a)
+}
+
 impl Simd for Scalar {
     type F = F;
     type U = U;
-    type M = u32;
+    type M = M;
+    const HAS_VECTORS: bool = false;
+
+    methods! {
+        add(a: F, b: F) -> F;
+        sub(a: F, b: F) -> F;
+        mul(a: F, b: F) -> F;
+        div(a: F, b: F) -> F;
+        fma(a: F, b: F, c: F) -> F;
+        fnma(a: F, b: F, c: F) -> F;
+        min(a: F, b: F) -> F;
+        max(a: F, b: F) -> F;
+        abs(a: F) -> F;
+        max_abs(a: F, b: F) -> F;
+        lt(a: F, b: F) -> M;
+        le(a: F, b: F) -> M;
+        least(a: F) -> f32;
+        add_u(a: U, b: U) -> U;
+        add_where(a: U, m: M, b: U) -> U;
+        and_u(a: U, b: U) -> U;
+        or_u(a: U, b: U) -> U;
+        xor_u(a: U, b: U) -> U;
+        eq_u(a: U, b: U) -> M;
+        lt_u(a: U, b: U) -> M;
+        select_u(m: M, a: U, b: U) -> U;
+        numbers(a: U) -> F;
+        mask_bits(m: M) -> u32;
+    }
 
     #[inline(always)]
     fn splat(self, x: f32) -> F {
@@ -127,80 +263,28 @@ impl Simd for Scalar {
         *to = a;
     }
     #[inline(always)]
-    fn add(self, a: F, b: F) -> F {
-        from_fn(|i| a[i] + b[i])
-    }
-    #[inline(always)]
-    fn sub(self, a: F, b: F) -> F {
-        from_fn(|i| a[i] - b[i])
-    }
-    #[inline(always)]
-    fn mul(self, a: F, b: F) -> F {
-        from_fn(|i| a[i] * b[i])
-    }
-    #[inline(always)]
-    fn div(self, a: F, b: F) -> F {
-        from_fn(|i| a[i] / b[i])
-    }
-    #[inline(always)]
-    fn fma(self, a: F, b: F, c: F) -> F {
-        from_fn(|i| a[i] * b[i] + c[i])
-    }
-    #[inline(always)]
-    fn fnma(self, a: F, b: F, c: F) -> F {
-        from_fn(|i| c[i] - a[i] * b[i])
-    }
-    #[inline(always)]
-    fn min(self, a: F, b: F) -> F {
-        from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
-    }
-    #[inline(always)]
-    fn max(self, a: F, b: F) -> F {
-        from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
-    }
-    #[inline(always)]
-    fn abs(self, a: F) -> F {
-        a.map(f32::abs)
-    }
-    #[inline(always)]
-    fn max_abs(self, a: F, b: F) -> F {
-        self.max(self.abs(a), self.abs(b))
-    }
-    #[inline(always)]
-    fn lt(self, a: F, b: F) -> u32 {
-        compare(|i| a[i] < b[i])
-    }
-    #[inline(always)]
-    fn le(self, a: F, b: F) -> u32 {
-        compare(|i| a[i] <= b[i])
-    }
-    #[inline(always)]
-    fn select(self, m: u32, a: F, b: F) -> F {
-        from_fn(|i| if set(m, i) { a[i] } else { b[i] })
+    fn select(self, m: M, a: F, b: F) -> F {
+        floats(select_u(&m, &words(a), &words(b)))
     }
     #[inline(always)]
     fn lookup(self, table: F, at: U) -> F {
-        at.map(|i| table[i as usize % LANES])
+        floats(lookup(&words(table), &at))
     }
     #[inline(always)]
-    fn least(self, a: F) -> f32 {
-        a.into_iter().fold(f32::INFINITY, |m, x| if x < m { x } else { m })
+    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
+        columns(&m, from, &row)
     }
     #[inline(always)]
-    fn rows4(self, m: u32, from: &[[f32; 4]], row: U) -> [F; 4] {
-        columns(m, from, row)
-    }
-    #[inline(always)]
-    fn rows8(self, m: u32, from: &[[u32; 8]], row: U) -> [U; 8] {
-        columns(m, from, row)
+    fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
+        columns(&m, from, &row)
     }
     #[inline(always)]
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
-        from_fn(|k| from_fn(|i| rows[i][k]))
+        columns_of_all(rows)
     }
     #[inline(always)]
-    fn expand(self, a: F, m: u32, from: &F) -> F {
-        expand(a, m, from)
+    fn expand(self, a: F, m: M, from: &F) -> F {
+        floats(expand(&words(a), &m, &words(*from)))
     }
 
     #[inline(always)]
@@ -220,90 +304,49 @@ impl Simd for Scalar {
         *to = a;
     }
     #[inline(always)]
-    fn add_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i].wrapping_add(b[i]))
-    }
-    #[inline(always)]
-    fn add_where(self, a: U, m: u32, b: U) -> U {
-        from_fn(|i| if set(m, i) { a[i].wrapping_add(b[i]) } else { a[i] })
-    }
-    #[inline(always)]
-    fn and_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i] & b[i])
-    }
-    #[inline(always)]
-    fn or_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i] | b[i])
-    }
-    #[inline(always)]
-    fn xor_u(self, a: U, b: U) -> U {
-        from_fn(|i| a[i] ^ b[i])
-    }
-    #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
-        a.map(|x| x << K)
-    }
-    #[inline(always)]
-    fn eq_u(self, a: U, b: U) -> u32 {
-        compare(|i| a[i] == b[i])
-    }
-    #[inline(always)]
-    fn lt_u(self, a: U, b: U) -> u32 {
-        compare(|i| a[i] < b[i])
-    }
-    #[inline(always)]
-    fn select_u(self, m: u32, a: U, b: U) -> U {
-        from_fn(|i| if set(m, i) { a[i] } else { b[i] })
+        shl(&a, K)
     }
     #[inline(always)]
     fn lookup_u(self, table: U, at: U) -> U {
-        at.map(|i| table[i as usize % LANES])
+        lookup(&table, &at)
     }
     #[inline(always)]
-    fn gather_u(self, m: u32, from: &[u32], at: U) -> U {
-        from_fn(|i| if set(m, i) { from[at[i] as usize] } else { 0 })
+    fn gather_u(self, m: M, from: &[u32], at: U) -> U {
+        gather(&m, from, &at)
     }
     #[inline(always)]
-    fn gather_pair(self, m: u32, from: &[[u32; 2]], at: U) -> (U, U) {
-        let pair: [[u32; 2]; LANES] = from_fn(|i| if set(m, i) { from[at[i] as usize] } else { [0; 2] });
-        (pair.map(|p| p[0]), pair.map(|p| p[1]))
+    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
+        gather_pair(&m, from, &at)
     }
     #[inline(always)]
-    fn expand_u(self, a: U, m: u32, from: &U) -> U {
-        expand(a, m, from)
+    fn expand_u(self, a: U, m: M, from: &U) -> U {
+        expand(&a, &m, from)
     }
     #[inline(always)]
     fn bits(self, a: F) -> U {
-        a.map(f32::to_bits)
+        words(a)
     }
     #[inline(always)]
     fn floats(self, a: U) -> F {
-        a.map(f32::from_bits)
-    }
-    #[inline(always)]
-    fn numbers(self, a: U) -> F {
-        a.map(|x| x as f32)
+        floats(a)
     }
 
     #[inline(always)]
-    fn mask(self, bits: u32) -> u32 {
-        bits
+    fn mask(self, bits: u32) -> M {
+        mask(bits)
     }
     #[inline(always)]
-    fn mask_bits(self, m: u32) -> u32 {
-        m
+    fn and(self, a: M, b: M) -> M {
+        and_u(&a, &b)
     }
     #[inline(always)]
-    fn and(self, a: u32, b: u32) -> u32 {
-        a & b
+    fn or(self, a: M, b: M) -> M {
+        or_u(&a, &b)
     }
     #[inline(always)]
-    fn or(self, a: u32, b: u32) -> u32 {
-        a | b
-    }
-    #[inline(always)]
-    fn and_not(self, a: u32, b: u32) -> u32 {
-        a & !b
+    fn and_not(self, a: M, b: M) -> M {
+        and_not_u(&a, &b)
     }
 
     #[inline(always)]
@@ -312,19 +355,22 @@ impl Simd for Scalar {
     }
     #[inline(always)]
     fn compress_f(self, bits: u32, a: F, to: &mut F) -> usize {
-        compress(bits, &a, to)
+        let mut packed = words(*to);
+        let count = compress(bits, &words(a), &mut packed);
+        *to = floats(packed);
+        count
     }
     #[inline(always)]
     fn compress_far_to_near(self, bits: u32, key: F, a: U, to: &mut U, keys: &mut F) -> usize {
-        compress_far_to_near(bits, &key, &a, to, keys)
+        sort(bits, &key, &a, to, keys)
     }
     #[inline(always)]
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
-        keep_up_to(codes, keys, limit)
+        filter(codes, keys, limit)
     }
     #[inline(always)]
     fn transpose(self, rows: [F; LANES]) -> [F; LANES] {
-        transpose(rows)
+        transpose(&rows)
     }
     #[inline(always)]
     fn prefetch<T>(self, _place: *const T) {}

@@ -5,21 +5,21 @@ use super::bvh::batch::{BatchWalk, Waiting};
 use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::bvh::walk::TetOutcome;
 use super::choice::{self, LEAST_RAYS, Way};
-use super::crossings::Crossings;
 use super::hinted::Hinted;
+use super::intersections::Intersections;
 use super::packets;
-use super::query::{Any, Deliver, Nearest, Offset, Query, Sixteen, one_by_one};
-use super::quick::{Fast, MoellerTrumbore, Quick, Test, Watertight};
+use super::query::{AnswerLanes, Any, Nearest, Query};
+use super::single;
+use super::sink::Sink;
 use super::tets;
 use super::tets::batch::Walk;
 use super::tets::records::LaneRecords;
 use super::tets::{enter_tets, leaf_of_face};
 use super::{FEW, Scratch};
-use crate::rays::{Hit, Ray, Surface};
+use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
-use std::marker::PhantomData;
 
 /// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
 const PART: usize = 2048;
@@ -34,38 +34,8 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    let mut sink = Sink::<Nearest> { ids: object.triangle_ids, answers: hits, instance };
+    let mut sink = Sink::<Nearest>::new(object.triangle_ids, hits, instance);
     trace_batch(object, rays, from, scratch, &mut sink);
-}
-
-/// Nearest hits of rays in object space by a test, each ray on its own.
-pub(crate) fn nearest_batch_by(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    test: Test,
-    scratch: &mut Scratch,
-    hits: &mut [Hit],
-) {
-    fn through<Q: Query<Answer = Hit>>(
-        object: &ObjectView<'_>,
-        rays: &[Ray],
-        scratch: &mut Scratch,
-        answers: &mut [Hit],
-    ) {
-        let waiting = Waiting { order: None, queries: None, walked: None };
-        let mut sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
-        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, to: &mut sink });
-    }
-    if object.header.root == NONE {
-        return;
-    }
-    match test {
-        _ if object.has_packed_nodes() => nearest_batch(object, rays, None, 0, scratch, hits),
-        Test::Exact => through::<Nearest>(object, rays, scratch, hits),
-        Test::Watertight => through::<Quick<Watertight>>(object, rays, scratch, hits),
-        Test::Fast => through::<Quick<Fast>>(object, rays, scratch, hits),
-        Test::MoellerTrumbore => through::<Quick<MoellerTrumbore>>(object, rays, scratch, hits),
-    }
 }
 
 /// Whether rays in object space hit anything; `from` as for [`nearest_batch`].
@@ -76,7 +46,7 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    let mut sink = Sink::<Any> { ids: object.triangle_ids, answers: found, instance: 0 };
+    let mut sink = Sink::<Any>::new(object.triangle_ids, found, 0);
     trace_batch(object, rays, from, scratch, &mut sink);
 }
 
@@ -99,7 +69,7 @@ impl Kernel for MissAll<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let (blocks, rest) = self.0.as_chunks_mut();
-        let none = Sixteen { lanes: 0, crossings: &Crossings::NONE, instance: NONE };
+        let none = AnswerLanes { lanes: 0, intersections: &Intersections::NONE, instance: NONE };
         for block in blocks {
             Nearest::answers_of(s, &none, block);
         }
@@ -107,41 +77,13 @@ impl Kernel for MissAll<'_> {
     }
 }
 
-/// Where answers go, by the place of their rays in the batch. Those that are not put are misses already.
-pub(super) struct Sink<'a, Q: Query> {
-    /// Of the object's triangles, in leaf order.
-    pub(super) ids: &'a [u32],
-    pub(super) answers: &'a mut [Q::Answer],
-    pub(super) instance: u32,
-}
-
-impl<Q: Query> Deliver<Q> for Sink<'_, Q> {
-    #[inline(always)]
-    fn query(&mut self, ray: usize, query: &Q) {
-        self.answers[ray] = query.answer(self.ids, self.instance);
-    }
-    #[inline(always)]
-    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        self.answers[ray] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
-    }
-    #[inline(always)]
-    fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
-        if let Some(to) = self.answers[first..].first_chunk_mut() {
-            let hits = Sixteen { lanes, crossings, instance: self.instance };
-            Q::answers_of(s, &hits, to);
-        } else {
-            one_by_one(self, first, lanes, crossings);
-        }
-    }
-}
-
 /// Hands on what rays in object space hit, of those that hit anything; `from` as for [`nearest_batch`].
-pub(crate) fn trace_batch<Q: Query, D: Deliver<Q>>(
+pub(crate) fn trace_batch<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut D,
+    to: &mut Sink<'_, Q>,
 ) {
     if object.header.root == NONE {
         return;
@@ -174,24 +116,23 @@ pub(crate) fn trace_batch<Q: Query, D: Deliver<Q>>(
 }
 
 /// Traces rays that start on surfaces of which tetrahedra are known through those; others through packets and the BVH.
-fn trace_one_way<Q: Query, D: Deliver<Q>>(
+fn trace_one_way<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut D,
+    to: &mut Sink<'_, Q>,
 ) {
     if from.is_some() || whole(object) != NONE {
         for (part, rays) in rays.chunks(PART).enumerate() {
             let first = part * PART;
             let from = from.map(|from| &from[first..][..rays.len()]);
-            trace_hinted::<Q, _>(object, rays, from, scratch, &mut Offset { first, to: &mut *to });
+            trace_hinted(object, rays, from, scratch, to.from_ray(first));
         }
         return;
     }
-    // The same kernels as for parts.
-    let to = &mut Offset { first: 0, to };
-    let packed = Isa::chosen().run(Together { object, rays, scratch, to: &mut *to, query: PhantomData::<Q> });
+    let to = to.from_ray(0);
+    let packed = in_packets(object, rays, scratch, to);
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
@@ -215,15 +156,15 @@ fn whole(object: &ObjectView<'_>) -> u32 {
 }
 
 /// Traces at most [`PART`] rays, some of which start on known surfaces, or all of which enter the same tetrahedra.
-fn trace_hinted<Q: Query, D: Deliver<Q>>(
+fn trace_hinted<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut D,
+    to: &mut Sink<'_, Q>,
 ) {
     // Packets of rays that go together beat all else, where they serve enough of their rays.
-    let packed = Isa::chosen().run(Together { object, rays, scratch, to: &mut *to, query: PhantomData::<Q> });
+    let packed = in_packets(object, rays, scratch, to);
     let mut faces = vec![NONE; rays.len()];
     let home = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
@@ -296,17 +237,27 @@ fn walk_tets<Q: Query>(
     }
 }
 
+/// Traces rays that go together in packets; returns how many rays went in them. If any did, the others are in the scratch's
+/// `rest`. None do in plain code, which has no vectors to fill.
+fn in_packets<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    scratch: &mut Scratch,
+    to: &mut Sink<'_, Q>,
+) -> usize {
+    Isa::chosen().run_wide(Together { object, rays, scratch, to }).unwrap_or(0)
+}
+
 /// Packets of rays that go together, as a kernel; returns how many rays went in them. If any did, the others are in the
 /// scratch's rest.
-struct Together<'a, Q, D> {
+struct Together<'a, 's, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut Scratch,
-    to: &'a mut D,
-    query: PhantomData<Q>,
+    to: &'a mut Sink<'s, Q>,
 }
 
-impl<Q: Query, D: Deliver<Q>> Kernel for Together<'_, Q, D> {
+impl<Q: Query> Kernel for Together<'_, '_, Q> {
     type Output = usize;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
@@ -316,31 +267,56 @@ impl<Q: Query, D: Deliver<Q>> Kernel for Together<'_, Q, D> {
 }
 
 /// Rays through the BVH, each on its own.
-fn through_bvh<Q: Query, D: Deliver<Q>>(
+fn through_bvh<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     waiting: Waiting<'_, Q>,
     scratch: &mut Scratch,
-    to: &mut D,
+    to: &mut Sink<'_, Q>,
 ) {
+    if Isa::chosen() == Isa::Scalar {
+        return one_by_one(object, rays, &waiting, to);
+    }
+    // Without vectors neither runs, and the branch above was taken.
     if object.has_packed_nodes() {
-        Isa::chosen().run(ThroughBvh { nodes: Packed, object, rays, waiting, scratch, to });
+        let _ = Isa::chosen().run_wide(ThroughBvh { nodes: Packed, object, rays, waiting, scratch, to });
     } else {
-        Isa::chosen().run(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, to });
+        let _ = Isa::chosen().run_wide(ThroughBvh { nodes: Wide, object, rays, waiting, scratch, to });
+    }
+}
+
+/// As [`through_bvh`] in plain code: one ray after the other, as there are no cache misses of vectors to overlap with and the
+/// kernels of many rays would be the largest part of the library.
+fn one_by_one<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    waiting: &Waiting<'_, Q>,
+    to: &mut Sink<'_, Q>,
+) {
+    let trace = |place: usize, to: &mut Sink<'_, Q>| {
+        let ray = &rays[place];
+        let mut query = waiting.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
+        let walked = waiting.walked.map_or(NONE, |walked| walked[place]);
+        single::through_bvh(object, ray, &mut query, walked, &mut ());
+        to.query(place, &query);
+    };
+    match waiting.order {
+        Some(order) => order.iter().for_each(|&place| trace(place as usize, to)),
+        None => (0..rays.len()).for_each(|place| trace(place, to)),
     }
 }
 
 /// As [`through_bvh`], as a kernel.
-struct ThroughBvh<'a, N, Q, D> {
+struct ThroughBvh<'a, 's, N, Q: Query> {
     nodes: N,
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     waiting: Waiting<'a, Q>,
     scratch: &'a mut Scratch,
-    to: &'a mut D,
+    to: &'a mut Sink<'s, Q>,
 }
 
-impl<N: Nodes, Q: Query, D: Deliver<Q>> Kernel for ThroughBvh<'_, N, Q, D> {
+impl<N: Nodes, Q: Query> Kernel for ThroughBvh<'_, '_, N, Q> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {

@@ -1,7 +1,7 @@
 //! A triangle that f32 says may be hit, and what f64 and exact arithmetic say of it later.
 
 use crate::rays::Ray;
-use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
+use crate::trace::intersection::{Estimate, Intersection, estimate, wide};
 use crate::trace::line::Line;
 use crate::trace::query::{Named, Query};
 use crate::trace::sight::Block;
@@ -109,13 +109,13 @@ pub(crate) fn settle_one<Q: Query>(
 /// What f64 leaves open of a candidate. It is read again, so that what is common needs no corners in memory.
 #[cold]
 #[inline(never)]
-fn open_candidate(object: &ObjectView<'_>, ray: &Ray, candidate: Candidate) -> Option<Crossing> {
+fn open_candidate(object: &ObjectView<'_>, ray: &Ray, candidate: Candidate) -> Option<Intersection> {
     open(ray, candidate.read(object, Corners)?.1)
 }
 
 /// What f64 leaves open.
 #[cold]
 #[inline(never)]
-pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     Line::new(ray)?.crossing(corners)
 }

@@ -5,7 +5,7 @@
 //! uncertain. Whether, where and how lines cross triangles is decided in [`super::crossing`], which says of every triangle
 //! exactly whether the real line meets it (lines in its plane miss it).
 
-use super::crossing::RATIO_ERROR;
+use super::intersection::RATIO_ERROR;
 use crate::rays::Ray;
 
 /// 8 units of f64 rounding (2^-53 each): bounds the error of a projected coordinate relative

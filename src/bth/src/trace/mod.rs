@@ -6,20 +6,20 @@ mod batch;
 mod bvh;
 mod candidate;
 mod choice;
-mod crossing;
-mod crossings;
 mod hinted;
+mod intersection;
+mod intersections;
 mod line;
 mod packets;
 mod prepare;
 mod query;
-mod quick;
 mod sight;
 mod single;
+mod sink;
 mod slabs;
 mod tets;
 
-pub(crate) use batch::{any_batch, miss_all, nearest_batch, nearest_batch_by, trace_batch};
+pub(crate) use batch::{any_batch, miss_all, nearest_batch, trace_batch};
 pub(crate) use bvh::flight::KEY_SLACK;
 pub(crate) use bvh::stack::{BOTTOM, Place, Stacks};
 pub use hinted::Hinted;
@@ -29,8 +29,8 @@ pub(crate) use packets::hull::{Beam, Hull};
 pub(crate) use packets::packet::PACKET;
 pub(crate) use prepare::Prepared;
 pub use query::Steps;
-pub(crate) use query::{Any, Deliver, Nearest, Query};
-pub use quick::Test;
+pub(crate) use query::{Any, Nearest, better};
+pub(crate) use sink::{SceneRays, Sink, Visit};
 pub(crate) use slabs::Slabs;
 
 use crate::rays::{Hit, Ray};
@@ -67,15 +67,15 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
-#[inline(never)]
+#[inline]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     nearest_to(object, ray, from, instance, &mut hit);
     hit
 }
 
-/// As [`nearest`], put in its place.
-#[inline(always)]
+/// As [`nearest`], written to `to`. Compiled here once, and not in every crate that traces.
+#[inline(never)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, to: &mut Hit) {
     trace::<Nearest, ()>(object, ray, from, instance, &mut (), to);
 }
@@ -88,7 +88,7 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 }
 
 /// Whether a ray in object space hits anything.
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;
     trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);

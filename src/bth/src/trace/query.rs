@@ -1,68 +1,17 @@
 //! What a traversal looks for: the nearest hit or any hit; and what it counts.
 
-use super::crossing::Crossing;
-use super::crossings::Crossings;
-use super::quick::Test;
+use super::intersection::Intersection;
+use super::intersections::Intersections;
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 
-/// Where answers go. Rays that are not spoken of hit nothing.
-pub(crate) trait Deliver<Q> {
-    /// A query over a ray of the batch has ended.
-    fn query(&mut self, ray: usize, query: &Q);
-    /// The nearest hit of a ray, as it is reported. (In single words: what goes through memory as a pair stalls.)
-    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32);
-    /// The same of up to sixteen rays from this one on, a bit each, of which nothing has been said before.
-    #[inline(always)]
-    fn hits<S: Simd>(&mut self, _s: S, first: usize, lanes: u32, crossings: &Crossings) {
-        one_by_one(self, first, lanes, crossings);
-    }
-}
-
-/// [`Deliver::hits`] as single ones.
-#[inline(always)]
-pub(crate) fn one_by_one<Q, D: Deliver<Q> + ?Sized>(
-    to: &mut D,
-    first: usize,
-    mut lanes: u32,
-    crossings: &Crossings,
-) {
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize % LANES;
-        lanes &= lanes - 1;
-        let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
-        to.hit(first + lane, crossings.triangle[lane], t, u, v);
-    }
-}
-
 /// What sixteen rays hit in an object.
-pub(crate) struct Sixteen<'a> {
+pub(crate) struct AnswerLanes<'a> {
     /// Those that hit anything, a bit each.
     pub(crate) lanes: u32,
-    pub(crate) crossings: &'a Crossings,
+    pub(crate) intersections: &'a Intersections,
     pub(crate) instance: u32,
-}
-
-/// Answers to rays from a place in the batch on.
-pub(crate) struct Offset<'a, D> {
-    pub(crate) first: usize,
-    pub(crate) to: &'a mut D,
-}
-
-impl<Q, D: Deliver<Q>> Deliver<Q> for Offset<'_, D> {
-    #[inline(always)]
-    fn query(&mut self, ray: usize, query: &Q) {
-        self.to.query(self.first + ray, query);
-    }
-    #[inline(always)]
-    fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        self.to.hit(self.first + ray, triangle, t, u, v);
-    }
-    #[inline(always)]
-    fn hits<S: Simd>(&mut self, s: S, first: usize, lanes: u32, crossings: &Crossings) {
-        self.to.hits(s, self.first + first, lanes, crossings);
-    }
 }
 
 /// A triangle, by its id or by its place in leaf order among the ids of an object. An id is most often a cache miss, and of no
@@ -92,8 +41,6 @@ impl<'a> Named<'a> {
 pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
-    /// How triangles of leaves are decided.
-    const TEST: Test = Test::Exact;
     /// Whether only the last of several hits, each nearer than the one before, need be computed.
     const DEFERS: bool = false;
     /// What the caller gets.
@@ -103,13 +50,16 @@ pub(crate) trait Query: Copy {
     /// The same, given t, u and v as they are to be reported.
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
     /// The same of sixteen rays; those whose bit is not set hit nothing.
-    fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Self::Answer; LANES]);
+    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, to: &mut [Self::Answer; LANES]);
+    /// Merges an answer that was found in an object into that of the ray of a scene; `t_scale` turns t of the object into that
+    /// of the world.
+    fn merge(best: &mut Self::Answer, found: Self::Answer, ray: &Ray, t_scale: f32);
     fn new(ray: &Ray) -> Self;
     /// Whether walks should keep an eye on how far they are: where rays are often short, and where
     /// [`Self::settled_by`] has a use for it.
     const KEEPS_DEPTHS: bool = false;
     /// Offers a crossing within the object; true ends the traversal.
-    fn offer(&mut self, triangle: Named<'_>, crossing: Crossing) -> bool;
+    fn offer(&mut self, triangle: Named<'_>, crossing: Intersection) -> bool;
     /// Tells of a crossing whose t certainly lies between two values, roundings included; true if that is all that the
     /// query wants to know.
     fn settled_by(&mut self, _t: (f64, f64)) -> bool {
@@ -142,7 +92,7 @@ pub(crate) struct Nearest {
     /// An id, or a place among the ids ([`Named`]); `NONE` where nothing is hit.
     triangle: u32,
     is_place: bool,
-    best: Crossing,
+    best: Intersection,
 }
 
 impl Nearest {
@@ -169,8 +119,8 @@ impl Query for Nearest {
         Hit { t, u, v, surface }
     }
     #[inline(always)]
-    fn answers_of<S: Simd>(s: S, hits: &Sixteen<'_>, to: &mut [Hit; LANES]) {
-        let &Sixteen { lanes, crossings, instance } = hits;
+    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, to: &mut [Hit; LANES]) {
+        let &AnswerLanes { lanes, intersections: crossings, instance } = hits;
         let m = s.mask(lanes);
         let Hit { t, u, v, surface } = Hit::MISS;
         let t = s.select(m, s.load(&crossings.t), s.splat(t));
@@ -180,12 +130,16 @@ impl Query for Nearest {
         let triangle = s.select_u(m, s.load_u(&crossings.triangle), s.splat_u(surface.triangle));
         s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(to));
     }
+    #[inline]
+    fn merge(best: &mut Hit, found: Hit, ray: &Ray, t_scale: f32) {
+        *best = better(ray, best, &found, t_scale).unwrap_or(*best);
+    }
     fn new(ray: &Ray) -> Self {
-        let best = Crossing { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
+        let best = Intersection { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
         Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_place: false, best }
     }
     #[inline(always)]
-    fn offer(&mut self, triangle: Named<'_>, crossing: Crossing) -> bool {
+    fn offer(&mut self, triangle: Named<'_>, crossing: Intersection) -> bool {
         let nearer = self.triangle == NONE
             || crossing.t < self.best.t
             || (crossing.t == self.best.t && triangle.read() < self.named(triangle.ids).read());
@@ -206,6 +160,20 @@ impl Query for Nearest {
         (self.triangle != NONE).then_some(self.best.t)
     }
     fn accept(&mut self) {}
+}
+
+/// The better of two hits of a ray of a scene: least t, then least instance. None where the new one is no better, or where its t
+/// lies outside the ray's range once it is scaled to the world's.
+pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<Hit> {
+    if !hit.is_hit() {
+        return None;
+    }
+    // A factor of 1 leaves every t as it is, without a rounding.
+    let t = if t_scale == 1.0 { hit.t } else { hit.t * t_scale };
+    let hit = Hit { t, ..*hit };
+    let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
+    let nearer = hit.t < best.t || hit.t == best.t && hit.surface.instance < best.surface.instance;
+    (in_range && nearer).then_some(hit)
 }
 
 /// Whether a t between two values may lie in a range, rounding counted in.
@@ -242,17 +210,21 @@ impl Query for Any {
     fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
         true
     }
-    fn answers_of<S: Simd>(_s: S, hits: &Sixteen<'_>, to: &mut [bool; LANES]) {
+    fn answers_of<S: Simd>(_s: S, hits: &AnswerLanes<'_>, to: &mut [bool; LANES]) {
         for (lane, found) in to.iter_mut().enumerate() {
             *found = hits.lanes >> lane & 1 != 0;
         }
+    }
+    #[inline]
+    fn merge(best: &mut bool, found: bool, _ray: &Ray, _t_scale: f32) {
+        *best |= found;
     }
     fn new(ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
     const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
-    fn offer(&mut self, _triangle: Named<'_>, crossing: Crossing) -> bool {
+    fn offer(&mut self, _triangle: Named<'_>, crossing: Intersection) -> bool {
         self.found |= in_range(crossing.t as f32, self.tmin, self.tmax);
         self.found
     }

@@ -121,8 +121,6 @@ pub(crate) trait Block {
     /// One coordinate of a corner.
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
     fn project<S: Simd>(&self, s: S, sight: &Sight) -> Corners<S>;
-    /// The corners as they are: `[corner][x, y, z]`.
-    fn points<S: Simd>(&self, s: S) -> Corners<S>;
 }
 
 /// The points at these places.
@@ -168,11 +166,6 @@ impl Block for IndexedLeaf {
         let points = sight.project(s, &self.vertex);
         [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
     }
-    #[inline(always)]
-    fn points<S: Simd>(&self, s: S) -> Corners<S> {
-        let points = [s.load(&self.vertex[0]), s.load(&self.vertex[1]), s.load(&self.vertex[2])];
-        [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
-    }
 }
 
 impl Block for RawLeaf {
@@ -195,11 +188,6 @@ impl Block for RawLeaf {
             sight.project(s, &self.corner[1]),
             sight.project(s, &self.corner[2]),
         ]
-    }
-    #[inline(always)]
-    fn points<S: Simd>(&self, s: S) -> Corners<S> {
-        let point = |rows: &[[f32; WIDTH]; 3]| [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])];
-        [point(&self.corner[0]), point(&self.corner[1]), point(&self.corner[2])]
     }
 }
 

@@ -1,7 +1,7 @@
 //! One ray through an object.
 
 use super::bvh::alone::Alone;
-use super::bvh::nodes::{Nodes, Packed, Wide};
+use super::bvh::nodes::{AnyKind, Nodes, Packed, Wide};
 use super::bvh::walk::walk;
 use super::prepare::Aim;
 use super::query::{Count, Query};
@@ -23,7 +23,10 @@ pub(crate) fn trace<Q: Query, C: Count>(
     to: &mut Q::Answer,
 ) {
     if from == NONE || object.tet_leaves.is_empty() {
-        return through_bvh::<Q, C>(object, ray, (Q::new(ray), NONE), instance, count, to);
+        let mut query = Q::new(ray);
+        through_bvh(object, ray, &mut query, NONE, count);
+        *to = query.answer(object.triangle_ids, instance);
+        return;
     }
     trace_from::<Q, C>(object, ray, from, instance, count, to);
 }
@@ -42,27 +45,24 @@ fn trace_from<Q: Query, C: Count>(
     match start_in_tets(object, ray, from, &mut query, count) {
         Start::Done => {}
         Start::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}
-        Start::Walked(leaf) => {
-            return through_bvh(object, ray, (query, leaf), instance, count, to);
-        }
+        Start::Walked(leaf) => through_bvh(object, ray, &mut query, leaf, count),
     }
     *to = query.answer(object.triangle_ids, instance);
 }
 
+/// Traces a ray through the BVH; `walked` is the tet leaf from which the query has what it knows, which is left out, or `NONE`.
 #[inline(always)]
-fn through_bvh<Q: Query, C: Count>(
+pub(crate) fn through_bvh<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
-    (mut query, walked): (Q, u32),
-    instance: u32,
+    query: &mut Q,
+    walked: u32,
     count: &mut C,
-    to: &mut Q::Answer,
 ) {
     if object.header.root != NONE {
-        let (query, stack) = (&mut query, &mut Alone::new());
+        let stack = &mut Alone::new();
         Isa::chosen().run(&mut Single { object, ray, query, walked, count, stack });
     }
-    *to = query.answer(object.triangle_ids, instance);
 }
 
 /// A ray and its query, which says afterwards what was found.
@@ -81,6 +81,9 @@ impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
+        if !S::HAS_VECTORS {
+            return self.walk(s, AnyKind);
+        }
         if self.object.has_packed_nodes() {
             return through_packed_nodes(self);
         }
@@ -92,7 +95,8 @@ impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
 #[cold]
 #[inline(never)]
 fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) {
-    Isa::chosen().run(AmongPacked(single));
+    // Plain code does not get here.
+    let _ = Isa::chosen().run_wide(AmongPacked(single));
 }
 
 /// A ray among packed nodes, as a kernel.

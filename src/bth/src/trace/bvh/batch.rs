@@ -1,14 +1,15 @@
 //! Rays of a batch through the BVH of an object: taken in sixteen at a time, and handed on as they end.
 
 use super::flight::{Flight, Found};
-use super::flights::{Flights, IN_FLIGHT};
+use super::flights::Flights;
 use super::landing::Landing;
 use super::nodes::Nodes;
 use super::stack::{Place, Stacks};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::prepare::Prepared;
-use crate::trace::query::{Deliver, Query};
+use crate::trace::query::Query;
+use crate::trace::sink::Sink;
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -24,13 +25,13 @@ pub(crate) struct Waiting<'a, Q> {
 }
 
 /// A batch on its way.
-pub(crate) struct BatchWalk<'a, Q, D> {
+pub(crate) struct BatchWalk<'a, 's, Q: Query> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
     pub(crate) waiting: Waiting<'a, Q>,
     pub(crate) stacks: &'a mut Stacks,
     /// Where answers go.
-    pub(crate) to: &'a mut D,
+    pub(crate) to: &'a mut Sink<'s, Q>,
 }
 
 /// The next rays, sixteen at a time: prepared, and tested against the boxes of the root's children.
@@ -57,7 +58,7 @@ struct Supply<'a, Q> {
     before: usize,
 }
 
-impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
+impl<Q: Query> BatchWalk<'_, '_, Q> {
     /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
     /// the query has what it wants.
     #[inline(always)]
@@ -86,9 +87,6 @@ impl<Q: Query, D: Deliver<Q>> BatchWalk<'_, Q, D> {
         };
         let mut landing = Landing::new();
         let mut flights = Flights::new(object, stacks);
-        for at in 0..IN_FLIGHT {
-            supply.launch(s, nodes, at, &mut flights);
-        }
         while !flights.is_empty() {
             flights.inner_steps(s, nodes, object);
             for i in 0..flights.take_ended() {
@@ -138,7 +136,7 @@ impl<Q: Query> Supply<'_, Q> {
             }
             if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
                 let root = N::node(self.object.ground(), self.root);
-                flights.start_among(s, at, root, (self.met[lane], s.load(&self.enter[lane])));
+                flights.start_among(s, at, &root, (self.met[lane], s.load(&self.enter[lane])));
             } else {
                 flights.start(at, self.root);
             }
@@ -165,7 +163,7 @@ impl<Q: Query> Supply<'_, Q> {
         let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.ground(), self.root));
         for lane in 0..count {
             let mut meets = true;
-            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), root) {
+            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), &root) {
                 let (bits, enter) = aim.slabs.children(s, root, aim.slabs.last);
                 s.store(enter, &mut self.enter[lane % LANES]);
                 self.met[lane % LANES] = bits;

@@ -4,11 +4,11 @@
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, open, settle};
-use crate::trace::crossing::{Crossing, Estimate, estimate, wide};
+use crate::trace::intersection::{Estimate, estimate, wide};
 use crate::trace::prepare::{Aim, Noted};
-use crate::trace::query::{Deliver, Named, Query};
-use crate::trace::quick::Test;
+use crate::trace::query::{Named, Query};
 use crate::trace::sight::{Block, Candidates, Certain};
+use crate::trace::sink::Sink;
 use crate::trace::slabs::Boxes;
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
@@ -62,7 +62,7 @@ impl<Q: Query> Flight<Q> {
 
     /// A place for a ray.
     pub(crate) fn vacant(query: Q) -> Self {
-        Flight { aim: Aim::new_zeroed(), query }
+        Flight { aim: Aim { noted: Noted::NOTHING, ..Aim::new_zeroed() }, query }
     }
 
     /// Takes in a ray that has been prepared, and its query if it has one.
@@ -86,7 +86,7 @@ impl<Q: Query> Flight<Q> {
 
     /// Hands on what has been found, but for what waits to be computed.
     #[inline(always)]
-    pub(crate) fn hand_on(&self, to: &mut impl Deliver<Q>) {
+    pub(crate) fn hand_on(&self, to: &mut Sink<'_, Q>) {
         match self.aim.noted.decided {
             Noted::NEVER_ASKED => {}
             Noted::ACCEPTED => {
@@ -159,9 +159,6 @@ impl<Q: Query> Flight<Q> {
         rays: &[Ray],
         (block, code): (&B, u32),
     ) -> Found {
-        if Q::TEST != Test::Exact {
-            return self.enter_leaf_quickly(s, object, &rays[self.ray()], block);
-        }
         let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.aim.slabs.last);
         if found.maybe == 0 {
             return Found::Nothing;
@@ -204,26 +201,6 @@ impl<Q: Query> Flight<Q> {
         let ray = &rays[self.ray()];
         self.settle(object, ray);
         self.decide(s, object, ray, block, maybe)
-    }
-
-    /// As [`Self::enter_leaf`], as f32 sees the triangles.
-    #[inline(always)]
-    fn enter_leaf_quickly<S: Simd, B: Block>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        ray: &Ray,
-        block: &B,
-    ) -> Found {
-        let Some(found) =
-            self.aim.sight.nearby(s, block, ray, Q::TEST, self.aim.slabs.last, self.aim.slabs.scale)
-        else {
-            return Found::Nothing;
-        };
-        let weight = [found.weight[0].into(), found.weight[1].into(), 1.0];
-        let place = block.first() + found.triangle as u32;
-        self.ask(ray).offer(Named::place(place, object.triangle_ids), Crossing { t: found.t.into(), weight });
-        self.settled(Found::Nothing)
     }
 
     /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.

@@ -2,7 +2,7 @@
 //! with the work of the others. Where they come from and where they go is not known here.
 
 use super::flight::{Flight, Found, write_children};
-use super::nodes::{Nodes, prefetch};
+use super::nodes::{Nodes, indexed_leaf, prefetch};
 use super::stack::{BOTTOM, Place, Stacks};
 use crate::rays::Ray;
 use crate::simd::Simd;
@@ -12,7 +12,7 @@ use bth_format::layout::Child;
 use bth_format::object::ObjectView;
 
 /// Rays on their way at once.
-pub(super) const IN_FLIGHT: usize = 32;
+const IN_FLIGHT: usize = 32;
 /// While at least this many rays stand before inner nodes, those before leaves wait.
 const ENOUGH: u8 = (IN_FLIGHT / 4) as u8;
 
@@ -29,7 +29,7 @@ struct Lists {
 }
 
 /// How many rays are in each of the [`Lists`], a byte each. Loops count in a copy, which stays in a register.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Counts(u32);
 
 impl Counts {
@@ -101,7 +101,7 @@ pub(super) struct Flights<'a, Q> {
 }
 
 impl<'a, Q: Query> Flights<'a, Q> {
-    /// No rays yet, for the BVH of an object.
+    /// Vacant slots, for the BVH of an object.
     #[inline(always)]
     pub(super) fn new(object: &ObjectView<'_>, stacks: &'a mut Stacks) -> Self {
         let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
@@ -110,11 +110,16 @@ impl<'a, Q: Query> Flights<'a, Q> {
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
             *bottom = stacks.bottom(stack);
         }
+        // All slots are at the bottom of their stacks, as those of rays that have ended: so the first rays come in as all others do.
+        let mut bottom = [0; 256];
+        for at in 0..IN_FLIGHT {
+            bottom[at] = at as u8;
+        }
         Flights {
             slots: [Slot(Flight::vacant(vacant)); IN_FLIGHT],
             tops: Tops { place: bottoms, code: [BOTTOM; IN_FLIGHT] },
-            lists: Lists { inner: [0; 256], leaf: [0; 256], bottom: [0; 256] },
-            counts: Counts::default(),
+            lists: Lists { inner: [0; 256], leaf: [0; 256], bottom },
+            counts: Counts((IN_FLIGHT as u32) << Counts::BOTTOM),
             stacks,
             bottoms,
         }
@@ -184,7 +189,7 @@ impl<'a, Q: Query> Flights<'a, Q> {
             for i in 0..counts.take(Counts::INNER) {
                 let at = usize::from(lists.inner[i]) % IN_FLIGHT;
                 let (top, node) = (tops.place[at], N::node(ground, tops.code[at]));
-                let count = slots[at].0.enter_node(s, node, stacks.room(top));
+                let count = slots[at].0.enter_node(s, &node, stacks.room(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.place[at], tops.code[at]) = (top, code);
@@ -214,17 +219,14 @@ impl<'a, Q: Query> Flights<'a, Q> {
             let at = usize::from(lists.leaf[i]) % IN_FLIGHT;
             let flight = &mut slots[at].0;
             let (code, top) = (tops.code[at], tops.place[at]);
-            let found = if let Some(leaf) = ground.indexed_leaf(code) {
+            let mut unpacked = None;
+            let found = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
                 flight.enter_leaf(s, object, rays, (leaf, code))
             } else {
-                let (mut indexed, mut raw) = (None, None);
+                let mut unpacked = None;
                 match Child::from_code(code) {
-                    Some(Child::Indexed(index)) => {
-                        let leaf = object.indexed(index, &mut indexed);
-                        flight.enter_leaf(s, object, rays, (leaf, code))
-                    }
                     Some(Child::Raw(index)) => {
-                        let leaf = object.raw(index, &mut raw);
+                        let leaf = object.raw(index, &mut unpacked);
                         flight.enter_leaf(s, object, rays, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, flight, top, stacks),

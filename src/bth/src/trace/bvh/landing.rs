@@ -4,10 +4,11 @@ use super::flight::Flight;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Reader, settle};
-use crate::trace::crossings::{Crossings, Pairs};
+use crate::trace::intersections::{Intersections, Pairs};
 use crate::trace::prepare::fields;
-use crate::trace::query::{Deliver, Query};
+use crate::trace::query::Query;
 use crate::trace::sight::Block;
+use crate::trace::sink::Sink;
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -20,7 +21,7 @@ pub(crate) struct Landing {
     /// In leaf order.
     place: [u32; LANES],
     pairs: Pairs,
-    crossings: Crossings,
+    crossings: Intersections,
 }
 
 /// Notes the corners of a triangle.
@@ -49,7 +50,7 @@ impl Landing {
             candidate: [Candidate::NONE; LANES],
             place: [0; LANES],
             pairs: Pairs::NONE,
-            crossings: Crossings::NONE,
+            crossings: Intersections::NONE,
         }
     }
 
@@ -61,7 +62,7 @@ impl Landing {
         object: &ObjectView<'_>,
         rays: &[Ray],
         flight: &Flight<Q>,
-        to: &mut impl Deliver<Q>,
+        to: &mut Sink<'_, Q>,
     ) {
         let (at, candidate) = (flight.ray(), flight.waiting());
         if !Q::DEFERS || candidate.leaf == NONE {
@@ -86,7 +87,7 @@ impl Landing {
         s: S,
         object: &ObjectView<'_>,
         rays: &[Ray],
-        to: &mut impl Deliver<Q>,
+        to: &mut Sink<'_, Q>,
     ) {
         if self.count == 0 {
             return;

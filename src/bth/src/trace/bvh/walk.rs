@@ -3,7 +3,7 @@
 
 use super::alone::Alone;
 use super::flight::key_limit;
-use super::nodes::{Nodes, prefetch};
+use super::nodes::{Nodes, indexed_leaf, prefetch};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use crate::trace::candidate::{Candidate, Settled, settle, settle_one};
@@ -143,7 +143,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         while code & Child::LEAF_BIT == 0 {
             count.node();
             let node = N::node(ground, code);
-            let (bits, enter) = planes.children(s, node, walk.last);
+            let (bits, enter) = planes.children(s, &node, walk.last);
             if bits & bits.wrapping_sub(1) == 0 {
                 if bits != 0 {
                     code = node.child()[bits.trailing_zeros() as usize % WIDTH];
@@ -166,21 +166,16 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
             // A ray alone has nothing to do while it waits for that one.
             prefetch(s, nodes, ground, stack.below());
         }
-        let done = if let Some(leaf) = ground.indexed_leaf(code) {
+        let mut unpacked = None;
+        let done = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
             count.leaf();
             count.triangles(leaf.triangles);
             walk.enter_leaf(s, (leaf, code), query)
         } else {
-            let (mut indexed, mut raw) = (None, None);
+            let mut unpacked = None;
             match Child::from_code(code) {
-                Some(Child::Indexed(at)) => {
-                    let leaf = object.indexed(at, &mut indexed);
-                    count.leaf();
-                    count.triangles(leaf.triangles);
-                    walk.enter_leaf(s, (leaf, code), query)
-                }
                 Some(Child::Raw(at)) => {
-                    let leaf = object.raw(at, &mut raw);
+                    let leaf = object.raw(at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
                     walk.enter_leaf(s, (leaf, code), query)

@@ -7,7 +7,7 @@ use super::group::Group;
 use super::hull::Hull;
 use super::packet::{Entry, GROUPS};
 use crate::simd::{LANES, Simd};
-use crate::trace::crossings::Many;
+use crate::trace::intersections::Many;
 use crate::trace::prepare::{Aim, Prepared};
 use crate::trace::sight::{Block, Candidates};
 use bth_format::layout::{WIDTH, WideNode};

@@ -1,4 +1,4 @@
-//! Sixteen rays of a packet, a lane each.
+//! AnswerLanes rays of a packet, a lane each.
 //!
 //! What [`crate::trace::slabs`] and [`crate::trace::sight`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
 //! one box or triangle: the same operations on the same prepared floats ([`crate::trace::prepare`]), so the same bounds hold.
@@ -8,7 +8,7 @@ use super::leaf::Leaf;
 use super::met::{APART, Looks};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::crossings::{Crossings, Pairs};
+use crate::trace::intersections::{Intersections, Pairs};
 use crate::trace::prepare::{self, Axes, Common, Mixed};
 use crate::trace::sight::Block;
 use bth_format::layout::NONE;
@@ -47,7 +47,7 @@ impl<S: Simd> Projection<S> {
     }
 }
 
-/// Sixteen rays, and what they have found.
+/// AnswerLanes rays, and what they have found.
 #[derive(Clone, Copy)]
 pub(crate) struct Group<S: Simd> {
     pub(crate) origin: [S::F; 3],
@@ -240,7 +240,7 @@ impl<S: Simd> Group<S> {
 
     /// Computes where rays cross the triangles that wait to be computed; if none does, it is only said so.
     #[inline(always)]
-    pub(crate) fn cross<H: Hull<S>>(&self, s: S, looks: &mut Looks<'_>, crossings: &mut Crossings) {
+    pub(crate) fn cross<H: Hull<S>>(&self, s: S, looks: &mut Looks<'_>, crossings: &mut Intersections) {
         let some = s.mask_bits(s.lt_u(self.waiting, s.splat_u(NONE)));
         (crossings.certain, crossings.open) = (0, 0);
         if some == 0 {

@@ -1,11 +1,11 @@
 //! Triangles that rays of a packet certainly hit, each nearer than all before: kept once for all rays that start at one point.
 //!
-//! f64 then does for a triangle what does not depend on the direction ([`crate::trace::crossing::Seen`]), and for a ray only the rest.
+//! f64 then does for a triangle what does not depend on the direction ([`crate::trace::intersection::Seen`]), and for a ray only the rest.
 
 use super::leaf::Leaf;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::Candidate;
-use crate::trace::crossings::{Many, SeenFromPoint};
+use crate::trace::intersections::{Many, SeenFromPoint};
 use crate::trace::sight::Block;
 
 /// Triangles that are kept.

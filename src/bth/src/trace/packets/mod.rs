@@ -17,7 +17,8 @@ use self::hull::{Beam, Hull, SegmentBox};
 use self::packet::{KeptGroups, PACKET, Packets, Room, Use};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::query::{Deliver, Offset, Query};
+use crate::trace::query::Query;
+use crate::trace::sink::Sink;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -64,7 +65,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     scratch: &mut PacketScratch,
     least: LeastUse,
-    to: &mut impl Deliver<Q>,
+    to: &mut Sink<'_, Q>,
 ) -> PacketCount {
     let mut count = PacketCount::default();
     // Where tetrahedra have no subtree beside them, and through packed nodes, rays go alone.
@@ -88,14 +89,14 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         for line in 0..PACKET / RAYS_A_LINE {
             s.prefetch(next.wrapping_add(line * RAYS_A_LINE));
         }
-        let mut to = Offset { first: at, to: &mut *to };
+        let to = to.from_ray(at);
         let (outcome, guard, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
                 // Whether any hit will do is most often asked on the way to a light, from different points.
                 let outcome = if !Q::ANY && span.is_from_point() {
-                    beam::<S, Q, true>(s, object, &bounds, &span, &mut packets, own, &mut to)
+                    beam::<S, Q, true>(s, object, &bounds, &span, &mut packets, own, to)
                 } else {
-                    beam::<S, Q, false>(s, object, &bounds, &span, &mut packets, own, &mut to)
+                    beam::<S, Q, false>(s, object, &bounds, &span, &mut packets, own, to)
                 };
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
@@ -103,7 +104,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             Kind::Short(_) if !Q::ANY => (Use::Refused, &mut runs.short, least.short, &mut count.short),
             Kind::Short(segments) => {
                 let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, own) {
-                    packets.trace(s, object, &SegmentBox::new(s, segments), own, &mut to)
+                    packets.trace(s, object, &SegmentBox::new(s, segments), own, to)
                 } else {
                     Use::Refused
                 };
@@ -208,7 +209,7 @@ fn beam<S: Simd, Q: Query, const POINT: bool>(
     span: &Span,
     packets: &mut Packets<'_, S, Q>,
     rays: &[Ray],
-    to: &mut impl Deliver<Q>,
+    to: &mut Sink<'_, Q>,
 ) -> Use {
     if !prepare::<S, Q, Beam<S, POINT>>(s, bounds, packets, rays) {
         return Use::Refused;

@@ -15,8 +15,9 @@ use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::bvh::flight::KEY_SLACK;
 use crate::trace::bvh::nodes::{Wide, prefetch};
-use crate::trace::crossings::{Crossings, SeenFromPoint};
-use crate::trace::query::{Deliver, Query};
+use crate::trace::intersections::{Intersections, SeenFromPoint};
+use crate::trace::query::Query;
+use crate::trace::sink::Sink;
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
@@ -48,7 +49,7 @@ pub(crate) struct Room {
     lone: Lone,
     pub(crate) met: Met,
     seen: SeenFromPoint,
-    crossings: [Crossings; GROUPS],
+    crossings: [Intersections; GROUPS],
 }
 
 impl Default for Room {
@@ -60,7 +61,7 @@ impl Default for Room {
             lone: Lone::NONE,
             met: Met::NONE,
             seen: SeenFromPoint::NONE,
-            crossings: [Crossings::NONE; GROUPS],
+            crossings: [Intersections::NONE; GROUPS],
         }
     }
 }
@@ -120,7 +121,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         object: &ObjectView<'_>,
         hull: &H,
         rays: &[Ray],
-        to: &mut impl Deliver<Q>,
+        to: &mut Sink<'_, Q>,
     ) -> Use {
         let Packets { groups, queries, room } = self;
         let Room { stack, points, relative, lone, met, seen, crossings } = &mut **room;
@@ -260,10 +261,10 @@ fn meeting<S: Simd, H: Hull<S>>(
 fn finish<S: Simd, H: Hull<S>, Q: Query>(
     s: S,
     groups: &[Group<S>],
-    (seen, crossings): (&mut SeenFromPoint, &mut [Crossings; GROUPS]),
+    (seen, crossings): (&mut SeenFromPoint, &mut [Intersections; GROUPS]),
     rays: &mut Rays<'_, Q>,
     all: u64,
-    to: &mut impl Deliver<Q>,
+    to: &mut Sink<'_, Q>,
 ) {
     if Q::ANY {
         let mut hit = all & !rays.alive;

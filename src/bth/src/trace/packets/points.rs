@@ -3,7 +3,7 @@
 use super::group::Projection;
 use super::hull::View;
 use crate::simd::{LANES, Simd};
-use crate::trace::crossings::Many;
+use crate::trace::intersections::Many;
 use bth_format::layout::WIDTH;
 
 /// Points of a leaf at most.
@@ -39,7 +39,7 @@ pub(crate) struct Relative([[Many; 3]; 3]);
 impl Relative {
     pub(crate) const NONE: Relative = Relative([[[0.0; LANES]; 3]; 3]);
 
-    /// Sixteen of them.
+    /// AnswerLanes of them.
     #[inline(always)]
     pub(crate) fn put<S: Simd>(&mut self, s: S, part: usize, rows: [S::F; 3], from: [f32; 3]) {
         for k in 0..3 {

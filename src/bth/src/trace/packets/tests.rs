@@ -2,10 +2,10 @@
 
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::trace::batch::Sink;
 use crate::trace::packets::{self, LEAST_USE, LeastUse, PacketCount, PacketScratch};
 use crate::trace::query::{Any, Nearest, Query};
 use crate::trace::single;
+use crate::trace::sink::Sink;
 use bth_format::layout::{
     Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
 };
@@ -202,7 +202,7 @@ fn packed_in<Q: Query>(
     least: LeastUse,
     answers: &mut [Q::Answer],
 ) -> PacketCount {
-    let sink = Sink::<Q> { ids: object.triangle_ids, answers, instance: 0 };
+    let sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
     let count = isa.run(Packed { object, rays, scratch, least, sink });
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     count

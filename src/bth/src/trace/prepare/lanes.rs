@@ -1,4 +1,4 @@
-//! Sixteen rays prepared in lanes: what [`Aim`]s say of them, before they are turned into those.
+//! AnswerLanes rays prepared in lanes: what [`Aim`]s say of them, before they are turned into those.
 
 use super::axes::Axes;
 use super::{Aim, LARGEST, Noted, SMALLEST, UP};

@@ -4,7 +4,7 @@
 use super::{Aim, Prepared};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
-use crate::trace::crossing::Crossing;
+use crate::trace::intersection::Intersection;
 use crate::trace::line::Line;
 use crate::trace::sight::Sight;
 use crate::trace::slabs::Slabs;
@@ -67,7 +67,7 @@ impl Kernel for Look<'_> {
     }
 }
 
-/// Sixteen rays prepared together, as a kernel.
+/// AnswerLanes rays prepared together, as a kernel.
 struct Together<'a>(&'a [Ray; LANES], &'a Object);
 
 impl Kernel for Together<'_> {
@@ -97,7 +97,7 @@ fn aims(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<Aim> {
     aims
 }
 
-fn in_range(ray: &Ray, crossing: &Option<Crossing>) -> bool {
+fn in_range(ray: &Ray, crossing: &Option<Intersection>) -> bool {
     crossing.is_some_and(|crossing| {
         let t = crossing.t as f32;
         ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY

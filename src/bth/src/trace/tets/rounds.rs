@@ -115,19 +115,23 @@ impl<Q: Query + Copy> Kernel for &mut Batch<'_, Q> {
         let vertices = vertices(self.object);
         let mut queue = Queue::new();
         let idle = Group { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
-        let (mut a, mut b, mut c) = (idle, idle, idle);
+        let mut groups = [idle; 3];
         // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
         let most = self.object.records.len();
         let mut clock = Clock { round: 0, more: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));
         loop {
-            self.refill(s, &mut queue, &mut a, &mut clock);
-            self.refill(s, &mut queue, &mut b, &mut clock);
-            self.refill(s, &mut queue, &mut c, &mut clock);
-            if a.held | b.held | c.held == 0 {
+            // In a loop, and compiled once: lanes are in memory here whatever is done.
+            let mut held = 0;
+            for group in &mut groups {
+                self.refill(s, &mut queue, group, &mut clock);
+                held |= group.held;
+            }
+            if held == 0 {
                 return;
             }
+            let [a, b, c] = &mut groups;
             a.lanes.fetch(s, one, &mut a.step, &records, vertices);
             b.lanes.fetch(s, one, &mut b.step, &records, vertices);
             c.lanes.fetch(s, one, &mut c.step, &records, vertices);
@@ -145,9 +149,9 @@ impl<Q: Query + Copy> Kernel for &mut Batch<'_, Q> {
             steps += 1;
             if steps == most {
                 (clock.round, steps) = (clock.round + 1, 0);
-                self.give_up(s, &mut a, clock.round);
-                self.give_up(s, &mut b, clock.round);
-                self.give_up(s, &mut c, clock.round);
+                for group in &mut groups {
+                    self.give_up(s, group, clock.round);
+                }
             }
         }
     }

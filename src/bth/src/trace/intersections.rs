@@ -1,13 +1,13 @@
 //! Where sixteen rays cross the triangles that f32 is sure they hit: in f64, all at once.
 
-use super::crossing::{Seen, Weighed, reported_share, size, wide};
+use super::intersection::{Seen, Weighed, reported_share, size, wide};
 use super::query::reported;
 use crate::simd::{LANES, Simd};
 
-/// Sixteen of a number.
+/// AnswerLanes of a number.
 pub(crate) type Many = [f32; LANES];
 
-/// Sixteen rays and a triangle of each.
+/// AnswerLanes rays and a triangle of each.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Pairs {
@@ -70,7 +70,7 @@ fn lane(rows: &[Many; 3], i: usize) -> [f64; 3] {
 /// What f64 makes of the triangles that wait to be computed.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Crossings {
+pub(crate) struct Intersections {
     /// As it is reported.
     pub(crate) triangle: [u32; LANES],
     pub(crate) t: Many,
@@ -83,8 +83,8 @@ pub(crate) struct Crossings {
     pub(crate) open: u32,
 }
 
-impl Crossings {
-    pub(crate) const NONE: Crossings = Crossings {
+impl Intersections {
+    pub(crate) const NONE: Intersections = Intersections {
         certain: 0,
         open: 0,
         triangle: [0; LANES],

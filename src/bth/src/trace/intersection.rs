@@ -22,7 +22,7 @@ const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Crossing {
+pub(crate) struct Intersection {
     /// In units of the direction. Order hits by this; report it rounded to f32.
     pub(crate) t: f64,
     /// u, v and 1 as multiples of the same.
@@ -36,7 +36,7 @@ pub(crate) fn reported_share(x: f64) -> f32 {
     (if x > 0.0 { x } else { 0.0 }) as f32
 }
 
-impl Crossing {
+impl Intersection {
     /// Barycentric weights of the triangle's second and third vertex, as they are reported.
     pub(crate) fn uv(&self) -> [f32; 2] {
         let [u, v, whole] = self.weight;
@@ -51,7 +51,7 @@ pub(crate) enum Estimate {
     /// The line passes the triangle.
     Missed,
     /// It crosses, at t, u and v good to [`RATIO_ERROR`].
-    Crossed(Crossing),
+    Crossed(Intersection),
     /// Rounding hides the answer; and between which t the line crosses, if it does.
     Open(Doubt, [f64; 2]),
 }
@@ -170,8 +170,8 @@ impl Weighed {
         Weighed { weight, share, t: seen.volume * share, is_good: seen.least * size < whole.abs() }
     }
 
-    fn crossing(&self) -> Crossing {
-        Crossing { t: self.t, weight: self.weight }
+    fn crossing(&self) -> Intersection {
+        Intersection { t: self.t, weight: self.weight }
     }
 }
 
@@ -223,7 +223,7 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
 
 impl Line {
     /// Whether, where and how the line crosses the closed triangle with these corners.
-    pub(crate) fn crossing(&self, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+    pub(crate) fn crossing(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         match estimate(self.origin, self.direction, corners.map(wide)) {
             Estimate::Missed => None,
             Estimate::Crossed(crossing) => Some(crossing),
@@ -234,7 +234,7 @@ impl Line {
     /// A crossing that f64 leaves open: whether there is one is decided exactly, and t, u and v are exact unless f64's are good.
     #[cold]
     #[inline(never)]
-    fn close_crossing(&self, corners: [[f32; 3]; 3], doubt: &Doubt) -> Option<Crossing> {
+    fn close_crossing(&self, corners: [[f32; 3]; 3], doubt: &Doubt) -> Option<Intersection> {
         let corners = corners.map(wide);
         let &Doubt { weighed, mut weight, bound } = doubt;
         for i in 0..3 {
@@ -258,7 +258,7 @@ impl Line {
     }
 
     /// t, u and v from exact sums.
-    fn exact_crossing(&self, [a, b, c]: [[f64; 3]; 3]) -> Crossing {
+    fn exact_crossing(&self, [a, b, c]: [[f64; 3]; 3]) -> Intersection {
         let (second, third) = (self.edge(c, a), self.edge(a, b));
         let mut whole = Expansion::<{ 3 * EDGE }>::new();
         whole.add_edge(self.origin, self.direction, b, c);
@@ -267,7 +267,7 @@ impl Line {
         let mut volume = Expansion::<VOLUME>::new();
         volume.add_volume(self.origin, a, b, c);
         let whole = whole.value();
-        Crossing { t: volume.value() / whole, weight: [second.value(), third.value(), whole] }
+        Intersection { t: volume.value() / whole, weight: [second.value(), third.value(), whole] }
     }
 }
 

@@ -127,11 +127,10 @@ fn trace_one_way<Q: Query>(
         for (part, rays) in rays.chunks(PART).enumerate() {
             let first = part * PART;
             let from = from.map(|from| &from[first..][..rays.len()]);
-            trace_hinted(object, rays, from, scratch, to.from_ray(first));
+            trace_hinted(object, rays, from, scratch, &mut to.part(first));
         }
         return;
     }
-    let to = to.from_ray(0);
     let packed = in_packets(object, rays, scratch, to);
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);

@@ -14,6 +14,7 @@ pub(crate) struct Visit {
 }
 
 /// Relates the rays of a batch in object space to those of the scene that they come from.
+#[derive(Clone, Copy)]
 pub(crate) struct SceneRays<'a> {
     /// All rays of the scene's batch, in world space.
     pub(crate) rays: &'a [Ray],
@@ -46,11 +47,11 @@ impl<'a, Q: Query> Sink<'a, Q> {
         Sink { ids, answers, instance: 0, scene: Some(scene), first: 0 }
     }
 
-    /// The same answers, for a part of the batch that begins at `first`.
+    /// The same answers for a part of the rays, which begins at `first`.
     #[inline(always)]
-    pub(crate) fn from_ray(&mut self, first: usize) -> &mut Self {
-        self.first = first;
-        self
+    pub(crate) fn part(&mut self, first: usize) -> Sink<'_, Q> {
+        let Sink { ids, instance, scene, .. } = *self;
+        Sink { ids, answers: self.answers, instance, scene, first: self.first + first }
     }
 
     /// Takes in the answer of a query that has ended.

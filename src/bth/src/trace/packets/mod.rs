@@ -89,7 +89,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         for line in 0..PACKET / RAYS_A_LINE {
             s.prefetch(next.wrapping_add(line * RAYS_A_LINE));
         }
-        let to = to.from_ray(at);
+        let to = &mut to.part(at);
         let (outcome, guard, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
                 // Whether any hit will do is most often asked on the way to a light, from different points.

@@ -1,7 +1,7 @@
 //! AnswerLanes lanes in plain arrays: for machines without vector code, and what the other instruction sets are tested against.
 //!
-//! Each operation is a small function of its own that loops over the lanes. Inlined, the loops of a kernel would be unrolled
-//! into hundreds of kilobytes; apart, compilers turn each into what vectors the target has at least.
+//! Each operation is a loop over the lanes, which compilers turn into what vectors the target has at least. Kernels that only
+//! pay with vectors are left out ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part of the library.
 
 use super::{LANES, Simd};
 use std::array::from_fn;
@@ -30,7 +30,7 @@ pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-#[inline(never)]
+#[inline(always)]
 fn mask_bits(m: &M) -> u32 {
     let mut bits = 0;
     for i in 0..LANES {
@@ -39,7 +39,7 @@ fn mask_bits(m: &M) -> u32 {
     bits
 }
 
-#[inline(never)]
+#[inline(always)]
 fn expand(a: &U, m: &M, from: &U) -> U {
     let mut out = *a;
     for (next, lane) in lanes(mask_bits(m)).enumerate() {
@@ -48,7 +48,7 @@ fn expand(a: &U, m: &M, from: &U) -> U {
     out
 }
 
-#[inline(never)]
+#[inline(always)]
 fn compress(bits: u32, a: &U, to: &mut U) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
@@ -77,7 +77,7 @@ pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: 
 }
 
 /// [`Simd::transpose`] in plain code.
-#[inline(never)]
+#[inline(always)]
 fn transpose(rows: &[F; LANES]) -> [F; LANES] {
     let mut out = [[0.0; LANES]; LANES];
     for (i, row) in rows.iter().enumerate() {
@@ -99,18 +99,8 @@ pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usi
     kept
 }
 
-#[inline(never)]
-fn sort(bits: u32, key: &F, a: &U, to: &mut U, keys: &mut F) -> usize {
-    compress_far_to_near(bits, key, a, to, keys)
-}
-
-#[inline(never)]
-fn filter(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
-    keep_up_to(codes, keys, limit)
-}
-
 /// Rows by their columns.
-#[inline(never)]
+#[inline(always)]
 fn columns<T: Copy + Default, const N: usize>(m: &M, from: &[[T; N]], row: &U) -> [[T; LANES]; N] {
     let mut out = [[T::default(); LANES]; N];
     for i in 0..LANES {
@@ -124,12 +114,12 @@ fn columns<T: Copy + Default, const N: usize>(m: &M, from: &[[T; N]], row: &U) -
     out
 }
 
-#[inline(never)]
+#[inline(always)]
 fn gather(m: &M, from: &[u32], at: &U) -> U {
     from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { 0 })
 }
 
-#[inline(never)]
+#[inline(always)]
 fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
     let pair: [[u32; 2]; LANES] = from_fn(|i| if m[i] != 0 { from[at[i] as usize] } else { [0; 2] });
     (pair.map(|p| p[0]), pair.map(|p| p[1]))
@@ -138,7 +128,7 @@ fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
 /// Functions of whole vectors, a loop over the lanes each.
 macro_rules! loops {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $lane:expr;)*) => { $(
-        #[inline(never)]
+        #[inline(always)]
         fn $name($($arg: &$of),*) -> $out {
             from_fn(|i| {
                 $(let $arg = $arg[i];)*
@@ -183,27 +173,27 @@ loops! {
     numbers(a: U) -> F = a as f32;
 }
 
-#[inline(never)]
+#[inline(always)]
 fn lookup(table: &U, at: &U) -> U {
     from_fn(|i| table[at[i] as usize % LANES])
 }
 
-#[inline(never)]
+#[inline(always)]
 fn shl(a: &U, by: u32) -> U {
     from_fn(|i| a[i] << by)
 }
 
-#[inline(never)]
+#[inline(always)]
 fn mask(bits: u32) -> M {
     from_fn(|i| all_bits(bits >> i & 1 != 0))
 }
 
-#[inline(never)]
+#[inline(always)]
 fn least(a: &F) -> f32 {
     a.iter().fold(f32::INFINITY, |m, &x| if x < m { x } else { m })
 }
 
-#[inline(never)]
+#[inline(always)]
 fn columns_of_all(rows: &[[u32; 8]; LANES]) -> [U; 8] {
     from_fn(|k| from_fn(|i| rows[i][k]))
 }
@@ -362,11 +352,11 @@ impl Simd for Scalar {
     }
     #[inline(always)]
     fn compress_far_to_near(self, bits: u32, key: F, a: U, to: &mut U, keys: &mut F) -> usize {
-        sort(bits, &key, &a, to, keys)
+        compress_far_to_near(bits, &key, &a, to, keys)
     }
     #[inline(always)]
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
-        filter(codes, keys, limit)
+        keep_up_to(codes, keys, limit)
     }
     #[inline(always)]
     fn transpose(self, rows: [F; LANES]) -> [F; LANES] {

@@ -67,15 +67,15 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
 }
 
 /// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
-#[inline]
+#[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     nearest_to(object, ray, from, instance, &mut hit);
     hit
 }
 
-/// As [`nearest`], written to `to`. Compiled here once, and not in every crate that traces.
-#[inline(never)]
+/// As [`nearest`], written to `to`.
+#[inline(always)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, to: &mut Hit) {
     trace::<Nearest, ()>(object, ray, from, instance, &mut (), to);
 }
@@ -88,7 +88,7 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 }
 
 /// Whether a ray in object space hits anything.
-#[inline(never)]
+#[inline(always)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;
     trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);

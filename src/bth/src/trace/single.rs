@@ -1,7 +1,7 @@
 //! One ray through an object.
 
 use super::bvh::alone::Alone;
-use super::bvh::nodes::{AnyKind, Nodes, Packed, Wide};
+use super::bvh::nodes::{Nodes, Packed, Wide};
 use super::bvh::walk::walk;
 use super::prepare::Aim;
 use super::query::{Count, Query};
@@ -81,9 +81,6 @@ impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        if !S::HAS_VECTORS {
-            return self.walk(s, AnyKind);
-        }
         if self.object.has_packed_nodes() {
             return through_packed_nodes(self);
         }
@@ -95,8 +92,7 @@ impl<Q: Query, C: Count> Kernel for &mut Single<'_, Q, C> {
 #[cold]
 #[inline(never)]
 fn through_packed_nodes<Q: Query, C: Count>(single: &mut Single<'_, Q, C>) {
-    // Plain code does not get here.
-    let _ = Isa::chosen().run_wide(AmongPacked(single));
+    Isa::chosen().run(AmongPacked(single));
 }
 
 /// A ray among packed nodes, as a kernel.

@@ -175,17 +175,6 @@ pub(crate) fn row<T>(rows: &[[T; WIDTH]; 2], at: u32) -> &[T; WIDTH] {
     rows.as_flattened()[at..at + WIDTH].try_into().expect("a row")
 }
 
-impl<B: Boxes> Boxes for &B {
-    #[inline(always)]
-    fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
-        (**self).ends(s, axis, at)
-    }
-    #[inline(always)]
-    fn child(&self) -> &[u32; WIDTH] {
-        (**self).child()
-    }
-}
-
 impl Boxes for WideNode {
     #[inline(always)]
     fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {

@@ -136,7 +136,7 @@ impl<Q: Query> Supply<'_, Q> {
             }
             if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
                 let root = N::node(self.object.ground(), self.root);
-                flights.start_among(s, at, &root, (self.met[lane], s.load(&self.enter[lane])));
+                flights.start_among(s, at, root, (self.met[lane], s.load(&self.enter[lane])));
             } else {
                 flights.start(at, self.root);
             }
@@ -163,7 +163,7 @@ impl<Q: Query> Supply<'_, Q> {
         let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.ground(), self.root));
         for lane in 0..count {
             let mut meets = true;
-            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), &root) {
+            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), root) {
                 let (bits, enter) = aim.slabs.children(s, root, aim.slabs.last);
                 s.store(enter, &mut self.enter[lane % LANES]);
                 self.met[lane % LANES] = bits;

@@ -189,7 +189,7 @@ impl<'a, Q: Query> Flights<'a, Q> {
             for i in 0..counts.take(Counts::INNER) {
                 let at = usize::from(lists.inner[i]) % IN_FLIGHT;
                 let (top, node) = (tops.place[at], N::node(ground, tops.code[at]));
-                let count = slots[at].0.enter_node(s, &node, stacks.room(top));
+                let count = slots[at].0.enter_node(s, node, stacks.room(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.place[at], tops.code[at]) = (top, code);

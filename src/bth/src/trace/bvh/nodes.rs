@@ -4,18 +4,18 @@ use crate::simd::Simd;
 use crate::trace::slabs::Boxes;
 use bth_format::Room;
 use bth_format::layout::{
-    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WIDTH, WideNode,
+    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode,
 };
 use bth_format::object::{Ground, ObjectView};
 
 /// A kind of nodes.
 pub(crate) trait Nodes: Copy {
     /// A node.
-    type Node<'a>: Boxes;
+    type Node: Boxes;
     /// Cache lines of one.
     const LINES: usize;
     /// The node that the code of a child leads to.
-    fn node(ground: Ground<'_>, code: u32) -> Self::Node<'_>;
+    fn node(ground: Ground<'_>, code: u32) -> &Self::Node;
 }
 
 /// All nodes are [`WideNode`]s.
@@ -26,18 +26,8 @@ pub(crate) struct Wide;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packed;
 
-/// Nodes of either kind, told apart by their codes: for plain code, where a branch a node costs nothing in comparison.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct AnyKind;
-
-/// A node of [`AnyKind`].
-pub(crate) enum WideOrPacked<'a> {
-    Wide(&'a WideNode),
-    Packed(&'a PackedNode),
-}
-
 impl Nodes for Wide {
-    type Node<'a> = &'a WideNode;
+    type Node = WideNode;
     const LINES: usize = NODE_LINES;
     #[inline(always)]
     fn node(ground: Ground<'_>, code: u32) -> &WideNode {
@@ -46,41 +36,11 @@ impl Nodes for Wide {
 }
 
 impl Nodes for Packed {
-    type Node<'a> = &'a PackedNode;
+    type Node = PackedNode;
     const LINES: usize = PACKED_NODE_LINES;
     #[inline(always)]
     fn node(ground: Ground<'_>, code: u32) -> &PackedNode {
         ground.packed_node(code & !Child::PACKED_BIT)
-    }
-}
-
-impl Nodes for AnyKind {
-    type Node<'a> = WideOrPacked<'a>;
-    const LINES: usize = NODE_LINES;
-    #[inline(always)]
-    fn node(ground: Ground<'_>, code: u32) -> WideOrPacked<'_> {
-        if code & Child::PACKED_BIT == 0 {
-            WideOrPacked::Wide(Wide::node(ground, code))
-        } else {
-            WideOrPacked::Packed(Packed::node(ground, code))
-        }
-    }
-}
-
-impl Boxes for WideOrPacked<'_> {
-    #[inline(always)]
-    fn ends<S: Simd>(&self, s: S, axis: usize, at: u32) -> S::F {
-        match self {
-            WideOrPacked::Wide(node) => node.ends(s, axis, at),
-            WideOrPacked::Packed(node) => node.ends(s, axis, at),
-        }
-    }
-    #[inline(always)]
-    fn child(&self) -> &[u32; WIDTH] {
-        match self {
-            WideOrPacked::Wide(node) => &node.child,
-            WideOrPacked::Packed(node) => &node.child,
-        }
     }
 }
 

@@ -143,7 +143,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         while code & Child::LEAF_BIT == 0 {
             count.node();
             let node = N::node(ground, code);
-            let (bits, enter) = planes.children(s, &node, walk.last);
+            let (bits, enter) = planes.children(s, node, walk.last);
             if bits & bits.wrapping_sub(1) == 0 {
                 if bits != 0 {
                     code = node.child()[bits.trailing_zeros() as usize % WIDTH];

@@ -134,6 +134,7 @@ impl File {
     }
 
     /// Objects in the file.
+    #[inline]
     pub fn object_count(&self) -> u32 {
         self.rows.len() as u32
     }

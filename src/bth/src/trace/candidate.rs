@@ -17,15 +17,6 @@ pub(crate) struct Candidate {
     pub(crate) triangle: u32,
 }
 
-/// What became of a ray.
-pub(crate) enum Settled {
-    Nothing,
-    /// The nearest hit so far lies between these t.
-    Found([f64; 2]),
-    /// The query has what it wants.
-    Enough,
-}
-
 impl Candidate {
     /// None at all.
     pub(crate) const NONE: Candidate = Candidate { leaf: NONE, triangle: 0 };
@@ -70,22 +61,27 @@ impl Reader for Corners {
     }
 }
 
-/// Offers candidates of a ray to its query, and tells how far the nearest hit is now.
+/// Offers candidates of a ray to its query: the pending hit, then these triangles of a leaf, a bit each. True if the query has
+/// what it wants. What f32 leaves open is decided here for all kinds of traversal, by f64 and where need be exactly.
 #[inline(never)]
 pub(crate) fn settle<Q: Query>(
     object: &ObjectView<'_>,
     ray: &Ray,
-    candidates: [Candidate; 2],
+    pending: Candidate,
+    (leaf, mut triangles): (u32, u32),
     query: &mut Q,
-) -> Settled {
-    for candidate in candidates {
-        if settle_one(object, ray, candidate, query) {
-            return Settled::Enough;
+) -> bool {
+    let mut candidate = pending;
+    loop {
+        if candidate.leaf != NONE && settle_one(object, ray, candidate, query) {
+            return true;
         }
+        if triangles == 0 {
+            return false;
+        }
+        candidate = Candidate { leaf, triangle: triangles.trailing_zeros() };
+        triangles &= triangles - 1;
     }
-    let limit = query.limit();
-    // As far below as the limit lies above.
-    query.found().map_or(Settled::Nothing, |t| Settled::Found([2.0 * t - limit, limit]))
 }
 
 /// Offers a candidate of a ray to its query; true if it has what it wants then.

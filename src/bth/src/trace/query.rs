@@ -41,8 +41,6 @@ impl<'a> Named<'a> {
 pub(crate) trait Query: Copy {
     /// Whether any hit will do.
     const ANY: bool;
-    /// Whether only the last of several hits, each nearer than the one before, need be computed.
-    const DEFERS: bool = false;
     /// What the caller gets.
     type Answer;
     /// `ids` are those of the object, in leaf order.
@@ -72,6 +70,13 @@ pub(crate) trait Query: Copy {
     fn cares(&self, t: [f64; 2]) -> bool;
     /// t of the nearest hit so far, if the query wants the nearest.
     fn found(&self) -> Option<f64>;
+    /// Between which t the nearest hit so far lies, if there is one and the query wants the nearest.
+    #[inline(always)]
+    fn found_between(&self) -> Option<[f64; 2]> {
+        let limit = self.limit();
+        // As far below as the limit lies above.
+        self.found().map(|t| [2.0 * t - limit, limit])
+    }
     /// A triangle is certainly hit within the ray's range; of use where any hit will do.
     fn accept(&mut self);
 }
@@ -104,7 +109,6 @@ impl Nearest {
 
 impl Query for Nearest {
     const ANY: bool = false;
-    const DEFERS: bool = true;
     type Answer = Hit;
     fn answer(&self, ids: &[u32], instance: u32) -> Hit {
         if self.triangle == NONE {

@@ -1,8 +1,9 @@
 //! Rays of a batch through the BVH of an object: taken in sixteen at a time, and handed on as they end.
 
-use super::flight::{Flight, Found};
+use super::flight::Flight;
 use super::flights::Flights;
 use super::landing::Landing;
+use super::leaf::{LeafOutcome, Progress, decide};
 use super::nodes::Nodes;
 use super::stack::{Place, Stacks};
 use crate::rays::Ray;
@@ -98,7 +99,7 @@ impl<Q: Query> BatchWalk<'_, '_, Q> {
             flights.leaf_steps(s, nodes, (object, rays), |row, flight, top, stacks| {
                 let place = flight.ray();
                 if walked.is_some_and(|walked| walked[place] == row) {
-                    return Found::Nothing;
+                    return LeafOutcome::Nothing;
                 }
                 enter_tets(object, row, &rays[place], (flight, top), stacks, &mut tets)
             });
@@ -132,7 +133,7 @@ impl<Q: Query> Supply<'_, Q> {
                 }
             }
             if query.is_some() {
-                flight.take_over();
+                flight.take_over(&self.rays[place as usize]);
             }
             if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
                 let root = N::node(self.object.ground(), self.root);
@@ -196,13 +197,12 @@ fn enter_tets<Q: Query>(
     (flight, top): (&mut Flight<Q>, Place),
     stacks: &mut Stacks,
     tets: &mut impl FnMut(u32, &Ray, &mut Q) -> bool,
-) -> Found {
+) -> LeafOutcome {
     let subtree = object.tet_leaves[row as usize].subtree;
     if subtree != NONE {
         stacks.set_code(top, subtree);
-        return Found::Again;
+        return LeafOutcome::Replaced;
     }
-    flight.settle(object, ray);
-    let done = tets(row, ray, flight.ask(ray));
-    if done { Found::Enough } else { flight.settled(Found::Nothing) }
+    decide(object, ray, flight, NONE, 0);
+    if tets(row, ray, flight.query(ray)) { LeafOutcome::Done } else { flight.take_over(ray) }
 }

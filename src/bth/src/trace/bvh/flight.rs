@@ -1,16 +1,15 @@
 //! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
 //! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
 
+use super::leaf::Progress;
 use crate::rays::Ray;
 use crate::simd::Simd;
-use crate::trace::candidate::{Candidate, open, settle};
-use crate::trace::intersection::{Estimate, estimate, wide};
+use crate::trace::candidate::Candidate;
 use crate::trace::prepare::{Aim, Noted};
-use crate::trace::query::{Named, Query};
-use crate::trace::sight::{Block, Candidates, Certain};
+use crate::trace::query::Query;
 use crate::trace::sink::Sink;
 use crate::trace::slabs::Boxes;
-use bth_format::layout::{NONE, WIDTH};
+use bth_format::layout::WIDTH;
 use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
 
@@ -32,18 +31,6 @@ pub(crate) struct Flight<Q> {
     aim: Aim,
     /// Of rays of which something had to be decided ([`Noted::ASKED`]): for most nothing is ever, and they don't touch it.
     query: Q,
-}
-
-/// What a leaf made of a ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Found {
-    Nothing,
-    /// Something else in the place of the leaf, to be entered now.
-    Again,
-    /// A nearer hit than before: what waits farther off need not be entered.
-    Nearer,
-    /// What the query wants.
-    Enough,
 }
 
 impl<Q: Query> Flight<Q> {
@@ -98,40 +85,6 @@ impl<Q: Query> Flight<Q> {
         }
     }
 
-    /// The query: a new one, unless there is one already.
-    #[inline(always)]
-    pub(crate) fn ask(&mut self, ray: &Ray) -> &mut Q {
-        if self.aim.noted.decided == Noted::NEVER_ASKED {
-            self.give(Q::new(ray));
-        }
-        &mut self.query
-    }
-
-    /// Takes over what the query has found meanwhile.
-    pub(crate) fn take_over(&mut self) {
-        self.aim.slabs.last = self.aim.slabs.limit(self.query.limit());
-        if Q::DEFERS {
-            self.aim.noted.nearest = self.aim.slabs.nearest(&self.query);
-        }
-    }
-
-    /// What waits to be computed.
-    #[inline(always)]
-    pub(crate) fn waiting(&self) -> Candidate {
-        let Noted { leaf, triangle, .. } = self.aim.noted;
-        Candidate { leaf, triangle: triangle.into() }
-    }
-
-    /// Computes what waits.
-    #[inline(always)]
-    pub(crate) fn settle(&mut self, object: &ObjectView<'_>, ray: &Ray) {
-        if Q::DEFERS && self.aim.noted.leaf != NONE {
-            let waiting = self.waiting();
-            self.aim.noted.leaf = NONE;
-            settle(object, ray, [waiting, Candidate::NONE], self.ask(ray));
-        }
-    }
-
     /// Keys of the stack beyond this are of no interest any more.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
@@ -149,102 +102,48 @@ impl<Q: Query> Flight<Q> {
         let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
         write_children::<S, Q, B>(s, node, (bits, enter), to)
     }
+}
 
-    /// Tests the triangles of a leaf with this code. Of the rays of the batch only its own is looked up, and only if it must be.
+impl<Q: Query> Progress<Q> for Flight<Q> {
     #[inline(always)]
-    pub(crate) fn enter_leaf<S: Simd, B: Block>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        rays: &[Ray],
-        (block, code): (&B, u32),
-    ) -> Found {
-        let found = self.aim.sight.candidates(s, block, self.aim.slabs.first, self.aim.slabs.last);
-        if found.maybe == 0 {
-            return Found::Nothing;
-        }
-        if Q::ANY && found.sure != 0 {
-            self.aim.noted.decided = Noted::ACCEPTED;
-            return Found::Enough;
-        }
-        if Q::DEFERS {
-            return self.defer(s, object, rays, (block, code), found);
-        }
-        self.decide(s, object, &rays[self.ray()], block, found.maybe)
+    fn aim(&self) -> &Aim {
+        &self.aim
     }
-
-    /// Notes the nearest hit of a leaf if that is certain, and nearer than all before; else decides.
     #[inline(always)]
-    fn defer<S: Simd, B: Block>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        rays: &[Ray],
-        (block, code): (&B, u32),
-        found: Candidates<S>,
-    ) -> Found {
-        let (maybe, certain) = found.nearest_of_all(s);
-        if let Some(Certain { triangle, near, far }) = certain
-            && far < self.aim.noted.nearest
-        {
-            let place = (block.first() as usize).wrapping_add(triangle);
-            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
-            let noted = &mut self.aim.noted;
-            (noted.nearest, noted.leaf, noted.triangle) = (near, code, triangle as u16);
-            let nearer = far < self.aim.slabs.last;
-            if nearer {
-                self.aim.slabs.last = far;
-                return Found::Nearer;
-            }
-            return Found::Nothing;
-        }
-        let ray = &rays[self.ray()];
-        self.settle(object, ray);
-        self.decide(s, object, ray, block, maybe)
+    fn last(&self) -> f32 {
+        self.aim.slabs.last
     }
-
-    /// Offers the candidates of a leaf, a bit each, to the query, as f64 and exact arithmetic see them.
     #[inline(always)]
-    fn decide<S: Simd, B: Block>(
-        &mut self,
-        s: S,
-        object: &ObjectView<'_>,
-        ray: &Ray,
-        block: &B,
-        mut bits: u32,
-    ) -> Found {
-        self.ask(ray);
-        let (origin, direction) = (wide(ray.origin), wide(ray.direction));
-        while bits != 0 {
-            let i = bits.trailing_zeros() as usize % WIDTH;
-            bits &= bits - 1;
-            let corners = block.corners(i);
-            let crossing = match estimate(origin, direction, corners.map(wide)) {
-                Estimate::Missed => None,
-                Estimate::Crossed(crossing) => Some(crossing),
-                Estimate::Open(_, t) if !self.query.cares(t) => None,
-                Estimate::Open(..) => open(ray, corners),
-            };
-            let Some(crossing) = crossing else { continue };
-            let place = block.first() + i as u32;
-            s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place as usize));
-            if self.query.offer(Named::place(place, object.triangle_ids), crossing) {
-                return Found::Enough;
-            }
-        }
-        self.settled(Found::Nothing)
+    fn set_last(&mut self, last: f32) {
+        self.aim.slabs.last = last;
     }
-
-    /// Takes over what the query has found, and says what that means.
     #[inline(always)]
-    pub(crate) fn settled(&mut self, otherwise: Found) -> Found {
-        // Any hit ends the query; until then nothing changes. (And the stack has no keys.)
-        if Q::ANY {
-            return otherwise;
+    fn nearest(&self) -> f32 {
+        self.aim.noted.nearest
+    }
+    #[inline(always)]
+    fn set_nearest(&mut self, nearest: f32) {
+        self.aim.noted.nearest = nearest;
+    }
+    #[inline(always)]
+    fn pending(&self) -> Candidate {
+        let Noted { leaf, triangle, .. } = self.aim.noted;
+        Candidate { leaf, triangle: triangle.into() }
+    }
+    #[inline(always)]
+    fn set_pending(&mut self, pending: Candidate) {
+        (self.aim.noted.leaf, self.aim.noted.triangle) = (pending.leaf, pending.triangle as u16);
+    }
+    #[inline(always)]
+    fn query(&mut self, ray: &Ray) -> &mut Q {
+        if self.aim.noted.decided == Noted::NEVER_ASKED {
+            self.give(Q::new(ray));
         }
-        let limit = self.aim.slabs.last;
-        self.take_over();
-        if self.aim.slabs.last < limit { Found::Nearer } else { otherwise }
+        &mut self.query
+    }
+    #[inline(always)]
+    fn accept(&mut self) {
+        self.aim.noted.decided = Noted::ACCEPTED;
     }
 }
 

@@ -1,7 +1,8 @@
 //! Rays on their way through a wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
 //! with the work of the others. Where they come from and where they go is not known here.
 
-use super::flight::{Flight, Found, write_children};
+use super::flight::{Flight, write_children};
+use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Nodes, indexed_leaf, prefetch};
 use super::stack::{BOTTOM, Place, Stacks};
 use crate::rays::Ray;
@@ -211,7 +212,7 @@ impl<'a, Q: Query> Flights<'a, Q> {
         s: S,
         nodes: N,
         (object, rays): (&ObjectView<'_>, &[Ray]),
-        mut tets: impl FnMut(u32, &mut Flight<Q>, Place, &mut Stacks) -> Found,
+        mut tets: impl FnMut(u32, &mut Flight<Q>, Place, &mut Stacks) -> LeafOutcome,
     ) {
         let Flights { slots, tops, lists, stacks, bottoms, .. } = self;
         let (mut counts, ground) = (self.counts, object.ground());
@@ -219,28 +220,28 @@ impl<'a, Q: Query> Flights<'a, Q> {
             let at = usize::from(lists.leaf[i]) % IN_FLIGHT;
             let flight = &mut slots[at].0;
             let (code, top) = (tops.code[at], tops.place[at]);
-            let mut unpacked = None;
+            let (place, mut unpacked) = (flight.ray(), None);
             let found = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
-                flight.enter_leaf(s, object, rays, (leaf, code))
+                enter_leaf(s, object, || &rays[place], flight, (leaf, code))
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
                     Some(Child::Raw(index)) => {
                         let leaf = object.raw(index, &mut unpacked);
-                        flight.enter_leaf(s, object, rays, (leaf, code))
+                        enter_leaf(s, object, || &rays[place], flight, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, flight, top, stacks),
-                    _ => Found::Nothing,
+                    _ => LeafOutcome::Nothing,
                 }
             };
             let below = top.below();
             let top = match found {
                 // Any-hit queries keep no keys, so nothing can be told of what waits.
-                Found::Nearer if Q::ANY => below,
-                Found::Nothing => below,
-                Found::Again => top,
-                Found::Nearer => stacks.keep_up_to(s, bottoms[at], below, flight.key_limit()),
-                Found::Enough => bottoms[at],
+                LeafOutcome::Nearer if Q::ANY => below,
+                LeafOutcome::Nothing => below,
+                LeafOutcome::Replaced => top,
+                LeafOutcome::Nearer => stacks.keep_up_to(s, bottoms[at], below, flight.key_limit()),
+                LeafOutcome::Done => bottoms[at],
             };
             let code = stacks.code(top);
             (tops.place[at], tops.code[at]) = (top, code);

@@ -1,6 +1,7 @@
 //! Rays at the end of their way whose nearest hit is certain, and where it is still to be computed: sixteen at a time.
 
 use super::flight::Flight;
+use super::leaf::Progress;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use crate::trace::candidate::{Candidate, Reader, settle};
@@ -64,8 +65,8 @@ impl Landing {
         flight: &Flight<Q>,
         to: &mut Sink<'_, Q>,
     ) {
-        let (at, candidate) = (flight.ray(), flight.waiting());
-        if !Q::DEFERS || candidate.leaf == NONE {
+        let (at, candidate) = (flight.ray(), flight.pending());
+        if Q::ANY || candidate.leaf == NONE {
             return flight.hand_on(to);
         }
         let lane = self.count % LANES;
@@ -115,7 +116,7 @@ impl Landing {
             rest &= rest - 1;
             let ray = &rays[self.ray[lane] as usize];
             let mut query = Q::new(ray);
-            settle(object, ray, [self.candidate[lane], Candidate::NONE], &mut query);
+            settle(object, ray, self.candidate[lane], (NONE, 0), &mut query);
             to.query(self.ray[lane] as usize, &query);
         }
     }

@@ -7,6 +7,7 @@ pub(crate) mod batch;
 pub(crate) mod flight;
 mod flights;
 pub(crate) mod landing;
+pub(crate) mod leaf;
 pub(crate) mod nodes;
 pub(crate) mod stack;
 pub(crate) mod walk;

@@ -3,13 +3,13 @@
 
 use super::alone::Alone;
 use super::flight::key_limit;
+use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Nodes, indexed_leaf, prefetch};
 use crate::rays::Ray;
 use crate::simd::Simd;
-use crate::trace::candidate::{Candidate, Settled, settle, settle_one};
+use crate::trace::candidate::{Candidate, settle_one};
 use crate::trace::prepare::Aim;
 use crate::trace::query::{Count, Query};
-use crate::trace::sight::{Block, Certain};
 use crate::trace::slabs::{Boxes, Planes};
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::ObjectView;
@@ -24,89 +24,54 @@ pub(crate) enum TetOutcome {
     GoOn,
 }
 
-/// What a ray has come upon. Kept apart from the query, so that it stays in registers.
-struct Walk<'a> {
-    object: &'a ObjectView<'a>,
-    ray: &'a Ray,
+/// What a ray has come upon, in registers but for its query.
+struct Walk<'a, Q> {
     aim: &'a Aim,
+    query: &'a mut Q,
     /// Nothing whose depth certainly exceeds this matters any more.
     last: f32,
     /// Lower bound of the depth of the nearest hit so far.
     nearest: f32,
     /// That hit, if it has still to be computed.
-    waiting: Candidate,
+    pending: Candidate,
 }
 
-impl Walk<'_> {
-    /// Tests the triangles of a leaf with this code; true if the query has what it wants.
+impl<Q: Query> Progress<Q> for Walk<'_, Q> {
     #[inline(always)]
-    fn enter_leaf<S: Simd, Q: Query, B: Block>(
-        &mut self,
-        s: S,
-        (block, code): (&B, u32),
-        query: &mut Q,
-    ) -> bool {
-        let aim = self.aim;
-        let found = aim.sight.candidates(s, block, aim.slabs.first, self.last);
-        if found.maybe == 0 {
-            return false;
-        }
-        if Q::ANY {
-            if found.sure != 0 {
-                query.accept();
-                return true;
-            }
-            return self.decide(code, found.maybe, query);
-        }
-        let (maybe, certain) = found.nearest_of_all(s);
-        if let Some(Certain { triangle, near, far }) = certain
-            && far < self.nearest
-        {
-            let place = (block.first() as usize).wrapping_add(triangle);
-            s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
-            self.nearest = near;
-            self.waiting = Candidate { leaf: code, triangle: triangle as u32 };
-            self.last = if far < self.last { far } else { self.last };
-            return false;
-        }
-        self.decide(code, maybe, query)
+    fn aim(&self) -> &Aim {
+        self.aim
     }
-
-    /// Computes what waits and these triangles of a leaf, a bit each; true if the query has what it wants.
     #[inline(always)]
-    fn decide<Q: Query>(&mut self, leaf: u32, mut maybe: u32, query: &mut Q) -> bool {
-        let (object, ray) = (self.object, self.ray);
-        let mut candidates = [self.waiting, Candidate::NONE];
-        self.waiting = Candidate::NONE;
-        let mut done = false;
-        while !done && (maybe != 0 || candidates[0] != Candidate::NONE) {
-            if maybe != 0 {
-                candidates[1] = Candidate { leaf, triangle: maybe.trailing_zeros() };
-            }
-            done = matches!(settle(object, ray, candidates, query), Settled::Enough);
-            candidates[0] = Candidate::NONE;
-            maybe &= maybe.wrapping_sub(1);
-        }
-        self.take_over(query);
-        done
+    fn last(&self) -> f32 {
+        self.last
     }
-
-    /// Computes what waits.
     #[inline(always)]
-    fn settle<Q: Query>(&mut self, query: &mut Q) {
-        if self.waiting.leaf != NONE {
-            settle_one(self.object, self.ray, self.waiting, query);
-            self.waiting = Candidate::NONE;
-        }
+    fn set_last(&mut self, last: f32) {
+        self.last = last;
     }
-
-    /// Takes over what the query has found meanwhile.
     #[inline(always)]
-    fn take_over<Q: Query>(&mut self, query: &Q) {
-        if !Q::ANY {
-            self.last = self.aim.slabs.limit(query.limit());
-            self.nearest = self.aim.slabs.nearest(query);
-        }
+    fn nearest(&self) -> f32 {
+        self.nearest
+    }
+    #[inline(always)]
+    fn set_nearest(&mut self, nearest: f32) {
+        self.nearest = nearest;
+    }
+    #[inline(always)]
+    fn pending(&self) -> Candidate {
+        self.pending
+    }
+    #[inline(always)]
+    fn set_pending(&mut self, pending: Candidate) {
+        self.pending = pending;
+    }
+    #[inline(always)]
+    fn query(&mut self, _ray: &Ray) -> &mut Q {
+        self.query
+    }
+    #[inline(always)]
+    fn accept(&mut self) {
+        self.query.accept();
     }
 }
 
@@ -128,9 +93,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     // In memory: compilers would rather make sixteen of each of its numbers before the walk, and store those.
     let aim = black_box(aim);
     let mut walk =
-        Walk { object, ray, aim, last: aim.slabs.last, nearest: f32::INFINITY, waiting: Candidate::NONE };
+        Walk { aim, query, last: aim.slabs.last, nearest: f32::INFINITY, pending: Candidate::NONE };
     if walked != NONE {
-        walk.take_over(query);
+        walk.take_over(ray);
     }
     let ground = object.ground();
     let mut code = object.header.root;
@@ -170,7 +135,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         let done = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
             count.leaf();
             count.triangles(leaf.triangles);
-            walk.enter_leaf(s, (leaf, code), query)
+            enter_leaf(s, object, || ray, &mut walk, (leaf, code)) == LeafOutcome::Done
         } else {
             let mut unpacked = None;
             match Child::from_code(code) {
@@ -178,7 +143,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                     let leaf = object.raw(at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
-                    walk.enter_leaf(s, (leaf, code), query)
+                    enter_leaf(s, object, || ray, &mut walk, (leaf, code)) == LeafOutcome::Done
                 }
                 Some(Child::Tets(row)) if row != walked => {
                     let subtree = object.tet_leaves[row as usize].subtree;
@@ -187,9 +152,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                         continue;
                     }
                     count.leaf();
-                    walk.decide(NONE, 0, query);
-                    let done = tets(row, query, count) == TetOutcome::Done;
-                    walk.take_over(query);
+                    decide(object, ray, &mut walk, NONE, 0);
+                    let done = tets(row, walk.query, count) == TetOutcome::Done;
+                    walk.take_over(ray);
                     done
                 }
                 _ => stack.is_empty(),
@@ -201,5 +166,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         limit = key_limit(walk.last);
         code = stack.pop::<Q>(limit);
     }
-    walk.settle(query);
+    if walk.pending.leaf != NONE {
+        settle_one(object, ray, walk.pending, walk.query);
+    }
 }

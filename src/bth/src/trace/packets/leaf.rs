@@ -12,7 +12,7 @@ use super::met::{APART, Met};
 use super::points::{AtOnce, Greatest, POINTS, Points, Relative, Sightings};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::candidate::{Candidate, Settled, settle};
+use crate::trace::candidate::{Candidate, settle};
 use crate::trace::prepare::{Axes, Common};
 use crate::trace::query::Query;
 use crate::trace::sight;
@@ -144,12 +144,8 @@ impl<Q: Query> Rays<'_, Q> {
             active &= active - 1;
             let found = self.lone.candidates::<S, H>(s, group, (at, lane), leaf.block);
             let ray = at * LANES + lane;
-            let (mut hit, mut maybe) = (found.sure != 0, found.maybe);
-            while !hit && maybe != 0 {
-                let candidate = Candidate { leaf: leaf.code, triangle: maybe.trailing_zeros() };
-                maybe &= maybe - 1;
-                hit = matches!(self.settle_one(ray, [candidate, Candidate::NONE]), Settled::Enough);
-            }
+            let hit = found.sure != 0
+                || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (leaf.code, found.maybe));
             self.alive &= !(u64::from(hit) << ray);
         }
     }
@@ -291,14 +287,13 @@ impl<Q: Query> Rays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
-            match self.settle_one(ray, [apart.candidate(self.met, waiting[lane], lane), candidate]) {
-                Settled::Enough => self.alive &= !(1 << ray),
-                Settled::Found(t) => {
-                    let [near, far] = t.map(|t| t * f64::from(scale[lane]));
-                    nearest[lane] = (near as f32).next_down();
-                    limit[lane] = limit[lane].min((far as f32).next_up());
-                }
-                Settled::Nothing => {}
+            let pending = apart.candidate(self.met, waiting[lane], lane);
+            if self.settle_one(ray, pending, (candidate.leaf, 1 << candidate.triangle)) {
+                self.alive &= !(1 << ray);
+            } else if let Some(t) = self.queries[ray].found_between() {
+                let [near, far] = t.map(|t| t * f64::from(scale[lane]));
+                nearest[lane] = (near as f32).next_down();
+                limit[lane] = limit[lane].min((far as f32).next_up());
             }
             waiting[lane] = NONE;
         }
@@ -317,17 +312,17 @@ impl<Q: Query> Rays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let waiting = apart.candidate(self.met, waiting[lane], lane);
-            self.settle_one(at * LANES + lane, [waiting, Candidate::NONE]);
+            self.settle_one(at * LANES + lane, waiting, (NONE, 0));
         }
     }
 
-    /// Offers candidates of a ray to its query.
+    /// Offers candidates of a ray to its query, as [`settle`] does.
     #[inline(always)]
-    fn settle_one(&mut self, ray: usize, candidates: [Candidate; 2]) -> Settled {
+    fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
         if self.asked >> ray & 1 == 0 {
             self.queries[ray] = Q::new(&self.rays[ray]);
             self.asked |= 1 << ray;
         }
-        settle(self.object, &self.rays[ray], candidates, &mut self.queries[ray])
+        settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])
     }
 }

@@ -12,17 +12,24 @@
 //! # Ok::<(), bth::Error>(())
 //! ```
 #![warn(missing_docs)]
+// Iterators and closures over lanes would be compiled without the instruction set that the lanes need.
+#![allow(clippy::needless_range_loop)]
 
+mod bvh;
 mod instances;
+mod intersect;
 mod motion;
+mod object;
+mod query;
 pub mod rays;
 mod scene;
 mod simd;
-mod trace;
+mod tets;
 
 pub use bth_format::{Code, Error};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
+pub use object::Hinted;
+pub use query::Steps;
 pub use scene::{Scene, from_bytes, map, open};
 pub use simd::{Isa, IsaError};
-pub use trace::{Hinted, Steps};

@@ -1,8 +1,9 @@
 //! A scene: what callers open and trace.
 
 use crate::instances::World;
+use crate::object;
+use crate::query::Steps;
 use crate::rays::{Hit, Ray, Surface};
-use crate::trace::{self, Steps};
 use bth_format::error::Error;
 use bth_format::file::File;
 use bth_format::layout::NONE;
@@ -142,7 +143,7 @@ impl Scene {
     /// As [`Self::nearest`], with a count of the work.
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
-            return trace::nearest_counted(object, ray, hint(from, instance), instance);
+            return object::nearest_counted(object, ray, hint(from, instance), instance);
         }
         if let Some(world) = &self.world {
             return world.nearest_counted(&self.file, ray, from);
@@ -150,7 +151,7 @@ impl Scene {
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
             let (hit, more) =
-                trace::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
+                object::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
             steps += more;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
@@ -175,7 +176,7 @@ impl Scene {
         check_lengths(rays, from, hits.len());
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
-                trace::nearest_to(object, ray, hint(surface(from, 0), instance), instance, hit);
+                object::nearest_to(object, ray, hint(surface(from, 0), instance), instance, hit);
             }
             (sole, ..) => self.nearest_many(sole, rays, from, hits),
         }
@@ -190,17 +191,17 @@ impl Scene {
         from: Option<&[Surface]>,
         hits: &mut [Hit],
     ) {
-        trace::miss_all(hits);
+        object::fill_misses(hits);
         if let Some((object, instance)) = sole {
-            if rays.len() < trace::FEW {
+            if rays.len() < object::LEAST_BATCH {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = trace::nearest(object, ray, hint(surface(from, i), instance), instance);
+                    *hit = object::nearest(object, ray, hint(surface(from, i), instance), instance);
                 }
                 return;
             }
             let from = hints(object, from, instance);
-            return trace::with_scratch(|scratch| {
-                trace::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
+            return object::with_scratch(|scratch| {
+                object::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
             });
         }
         if let Some(world) = &self.world {
@@ -212,7 +213,7 @@ impl Scene {
                 // Not `min`, which would make a range of NaN.
                 let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
                 let ray = Ray { tmax, ..*ray };
-                let hit = trace::nearest(object, &ray, hint(surface(from, i), instance), instance);
+                let hit = object::nearest(object, &ray, hint(surface(from, i), instance), instance);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -229,7 +230,7 @@ impl Scene {
         check_lengths(rays, from, found.len());
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
-                *found = trace::any(object, ray, hint(surface(from, 0), instance));
+                *found = object::any(object, ray, hint(surface(from, 0), instance));
             }
             (sole, ..) => self.any_many(sole, rays, from, found),
         }
@@ -246,15 +247,15 @@ impl Scene {
     ) {
         found.fill(false);
         if let Some((object, instance)) = sole {
-            if rays.len() < trace::FEW {
+            if rays.len() < object::LEAST_BATCH {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = trace::any(object, ray, hint(surface(from, i), instance));
+                    *found = object::any(object, ray, hint(surface(from, i), instance));
                 }
                 return;
             }
             let from = hints(object, from, instance);
-            return trace::with_scratch(|scratch| {
-                trace::any_batch(object, rays, from.as_deref(), scratch, found);
+            return object::with_scratch(|scratch| {
+                object::any_batch(object, rays, from.as_deref(), scratch, found);
             });
         }
         if let Some(world) = &self.world {
@@ -263,7 +264,7 @@ impl Scene {
         for instance in 0..self.object_count() {
             let object = self.view(instance);
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || trace::any(object, ray, hint(surface(from, i), instance));
+                *found = *found || object::any(object, ray, hint(surface(from, i), instance));
             }
         }
     }

@@ -3,14 +3,16 @@
 
 use super::World;
 use super::affine::ObjectRay;
-use super::entry::Batch;
+use super::enter_object::ObjectRays;
 use super::packets::Packets;
-use super::placed::Placed;
-use super::visits::Visits;
-use super::walk::Walks;
+use super::placement::Placed;
+use super::traverse::RayTraversals;
+use super::visit_queue::VisitQueue;
+use crate::object::{self, Scratch};
+use crate::query::sink::{SceneRays, Sink, Visit};
+use crate::query::{self, Steps, better};
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::trace::{self, SceneRays, Scratch, Sink, Steps, Visit, better};
 use bth_format::file::File;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -20,10 +22,10 @@ use std::cell::RefCell;
 const CHUNK: usize = 2048;
 /// Rays through one instance from which on they are traced apart from those through others: so many, four packets if they go
 /// together, that a small batch more is no loss.
-const PACKET: usize = 256;
+const FEWEST_RAYS_APART: usize = 256;
 
 /// What a query makes of rays in an object.
-trait Query {
+trait SceneQuery {
     /// The greatest t of a ray that is still of interest; `None` when nothing is.
     fn tmax(&self, ray: usize) -> Option<f32>;
     /// Traces the visits of one object.
@@ -52,35 +54,36 @@ impl Round<'_> {
 
 /// Rays under way, whose memory a thread keeps.
 #[derive(Default)]
-struct Ways {
+struct ActiveRays {
     /// Of the rays of a chunk that go together,
     packets: Packets,
     /// and of the others.
-    walks: Walks,
+    walks: RayTraversals,
     /// The others that go on, by number within the chunk.
     active: Vec<u32>,
-    visits: Visits,
+    visits: VisitQueue,
 }
 
 thread_local! {
-    static WAYS: RefCell<Ways> = RefCell::default();
+    static ACTIVE_RAYS: RefCell<ActiveRays> = RefCell::default();
 }
 
 /// Starts the rays of a chunk.
-struct Start<'a> {
+struct StartKernel<'a> {
     round: &'a Round<'a>,
     /// The rays of the chunk: from this one on, so many.
     first: usize,
     count: usize,
-    ways: &'a mut Ways,
+    active_rays: &'a mut ActiveRays,
 }
 
-impl Kernel for Start<'_> {
+impl Kernel for StartKernel<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Start { round, first, count, ways: Ways { packets, walks, active, visits } } = self;
+        let StartKernel { round, first, count, active_rays: ActiveRays { packets, walks, active, visits } } =
+            self;
         let (world, rays) = (round.world, &round.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
@@ -102,20 +105,21 @@ impl Kernel for Start<'_> {
 }
 
 /// Takes each ray that is under way to its next instance; those that have come to their end are under way no more.
-struct Advance<'a, Q> {
+struct AdvanceKernel<'a, Q> {
     round: &'a Round<'a>,
     query: &'a Q,
     /// The first ray of the chunk.
     first: usize,
-    ways: &'a mut Ways,
+    active_rays: &'a mut ActiveRays,
 }
 
-impl<Q: Query> Kernel for Advance<'_, Q> {
+impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Advance { round, query, first, ways: Ways { packets, walks, active, visits } } = self;
+        let AdvanceKernel { round, query, first, active_rays: ActiveRays { packets, walks, active, visits } } =
+            self;
         let world = round.world;
         let tmax = |number: usize| query.tmax(first + number);
         packets.advance(&round.rays[first..], tmax, |number, instance| {
@@ -129,8 +133,8 @@ impl World {
     /// Nearest hits; of equal t the instance of least number is reported.
     pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         hits.fill(Hit::MISS);
-        trace::with_scratch(|scratch| {
-            let mut query = Nearest { rays, hits, scratch, batch: Batch::default() };
+        object::with_scratch(|scratch| {
+            let mut query = SceneNearest { rays, hits, scratch, batch: ObjectRays::default() };
             self.run(file, rays, from, &mut query);
         });
     }
@@ -138,35 +142,35 @@ impl World {
     /// Whether anything is hit.
     pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         found.fill(false);
-        trace::with_scratch(|scratch| {
-            let mut query = Any { rays, found, scratch, batch: Batch::default() };
+        object::with_scratch(|scratch| {
+            let mut query = SceneAny { rays, found, scratch, batch: ObjectRays::default() };
             self.run(file, rays, from, &mut query);
         });
     }
 
     /// As [`Self::nearest`] for one ray, with a count of the work within objects.
     pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: Surface) -> (Hit, Steps) {
-        let mut query = Counted { ray, best: Hit::MISS, steps: Steps::default() };
+        let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
         self.run(file, std::slice::from_ref(ray), Some(&[from]), &mut query);
         (query.best, query.steps)
     }
 
-    fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl Query) {
+    fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl SceneQuery) {
         let round = Round { world: self, file, rays, from };
         // Taken out while they are in use, so that a panic leaves nothing half done behind.
-        let mut ways = WAYS.take();
+        let mut active_rays = ACTIVE_RAYS.take();
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
-            ways.visits.all.clear();
-            isa.run(Start { round: &round, first, count: end - first, ways: &mut ways });
-            self.trace(&round, query, &mut ways.visits);
-            while !ways.active.is_empty() || !ways.packets.is_empty() {
-                isa.run(Advance { round: &round, query, first, ways: &mut ways });
-                self.trace(&round, query, &mut ways.visits);
+            active_rays.visits.all.clear();
+            isa.run(StartKernel { round: &round, first, count: end - first, active_rays: &mut active_rays });
+            self.trace(&round, query, &mut active_rays.visits);
+            while !active_rays.active.is_empty() || !active_rays.packets.is_empty() {
+                isa.run(AdvanceKernel { round: &round, query, first, active_rays: &mut active_rays });
+                self.trace(&round, query, &mut active_rays.visits);
             }
         }
-        WAYS.set(ways);
+        ACTIVE_RAYS.set(active_rays);
     }
 
     /// The instance that a ray is said to start on, if it can be seen.
@@ -181,7 +185,7 @@ impl World {
         self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
     }
 
-    fn trace(&self, round: &Round<'_>, query: &mut impl Query, visits: &mut Visits) {
+    fn trace(&self, round: &Round<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
         // In the space of one instance neighbours stay neighbours, and take the same way.
         visits.sort(self.placed.len());
         let mut trace = |object: u32, visits: &[Visit]| {
@@ -189,20 +193,20 @@ impl World {
             let object = round.file.view(object).expect("checked when opened");
             query.trace(round, object, visits);
         };
-        let Visits { sorted, few, gathered, .. } = &mut *visits;
-        few.clear();
+        let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;
+        short_runs.clear();
         let mut first = 0;
         for same in sorted.chunk_by(|a, b| a.instance == b.instance) {
             let (object, end) = (self.placed_at(same[0].instance).object(), first + same.len());
-            if same.len() >= PACKET {
+            if same.len() >= FEWEST_RAYS_APART {
                 trace(object, same);
             } else {
-                few.push([object, first as u32, end as u32]);
+                short_runs.push([object, first as u32, end as u32]);
             }
             first = end;
         }
-        few.sort_unstable();
-        for runs in few.chunk_by(|a, b| a[0] == b[0]) {
+        short_runs.sort_unstable();
+        for runs in short_runs.chunk_by(|a, b| a[0] == b[0]) {
             gathered.clear();
             for &[_, first, end] in runs {
                 gathered.extend_from_slice(&sorted[first as usize..end as usize]);
@@ -213,24 +217,24 @@ impl World {
     }
 }
 
-struct Nearest<'a> {
+struct SceneNearest<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
     scratch: &'a mut Scratch,
-    batch: Batch,
+    batch: ObjectRays,
 }
 
-impl Query for Nearest<'_> {
+impl SceneQuery for SceneNearest<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
-        if visits.len() < trace::FEW {
+        if visits.len() < object::LEAST_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
                 let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
                 let from = round.hint(i, visit.instance);
-                let hit = trace::nearest(object, &ray.ray, from, visit.instance);
+                let hit = object::nearest(object, &ray.ray, from, visit.instance);
                 self.hits[i] =
                     better(&round.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
             }
@@ -238,45 +242,45 @@ impl Query for Nearest<'_> {
         }
         self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax.min(self.hits[ray].t));
         let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
-        let mut to = Sink::<trace::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
-        trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
+        let mut to = Sink::<query::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
+        object::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
     }
 }
 
-struct Any<'a> {
+struct SceneAny<'a> {
     rays: &'a [Ray],
     found: &'a mut [bool],
     scratch: &'a mut Scratch,
-    batch: Batch,
+    batch: ObjectRays,
 }
 
-impl Query for Any<'_> {
+impl SceneQuery for SceneAny<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
-        if visits.len() < trace::FEW {
+        if visits.len() < object::LEAST_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
                 let (ray, from) = (round.object_ray(visit, self.rays[i].tmax), round.hint(i, visit.instance));
-                self.found[i] |= trace::any(object, &ray.ray, from);
+                self.found[i] |= object::any(object, &ray.ray, from);
             }
             return;
         }
         self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax);
         let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
-        let mut to = Sink::<trace::Any>::of_scene(object.triangle_ids, self.found, scene);
-        trace::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
+        let mut to = Sink::<query::Any>::of_scene(object.triangle_ids, self.found, scene);
+        object::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
     }
 }
 
-struct Counted<'a> {
+struct SceneCounted<'a> {
     ray: &'a Ray,
     best: Hit,
     steps: Steps,
 }
 
-impl Query for Counted<'_> {
+impl SceneQuery for SceneCounted<'_> {
     fn tmax(&self, _: usize) -> Option<f32> {
         Some(self.ray.tmax.min(self.best.t))
     }
@@ -284,7 +288,7 @@ impl Query for Counted<'_> {
         for &visit in visits {
             let object_ray = round.object_ray(visit, self.ray.tmax.min(self.best.t));
             let from = round.hint(visit.ray as usize, visit.instance);
-            let (hit, more) = trace::nearest_counted(object, &object_ray.ray, from, visit.instance);
+            let (hit, more) = object::nearest_counted(object, &object_ray.ray, from, visit.instance);
             self.steps += more;
             self.best = better(self.ray, &self.best, &hit, object_ray.t_scale).unwrap_or(self.best);
         }

@@ -1,7 +1,7 @@
 //! Batches through instances against all instances one after another.
 
 use super::super::affine::Affine;
-use super::super::placed::Parts;
+use super::super::placement::Parts;
 use super::*;
 use crate::scene::Scene;
 use bth_random::Rng;
@@ -55,7 +55,7 @@ fn brute(world: &World, file: &File, ray: &Ray) -> Hit {
         let Some(placed) = placed else { continue };
         let object = placed.inverse.ray(ray);
         let view = file.object(placed.object()).unwrap();
-        let hit = trace::nearest(&view, &object.ray, NONE, number as u32);
+        let hit = object::nearest(&view, &object.ray, NONE, number as u32);
         best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
     }
     best
@@ -178,11 +178,16 @@ fn packets_through_the_top_level_change_no_answer() {
             assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
             hits_seen += usize::from(expected.is_hit());
         }
-        let mut ways = Ways::default();
+        let mut active_rays = ActiveRays::default();
         let start = Round { world: &world, file: &file, rays: &rays, from: None };
-        Isa::chosen().run(Start { round: &start, first: 0, count: rays.len(), ways: &mut ways });
-        in_packets += usize::from(!ways.packets.is_empty());
-        refused += usize::from(ways.packets.is_empty() && count == 150);
+        Isa::chosen().run(StartKernel {
+            round: &start,
+            first: 0,
+            count: rays.len(),
+            active_rays: &mut active_rays,
+        });
+        in_packets += usize::from(!active_rays.packets.is_empty());
+        refused += usize::from(active_rays.packets.is_empty() && count == 150);
         all += rays.len();
     }
     assert!(in_packets > 60, "{in_packets} of 200 rounds in packets");

@@ -6,14 +6,14 @@
 
 mod affine;
 mod batch;
-mod entry;
+mod enter_object;
 mod packets;
-mod placed;
+mod placement;
 mod pose;
 mod top_level;
 mod tracks;
-mod visits;
-mod walk;
+mod traverse;
+mod visit_queue;
 mod world;
 
 pub use world::Update;

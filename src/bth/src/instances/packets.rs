@@ -4,10 +4,15 @@
 //! other. In scenes where it would meet many, most are hidden by others, and its rays go alone.
 
 use super::top_level::{INSTANCE, TopLevel};
-use super::walk::limit;
+use super::traverse::limit;
+use crate::bvh::packet::bounds::PacketBounds;
+use crate::bvh::packet::coherence::{Guard, Span, is_same_octant};
+use crate::bvh::packet::entry::PACKET;
+use crate::bvh::packet::frustum::Frustum;
+use crate::bvh::packet::ray_group::RayGroup;
+use crate::bvh::stack::BOTTOM;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
-use crate::trace::{BOTTOM, Beam, Group, Guard, Hull, PACKET, Span, is_same_octant};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectBounds;
 
@@ -55,7 +60,7 @@ enum Listed {
     /// All instances that it may meet are listed.
     All,
     /// The rays do not go together.
-    Apart,
+    UncachedHits,
     /// There are too many.
     TooMany,
 }
@@ -77,15 +82,15 @@ impl Packets {
         for (i, own) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
-            let mut listed = Listed::Apart;
+            let mut listed = Listed::UncachedHits;
             if S::HAS_VECTORS
                 && own.len() >= FEWEST
                 && is_same_octant(&own[0], &own[own.len() - 1])
                 && self.guard.is_open()
             {
-                let groups = groups.get_or_insert_with(|| [Group::vacant(s); GROUPS]);
+                let groups = groups.get_or_insert_with(|| [RayGroup::vacant(s); GROUPS]);
                 listed = self.list(s, top, &bounds, groups, own);
-                if listed != Listed::Apart {
+                if listed != Listed::UncachedHits {
                     self.guard.learn(listed == Listed::All);
                 }
             }
@@ -105,21 +110,21 @@ impl Packets {
         s: S,
         top: &TopLevel,
         bounds: &ObjectBounds,
-        groups: &mut [Group<S>; GROUPS],
+        groups: &mut [RayGroup<S>; GROUPS],
         rays: &[Ray],
     ) -> Listed {
         let span = Span::of(s, rays);
         if top.is_empty() || !span.is_coherent() || span.farthest_origin() > top.reach {
-            return Listed::Apart;
+            return Listed::UncachedHits;
         }
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
-            if !group.prepare::<Beam<S, false>>(s, bounds, &rays[i * LANES..end]) {
-                return Listed::Apart;
+            if !group.prepare::<Frustum<S, false>>(s, bounds, &rays[i * LANES..end]) {
+                return Listed::UncachedHits;
             }
         }
-        let beam = Beam::<S, false>::new(s, bounds, &span, groups);
+        let frustum = Frustum::<S, false>::new(s, bounds, &span, groups);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
         let mut waiting = [0; MOST_NODES];
@@ -127,7 +132,7 @@ impl Packets {
         while count > 0 {
             count -= 1;
             let node = top.node(waiting[count]);
-            let (mut bits, depth) = beam.children(s, node, f32::INFINITY);
+            let (mut bits, depth) = frustum.children(s, node, f32::INFINITY);
             let mut depths = [0.0; WIDTH];
             s.store(depth, &mut depths);
             while bits != 0 {
@@ -137,12 +142,12 @@ impl Packets {
                 if code >= BOTTOM {
                     continue;
                 }
-                let corners = beam.corners(node, slot);
-                let mut met = 0;
+                let corners = frustum.corners(node, slot);
+                let mut hit_cache = 0;
                 for (i, group) in groups.iter().enumerate() {
-                    met |= u64::from(group.meets::<Beam<S, false>>(s, corners)) << (i * LANES);
+                    hit_cache |= u64::from(group.meets::<Frustum<S, false>>(s, corners)) << (i * LANES);
                 }
-                let rays = met & all;
+                let rays = hit_cache & all;
                 if rays == 0 {
                     continue;
                 }

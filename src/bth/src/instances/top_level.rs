@@ -3,7 +3,7 @@
 //! AnswerLanes instances or fewer are the children of one node: splitting them further would make nodes of two
 //! or three, whose empty slots cost memory and time.
 
-use super::placed::Placed;
+use super::placement::Placed;
 use bth_format::layout::{Child, Line, NODE_LINES, NONE, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -31,7 +31,7 @@ pub(crate) struct TopLevel {
     pub(crate) depth: u32,
 }
 
-/// An instance while building. Boxes are stored with the lower end negated: the union is then a maximum.
+/// An instance while building. ChildBoxes are stored with the lower end negated: the union is then a maximum.
 #[derive(Clone, Copy, Debug)]
 struct Item {
     bounds: Bounds,

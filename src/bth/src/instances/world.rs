@@ -1,6 +1,6 @@
 //! The instances of a scene at a time.
 
-use super::placed::{Misplaced, Parts, Placed};
+use super::placement::{Misplaced, Parts, Placed};
 use super::pose::Pose;
 use super::top_level::TopLevel;
 #[cfg(test)]

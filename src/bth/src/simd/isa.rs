@@ -68,7 +68,7 @@ static CHOSEN: AtomicU8 = AtomicU8::new(0);
 const SCALAR: u8 = Isa::Scalar as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
-/// Apart, so that what runs kernels stays short.
+/// UncachedHits, so that what runs kernels stays short.
 #[inline(never)]
 fn plain<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Scalar)

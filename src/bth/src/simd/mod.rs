@@ -109,9 +109,9 @@ pub(crate) trait Simd: Copy + 'static {
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
     /// Whether [`Self::lookup_f64`] takes but a few instructions.
     const LOOKS_UP_F64: bool = false;
-    /// Elements `at[i] % 16` of the table; with `FEW`, only those of its first half are looked up, the others are undefined.
+    /// Elements `at[i] % 16` of the table; with `FEWEST_OF_GROUP`, only those of its first half are looked up, the others are undefined.
     #[inline(always)]
-    fn lookup_f64<const FEW: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
+    fn lookup_f64<const FEWEST_OF_GROUP: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
         let (mut place, mut out) = ([0; LANES], [0.0; LANES]);
         self.store_u(at, &mut place);
         for i in 0..LANES {

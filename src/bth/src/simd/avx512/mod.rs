@@ -173,7 +173,7 @@ impl Simd for Avx512 {
     }
     const LOOKS_UP_F64: bool = true;
     #[inline(always)]
-    fn lookup_f64<const FEW: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
+    fn lookup_f64<const FEWEST_OF_GROUP: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
         let mut out = [0.0; LANES];
         // SAFETY: the features are there (the token); eight elements each are read from and written to arrays of sixteen.
         unsafe {
@@ -181,7 +181,7 @@ impl Simd for Avx512 {
             let first = _mm512_cvtepu32_epi64(_mm512_castsi512_si256(at));
             let second = _mm512_cvtepu32_epi64(_mm512_extracti64x4_epi64::<1>(at));
             // Three bits of an index count, or four.
-            let [first, second] = if FEW {
+            let [first, second] = if FEWEST_OF_GROUP {
                 [_mm512_permutexvar_pd(first, low), _mm512_permutexvar_pd(second, low)]
             } else {
                 [_mm512_permutex2var_pd(low, first, high), _mm512_permutex2var_pd(low, second, high)]

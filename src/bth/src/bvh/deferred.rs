@@ -1,0 +1,123 @@
+//! Rays at the end of their way whose nearest hit is certain, and where it is still to be computed: sixteen at a time.
+
+use super::leaf::Progress;
+use super::ray_state::RayState;
+use crate::bvh::candidate::{Candidate, Reader, settle};
+use crate::intersect::exact_lanes::{Intersections, Pairs};
+use crate::intersect::filter::TriangleBlock;
+use crate::intersect::prepare::fields;
+use crate::query::Query;
+use crate::query::sink::Sink;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{NONE, WIDTH};
+use bth_format::object::ObjectView;
+
+/// Rays that have ended, up to sixteen.
+pub(crate) struct DeferredHits {
+    count: usize,
+    /// Places in the batch.
+    ray: [u32; LANES],
+    candidate: [Candidate; LANES],
+    /// In leaf order.
+    place: [u32; LANES],
+    pairs: Pairs,
+    crossings: Intersections,
+}
+
+/// Notes the corners of a triangle.
+struct StoreCorners<'a> {
+    pairs: &'a mut Pairs,
+    lane: usize,
+}
+
+impl Reader for StoreCorners<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn read<B: TriangleBlock>(self, block: &B, triangle: usize) {
+        for c in 0..3 {
+            for k in 0..3 {
+                self.pairs.corner[c][k][self.lane] = block.coordinate(triangle % WIDTH, c, k);
+            }
+        }
+    }
+}
+
+impl DeferredHits {
+    pub(crate) fn new() -> Self {
+        DeferredHits {
+            count: 0,
+            ray: [0; LANES],
+            candidate: [Candidate::NONE; LANES],
+            place: [0; LANES],
+            pairs: Pairs::NONE,
+            crossings: Intersections::NONE,
+        }
+    }
+
+    /// Takes in a ray at the end of its way, at this place of the batch.
+    #[inline(always)]
+    pub(crate) fn add<S: Simd, Q: Query>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        rays: &[Ray],
+        state: &RayState<Q>,
+        to: &mut Sink<'_, Q>,
+    ) {
+        let (at, candidate) = (state.ray(), state.pending());
+        if Q::ANY || candidate.leaf == NONE {
+            return state.report(to);
+        }
+        let lane = self.count % LANES;
+        let reader = StoreCorners { pairs: &mut self.pairs, lane };
+        let Some((place, ())) = candidate.read(object, reader) else { return };
+        self.place[lane] = place;
+        self.ray[lane] = at as u32;
+        self.candidate[lane] = candidate;
+        self.count = lane + 1;
+        if self.count == LANES {
+            self.flush(s, object, rays, to);
+        }
+    }
+
+    /// Computes the hits of all that have landed, and hands them on.
+    #[inline(always)]
+    pub(crate) fn flush<S: Simd, Q: Query>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        rays: &[Ray],
+        to: &mut Sink<'_, Q>,
+    ) {
+        if self.count == 0 {
+            return;
+        }
+        let all = ((1u64 << self.count) - 1) as u32;
+        self.count = 0;
+        // Read here, as a block: word by word, as they add, would take twice as long.
+        let [ox, oy, oz, _, dx, dy, dz, _] = fields(s, s.mask(all), rays, s.load_u(&self.ray));
+        let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
+        for k in 0..3 {
+            s.store(origin[k], &mut self.pairs.origin[k]);
+            s.store(direction[k], &mut self.pairs.direction[k]);
+        }
+        let crossings = &mut self.crossings;
+        crossings.compute(s, all, &self.pairs);
+        for lane in 0..LANES {
+            if crossings.certain >> lane & 1 != 0 {
+                let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
+                to.hit(self.ray[lane] as usize, object.triangle_ids[self.place[lane] as usize], t, u, v);
+            }
+        }
+        let mut rest = all & !crossings.certain;
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize % LANES;
+            rest &= rest - 1;
+            let ray = &rays[self.ray[lane] as usize];
+            let mut query = Q::new(ray);
+            settle(object, ray, self.candidate[lane], (NONE, 0), &mut query);
+            to.query(self.ray[lane] as usize, &query);
+        }
+    }
+}

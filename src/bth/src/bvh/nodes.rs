@@ -1,0 +1,69 @@
+//! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
+
+use crate::intersect::boxes::ChildBoxes;
+use crate::simd::Simd;
+use bth_format::Room;
+use bth_format::layout::{
+    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode,
+};
+use bth_format::object::{Ground, ObjectView};
+
+/// A kind of nodes.
+pub(crate) trait Nodes: Copy {
+    /// A node.
+    type Node: ChildBoxes;
+    /// Cache lines of one.
+    const LINES: usize;
+    /// The node that the code of a child leads to.
+    fn node(ground: Ground<'_>, code: u32) -> &Self::Node;
+}
+
+/// All nodes are [`WideNode`]s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wide;
+
+/// All nodes are [`PackedNode`]s.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Packed;
+
+impl Nodes for Wide {
+    type Node = WideNode;
+    const LINES: usize = NODE_LINES;
+    #[inline(always)]
+    fn node(ground: Ground<'_>, code: u32) -> &WideNode {
+        ground.node(code)
+    }
+}
+
+impl Nodes for Packed {
+    type Node = PackedNode;
+    const LINES: usize = PACKED_NODE_LINES;
+    #[inline(always)]
+    fn node(ground: Ground<'_>, code: u32) -> &PackedNode {
+        ground.packed_node(code & !Child::PACKED_BIT)
+    }
+}
+
+/// The indexed leaf that a code leads to, if it is one: as it is stored or, where coordinates lie on a grid, unpacked.
+#[inline(always)]
+pub(crate) fn indexed_leaf<'r>(
+    object: &'r ObjectView<'_>,
+    ground: Ground<'r>,
+    code: u32,
+    unpacked: &'r mut Option<Room<IndexedLeaf>>,
+) -> Option<&'r IndexedLeaf> {
+    match (ground.indexed_leaf(code), Child::from_code(code)) {
+        (Some(leaf), _) => Some(leaf),
+        (None, Some(Child::Indexed(index))) => Some(object.indexed(index, unpacked)),
+        _ => None,
+    }
+}
+
+/// Asks for the lines of a node or of an indexed leaf.
+#[inline(always)]
+pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, ground: Ground<'_>, code: u32) {
+    let first = ground.place(code);
+    for i in 0..N::LINES.max(INDEXED_LINES) {
+        s.prefetch(first.wrapping_add(i));
+    }
+}

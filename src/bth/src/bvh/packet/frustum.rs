@@ -1,0 +1,180 @@
+//! The frustum of coherent rays, by interval arithmetic.
+
+use super::bounds::{FrustumView, PacketBounds};
+use super::coherence::Span;
+use super::ray_group::RayGroup;
+use crate::intersect::boxes::{self, PAD};
+use crate::intersect::prepare;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
+
+/// Rays into one octant: interval arithmetic over their origins and directions (Wald, Boulos and Shirley, "Ray Tracing
+/// Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007, cull boxes in this way).
+///
+/// **ChildBoxes.** The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
+/// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
+/// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
+/// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`crate::intersect::boxes`] for
+/// clamped components less than 14uE|r|; the pad is 2 · PAD = 32uE.
+///
+/// **Triangles.** With s = d_x/d_z along one axis z for all, a point's sheared x is
+/// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
+/// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
+/// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
+/// Where all rays start at one point (`POINT`), the intervals of origins, widened by their pads, serve for the single rays, too
+/// ([`RayGroup::meets`]), and those of a are zero.
+pub(crate) struct Frustum<S: Simd, const POINT: bool> {
+    view: FrustumView,
+    /// The end of the origins' interval that is nearest to the planes that are met first, and that nearest to the others.
+    near_origin: [f32; 3],
+    far_origin: [f32; 3],
+    /// Least and greatest reciprocal.
+    reciprocal: [[S::F; 2]; 3],
+    /// Row of the ends that are met first.
+    near: [u32; 3],
+    first: S::F,
+    /// What keeps points on the upper side, and on the lower.
+    upper: [f32; 2],
+    lower: [f32; 2],
+}
+
+impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
+    /// Of a coherent run ([`Span::is_coherent`]).
+    #[inline(always)]
+    pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
+        let zero = s.splat(0.0);
+        let extent = prepare::extent(bounds, span.farthest_origin());
+        let (main, _) = span.main_axis();
+        let axis = [(main + 1) % 3, (main + 2) % 3, main];
+        let mut center = [0.0; 3];
+        for k in 0..3 {
+            let [least, greatest] = span.origin[k];
+            center[k] = if POINT { least } else { 0.5 * least + 0.5 * greatest };
+        }
+        // Of the reciprocals, the slopes and what is added to sheared coordinates; and of the first depth.
+        let (mut least, mut greatest) = ([s.splat(f32::INFINITY); 8], [s.splat(f32::NEG_INFINITY); 7]);
+        for group in groups {
+            for k in 0..3 {
+                let r = group.reciprocal[k];
+                (least[k], greatest[k]) = (s.min(least[k], r), s.max(greatest[k], r));
+            }
+            for j in 0..2 {
+                let slope = match group.common {
+                    // As good as the quotient, and there already.
+                    Some(common) if common.0 == main => {
+                        s.mul(group.projection.shear[j], group.projection.forward)
+                    }
+                    _ => s.div(group.direction[axis[j]], group.direction[main]),
+                };
+                (least[3 + j], greatest[3 + j]) = (s.min(least[3 + j], slope), s.max(greatest[3 + j], slope));
+                let addend = if POINT {
+                    zero
+                } else {
+                    let from = s.sub(s.splat(center[main]), group.origin[main]);
+                    let beside = s.sub(s.splat(center[axis[j]]), group.origin[axis[j]]);
+                    s.fnma(slope, from, beside)
+                };
+                (least[5 + j], greatest[5 + j]) =
+                    (s.min(least[5 + j], addend), s.max(greatest[5 + j], addend));
+            }
+            least[7] = s.min(least[7], group.first);
+        }
+        let mut ends = [least[7]; LANES];
+        for i in 0..7 {
+            (ends[i], ends[8 + i]) = (least[i], s.sub(s.splat(0.0), greatest[i]));
+        }
+        let mut least = [0.0; LANES];
+        s.store(s.least_of_each(ends), &mut least);
+        let ends = least;
+        let both = |of: usize| [ends[of], -ends[8 + of]];
+        let view = FrustumView { origin: center, axis, shear: [0.0; 2], shear_width: [0.0; 2] };
+        let mut frustum = Frustum {
+            view,
+            near_origin: [0.0; 3],
+            far_origin: [0.0; 3],
+            reciprocal: [[zero; 2]; 3],
+            near: [0; 3],
+            first: s.splat(ends[7]),
+            upper: [0.0; 2],
+            lower: [0.0; 2],
+        };
+        let pad = 2.0 * PAD as f32 * extent;
+        for k in 0..3 {
+            let [least, greatest] = both(k);
+            frustum.reciprocal[k] = [s.splat(least), s.splat(greatest)];
+            let [low, high] = [span.origin[k][0] - pad, span.origin[k][1] + pad];
+            let is_negative = span.direction[k][0] < 0.0;
+            [frustum.near_origin[k], frustum.far_origin[k]] =
+                if is_negative { [low, high] } else { [high, low] };
+            frustum.near[k] = if is_negative { boxes::FAR } else { 0 };
+        }
+        let pad = 4.0 * PAD as f32 * extent;
+        for j in 0..2 {
+            let (shear, addend) = (both(3 + j), both(5 + j));
+            let middle = 0.5 * (shear[0] + shear[1]);
+            frustum.view.shear[j] = middle;
+            frustum.view.shear_width[j] = (shear[1] - middle).max(middle - shear[0]);
+            frustum.upper[j] = pad - addend[0];
+            frustum.lower[j] = pad + addend[1];
+        }
+        frustum
+    }
+}
+
+impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
+    const MIXED: bool = false;
+    const FROM_POINT: bool = POINT;
+
+    #[inline(always)]
+    fn view(&self) -> Option<&FrustumView> {
+        POINT.then_some(&self.view)
+    }
+
+    #[inline(always)]
+    fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
+        let (mut enter, mut leave) = (self.first, s.splat(limit));
+        for k in 0..3 {
+            let [least, greatest] = self.reciprocal[k];
+            let near = s.load(boxes::row(&node.bounds[k], self.near[k]));
+            let far = s.load(boxes::row(&node.bounds[k], self.near[k] ^ boxes::FAR));
+            let (near, far) =
+                (s.sub(near, s.splat(self.near_origin[k])), s.sub(far, s.splat(self.far_origin[k])));
+            enter = s.max(s.min(s.mul(near, least), s.mul(near, greatest)), enter);
+            leave = s.min(s.max(s.mul(far, least), s.mul(far, greatest)), leave);
+        }
+        (s.mask_bits(s.le(enter, leave)), enter)
+    }
+
+    #[inline(always)]
+    fn sides(&self, s: S, rows: [S::F; 3]) -> S::U {
+        let FrustumView { origin, axis, shear, shear_width } = &self.view;
+        let depth = s.sub(rows[axis[2]], s.splat(origin[axis[2]]));
+        let far = s.abs(depth);
+        let mut out = s.splat_u(0);
+        for j in 0..2 {
+            let x = s.sub(rows[axis[j]], s.splat(origin[axis[j]]));
+            let x = s.fnma(s.splat(shear[j]), depth, x);
+            let width = s.splat(shear_width[j]);
+            let above = s.lt(s.fma(far, width, s.splat(self.upper[j])), x);
+            let below = s.lt(s.fma(far, width, s.add(x, s.splat(self.lower[j]))), s.splat(0.0));
+            out = s.or_u(out, s.select_u(above, s.splat_u(1 << (2 * j)), s.splat_u(0)));
+            out = s.or_u(out, s.select_u(below, s.splat_u(2 << (2 * j)), s.splat_u(0)));
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2] {
+        let mut out = [[0.0; 3]; 2];
+        for k in 0..3 {
+            out[0][k] = boxes::row(&node.bounds[k], self.near[k])[slot % WIDTH];
+            out[1][k] = boxes::row(&node.bounds[k], self.near[k] ^ boxes::FAR)[slot % WIDTH];
+            if POINT {
+                out[0][k] -= self.near_origin[k];
+                out[1][k] -= self.far_origin[k];
+            }
+        }
+        out
+    }
+}

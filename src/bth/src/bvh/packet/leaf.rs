@@ -1,0 +1,322 @@
+//! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time, unless few rays are left ([`super::single_rays`]).
+//!
+//! Points are projected once for a group of sixteen rays or, where all rays of the packet start at one point, for each triangle that
+//! is tested. Most triangles are left out by the error bound of the whole leaf, which is that of [`crate::intersect::filter`] for the
+//! greatest corner of all; only for the others is it worked out.
+
+use super::bounds::PacketBounds;
+use super::hit_cache::{HitCache, UNCACHED};
+use super::leaf_mesh::{Leaf, LeafMesh};
+use super::points::{CornerSource, Greatest, POINTS, Points, ProjectedOnDemand, Relative};
+use super::ray_group::RayGroup;
+use super::single_rays::{FEWEST_OF_GROUP, SingleRays};
+use crate::bvh::candidate::{Candidate, settle};
+use crate::intersect::filter;
+use crate::intersect::prepare::{Axes, Common};
+use crate::query::Query;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{NONE, WIDTH};
+use bth_format::object::ObjectView;
+
+/// In place of the number of a triangle among those that the packet keeps: it has not been asked for.
+const NOT_CACHED_YET: u8 = u8::MAX;
+
+/// The rays of a packet, and what has been found for them.
+pub(crate) struct PacketRays<'a, Q> {
+    pub(crate) object: &'a ObjectView<'a>,
+    pub(crate) rays: &'a [Ray],
+    /// Queries of rays for which anything has been decided, where their bit is set.
+    pub(crate) queries: &'a mut [Q],
+    pub(crate) queried: u64,
+    /// The rays, one by one.
+    pub(crate) single_rays: &'a mut SingleRays,
+    pub(crate) hit_cache: &'a mut HitCache,
+    /// Those that are not done.
+    pub(crate) alive: u64,
+}
+
+/// What groups keep of triangles that wait, lane by lane.
+struct UncachedHits {
+    leaf: [u32; LANES],
+    triangle: [u32; LANES],
+}
+
+impl UncachedHits {
+    #[inline(always)]
+    fn of<S: Simd>(s: S, group: &RayGroup<S>) -> Self {
+        let mut apart = UncachedHits { leaf: [0; LANES], triangle: [0; LANES] };
+        s.store_u(group.leaf, &mut apart.leaf);
+        s.store_u(group.triangle, &mut apart.triangle);
+        apart
+    }
+
+    /// What waits in a lane.
+    #[inline(always)]
+    fn candidate(&self, hit_cache: &HitCache, waiting: u32, lane: usize) -> Candidate {
+        match waiting {
+            NONE => Candidate::NONE,
+            UNCACHED => Candidate { leaf: self.leaf[lane], triangle: self.triangle[lane] },
+            number => hit_cache.candidate(number),
+        }
+    }
+}
+
+impl<Q: Query> PacketRays<'_, Q> {
+    /// Tests the triangles of a leaf for rays of the packet, a bit each. Returns whether any has a nearer hit.
+    #[inline(always)]
+    pub(crate) fn enter_leaf<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+        &mut self,
+        s: S,
+        bounds: &H,
+        groups: &mut [RayGroup<S>],
+        (points, relative): (&mut Points, &mut Relative),
+        leaf: &Leaf<'_, B>,
+        mut rays: u64,
+    ) -> bool {
+        // Nearest hits are asked in packets only of coherent rays, of which seldom few are left.
+        if Q::ANY {
+            for (i, group) in groups.iter().enumerate() {
+                let active = (rays >> (i * LANES)) as u32 & 0xffff;
+                if active.count_ones() <= FEWEST_OF_GROUP {
+                    rays &= !(0xffff << (i * LANES));
+                    self.enter_leaf_singly::<S, H, B>(s, group, i, leaf, active);
+                }
+            }
+            if rays == 0 {
+                return false;
+            }
+        }
+        let count = leaf.block.triangles().min(WIDTH as u32);
+        let triangles = !leaf.block.outside(s, bounds) & ((1 << count) - 1);
+        let (mut used, mut rest) = (0u64, triangles);
+        while rest != 0 {
+            let [a, b, c] = leaf.block.points_of(rest.trailing_zeros() as usize);
+            used |= 1 << a | 1 << b | 1 << c;
+            rest &= rest - 1;
+        }
+        if triangles == 0 {
+            return false;
+        }
+        let mut spread = [0.0; 2];
+        if let Some(view) = bounds.view() {
+            leaf.block.relative(s, view.origin, relative);
+            spread = relative.spread(s, view, B::PARTS, used);
+        }
+        let (mut nearer, mut numbers) = (false, [NOT_CACHED_YET; WIDTH]);
+        for (i, group) in groups.iter_mut().enumerate() {
+            let active = (rays >> (i * LANES)) as u32 & 0xffff;
+            if active != 0 {
+                nearer |= self.enter_group(
+                    s,
+                    bounds,
+                    group,
+                    i,
+                    (points, relative, spread),
+                    leaf,
+                    &mut numbers,
+                    (triangles, used),
+                    active,
+                );
+            }
+        }
+        nearer
+    }
+
+    /// Tests the triangles of a leaf for rays of a group one at a time: whether they hit any.
+    #[inline(always)]
+    fn enter_leaf_singly<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+        &mut self,
+        s: S,
+        group: &RayGroup<S>,
+        at: usize,
+        leaf: &Leaf<'_, B>,
+        mut active: u32,
+    ) {
+        while active != 0 {
+            let lane = active.trailing_zeros() as usize;
+            active &= active - 1;
+            let found = self.single_rays.candidates::<S, H>(s, group, (at, lane), leaf.block);
+            let ray = at * LANES + lane;
+            let hit = found.sure != 0
+                || found.maybe != 0 && self.settle_one(ray, Candidate::NONE, (leaf.code, found.maybe));
+            self.alive &= !(u64::from(hit) << ray);
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments)]
+    fn enter_group<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
+        &mut self,
+        s: S,
+        bounds: &H,
+        group: &mut RayGroup<S>,
+        at: usize,
+        (points, relative, spread): (&mut Points, &Relative, [f32; 2]),
+        leaf: &Leaf<'_, B>,
+        numbers: &mut [u8; WIDTH],
+        (triangles, mut used): (u32, u64),
+        active: u32,
+    ) -> bool {
+        let floor = s.splat(f32::MIN_POSITIVE);
+        if let Some(view) = bounds.view() {
+            let along = Common(view.axis());
+            debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
+            let rows = along.order().map(|axis| relative.row(axis));
+            let [size, depth] = spread;
+            let error = filter::error(s, s.splat(size + size), s.splat(depth), floor);
+            let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
+            return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
+        }
+        let order = group.common.map_or([0, 1, 2], Common::order);
+        // Copies, which stay in registers where the group itself would be read for each point.
+        let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
+        let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
+        let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
+        while used != 0 {
+            let i = used.trailing_zeros() as usize % POINTS;
+            used &= used - 1;
+            let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
+            let point = if is_common { point } else { mixed.turn(s, point) };
+            let point = projection.of(s, point);
+            points.put(s, i, greatest.including(s, point));
+        }
+        let size = s.add(greatest.coordinate, greatest.coordinate);
+        let error = filter::error(s, size, greatest.depth, floor);
+        self.test(s, group, at, &*points, error, leaf, numbers, triangles, active)
+    }
+
+    /// Tests triangles, a bit each, for rays of a group; `error` bounds those of weights for all of them.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments)]
+    fn test<S: Simd, B: LeafMesh>(
+        &mut self,
+        s: S,
+        group: &mut RayGroup<S>,
+        at: usize,
+        corners: &impl CornerSource<S>,
+        error: S::F,
+        leaf: &Leaf<'_, B>,
+        numbers: &mut [u8; WIDTH],
+        mut triangles: u32,
+        mut active: u32,
+    ) -> bool {
+        let floor = s.splat(f32::MIN_POSITIVE);
+        let minus_error = s.sub(s.splat(0.0), error);
+        let mut nearer = false;
+        while triangles != 0 {
+            let triangle = triangles.trailing_zeros();
+            triangles &= triangles - 1;
+            let [a, b, c] = leaf.block.points_of(triangle as usize);
+            let (a, b, c) = (corners.corner(s, a), corners.corner(s, b), corners.corner(s, c));
+            let weight = [filter::cross(s, b, c), filter::cross(s, c, a), filter::cross(s, a, b)];
+            let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+            let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+            let missed = s.mask_bits(s.and(s.lt(least, minus_error), s.lt(error, greatest)));
+            if active & !missed == 0 {
+                continue;
+            }
+            let size = s.max(s.max(filter::size(s, a), filter::size(s, b)), filter::size(s, c));
+            let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
+            let error = filter::error(s, size, depth, floor);
+            let weighed = filter::weigh(s, [a, b, c], error, group.first, group.limit);
+            let maybe = active & !s.mask_bits(weighed.out);
+            let in_range =
+                s.and(s.le(group.certain[0], weighed.nearest), s.le(weighed.farthest, group.certain[1]));
+            let sure = maybe & s.mask_bits(s.and(weighed.certain, in_range));
+            let candidate = Candidate { leaf: leaf.code, triangle };
+            let clear = if Q::ANY {
+                self.alive &= !(u64::from(sure) << (at * LANES));
+                active &= !sure;
+                sure
+            } else {
+                let clear = sure & s.mask_bits(s.lt(weighed.farthest, group.nearest));
+                let m = s.mask(clear);
+                if clear != 0 {
+                    let number = &mut numbers[triangle as usize % WIDTH];
+                    if *number == NOT_CACHED_YET {
+                        let place = (leaf.block.first() + triangle) as usize;
+                        s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
+                        *number = self.hit_cache.add(leaf, triangle) as u8;
+                    }
+                    let number = u32::from(*number);
+                    group.accept(s, m, [weighed.nearest, weighed.farthest], number);
+                    if number == UNCACHED {
+                        group.keep(s, m, leaf, triangle);
+                    }
+                }
+                nearer |= clear != 0;
+                clear
+            };
+            if maybe & !clear != 0 {
+                self.settle_lanes(s, group, at, candidate, maybe & !clear);
+                nearer = true;
+                active &= (self.alive >> (at * LANES)) as u32;
+            }
+            if active == 0 {
+                break;
+            }
+        }
+        nearer
+    }
+
+    /// Decides a candidate for a few rays of a group, and with it the one that waits.
+    #[inline(always)]
+    fn settle_lanes<S: Simd>(
+        &mut self,
+        s: S,
+        group: &mut RayGroup<S>,
+        at: usize,
+        candidate: Candidate,
+        mut lanes: u32,
+    ) {
+        let mut waiting = [0; LANES];
+        s.store_u(group.waiting, &mut waiting);
+        let apart = UncachedHits::of(s, group);
+        let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        s.store(group.scale, &mut scale);
+        s.store(group.limit, &mut limit);
+        s.store(group.nearest, &mut nearest);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let ray = at * LANES + lane;
+            let pending = apart.candidate(self.hit_cache, waiting[lane], lane);
+            if self.settle_one(ray, pending, (candidate.leaf, 1 << candidate.triangle)) {
+                self.alive &= !(1 << ray);
+            } else if let Some(t) = self.queries[ray].found_between() {
+                let [near, far] = t.map(|t| t * f64::from(scale[lane]));
+                nearest[lane] = (near as f32).next_down();
+                limit[lane] = limit[lane].min((far as f32).next_up());
+            }
+            waiting[lane] = NONE;
+        }
+        group.waiting = s.load_u(&waiting);
+        group.limit = s.load(&limit);
+        group.nearest = s.load(&nearest);
+    }
+
+    /// Decides for a few rays of a group the candidate that waits.
+    #[inline(always)]
+    pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, mut lanes: u32) {
+        let mut waiting = [0; LANES];
+        s.store_u(group.waiting, &mut waiting);
+        let apart = UncachedHits::of(s, group);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            let waiting = apart.candidate(self.hit_cache, waiting[lane], lane);
+            self.settle_one(at * LANES + lane, waiting, (NONE, 0));
+        }
+    }
+
+    /// Offers candidates of a ray to its query, as [`settle`] does.
+    #[inline(always)]
+    fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
+        if self.queried >> ray & 1 == 0 {
+            self.queries[ray] = Q::new(&self.rays[ray]);
+            self.queried |= 1 << ray;
+        }
+        settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])
+    }
+}

@@ -1,0 +1,303 @@
+//! Packets: up to 64 rays that go together through the wide BVH.
+//!
+//! A node's sixteen children are tested against what all the rays together can meet ([`super::frustum`]), and those that
+//! remain against the rays, sixteen at a time. f32 lanes leave out what certainly does not matter, as everywhere;
+//! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
+//! be computed at the end; what is not certain is decided at once ([`crate::bvh::candidate`]).
+
+use super::bounds::PacketBounds;
+use super::entry::{GROUPS, PACKET, StackEntry};
+use super::hit_cache::{CachedHits, HitCache};
+use super::leaf::PacketRays;
+use super::leaf_mesh::Leaf;
+use super::points::{Points, Relative};
+use super::ray_group::RayGroup;
+use super::single_rays::{FEWEST_OF_PACKET, SingleRays};
+use crate::bvh::nodes::{Wide, prefetch};
+use crate::bvh::ray_state::KEY_SLACK;
+use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
+use crate::query::Query;
+use crate::query::sink::Sink;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{Child, NONE, WIDTH, WideNode};
+use bth_format::limits::MAX_DEPTH;
+use bth_format::object::ObjectView;
+use std::any::Any;
+
+/// Memory that packets need, kept from one batch to the next.
+#[derive(Debug)]
+pub(crate) struct PacketBuffers {
+    stack: Vec<StackEntry>,
+    points: Points,
+    relative: Relative,
+    single_rays: SingleRays,
+    pub(crate) hit_cache: HitCache,
+    seen: OriginTermsLanes,
+    crossings: [Intersections; GROUPS],
+}
+
+impl Default for PacketBuffers {
+    fn default() -> Self {
+        PacketBuffers {
+            stack: Vec::new(),
+            points: Points::NONE,
+            relative: Relative::NONE,
+            single_rays: SingleRays::NONE,
+            hit_cache: HitCache::NONE,
+            seen: OriginTermsLanes::NONE,
+            crossings: [Intersections::NONE; GROUPS],
+        }
+    }
+}
+
+/// Groups of the instruction set that was last asked for: to clear them for every batch would take as long as to trace a few rays.
+#[derive(Debug, Default)]
+pub(crate) struct GroupStorage(Option<Box<dyn Any>>);
+
+impl GroupStorage {
+    #[inline(always)]
+    pub(crate) fn of<S: Simd>(&mut self, s: S) -> &mut [RayGroup<S>; GROUPS] {
+        if !self.0.as_ref().is_some_and(|groups| groups.is::<[RayGroup<S>; GROUPS]>()) {
+            self.0 = Some(Box::new([RayGroup::vacant(s); GROUPS]));
+        }
+        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("just made")
+    }
+}
+
+/// The rays of a packet, prepared, and what is decided of them.
+pub(crate) struct Packets<'a, S: Simd, Q> {
+    pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
+    queries: [Q; PACKET],
+    pub(crate) buffers: &'a mut PacketBuffers,
+}
+
+/// How a packet did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PacketOutcome {
+    /// Rays that took part in an average step, per cent.
+    Lanes(u32),
+    /// There is something that only single rays can do; nothing has been handed on.
+    Refused,
+}
+
+impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
+    #[inline(always)]
+    pub(crate) fn new(
+        object: &ObjectView<'_>,
+        groups: &'a mut [RayGroup<S>; GROUPS],
+        buffers: &'a mut PacketBuffers,
+        ray: &Ray,
+    ) -> Self {
+        // At every level all children but the one entered wait.
+        let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
+        if buffers.stack.len() < entries {
+            buffers.stack.resize(entries, StackEntry::default());
+        }
+        Packets { groups, queries: [Q::new(ray); PACKET], buffers }
+    }
+
+    /// Traces rays for which the groups have been prepared, and hands on the place and query of those that hit
+    /// something.
+    #[inline(always)]
+    pub(crate) fn trace<H: PacketBounds<S>>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        bounds: &H,
+        rays: &[Ray],
+        to: &mut Sink<'_, Q>,
+    ) -> PacketOutcome {
+        let Packets { groups, queries, buffers } = self;
+        let PacketBuffers { stack, points, relative, single_rays, hit_cache, seen, crossings } =
+            &mut **buffers;
+        let groups = &mut groups[..rays.len().div_ceil(LANES)];
+        let all = u64::MAX >> (PACKET - rays.len());
+        single_rays.clear();
+        let mut rays = PacketRays { object, rays, queries, single_rays, hit_cache, queried: 0, alive: all };
+        if let Some(group) = groups.last_mut() {
+            // Lanes without a ray hold nothing up.
+            let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
+            group.limit = s.select(valid, group.limit, s.splat(f32::MIN));
+        }
+        let mut limit = farthest_limit(s, groups);
+        let (mut code, mut mask, mut top) = (object.header.root, all, 0);
+        let (mut steps, mut used) = (0u32, 0);
+        'steps: loop {
+            steps += 1;
+            used += mask.count_ones();
+            match Child::from_code(code) {
+                Some(Child::Node(line)) => {
+                    let node = object.node(line);
+                    let buffers = stack[top..].first_chunk_mut().expect("as many levels as the header says");
+                    top += if H::MIXED && mask.count_ones() <= FEWEST_OF_PACKET {
+                        rays.single_rays.children(s, groups, mask, (line, node), buffers)
+                    } else {
+                        children::<S, H, Q>(s, bounds, groups, mask, (line, node), limit, buffers)
+                    };
+                }
+                Some(Child::Indexed(line)) => {
+                    let mut buffers = None;
+                    let leaf = Leaf { block: object.indexed(line, &mut buffers), code };
+                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
+                        limit = farthest_limit(s, groups);
+                    }
+                }
+                Some(Child::Raw(line)) => {
+                    let mut buffers = None;
+                    let leaf = Leaf { block: object.raw(line, &mut buffers), code };
+                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
+                        limit = farthest_limit(s, groups);
+                    }
+                }
+                Some(Child::Tets(row)) => {
+                    code = object.tet_leaves[row as usize].subtree;
+                    if code == NONE {
+                        return PacketOutcome::Refused;
+                    }
+                    continue;
+                }
+                Some(Child::Packed(_)) => return PacketOutcome::Refused,
+                None => {}
+            }
+            if rays.alive == 0 {
+                break;
+            }
+            loop {
+                if top == 0 {
+                    break 'steps;
+                }
+                top -= 1;
+                let entry = stack[top];
+                mask = entry.rays & rays.alive;
+                if mask == 0 || (!Q::ANY && entry.key > limit + limit.abs() * KEY_SLACK) {
+                    continue;
+                }
+                let node = object.node(entry.parent);
+                code = node.child[entry.slot as usize % WIDTH];
+                prefetch(s, Wide, object.ground(), code);
+                // Later: hits may have come between, which leave less of it to meet.
+                if !H::MIXED {
+                    mask &= meeting(s, bounds, groups, mask, node, entry.slot);
+                }
+                if mask != 0 {
+                    break;
+                }
+            }
+        }
+        finish::<S, H, Q>(s, groups, (seen, crossings), &mut rays, all, to);
+        let steps = u64::from(steps);
+        PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
+    }
+}
+
+/// Writes the children of a node that rays of the packet may meet together before a depth, the nearest last, and of rays that go into
+/// different octants which ones do; returns how many.
+#[inline(always)]
+fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
+    s: S,
+    bounds: &H,
+    groups: &[RayGroup<S>],
+    rays: u64,
+    (parent, node): (u32, &WideNode),
+    limit: f32,
+    to: &mut [StackEntry; WIDTH],
+) -> usize {
+    let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+    let (bits, keys) = bounds.children(s, node, limit);
+    let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
+    let count = if Q::ANY {
+        s.compress(bits, slots, &mut slot)
+    } else {
+        s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
+    };
+    let mut some = 0;
+    for i in 0..count {
+        let slot = slot[i];
+        let rays = if H::MIXED { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
+        to[some % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
+        some += usize::from(rays != 0);
+    }
+    some
+}
+
+/// Which of these rays, a bit each, meet the box of a child. Groups none of whose rays is asked about are left out.
+#[inline(always)]
+fn meeting<S: Simd, H: PacketBounds<S>>(
+    s: S,
+    bounds: &H,
+    groups: &[RayGroup<S>],
+    rays: u64,
+    node: &WideNode,
+    slot: u32,
+) -> u64 {
+    let corners = bounds.corners(node, slot as usize % WIDTH);
+    let mut meets = 0;
+    for (i, group) in groups.iter().enumerate() {
+        if rays >> (i * LANES) & 0xffff != 0 {
+            let bits = group.meets::<H>(s, corners);
+            meets |= u64::from(bits) << (i * LANES);
+        }
+    }
+    meets
+}
+
+/// Computes what is still to be computed, and hands on what was found.
+#[inline(always)]
+fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
+    s: S,
+    groups: &[RayGroup<S>],
+    (seen, crossings): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
+    rays: &mut PacketRays<'_, Q>,
+    all: u64,
+    to: &mut Sink<'_, Q>,
+) {
+    if Q::ANY {
+        let mut hit = all & !rays.alive;
+        let mut query = Q::new(&rays.rays[0]);
+        query.accept();
+        while hit != 0 {
+            to.query(hit.trailing_zeros() as usize, &query);
+            hit &= hit - 1;
+        }
+        return;
+    }
+    // First all, then what comes of them: so the divisions of one group overlap with the next.
+    let mut cached = CachedHits {
+        origin: rays.rays[0].origin,
+        ids: rays.object.triangle_ids,
+        hit_cache: rays.hit_cache,
+        seen,
+    };
+    for (group, crossings) in groups.iter().zip(&mut *crossings) {
+        group.cross::<H>(s, &mut cached, crossings);
+    }
+    for (i, (group, crossings)) in groups.iter().zip(crossings.iter()).enumerate() {
+        let queried = (rays.queried >> (i * LANES)) as u32 & 0xffff;
+        let clear = crossings.certain & !queried;
+        if clear != 0 {
+            to.hits(s, i * LANES, clear, crossings);
+        }
+        let rest = crossings.open | crossings.certain & queried;
+        if rest != 0 {
+            rays.settle_last(s, group, i, rest);
+        }
+    }
+    // Those of which something had to be decided alone.
+    let mut queried = rays.queried;
+    while queried != 0 {
+        let ray = queried.trailing_zeros() as usize;
+        queried &= queried - 1;
+        to.query(ray, &rays.queries[ray]);
+    }
+}
+
+/// The greatest limit of all rays.
+#[inline(always)]
+fn farthest_limit<S: Simd>(s: S, groups: &[RayGroup<S>]) -> f32 {
+    let mut farthest = groups[0].limit;
+    for group in groups {
+        farthest = s.max(farthest, group.limit);
+    }
+    -s.least(s.sub(s.splat(0.0), farthest))
+}

@@ -1,0 +1,207 @@
+//! Few rays of a packet before a node or a leaf: one ray at a time, lanes are children or triangles.
+//!
+//! Half of the leaves that sixteen rays of ambient occlusion enter matter to one of them only
+//! (benchmarks/2026-11-23-few-rays.md): one ray and sixteen triangles at once take far less than sixteen rays and each triangle in turn.
+
+use super::bounds::PacketBounds;
+use super::entry::{GROUPS, StackEntry};
+use super::ray_group::RayGroup;
+use crate::intersect::exact_lanes::Many;
+use crate::intersect::filter::{Candidates, TriangleBlock};
+use crate::intersect::prepare::{Prepared, PreparedRay};
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{WIDTH, WideNode};
+
+/// Rays of a group that are few before a leaf, by measurement,
+pub(crate) const FEWEST_OF_GROUP: u32 = 6;
+/// and rays of a packet that are few before a node.
+pub(crate) const FEWEST_OF_PACKET: u32 = 24;
+
+/// The rays of a packet, each by itself; of groups that have been asked for.
+#[derive(Debug)]
+pub(crate) struct SingleRays {
+    group: [Prepared; GROUPS],
+    /// Between which depths hits matter.
+    depths: [[Many; 2]; GROUPS],
+    /// Groups that are there, a bit each.
+    ready: u32,
+}
+
+impl SingleRays {
+    pub(crate) const NONE: SingleRays = SingleRays {
+        group: [const { Prepared::new() }; GROUPS],
+        depths: [[[0.0; LANES]; 2]; GROUPS],
+        ready: 0,
+    };
+
+    /// Begins anew.
+    #[inline(always)]
+    pub(crate) fn clear(&mut self) {
+        self.ready = 0;
+    }
+
+    /// Writes the rays of a group, unless they are there; what is for boxes only where it may ever be asked for.
+    #[inline(always)]
+    fn want<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, for_boxes: bool) {
+        if self.ready >> at & 1 == 0 {
+            self.ready |= 1 << at;
+            let lines = if for_boxes { 0..2 } else { 1..2 };
+            self.group[at % GROUPS].write(s, &group.lanes(s), s.splat_u(0), lines);
+            s.store(group.first, &mut self.depths[at % GROUPS][0]);
+            s.store(group.limit, &mut self.depths[at % GROUPS][1]);
+        }
+    }
+
+    /// A ray of a group, by the place of the group and its own.
+    #[inline(always)]
+    fn aim(&self, at: usize, lane: usize) -> &PreparedRay {
+        self.group[at % GROUPS].aim(lane).expect("packets are made of rays that are prepared")
+    }
+
+    /// The triangles of a leaf that a ray of a group may hit.
+    #[inline(always)]
+    pub(crate) fn candidates<S: Simd, H: PacketBounds<S>>(
+        &mut self,
+        s: S,
+        group: &RayGroup<S>,
+        (at, lane): (usize, usize),
+        block: &impl TriangleBlock,
+    ) -> Candidates<S> {
+        self.want(s, group, at, H::MIXED);
+        let [first, last] = &self.depths[at % GROUPS];
+        self.aim(at, lane).sight.candidates(s, block, first[lane % LANES], last[lane % LANES])
+    }
+
+    /// Writes the children of a node that any of these rays, a bit each, may meet, and which do; returns how many.
+    #[inline(always)]
+    pub(crate) fn children<S: Simd>(
+        &mut self,
+        s: S,
+        groups: &[RayGroup<S>],
+        mut rays: u64,
+        (parent, node): (u32, &WideNode),
+        to: &mut [StackEntry; WIDTH],
+    ) -> usize {
+        // A lane for each child, a bit for each ray: those of the first two groups, and of the others.
+        let (mut meeting, mut some) = ([s.splat_u(0); 2], 0);
+        while rays != 0 {
+            let ray = rays.trailing_zeros() as usize;
+            rays &= rays - 1;
+            let (at, lane) = (ray / LANES, ray % LANES);
+            self.want(s, &groups[at % groups.len()], at, true);
+            let slabs = &self.aim(at, lane).slabs;
+            let (bits, _) = slabs.children(s, node, slabs.last);
+            some |= bits;
+            let half = &mut meeting[ray / 32];
+            *half = s.select_u(s.mask(bits), s.or_u(*half, s.splat_u(1 << (ray % 32))), *half);
+        }
+        let mut words = [[0; WIDTH]; 2];
+        s.store_u(meeting[0], &mut words[0]);
+        s.store_u(meeting[1], &mut words[1]);
+        let mut count = 0;
+        while some != 0 {
+            let slot = some.trailing_zeros() as usize % WIDTH;
+            some &= some - 1;
+            let rays = u64::from(words[0][slot]) | u64::from(words[1][slot]) << 32;
+            to[count % WIDTH] = StackEntry { rays, parent, slot: slot as u32, key: f32::NEG_INFINITY };
+            count += 1;
+        }
+        count
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::packet::entry::PACKET;
+    use crate::bvh::packet::segment_box::SegmentBox;
+    use crate::rays::Ray;
+    use crate::simd::{Isa, Kernel};
+    use bth_format::layout::NONE;
+    use bth_format::object::ObjectBounds;
+    use bth_random::Rng;
+
+    /// What rays meet, a bit each, of each child.
+    struct Children<'a>(&'a [Ray], &'a WideNode, u64);
+
+    impl Kernel for Children<'_> {
+        type Output = [u64; WIDTH];
+        fn run<S: Simd>(self, s: S) -> [u64; WIDTH] {
+            let Children(rays, node, few) = self;
+            let mut groups = [RayGroup::vacant(s); GROUPS];
+            for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
+                assert!(group.prepare::<SegmentBox<S>>(s, &ObjectBounds::around(8.0), rays));
+            }
+            let groups = &groups[..rays.len().div_ceil(LANES)];
+            let (mut single_rays, mut to) = (SingleRays::NONE, [StackEntry::default(); WIDTH]);
+            let count = single_rays.children(s, groups, few, (7, node), &mut to);
+            let mut out = [0; WIDTH];
+            for entry in &to[..count] {
+                assert!(entry.parent == 7 && entry.rays != 0, "{entry:?}");
+                assert_eq!(out[entry.slot as usize], 0, "each child once");
+                out[entry.slot as usize] = entry.rays;
+            }
+            out
+        }
+    }
+
+    /// Whether a ray meets a box that is wider by `more` on all sides, in f64.
+    fn meets(ray: &Ray, lower: [f32; 3], upper: [f32; 3], more: f64) -> bool {
+        if lower[0] > upper[0] {
+            return false;
+        }
+        let (mut enter, mut leave) = (f64::from(ray.tmin), f64::from(ray.tmax));
+        for k in 0..3 {
+            let (o, d) = (f64::from(ray.origin[k]), f64::from(ray.direction[k]));
+            let [a, b] = [f64::from(lower[k]) - more, f64::from(upper[k]) + more].map(|x| (x - o) / d);
+            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+        }
+        enter <= leave
+    }
+
+    #[test]
+    fn children_are_met_by_the_rays_that_f64_says() {
+        let mut rng = Rng::new(31);
+        let mut unit = || rng.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
+        let (mut hit_cache, mut missed) = (0, 0);
+        for round in 0..120 {
+            // The last group of some packets is not full, or there is but one.
+            let rays: Vec<Ray> = (0..PACKET - round % 60)
+                .map(|_| {
+                    let [origin, direction] = [(); 2].map(|()| [(); 3].map(|()| 8.0 * unit()));
+                    Ray { origin, tmin: 0.0, direction, tmax: 0.4 + unit().abs() }
+                })
+                .collect();
+            let mut node =
+                WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
+            for slot in 0..WIDTH - round % 3 {
+                for k in 0..3 {
+                    let (middle, size) = (4.0 * unit(), 4.0 * unit().abs());
+                    (node.bounds[k][0][slot], node.bounds[k][1][slot]) = (middle - size, middle + size);
+                }
+            }
+            let few = (0..rays.len()).fold(0u64, |few, i| few | u64::from(unit() > 0.5) << i);
+            for isa in Isa::ALL {
+                let found = isa.run(Children(&rays, &node, few));
+                for (slot, &found) in found.iter().enumerate() {
+                    let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
+                    for (i, ray) in rays.iter().enumerate() {
+                        let is_found = found >> i & 1 != 0;
+                        let queried = few >> i & 1 != 0;
+                        assert!(queried || !is_found, "{isa}: only rays that were queried about");
+                        if queried && meets(ray, lower, upper, 0.0) {
+                            assert!(is_found, "{isa}: {ray:?} meets {lower:?}, {upper:?}");
+                            hit_cache += 1;
+                        }
+                        if queried && !meets(ray, lower, upper, 1e-4) {
+                            assert!(!is_found, "{isa}: {ray:?} misses {lower:?}, {upper:?}");
+                            missed += 1;
+                        }
+                    }
+                    assert_eq!(found.checked_shr(rays.len() as u32).unwrap_or(0), 0);
+                }
+            }
+        }
+        assert!(hit_cache > 1000 && missed > 1000, "{hit_cache}, {missed}");
+    }
+}

@@ -1,0 +1,429 @@
+//! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
+
+use crate::bvh::packet::runs::{self as packets, MINIMUM_USE, MinimumUse, PacketCount, PacketScratch};
+use crate::object::single;
+use crate::query::sink::Sink;
+use crate::query::{Any, Nearest, Query};
+use crate::rays::{Hit, Ray};
+use crate::simd::{Isa, Kernel, Simd};
+use bth_format::layout::{
+    Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
+};
+use bth_format::layout::{WIDTH, WideNode};
+use bth_format::object::ObjectBounds;
+use bth_format::object::{ObjectView, Records};
+use bth_random::Rng;
+use zerocopy::{FromZeros, IntoBytes};
+
+/// Quads of the surface along x and y, and of a leaf.
+const QUADS: [usize; 2] = [32, 64];
+const BLOCK: [usize; 2] = [2, 4];
+
+/// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
+struct Surface {
+    header: Object,
+    lines: Vec<Line>,
+    ids: Vec<u32>,
+    /// Its points.
+    points: Vec<[f32; 3]>,
+}
+
+/// Packets whatever they are worth.
+const ALWAYS: MinimumUse = MinimumUse { coherent: 0, short: 0 };
+
+/// A block that follows the lines.
+fn append(lines: &mut Vec<Line>, block: &[u8]) -> u32 {
+    let line = lines.len() as u32;
+    lines.resize(lines.len() + block.len() / 64, Line([0; 16]));
+    lines[line as usize..].as_mut_bytes().copy_from_slice(block);
+    line
+}
+
+fn bounds(points: &[[f32; 3]]) -> [[f32; 3]; 2] {
+    let end = |k: usize, pick: fn(f32, f32) -> f32| points.iter().map(|p| p[k]).reduce(pick).unwrap();
+    [[0, 1, 2].map(|k| end(k, f32::min)), [0, 1, 2].map(|k| end(k, f32::max))]
+}
+
+fn node(children: &[([[f32; 3]; 2], u32)]) -> WideNode {
+    let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
+    for (i, (bounds, code)) in children.iter().enumerate() {
+        node.child[i] = *code;
+        for k in 0..3 {
+            (node.bounds[k][0][i], node.bounds[k][1][i]) = (bounds[0][k], bounds[1][k]);
+        }
+    }
+    node
+}
+
+impl Surface {
+    /// Heights are small integers; then all is scaled and moved along x.
+    fn new(scale: f32, away: f32) -> Surface {
+        let mut rng = Rng::new(5);
+        let height: Vec<f32> = (0..(QUADS[0] + 1) * (QUADS[1] + 1)).map(|_| rng.below(5) as f32).collect();
+        let point = |x: usize, y: usize| {
+            let z = height[y * (QUADS[0] + 1) + x];
+            [(2.0 * x as f32 + away) * scale, 2.0 * y as f32 * scale, z * scale]
+        };
+        let (mut ids, mut points, mut leaves) = (vec![], vec![], vec![]);
+        let mut lines = vec![Line([0; 16]); NODE_LINES * (1 + WIDTH)];
+        for i in 0..QUADS[0] / BLOCK[0] * QUADS[1] / BLOCK[1] {
+            let (x0, y0) = (i % 16 * BLOCK[0], i / 16 * BLOCK[1]);
+            let first = ids.len() as u32;
+            let own: Vec<[f32; 3]> = (0..15).map(|v| point(x0 + v % 3, y0 + v / 3)).collect();
+            let triangles: Vec<[usize; 3]> = (0..8)
+                .flat_map(|q| {
+                    let v = q % 2 + q / 2 * 3;
+                    [[v, v + 1, v + 4], [v, v + 4, v + 3]]
+                })
+                .collect();
+            ids.extend((0..16).map(|t| 9999 - (first + t)));
+            let code = if i % 3 == 0 {
+                let mut leaf = RawLeaf::new_zeroed();
+                (leaf.first, leaf.triangles) = (first, 16);
+                for (t, of) in triangles.iter().enumerate() {
+                    for c in 0..3 {
+                        for k in 0..3 {
+                            leaf.corner[c][k][t] = own[of[c]][k];
+                        }
+                    }
+                }
+                assert_eq!(leaf.as_bytes().len(), RAW_LINES * 64);
+                Child::Raw(append(&mut lines, leaf.as_bytes())).code()
+            } else {
+                let mut leaf = IndexedLeaf::new_zeroed();
+                (leaf.first, leaf.triangles, leaf.vertices) = (first, 16, 15);
+                for v in 0..16 {
+                    for k in 0..3 {
+                        leaf.vertex[k][v] = own[v % 15][k];
+                    }
+                }
+                for (t, of) in triangles.iter().enumerate() {
+                    for c in 0..3 {
+                        leaf.corner[c][t] = of[c] as u8;
+                    }
+                }
+                assert_eq!(leaf.as_bytes().len(), INDEXED_LINES * 64);
+                Child::Indexed(append(&mut lines, leaf.as_bytes())).code()
+            };
+            leaves.push((bounds(&own), code));
+            points.extend(own);
+        }
+        let mut inner = vec![];
+        for (i, children) in leaves.chunks(WIDTH).enumerate() {
+            let line = NODE_LINES * (1 + i);
+            lines[line..line + NODE_LINES].as_mut_bytes().copy_from_slice(node(children).as_bytes());
+            let corners: Vec<[f32; 3]> = children.iter().flat_map(|c| c.0).collect();
+            inner.push((bounds(&corners), Child::Node(line as u32).code()));
+        }
+        lines[..NODE_LINES].as_mut_bytes().copy_from_slice(node(&inner).as_bytes());
+        let [lower, upper] = bounds(&points);
+        let header = Object {
+            lower,
+            upper,
+            root: Child::Node(0).code(),
+            record: 0,
+            triangles: 10_000,
+            dropped: 0,
+            depth: 2,
+            coordinates: 0,
+            grid_origin: [0.0; 3],
+            displacement: 0.0,
+        };
+        Surface { header, lines, ids, points }
+    }
+
+    /// One of its indexed leaves as a whole object.
+    fn one_leaf(&self) -> Surface {
+        let line = NODE_LINES * (1 + WIDTH) + RAW_LINES;
+        let lines = self.lines[line..line + INDEXED_LINES].to_vec();
+        let points = self.points[15..30].to_vec();
+        let [lower, upper] = bounds(&points);
+        let header = Object { lower, upper, root: Child::Indexed(0).code(), depth: 0, ..self.header };
+        Surface { header, lines, ids: self.ids.clone(), points }
+    }
+
+    fn view(&self) -> ObjectView<'_> {
+        ObjectView {
+            header: &self.header,
+            bounds: ObjectBounds::new(&self.header),
+            grid: None,
+            lines: &self.lines,
+            triangle_ids: &self.ids,
+            tet_leaves: &[],
+            records: Records::None,
+            tet_vertices: &[],
+            tet_faces: &[],
+            hull_faces: &[],
+            triangle_homes: &[],
+            positions: &[],
+            triangles: &[],
+            corners: &[],
+            normals: &[],
+            uvs: &[],
+        }
+    }
+}
+
+/// Packets of a batch as a kernel.
+struct Packed<'a, 'b, Q: Query> {
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    scratch: &'a mut PacketScratch,
+    least: MinimumUse,
+    sink: Sink<'b, Q>,
+}
+
+impl<Q: Query> Kernel for Packed<'_, '_, Q> {
+    type Output = PacketCount;
+    #[inline(always)]
+    fn run<S: Simd>(mut self, s: S) -> PacketCount {
+        packets::trace(s, self.object, self.rays, self.scratch, self.least, &mut self.sink)
+    }
+}
+
+fn packed<Q: Query>(
+    isa: Isa,
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    least: MinimumUse,
+    answers: &mut [Q::Answer],
+) -> (PacketCount, Vec<u32>) {
+    let mut scratch = PacketScratch::default();
+    let count = packed_in::<Q>(isa, &mut scratch, object, rays, least, answers);
+    (count, scratch.rest)
+}
+
+/// In memory that other batches may have used.
+fn packed_in<Q: Query>(
+    isa: Isa,
+    scratch: &mut PacketScratch,
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    least: MinimumUse,
+    answers: &mut [Q::Answer],
+) -> PacketCount {
+    let sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
+    let count = isa.run(Packed { object, rays, scratch, least, sink });
+    assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
+    count
+}
+
+fn bits(hit: &Hit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.triangle]
+}
+
+/// Compares packets with single rays; returns how many packets and how many hits there were.
+fn check(surface: &Surface, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
+    let object = surface.view();
+    let (mut nearest, mut any) = Default::default();
+    let alone = |ray: &Ray| {
+        let (mut hit, mut found) = (Hit::MISS, false);
+        single::trace::<Nearest, ()>(&object, ray, NONE, 0, &mut (), &mut hit);
+        single::trace::<Any, ()>(&object, ray, NONE, 0, &mut (), &mut found);
+        (hit, found)
+    };
+    let expected: Vec<(Hit, bool)> = rays.iter().map(alone).collect();
+    for isa in Isa::ALL {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
+        let mut found = vec![false; rays.len()];
+        let (count_any, rest_any) = packed::<Any>(isa, &object, rays, least, &mut found);
+        for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
+            if !rest.contains(&(i as u32)) {
+                assert_eq!(bits(&hits[i]), bits(hit), "{isa}, ray {i}, {ray:?}: {:?}, {hit:?}", hits[i]);
+            }
+            if !rest_any.contains(&(i as u32)) {
+                assert_eq!(found[i], *is_hit, "{isa}, ray {i}, {ray:?}");
+            }
+        }
+        nearest = (count, hits.iter().filter(|h| h.is_hit()).count());
+        any = (count_any, found.iter().filter(|&&f| f).count());
+    }
+    [nearest, any]
+}
+
+fn unit(rng: &mut Rng) -> f32 {
+    rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
+}
+
+/// Rays from near an eye to near a place of the surface, in runs of 64: exactly from the eye and to points of the surface
+/// where `exact`.
+fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
+    let mut rng = Rng::new(seed);
+    let mut rays = vec![];
+    for _ in 0..40 {
+        let start = rng.below(surface.points.len() as u64 - 64) as usize;
+        let target = surface.points[start];
+        let away = [unit(&mut rng), unit(&mut rng), 2.0].map(|x| (x * 40.0).round() * scale);
+        let eye = [0, 1, 2].map(|k| target[k] + away[k]);
+        for _ in 0..64 {
+            let mut jitter = |spread: f32| if exact { 0.0 } else { unit(&mut rng) * spread * scale };
+            let origin = eye.map(|x| x + jitter(0.5));
+            let point = surface.points[start + rng.below(64) as usize % 15];
+            let point = point.map(|x| x + if exact { 0.0 } else { unit(&mut rng) * 2.0 * scale });
+            let direction = [0, 1, 2].map(|k| point[k] - origin[k]);
+            let tmax = [f32::INFINITY, 1.0, 0.5, 4.0][rng.below(4) as usize];
+            rays.push(Ray { origin, tmin: 0.0, direction, tmax });
+        }
+    }
+    rays
+}
+
+/// Short rays from places near a point, all ways.
+fn short(surface: &Surface, scale: f32, seed: u64) -> Vec<Ray> {
+    let mut rng = Rng::new(seed);
+    let mut rays = vec![];
+    for _ in 0..40 {
+        let point = surface.points[rng.below(surface.points.len() as u64) as usize];
+        for _ in 0..64 {
+            let origin = point.map(|x| x + unit(&mut rng) * scale);
+            let direction = [(); 3].map(|()| unit(&mut rng) * scale);
+            rays.push(Ray { origin, tmin: 0.0, direction, tmax: 3.0 });
+        }
+    }
+    rays
+}
+
+#[test]
+fn coherent_bundles_are_traced_to_the_same_bits_as_single_rays() {
+    for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
+        let surface = Surface::new(scale, away);
+        let rays = bundles(&surface, scale, false, 1);
+        for (count, hits) in check(&surface, &rays, ALWAYS) {
+            assert!(count.coherent >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
+        }
+    }
+}
+
+#[test]
+fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
+    for scale in [1.0, 0.125] {
+        let surface = Surface::new(scale, 0.0);
+        let rays = bundles(&surface, scale, true, 2);
+        for (count, hits) in check(&surface, &rays, ALWAYS) {
+            assert!(count.coherent >= 5 && hits > 500, "{count:?}, {hits}");
+        }
+    }
+}
+
+/// Packets of rays from one point that hit a few triangles, or more than are kept, or some of each.
+#[test]
+fn views_from_one_point_are_traced_to_the_same_bits() {
+    let mut rng = Rng::new(12);
+    let surface = Surface::new(1.0, 0.0);
+    let eye = [30.3, 60.1, 90.7];
+    let mut rays = vec![];
+    for run in 0..120 {
+        let target = surface.points[rng.below(surface.points.len() as u64) as usize];
+        let spread = [0.3, 1.5, 3.0, 8.0][run / 3 % 4];
+        for _ in 0..64 {
+            let direction = [0, 1, 2].map(|k| target[k] + unit(&mut rng) * spread - eye[k]);
+            rays.push(Ray { origin: eye, tmin: 0.0, direction, tmax: f32::INFINITY });
+        }
+    }
+    let [(count, hits), _] = check(&surface, &rays, ALWAYS);
+    assert!(count.coherent > 60 && hits > 1000, "{count:?}, {hits}");
+    // How many triangles the rays of a packet hit: both halves of what is kept, and more.
+    let mut all = vec![Hit::MISS; rays.len()];
+    packed::<Nearest>(Isa::Scalar, &surface.view(), &rays, ALWAYS, &mut all);
+    let mut runs = [0; 3];
+    for run in all.chunks(64) {
+        let different: std::collections::BTreeSet<u32> =
+            run.iter().filter(|h| h.is_hit()).map(|h| h.surface.triangle).collect();
+        runs[(different.len().max(1) - 1) / 8 % 3] += usize::from(different.len() <= 24);
+    }
+    assert!(runs.iter().all(|&runs| runs > 5), "{runs:?}");
+}
+
+#[test]
+fn short_bundles_are_traced_to_the_same_bits() {
+    for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
+        let surface = Surface::new(scale, away);
+        let rays = short(&surface, scale, 3);
+        let [_, (count, hits)] = check(&surface, &rays, ALWAYS);
+        assert!(count.short >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
+    }
+}
+
+#[test]
+fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
+    let surface = Surface::new(1.0, 0.0);
+    let (coherent, short) = (bundles(&surface, 1.0, false, 4), short(&surface, 1.0, 5));
+    let mut rng = Rng::new(6);
+    let mut rays = vec![];
+    for (i, (a, b)) in coherent.chunks(64).zip(short.chunks(64)).enumerate() {
+        rays.extend_from_slice(if i % 2 == 0 { a } else { b });
+        if i % 5 == 0 {
+            // Anything at all: rays without a line, from within the surface, backward in t.
+            for _ in 0..64 {
+                let pick = |rng: &mut Rng, x: f32| if rng.below(60) == 0 { f32::NAN } else { x };
+                let origin = [(); 3].map(|()| {
+                    let x = unit(&mut rng) * 40.0;
+                    pick(&mut rng, x)
+                });
+                let direction = [(); 3].map(|()| unit(&mut rng).round());
+                rays.push(Ray { origin, tmin: unit(&mut rng), direction, tmax: unit(&mut rng) * 50.0 });
+            }
+        }
+    }
+    // A last packet that is not full.
+    rays.extend_from_slice(&coherent[..50]);
+    let [(nearest, _), (any, _)] = check(&surface, &rays, ALWAYS);
+    assert!(nearest.rays > 0 && nearest.rays < rays.len(), "{nearest:?}");
+    assert!(any.coherent > 0 && any.short > 0, "{any:?}");
+}
+
+#[test]
+fn rays_that_lanes_cannot_hold_are_left_to_go_alone() {
+    for scale in [1e15, 1e-42] {
+        let surface = Surface::new(scale, 0.0);
+        let rays = bundles(&surface, scale, false, 7);
+        for (count, _) in check(&surface, &rays, ALWAYS) {
+            assert_eq!(count, PacketCount::default(), "{scale}");
+        }
+    }
+}
+
+#[test]
+fn packets_that_serve_few_of_their_rays_make_way() {
+    // Every other ray of a run passes far from the others, so hardly any step serves half of them.
+    let surface = Surface::new(1.0, 0.0);
+    let mut rays = bundles(&surface, 1.0, false, 8);
+    let mut rng = Rng::new(9);
+    for ray in &mut rays {
+        let point = surface.points[rng.below(surface.points.len() as u64) as usize];
+        ray.origin = [point[0] - 400.0, point[1] - 300.0, point[2] + 500.0];
+        ray.direction = [400.0, 300.0, -500.0];
+        ray.tmax = f32::INFINITY;
+    }
+    for (count, _) in check(&surface, &rays, MINIMUM_USE) {
+        assert!(count.poor > 0 && count.rays < rays.len() / 2, "{count:?}");
+    }
+}
+
+/// What packets keep between batches says nothing about the next object.
+#[test]
+fn nothing_of_a_batch_is_left_for_the_next() {
+    let surface = Surface::new(1.0, 0.0);
+    let leaf = surface.one_leaf();
+    let mut rng = Rng::new(13);
+    let middle = leaf.points[7];
+    // Through a vertex, so that hits must be decided alone.
+    let rays: Vec<Ray> = (0..128)
+        .map(|_| {
+            let away = [(); 3].map(|()| (rng.below(64) as f32 - 31.5) / 128.0);
+            let origin = [0, 1, 2].map(|k| middle[k] + away[k]);
+            Ray { origin, tmin: 0.0, direction: away.map(|x| -2.0 * x), tmax: 1.0 }
+        })
+        .collect();
+    let before = bundles(&surface, 1.0, false, 14);
+    for isa in Isa::ALL {
+        let mut scratch = PacketScratch::default();
+        let mut hits = vec![Hit::MISS; before.len()];
+        packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, &mut hits);
+        assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 500);
+        let mut found = vec![false; rays.len()];
+        let count = packed_in::<Any>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, &mut found);
+        assert!(count.short == 2 && found.iter().all(|&found| found), "{isa}: {count:?}");
+    }
+}

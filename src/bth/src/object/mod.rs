@@ -1,0 +1,45 @@
+//! One object: rays in its space through its BVH and its tetrahedra, one ray or a batch.
+
+mod batch;
+pub(crate) mod hints;
+mod scratch;
+pub(crate) mod single;
+mod strategy;
+
+pub(crate) use batch::{LEAST_BATCH, any_batch, fill_misses, nearest_batch, trace_batch};
+pub use hints::Hinted;
+pub(crate) use scratch::{Scratch, with_scratch};
+
+use self::single::trace;
+use crate::query::{Any, Nearest, Steps};
+use crate::rays::{Hit, Ray};
+use bth_format::object::ObjectView;
+
+/// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
+#[inline(never)]
+pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
+    let mut hit = Hit::MISS;
+    nearest_to(object, ray, from, instance, &mut hit);
+    hit
+}
+
+/// As [`nearest`], written to `to`.
+#[inline(always)]
+pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, to: &mut Hit) {
+    trace::<Nearest, ()>(object, ray, from, instance, &mut (), to);
+}
+
+/// As [`nearest`], with a count of the work.
+pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
+    let (mut hit, mut steps) = (Hit::MISS, Steps::default());
+    trace::<Nearest, Steps>(object, ray, from, instance, &mut steps, &mut hit);
+    (hit, steps)
+}
+
+/// Whether a ray in object space hits anything.
+#[inline(always)]
+pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
+    let mut found = false;
+    trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);
+    found
+}

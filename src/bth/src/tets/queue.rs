@@ -1,0 +1,282 @@
+//! Rays made ready to walk, in wait for lanes that are free.
+
+use super::lanes::{Extent, Lanes, cross, float, three, word};
+use crate::intersect::prepare;
+use crate::rays::Ray;
+use crate::simd::{LANES, Simd};
+use bth_format::layout::{HullFace, NONE, TetFace};
+use zerocopy::{FromBytes, IntoBytes};
+
+/// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or
+/// underflow. Depths are then t times between 2^-40 and 2^40.
+const GREATEST_ORIGIN: f32 = (1u64 << 59) as f32;
+const GREATEST_DIRECTION: f32 = (1u64 << 40) as f32;
+const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
+/// Depths and bounds of t are compared with this much to spare, relative to them, and that absolutely: all
+/// roundings together are smaller, and so is the least f32 times the least direction.
+const SPARE: f32 = 1.0 / (1 << 20) as f32;
+const LEAST_SPARE: f32 = 1.0 / (1u128 << 100) as f32;
+/// Products of three lengths from within this reach (2^40) do not overflow; and what underflows of them is less than
+/// 2^-120.
+const GREATEST_REACH: f32 = GREATEST_DIRECTION;
+const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
+
+/// Most rays that wait.
+const CAPACITY: usize = 4 * LANES;
+
+/// Rows of rays that wait, one a field of [`Lanes`]; lanes are taken from the front and packed to the back.
+pub(super) struct ReadyQueue {
+    words: [[u32; CAPACITY + LANES]; word::COUNT],
+    floats: [[f32; CAPACITY + LANES]; float::COUNT],
+    first: usize,
+    end: usize,
+}
+
+/// AnswerLanes elements of a row.
+#[inline(always)]
+fn sixteen<T>(row: &[T; CAPACITY + LANES], at: usize) -> &[T; LANES] {
+    row[at..].first_chunk().expect("rows have sixteen elements to spare")
+}
+
+#[inline(always)]
+fn sixteen_mut<T>(row: &mut [T; CAPACITY + LANES], at: usize) -> &mut [T; LANES] {
+    row[at..].first_chunk_mut().expect("rows have sixteen elements to spare")
+}
+
+impl ReadyQueue {
+    pub(super) fn new() -> Self {
+        ReadyQueue {
+            words: [[0; CAPACITY + LANES]; word::COUNT],
+            floats: [[0.0; CAPACITY + LANES]; float::COUNT],
+            first: 0,
+            end: 0,
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.end - self.first
+    }
+
+    /// Starts over; nothing may wait.
+    pub(super) fn rewind(&mut self) {
+        debug_assert_eq!(self.len(), 0);
+        (self.first, self.end) = (0, 0);
+    }
+
+    /// Whether sixteen more have room.
+    pub(super) fn has_room(&self) -> bool {
+        self.end + LANES <= CAPACITY
+    }
+
+    /// Adds the lanes whose bit is set.
+    #[inline(always)]
+    pub(super) fn push<S: Simd>(&mut self, s: S, bits: u32, lanes: &Lanes<S>) {
+        macro_rules! push {
+            ($values:ident $compress:ident $($i:literal)*) => { $(
+                s.$compress(bits, lanes.$values[$i], sixteen_mut(&mut self.$values[$i], self.end));
+            )* };
+        }
+        push!(words compress 0 1 2 3 4 5 6 7 8);
+        push!(floats compress_f 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+        self.end += bits.count_ones() as usize;
+    }
+
+    /// Fills as many of the lanes as there are rays; returns which.
+    #[inline(always)]
+    pub(super) fn pop<S: Simd>(&mut self, s: S, idle: u32, lanes: &mut Lanes<S>) -> u32 {
+        let mut taken = idle;
+        while taken.count_ones() as usize > self.len() {
+            taken &= taken - 1;
+        }
+        let m = s.mask(taken);
+        // Written out, so that the lanes can stay in registers.
+        macro_rules! pop {
+            ($values:ident $expand:ident $($i:literal)*) => { $(
+                lanes.$values[$i] = s.$expand(lanes.$values[$i], m, sixteen(&self.$values[$i], self.first));
+            )* };
+        }
+        pop!(words expand_u 0 1 2 3 4 5 6 7 8);
+        pop!(floats expand 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+        self.first += taken.count_ones() as usize;
+        taken
+    }
+}
+
+#[inline(always)]
+fn spare<S: Simd>(s: S, depth: S::F) -> S::F {
+    s.fma(s.abs(depth), s.splat(SPARE), s.splat(LEAST_SPARE))
+}
+
+/// Rays set up for projection, and their faces projected.
+pub(super) struct Ready<S: Simd> {
+    pub(super) lanes: Lanes<S>,
+    /// tmin as a depth, less a little.
+    tmin_low: S::F,
+    /// The lanes whose rays f32 can take.
+    pub(super) able: S::M,
+}
+
+impl<S: Simd> Ready<S> {
+    /// Prepares the rays `slot` of the batch, without any place yet.
+    #[inline(always)]
+    fn of_rays(s: S, m: S::M, rays: &[Ray], slot: S::U) -> Self {
+        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::fields(s, m, rays, slot);
+        let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
+        let size = three!(|k| s.abs(d[k]));
+        let greatest = s.max(size[0], s.max(size[1], size[2]));
+        // Comparisons with NaN are false.
+        let mut able = s.and(m, s.le(tmin, tmax));
+        able = s.and(able, s.le(s.splat(LEAST_DIRECTION), greatest));
+        for k in 0..3 {
+            able = s.and(able, s.le(s.abs(o[k]), s.splat(GREATEST_ORIGIN)));
+            able = s.and(able, s.le(size[k], s.splat(GREATEST_DIRECTION)));
+        }
+        // The axis of the depth; the two that follow it in turn, swapped where the ray goes down.
+        let along0 = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
+        let along1 = s.and_not(s.lt(size[2], size[1]), along0);
+        let axis = s.select_u(along0, s.splat_u(0), s.select_u(along1, s.splat_u(1), s.splat_u(2)));
+        let mut lanes = Lanes::idle(s);
+        lanes.words[word::AXIS] = axis;
+        let depth = lanes.turn(s, d)[2];
+        let down = s.lt(depth, s.splat(0.0));
+        let per_t = s.abs(depth);
+        lanes.words[word::SIGN] = s.select_u(down, s.splat_u(1 << 31), s.splat_u(0));
+        let (origin, direction) = (lanes.turn(s, o), lanes.turn(s, d));
+        lanes.floats[float::ORIGIN..float::ORIGIN + 3].copy_from_slice(&origin);
+        lanes.floats[float::SHEAR] = s.div(direction[0], per_t);
+        lanes.floats[float::SHEAR + 1] = s.div(direction[1], per_t);
+        lanes.words[word::SLOT] = slot;
+        let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
+        lanes.floats[float::LIMIT] = s.add(high, spare(s, high));
+        Ready { lanes, tmin_low: s.sub(low, spare(s, low)), able }
+    }
+
+    /// Projects the faces.
+    #[inline(always)]
+    fn set_face(&mut self, s: S, m: S::M, vertices: &[[f32; 4]], face: [S::U; 3]) {
+        let lanes = &mut self.lanes;
+        let mut extent = Extent::least(s);
+        for (i, vertex) in face.into_iter().enumerate() {
+            let corner = lanes.project(s, lanes.gather(s, m, vertices, vertex));
+            extent = extent.with(s, &corner).0;
+            lanes.words[word::FACE + i] = vertex;
+            lanes.floats[float::X + i] = corner.x;
+            lanes.floats[float::Y + i] = corner.y;
+            lanes.floats[float::DEPTH + i] = corner.depth;
+        }
+        lanes.floats[float::REACH] = extent.reach;
+        lanes.floats[float::SIZE] = extent.size;
+    }
+
+    /// Prepares the rays `slot` of the batch, to the projection of their faces.
+    #[inline(always)]
+    pub(super) fn new(
+        s: S,
+        m: S::M,
+        rays: &[Ray],
+        vertices: &[[f32; 4]],
+        slot: S::U,
+        face: [S::U; 3],
+    ) -> Self {
+        let mut ready = Self::of_rays(s, m, rays, slot);
+        ready.set_face(s, m, vertices, face);
+        ready
+    }
+
+    /// Prepares rays to walk from where their lines enter a hull. Returns also which certainly do, and which
+    /// certainly miss it.
+    #[inline(always)]
+    pub(super) fn from_hull(
+        s: S,
+        m: S::M,
+        rays: &[Ray],
+        vertices: &[[f32; 4]],
+        hull: &[HullFace],
+        slot: S::U,
+    ) -> (Self, S::M, S::M) {
+        let mut ready = Self::of_rays(s, m, rays, slot);
+        let (mut entered, mut in_doubt) = (s.mask(0), s.mask(0));
+        let [mut tet, mut apex] = [s.splat_u(0); 2];
+        let mut entry = [s.splat_u(0); 3];
+        for face in hull {
+            let vertex = three!(|i| s.splat_u(face.vertex[i]));
+            ready.set_face(s, m, vertices, vertex);
+            let lanes = &ready.lanes;
+            let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
+            let bound = extent.bound(s, extent.size);
+            let mut inwards = m;
+            for i in 0..3 {
+                let value = cross(s, &lanes.corner(i), &lanes.corner((i + 1) % 3));
+                inwards = s.and(inwards, s.lt(bound, value));
+                in_doubt = s.or(in_doubt, s.and_not(m, s.lt(bound, s.abs(value))));
+            }
+            entered = s.or(entered, inwards);
+            tet = s.select_u(inwards, s.splat_u(face.tet), tet);
+            apex = s.select_u(inwards, s.splat_u(face.opposite), apex);
+            entry = three!(|i| s.select_u(inwards, vertex[i], entry[i]));
+        }
+        let certain = s.and_not(ready.able, in_doubt);
+        let entered = s.and(certain, entered);
+        ready.set_face(s, entered, vertices, entry);
+        ready.lanes.words[word::TET] = tet;
+        ready.lanes.words[word::APEX] = apex;
+        ready.lanes.words[word::BEHIND] = s.splat_u(NONE);
+        (ready, entered, s.and_not(certain, entered))
+    }
+
+    /// Prepares rays that start about constrained faces to walk from these, and returns which can: those whose lines
+    /// certainly cross the face, certainly before the ray begins. All that a line meets afterwards in the leaf
+    /// comes in order, so wherever the origin is in between, nothing is left out.
+    #[inline(always)]
+    pub(super) fn from_faces(
+        s: S,
+        m: S::M,
+        rays: &[Ray],
+        vertices: &[[f32; 4]],
+        faces: &[TetFace],
+        slot: S::U,
+        face: S::U,
+    ) -> (Self, S::M) {
+        let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).expect("a face is eight words");
+        // The fields of a `TetFace`, in their order.
+        let [v0, v1, v2, _, above, below, apex_above, apex_below] = s.rows8(m, faces, face);
+        let vertex = [v0, v1, v2];
+        let mut ready = Ready::new(s, m, rays, vertices, slot, vertex);
+        let lanes = &mut ready.lanes;
+        let corner = three!(|i| lanes.corner(i));
+        let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
+        let bound = extent.bound(s, extent.size);
+        let minus = s.sub(s.splat(0.0), bound);
+        let (mut up, mut down) = (ready.able, ready.able);
+        let (mut area, mut volume) = (s.splat(0.0), s.splat(0.0));
+        for i in 0..3 {
+            let value = cross(s, &corner[i], &corner[(i + 1) % 3]);
+            (up, down) = (s.and(up, s.lt(bound, value)), s.and(down, s.lt(value, minus)));
+            let weight = s.abs(value);
+            area = s.add(area, weight);
+            volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
+        }
+        // volume / area is the depth of the crossing; both are off by their bounds and roundings.
+        let low = ready.tmin_low;
+        let mut farthest = s.abs(low);
+        for p in &corner {
+            farthest = s.max(s.abs(p.depth), farthest);
+        }
+        let doubt = s.fma(area, s.splat(SPARE), s.mul(bound, s.splat(6.0)));
+        let behind = s.lt(s.fma(doubt, farthest, s.add(volume, s.splat(LEAST_VOLUME))), s.mul(low, area));
+        let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
+        let able = s.and(s.or(up, down), s.and(behind, near));
+        // The face turns around for those that go against its normal.
+        lanes.words[word::TET] = s.select_u(up, above, below);
+        lanes.words[word::APEX] = s.select_u(up, apex_above, apex_below);
+        lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(bth_format::layout::FACE_BIT));
+        lanes.words[word::FACE + 1] = s.select_u(up, v1, v2);
+        lanes.words[word::FACE + 2] = s.select_u(up, v2, v1);
+        for k in [float::X, float::Y, float::DEPTH] {
+            let (p1, p2) = (lanes.floats[k + 1], lanes.floats[k + 2]);
+            lanes.floats[k + 1] = s.select(up, p1, p2);
+            lanes.floats[k + 2] = s.select(up, p2, p1);
+        }
+        (ready, able)
+    }
+}

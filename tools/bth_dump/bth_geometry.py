@@ -38,11 +38,11 @@ def contains(box, points):
 
 def check_geometry(view, tets):
     """Checks an object whose indices have been checked; `tets` are the derived ones of each leaf."""
-    homes = _tree(view)
+    placed = _tree(view)
     for leaf, found in zip(view.tet_leaves, tets):
         _tet_leaf(view, leaf, found)
     _displacement(view)
-    missing = [t for t in range(view.triangles) if t not in homes]
+    missing = [t for t in range(view.triangles) if t not in placed]
     if len(missing) != view.dropped:
         raise view.invalid("F203", f"{len(missing)} triangles in no leaf, {view.dropped} dropped", c.OBJECT, 36)
     for t in missing:
@@ -64,7 +64,7 @@ def _displacement(view):
 
 def _tree(view):
     """Checks leaves and boxes; returns the triangles that are in a leaf or a constrained face."""
-    homes, beside = set(), [set() for _ in view.tet_leaves]
+    placed, in_subtree = set(), [set() for _ in view.tet_leaves]
 
     def triangle(t, corners, number, section, at):
         if view.source:
@@ -74,10 +74,10 @@ def _tree(view):
             if is_zero_area(source):
                 raise view.invalid("F207", f"triangle {t} has no area", section, at)
 
-    def home(t, section, at):
-        if t in homes:
+    def place(t, section, at):
+        if t in placed:
             raise view.invalid("F203", f"triangle {t} again", section, at)
-        homes.add(t)
+        placed.add(t)
 
     # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
     stack = [(view.root, [(view.lower, view.upper)], None)]
@@ -96,7 +96,7 @@ def _tree(view):
             for row in range(leaf.first_face, leaf.first_face + leaf.faces):
                 face = view.tet_faces[row]
                 corners = [view.tet_vertices[v][:3] for v in face.vertex]
-                home(face.triangle, c.TET_FACES, 32 * row)
+                place(face.triangle, c.TET_FACES, 32 * row)
                 triangle(face.triangle, corners, "F202", c.TET_FACES, 32 * row)
                 points += corners
             stack.append((leaf.subtree, [], index))
@@ -104,13 +104,13 @@ def _tree(view):
             for row, corners in bth_leaves.triangles(view, kind, index):
                 t = view.triangle_ids[row]
                 if leaf_row is None:
-                    home(t, c.TRIANGLE_IDS, 4 * row)
+                    place(t, c.TRIANGLE_IDS, 4 * row)
                 else:
                     leaf = view.tet_leaves[leaf_row]
-                    here = leaf.first_face <= view.triangle_homes[t] < leaf.first_face + leaf.faces
-                    if not here or t in beside[leaf_row]:
+                    here = leaf.first_face <= view.triangle_faces[t] < leaf.first_face + leaf.faces
+                    if not here or t in in_subtree[leaf_row]:
                         raise view.invalid("F203", f"triangle {t} in a subtree", c.TRIANGLE_IDS, 4 * row)
-                    beside[leaf_row].add(t)
+                    in_subtree[leaf_row].add(t)
                 triangle(t, corners, "F201", c.LINES, 32 * bth_leaves.halves(view, kind, index).start)
                 points += corners
         late.append((boxes, points))
@@ -118,9 +118,9 @@ def _tree(view):
         if not all(contains(box, points) for box in boxes):
             raise view.invalid("F204", "triangles outside a box above", c.LINES)
     for row, leaf in enumerate(view.tet_leaves):
-        if leaf.subtree != NONE and len(beside[row]) != leaf.faces:
-            raise view.invalid("F203", f"{len(beside[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
-    return homes
+        if leaf.subtree != NONE and len(in_subtree[row]) != leaf.faces:
+            raise view.invalid("F203", f"{len(in_subtree[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
+    return placed
 
 
 def _tet_leaf(view, leaf, found):

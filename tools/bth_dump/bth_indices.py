@@ -29,7 +29,7 @@ def check_indices(view):
     _header(view)
     _sources(view)
     _tet_ranges(view)
-    _homes(view)
+    _triangle_faces(view)
     _tree(view)
     return [derive(view, leaf) for leaf in view.tet_leaves]
 
@@ -39,7 +39,7 @@ def _header(view):
         if not condition:
             raise view.invalid(number, message, c.OBJECT, at)
 
-    for name, rows in (("TRIANGLE_HOMES", view.triangle_homes), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
+    for name, rows in (("TRIANGLE_FACES", view.triangle_faces), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
         need(len(rows) in (0, view.triangles), "F102", f"{len(rows)} rows of {name}", 32)
     need(view.triangles <= 1 << 30, "F022", f"{view.triangles} triangles", 32)
     need(view.dropped <= view.triangles, "F102", f"{view.dropped} dropped", 36)
@@ -93,16 +93,17 @@ def _tet_ranges(view):
             raise view.invalid("F124", f"vertex {x} {y} {z}, {reserved}", c.TET_VERTICES, 16 * i)
 
 
-def _homes(view):
-    homes = view.triangle_homes
-    if len(homes) != (view.triangles if view.tet_leaves else 0):
-        raise view.invalid("F131", f"{len(homes)} rows", c.TRIANGLE_HOMES)
+def _triangle_faces(view):
+    """F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other."""
+    faces = view.triangle_faces
+    if len(faces) != (view.triangles if view.tet_leaves else 0):
+        raise view.invalid("F131", f"{len(faces)} rows", c.TRIANGLE_FACES)
     expected = {face.triangle: row for row, face in enumerate(view.tet_faces)}
-    if len(expected) != len(view.tet_faces) or any(t >= len(homes) for t in expected):
+    if len(expected) != len(view.tet_faces) or any(t >= len(faces) for t in expected):
         raise view.invalid("F131", "a constrained face without a triangle of its own", c.TET_FACES)
-    for triangle, home in enumerate(homes):
-        if home != expected.get(triangle, NONE):
-            raise view.invalid("F131", f"triangle {triangle} at home in {home}", c.TRIANGLE_HOMES, 4 * triangle)
+    for triangle, face in enumerate(faces):
+        if face != expected.get(triangle, NONE):
+            raise view.invalid("F131", f"triangle {triangle} leads to face {face}", c.TRIANGLE_FACES, 4 * triangle)
 
 
 def _tree(view):

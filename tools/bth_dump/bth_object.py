@@ -37,7 +37,7 @@ class ObjectView:
         self.lines = self.bytes(c.LINES)
         self.grid = self._grid(raw)
         self.triangle_ids = self.rows(c.TRIANGLE_IDS, "<I", scalar=True)
-        self.triangle_homes = self.rows(c.TRIANGLE_HOMES, "<I", scalar=True)
+        self.triangle_faces = self.rows(c.TRIANGLE_FACES, "<I", scalar=True)
         self.tet_leaves = [TetLeaf(r[:3], r[3:6], *r[6:]) for r in self.rows(c.TET_LEAVES, "<6f10I")]
         self.tet_vertices = self.rows(c.TET_VERTICES, "<3fI")
         self.tet_faces = [TetFace(r[:3], r[3], r[4:6], r[6:]) for r in self.rows(c.TET_FACES, "<8I")]

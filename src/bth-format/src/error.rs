@@ -87,7 +87,7 @@ codes! {
     Neighbour "F128" "Neighbours share three vertices and refer to each other."
     TetRecord "F129" "Vertices and exclusive ors of a record are those of its tetrahedron; opposite vertices are those of the neighbour."
     Unreached "F130" "Every tetrahedron of a leaf is reached from its first hull face."
-    Homes "F131" "TRIANGLE_HOMES is empty without tet leaves; else it leads from each triangle of a constrained face to that face, and from others to NONE."
+    TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it leads from each triangle of a constrained face to that face, and from others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
     Positions "F141" "Positions are finite."
     Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and zeros."
@@ -286,7 +286,7 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::TET_VERTICES => "TET_VERTICES",
         kind::TET_FACES => "TET_FACES",
         kind::HULL_FACES => "HULL_FACES",
-        kind::TRIANGLE_HOMES => "TRIANGLE_HOMES",
+        kind::TRIANGLE_FACES => "TRIANGLE_FACES",
         kind::POSITIONS => "POSITIONS",
         kind::TRIANGLES => "TRIANGLES",
         kind::CORNERS => "CORNERS",

@@ -100,7 +100,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::TET_FACES, index, parts.tet_faces)?;
     builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
     if record.is_some() {
-        builder.rows(kind::TRIANGLE_HOMES, index, parts.triangle_homes)?;
+        builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_homes)?;
     }
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;

@@ -49,7 +49,7 @@ fn header(view: &ObjectView) -> Result<()> {
         return fail(Code::Record, offset_of!(Object, record), "the kind of the records".into(), found);
     }
     let rows = [
-        ("TRIANGLE_HOMES", view.triangle_homes.len()),
+        ("TRIANGLE_FACES", view.triangle_homes.len()),
         ("TRIANGLES", view.triangles.len()),
         ("CORNERS", view.corners.len()),
     ];

@@ -73,15 +73,15 @@ fn vertices(view: &ObjectView) -> Result<()> {
     }
 }
 
-/// Checks that TRIANGLE_HOMES and the triangles of TET_FACES are inverse to each other.
+/// Checks that TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other.
 fn homes(view: &ObjectView) -> Result<()> {
     let fail = |kind, at: usize, expected: String, found: String| {
-        Err(Error::within(Code::Homes, kind, at as u64, expected, found))
+        Err(Error::within(Code::TriangleFaces, kind, at as u64, expected, found))
     };
     let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };
     if view.triangle_homes.len() != expected {
         let found = view.triangle_homes.len().to_string();
-        return fail(kind::TRIANGLE_HOMES, 0, format!("{expected} rows"), found);
+        return fail(kind::TRIANGLE_FACES, 0, format!("{expected} rows"), found);
     }
     for (row, face) in view.tet_faces.iter().enumerate() {
         if view.triangle_homes.get(face.triangle as usize) != Some(&(row as u32)) {
@@ -94,7 +94,7 @@ fn homes(view: &ObjectView) -> Result<()> {
         let named = view.tet_faces.get(home as usize).map(|f| f.triangle);
         if home != NONE && named != Some(triangle as u32) {
             let expected = format!("NONE or the face of triangle {triangle}");
-            return fail(kind::TRIANGLE_HOMES, 4 * triangle, expected, format!("row {home}"));
+            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, format!("row {home}"));
         }
     }
     Ok(())

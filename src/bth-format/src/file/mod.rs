@@ -150,7 +150,7 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = kind::OBJECT..=kind::TRIANGLE_HOMES;
+        let traced = kind::OBJECT..=kind::TRIANGLE_FACES;
         self.table().iter().filter(|e| e.object != NONE && traced.contains(&e.kind)).map(|e| e.length).sum()
     }
 
@@ -228,7 +228,7 @@ impl File {
             tet_vertices: self.slice(object, kind::TET_VERTICES),
             tet_faces: self.slice(object, kind::TET_FACES),
             hull_faces: self.slice(object, kind::HULL_FACES),
-            triangle_homes: self.slice(object, kind::TRIANGLE_HOMES),
+            triangle_homes: self.slice(object, kind::TRIANGLE_FACES),
             positions: self.slice(object, kind::POSITIONS),
             triangles: self.slice(object, kind::TRIANGLES),
             corners: self.slice(object, kind::CORNERS),

@@ -40,7 +40,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
         kind::LINES => size_of::<Line>(),
-        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES => 4,
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::TETS => 0,
         kind::TET_VERTICES => size_of::<TetVertex>(),
@@ -66,7 +66,7 @@ fn most(kind: u32) -> u64 {
         kind::OBJECT => 1,
         kind::LINES => Child::INDEX_LIMIT as u64,
         kind::TETS => limits::MAX_TETS as u64,
-        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES | kind::TRIANGLES | kind::CORNERS => {
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS => {
             limits::MAX_TRIANGLES as u64
         }
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,

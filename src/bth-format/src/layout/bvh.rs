@@ -1,6 +1,6 @@
 //! The wide BVH: nodes and triangle leaves, in lines of 64 bytes.
 
-use super::assert_layout;
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// 64 bytes: the unit in which nodes and leaves are addressed.

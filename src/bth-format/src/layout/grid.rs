@@ -1,85 +1,9 @@
-//! Coordinates of triangle leaves in fewer bits: points of a grid, all of which are `f32` without rounding.
+//! The grid of an object: the points that 16 or 21 bits a coordinate can stand for, each an `f32` without rounding.
+//! Specification: "Grids".
 
-use super::{Object, PACKED_NODES, WIDTH, assert_layout};
-use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
-
-/// Bytes in which leaves on a grid are addressed: half a [`super::Line`].
-pub const HALF_LINE: usize = 32;
-
-/// An [`super::IndexedLeaf`] of 16-bit coordinates: 4 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct IndexedLeaf16 {
-    /// x, y and z rows: steps from the grid's origin; unused slots repeat vertex 0.
-    pub vertex: [[u16; WIDTH]; 3],
-    /// Per corner the vertices of triangles i (low four bits) and i + 8 (high ones); unused slots 0.
-    pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u8,
-    /// Vertices in use, 1 to 16.
-    pub vertices: u8,
-    /// Zero.
-    pub reserved: u16,
-}
-
-/// An [`super::IndexedLeaf`] of 21-bit coordinates: 5 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct IndexedLeaf21 {
-    /// As in [`IndexedLeaf16`]: the low 16 bits.
-    pub vertex: [[u16; WIDTH]; 3],
-    /// The high five bits of x, above them of y, above them of z; bit 15 zero.
-    pub high: [u16; WIDTH],
-    /// As in [`IndexedLeaf16`].
-    pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u8,
-    /// Vertices in use, 1 to 16.
-    pub vertices: u8,
-    /// Zero.
-    pub reserved: u16,
-}
-
-/// A [`super::RawLeaf`] of 16-bit coordinates: 10 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct RawLeaf16 {
-    /// `[corner][axis][triangle]`: steps from the grid's origin; unused slots repeat triangle 0.
-    pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Zero.
-    pub reserved: [u32; 6],
-}
-
-/// A [`super::RawLeaf`] of 21-bit coordinates: 13 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct RawLeaf21 {
-    /// As in [`RawLeaf16`]: the low 16 bits.
-    pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Per corner the high bits, as in [`IndexedLeaf21`].
-    pub high: [[u16; WIDTH]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Zero.
-    pub reserved: [u32; 6],
-}
-
-assert_layout! {
-    IndexedLeaf16 128 { corner 96, first 120, triangles 124, vertices 125, reserved 126 }
-    IndexedLeaf21 160 { high 96, corner 128, first 152, triangles 156, vertices 157, reserved 158 }
-    RawLeaf16 320 { first 288, triangles 292, reserved 296 }
-    RawLeaf21 416 { high 288, first 384, triangles 388, reserved 392 }
-}
+use super::bvh::WIDTH;
+use super::grid_leaves::{HALF_LINE, IndexedLeaf16, IndexedLeaf21, RawLeaf16, RawLeaf21};
+use super::object::{Object, PACKED_NODES};
 
 /// Bits of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

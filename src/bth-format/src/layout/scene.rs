@@ -1,5 +1,6 @@
 //! The scene sections: what stands where and how it moves. They belong to the whole file.
 
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Frames and the camera to begin with.
@@ -187,7 +188,7 @@ pub struct Light {
     pub reserved: [u32; 2],
 }
 
-super::assert_layout! {
+assert_layout! {
     Scene 64 { first_frame 8, last_frame 12, camera 16, reserved 20 }
     Node 128 { parent 96, flags 100, name 104, name_length 108, reserved 112 }
     Instance 16 { object 4, flags 8, reserved 12 }

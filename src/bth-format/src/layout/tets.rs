@@ -1,6 +1,6 @@
 //! Tet leaves and their records.
 
-use super::assert_layout;
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// Which record the `TETS` section holds (`Object::record`).

@@ -120,6 +120,20 @@ pub struct RawLeaf {
     pub reserved: [u32; 14],
 }
 
+impl IndexedLeaf {
+    /// Corners of the triangle in a slot. Panics where a corner is no vertex; after [`crate::check::object`] all are.
+    pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|vertices| self.vertex.map(|row| row[vertices[slot] as usize]))
+    }
+}
+
+impl RawLeaf {
+    /// Corners of the triangle in a slot.
+    pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|rows| rows.map(|row| row[slot]))
+    }
+}
+
 /// Lines that a [`WideNode`] takes.
 pub const NODE_LINES: usize = size_of::<WideNode>() / 64;
 /// Lines that a [`PackedNode`] takes.

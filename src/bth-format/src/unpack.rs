@@ -22,10 +22,10 @@ fn corners(packed: &[[u8; WIDTH / 2]; 3]) -> [[u8; WIDTH]; 3] {
 impl IndexedLeaf16 {
     /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
         let [x, y, z] = &self.vertex;
         IndexedLeaf {
-            vertex: [grid.row(0, x), grid.row(1, y), grid.row(2, z)],
+            vertex: [grid.row_16(0, x), grid.row_16(1, y), grid.row_16(2, z)],
             corner: corners(&self.corner),
             first: self.first,
             triangles: self.triangles.into(),
@@ -38,10 +38,10 @@ impl IndexedLeaf16 {
 impl IndexedLeaf21 {
     /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
         let ([x, y, z], high) = (&self.vertex, &self.high);
         IndexedLeaf {
-            vertex: [grid.row_of_21(0, x, high), grid.row_of_21(1, y, high), grid.row_of_21(2, z, high)],
+            vertex: [grid.row_21(0, x, high), grid.row_21(1, y, high), grid.row_21(2, z, high)],
             corner: corners(&self.corner),
             first: self.first,
             triangles: self.triangles.into(),
@@ -54,11 +54,11 @@ impl IndexedLeaf21 {
 impl RawLeaf16 {
     /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> RawLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> RawLeaf {
         let mut corner = [[[0.0; WIDTH]; 3]; 3];
         for c in 0..3 {
             for axis in 0..3 {
-                corner[c][axis] = grid.row(axis, &self.corner[c][axis]);
+                corner[c][axis] = grid.row_16(axis, &self.corner[c][axis]);
             }
         }
         RawLeaf { corner, first: self.first, triangles: self.triangles, reserved: widened(self.reserved) }
@@ -68,11 +68,11 @@ impl RawLeaf16 {
 impl RawLeaf21 {
     /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> RawLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> RawLeaf {
         let mut corner = [[[0.0; WIDTH]; 3]; 3];
         for c in 0..3 {
             for axis in 0..3 {
-                corner[c][axis] = grid.row_of_21(axis, &self.corner[c][axis], &self.high[c]);
+                corner[c][axis] = grid.row_21(axis, &self.corner[c][axis], &self.high[c]);
             }
         }
         RawLeaf { corner, first: self.first, triangles: self.triangles, reserved: widened(self.reserved) }

@@ -19,7 +19,7 @@ mod tracks;
 mod tree;
 
 pub(crate) use adjacency::TetAdjacency;
-pub use scene::check as scene;
+pub(crate) use scene::check as scene;
 
 use crate::error::Result;
 use crate::object::ObjectView;
@@ -29,7 +29,7 @@ use crate::object::ObjectView;
 /// # Errors
 /// The first violation of `BTH-F101` to `BTH-F141`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
-pub fn object(view: &ObjectView) -> Result<()> {
+pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
     sources::check(view)?;
     tet_leaves::check(view)?;

@@ -15,7 +15,7 @@ const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 ///
 /// # Errors
 /// The first violation of `BTH-F150` to `BTH-F159`, with an offset from the start of its section.
-pub fn check(view: &SceneView<'_>, objects: u32) -> Result<()> {
+pub(crate) fn check(view: &SceneView<'_>, objects: u32) -> Result<()> {
     scene_row(view)?;
     check_rows(kind::NODES, view.nodes, |row, node| self::node(view, row, node))?;
     check_rows(kind::INSTANCES, view.instances, |_, instance| self::instance(view, instance, objects))?;

@@ -1,4 +1,4 @@
-//! Exact arithmetic on coordinates of `f32`: sums of products without rounding, and the predicates made of them.
+//! Exact arithmetic on `f32` coordinates: sums of products without rounding, and geometric predicates made of them.
 
 mod expansion;
 mod predicates;

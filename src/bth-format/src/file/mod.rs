@@ -246,7 +246,7 @@ impl File {
             Error::within(Code::Coordinates, kind::OBJECT, at, expected.to_owned(), found)
         };
         let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
-        let grid = Grid::of(object).map_err(|what| wrong(expected, what.to_owned()))?;
+        let grid = Grid::from_object(object).map_err(|what| wrong(expected, what.to_owned()))?;
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
             return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));

@@ -4,22 +4,22 @@ use super::assert_layout::assert_layout;
 use super::bvh::WIDTH;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Bytes in which leaves on a grid are addressed: half a [`super::Line`].
+/// Bytes of half a [`super::Line`]: the unit in which leaves on a grid are addressed.
 pub const HALF_LINE: usize = 32;
 
 /// An [`super::IndexedLeaf`] of 16-bit coordinates: 4 half lines.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct IndexedLeaf16 {
-    /// x, y and z rows: steps from the grid's origin; unused slots repeat vertex 0.
+    /// `[axis][vertex]`: steps from the grid's origin; unused slots repeat vertex 0.
     pub vertex: [[u16; WIDTH]; 3],
-    /// Per corner the vertices of triangles i (low four bits) and i + 8 (high ones); unused slots 0.
+    /// `[corner][i]`: vertices of triangles i (low four bits) and i + 8 (high four bits); unused slots are 0.
     pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u8,
-    /// Vertices in use, 1 to 16.
+    /// Number of vertices, 1 to 16.
     pub vertices: u8,
     /// Zero.
     pub reserved: u16,
@@ -29,17 +29,17 @@ pub struct IndexedLeaf16 {
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct IndexedLeaf21 {
-    /// As in [`IndexedLeaf16`]: the low 16 bits.
+    /// `[axis][vertex]`: the low 16 bits, as in [`IndexedLeaf16`].
     pub vertex: [[u16; WIDTH]; 3],
-    /// The high five bits of x, above them of y, above them of z; bit 15 zero.
+    /// The high five bits of x in bits 0 to 4, of y in bits 5 to 9, of z in bits 10 to 14; bit 15 is zero.
     pub high: [u16; WIDTH],
-    /// As in [`IndexedLeaf16`].
+    /// Vertices of the triangles, as in [`IndexedLeaf16`].
     pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u8,
-    /// Vertices in use, 1 to 16.
+    /// Number of vertices, 1 to 16.
     pub vertices: u8,
     /// Zero.
     pub reserved: u16,
@@ -51,9 +51,9 @@ pub struct IndexedLeaf21 {
 pub struct RawLeaf16 {
     /// `[corner][axis][triangle]`: steps from the grid's origin; unused slots repeat triangle 0.
     pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u32,
     /// Zero.
     pub reserved: [u32; 6],
@@ -63,13 +63,13 @@ pub struct RawLeaf16 {
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct RawLeaf21 {
-    /// As in [`RawLeaf16`]: the low 16 bits.
+    /// `[corner][axis][triangle]`: the low 16 bits, as in [`RawLeaf16`].
     pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Per corner the high bits, as in [`IndexedLeaf21`].
+    /// `[corner][triangle]`: the high bits, as in [`IndexedLeaf21`].
     pub high: [[u16; WIDTH]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u32,
     /// Zero.
     pub reserved: [u32; 6],

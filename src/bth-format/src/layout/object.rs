@@ -3,35 +3,34 @@
 use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// An object: one geometry in its own space.
+/// An object: one geometry in its own space, which has no unit. Specification: "Object".
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Object {
-    /// ObjectBounds of the triangles that can be hit, object space; zero when there are none.
+    /// Lower end of the bounds of the triangles that can be hit, object space; zeros when there are none.
     pub lower: [f32; 3],
-    /// Upper end of the bounds.
+    /// Upper end of the bounds; zeros when there are none.
     pub upper: [f32; 3],
-    /// [`Child`] code of the root; `NONE` when nothing can be hit.
+    /// Code of the root, a [`super::Child`]; `NONE` when nothing can be hit.
     pub root: u32,
-    /// Tetrahedron record: 0 none, else a [`RecordKind`].
+    /// Tetrahedron record: a [`super::RecordKind`], or 0 without tet leaves.
     pub record: u32,
-    /// Triangles of the source; ids are below this.
+    /// Number of triangles of the source; triangle ids are below it.
     pub triangles: u32,
-    /// Zero-area triangles, which no ray can hit and no leaf holds.
+    /// Number of triangles of zero area, which no ray can hit and no leaf holds.
     pub dropped: u32,
-    /// Wide nodes on the longest path from the root.
+    /// Upper bound on the nodes of a path from the root, through subtrees of tet leaves too.
     pub depth: u32,
-    /// Bits of a coordinate of a triangle leaf in the lowest byte: 16, 21, or 0 for `f32`; and [`PACKED_NODES`]. Then per
-    /// axis the exponent field, as of an `f32`, of the power of two between neighbouring points of the [`Grid`]: zero for
-    /// `f32`, as the following.
+    /// Lowest byte: bits of a coordinate of a triangle leaf (16, 21, or 0 for `f32`), and [`PACKED_NODES`]. Above it a byte
+    /// per axis: the biased `f32` exponent of the grid's step, or 0 for `f32`. See [`super::Grid`].
     pub coordinates: u32,
-    /// The grid's least point.
+    /// The grid's least point, object space; zeros for `f32`.
     pub grid_origin: [f32; 3],
-    /// Greatest distance of a stored vertex from that of the source, object space.
+    /// Upper bound on the distance of a stored vertex from that of the source, object space; 0 for `f32`.
     pub displacement: f32,
 }
 
-/// Bit of [`Object::coordinates`]: all nodes are [`PackedNode`]s; else none is.
+/// Bit of [`Object::coordinates`]: all nodes are [`super::PackedNode`]s; without it none is.
 pub const PACKED_NODES: u32 = 1 << 7;
 
 assert_layout! {

@@ -11,7 +11,7 @@ pub struct Unpacked<T>(T);
 
 impl<'a> ObjectView<'a> {
     /// The indexed leaf at an index of a child code: the stored one where coordinates are `f32`, else the leaf unpacked
-    /// into `scratch`. Panics when the lines end before the leaf does; after [`crate::check::object`] they never do.
+    /// into `scratch`. Panics when the lines end before the leaf does; after [`crate::File::check`] they never do.
     #[inline(always)]
     pub fn indexed<'s>(&self, index: u32, scratch: &'s mut Option<Unpacked<IndexedLeaf>>) -> &'s IndexedLeaf
     where
@@ -56,7 +56,7 @@ impl<'a> ObjectView<'a> {
 
     /// The half lines of the block that a child code leads to: the first one, and how many. `None` for tet leaves, which
     /// are rows of TET_LEAVES. The block need not lie within the lines.
-    pub fn half_lines(&self, child: Child) -> Option<(u64, usize)> {
+    pub(crate) fn half_lines(&self, child: Child) -> Option<(u64, usize)> {
         let [indexed, raw] = match &self.grid {
             Some(grid) => grid.bits.half_lines(),
             None => [2 * INDEXED_LINES, 2 * RAW_LINES],

@@ -6,7 +6,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// The lines of an object and how child codes index them: what a traversal loop keeps at hand.
 ///
-/// Methods that return a node or leaf panic when the lines end before it does; after [`crate::check::object`] they never do.
+/// Methods that return a node or leaf panic when the lines end before it does; after [`crate::File::check`] they never do.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground<'a> {
     lines: &'a [Line],
@@ -52,7 +52,7 @@ impl<'a> ObjectView<'a> {
     pub fn ground(&self) -> Ground<'a> {
         Ground { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
     }
-    /// The node at a line. Panics when the lines end before the node does; after [`crate::check::object`] they never do.
+    /// The node at a line. Panics when the lines end before the node does; after [`crate::File::check`] they never do.
     #[inline(always)]
     pub fn node(&self, line: u32) -> &'a WideNode {
         self.ground().node(line)

@@ -54,7 +54,7 @@ impl<const PARTS: usize> Expansion<PARTS> {
     }
 
     /// Adds one number.
-    fn add(&mut self, x: f64) {
+    pub fn add(&mut self, x: f64) {
         if x == 0.0 {
             return;
         }

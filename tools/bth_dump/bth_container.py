@@ -104,6 +104,7 @@ class Container:
         self.by_key = {(e.object, e.kind): e for e in self.entries}
 
     def _check_entries(self, end):
+        """F006, F010 to F016 and F022; returns where the last section ends. `end` is where the table does."""
         before = None
         for i, e in enumerate(self.entries):
             at, name = HEADER.size + ENTRY.size * i, kind_name(e.kind)
@@ -126,6 +127,7 @@ class Container:
         return end
 
     def _check_objects(self):
+        """F017."""
         owners = sorted({e.object for e in self.entries} - {NONE})
         self.objects = len(owners)
         need(owners == list(range(len(owners))), "F017", f"objects {owners}", HEADER.size)
@@ -138,6 +140,7 @@ class Container:
             need(fits, "F017", f"{kind_name(e.kind)} of object {e.object}", HEADER.size)
 
     def content_id(self):
+        """The content id that the section table should have (F018)."""
         parts = [IDENTIFIER]
         for e in self.entries:
             if e.kind != PROVENANCE:

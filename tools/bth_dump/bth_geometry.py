@@ -12,6 +12,7 @@ from bth_tets import FACE_BIT
 
 
 def bits(points):
+    """Points as bytes of f32, so that comparing tells 0 from -0."""
     return [struct.pack("<3f", *p) for p in points]
 
 
@@ -26,12 +27,14 @@ def side(a, b, c_, d):
 
 
 def is_zero_area(points):
+    """Whether a triangle has exactly zero area."""
     a, b, c_ = ([Fraction(x) for x in p] for p in points)
     u, v = ([p[k] - a[k] for k in range(3)] for p in (b, c_))
     return all(u[i] * v[j] == u[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
 def contains(box, points):
+    """Whether a box, as (lower, upper), contains all points."""
     lower, upper = box
     return all(lower[k] <= p[k] <= upper[k] for p in points for k in range(3))
 
@@ -56,6 +59,7 @@ def _source(view, t):
 
 
 def _displacement(view):
+    """F208."""
     for row, p in enumerate(view.positions if view.grid else ()):
         square = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(p, bth_leaves.nearest(view.grid, p)))
         if square > Fraction(view.grid.displacement) ** 2:
@@ -63,7 +67,7 @@ def _displacement(view):
 
 
 def _tree(view):
-    """Checks leaves and boxes; returns the triangles that are in a leaf or a constrained face."""
+    """F201 to F204 and F207; returns the triangles that are in a triangle leaf of the tree or are a constrained face."""
     placed, in_subtree = set(), [set() for _ in view.tet_leaves]
 
     def triangle(t, corners, number, section, at):
@@ -81,7 +85,8 @@ def _tree(view):
 
     # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
     stack = [(view.root, [(view.lower, view.upper)], None)]
-    late = []
+    # Boxes around the triangles of each leaf, and those triangles' points.
+    found = []
     while stack:
         code, boxes, leaf_row = stack.pop()
         if code == NONE:
@@ -113,8 +118,8 @@ def _tree(view):
                     in_subtree[leaf_row].add(t)
                 triangle(t, corners, "F201", c.LINES, 32 * bth_leaves.halves(view, kind, index).start)
                 points += corners
-        late.append((boxes, points))
-    for boxes, points in late:
+        found.append((boxes, points))
+    for boxes, points in found:
         if not all(contains(box, points) for box in boxes):
             raise view.invalid("F204", "triangles outside a box above", c.LINES)
     for row, leaf in enumerate(view.tet_leaves):
@@ -124,6 +129,7 @@ def _tree(view):
 
 
 def _tet_leaf(view, leaf, found):
+    """F205 and F206; `found` has the derived vertices and links by tetrahedron."""
     def point(v):
         return view.tet_vertices[v][:3]
 

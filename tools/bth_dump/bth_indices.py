@@ -21,6 +21,7 @@ def child(code):
 
 
 def is_box(lower, upper):
+    """Whether a box is finite with lower <= upper."""
     return all(map(math.isfinite, (*lower, *upper))) and all(a <= b for a, b in zip(lower, upper))
 
 
@@ -35,6 +36,7 @@ def check_indices(view):
 
 
 def _header(view):
+    """F102, F103, F110 and F022 of the OBJECT row; ObjectView checks F101 and F104."""
     def need(condition, number, message, at):
         if not condition:
             raise view.invalid(number, message, c.OBJECT, at)
@@ -49,6 +51,7 @@ def _header(view):
 
 
 def _sources(view):
+    """F140 and F141."""
     attributes = max(len(view.normals), len(view.uvs))
     for kind, table, rows in (
         (c.TRIANGLES, view.source, len(view.positions)),
@@ -65,6 +68,7 @@ def _sources(view):
 
 
 def _tet_ranges(view):
+    """F120 to F122 and F124."""
     rows = [len(view.tets), len(view.tet_vertices), len(view.tet_faces), len(view.hull_faces)]
     end = [0] * 4
     for i, leaf in enumerate(view.tet_leaves):
@@ -107,6 +111,7 @@ def _triangle_faces(view):
 
 
 def _tree(view):
+    """F105 to F118 and F123."""
     halves = len(view.lines) // 32
     claimed, referenced = set(), set()
     # Code, nodes above, first half line of the parent, whether in a subtree, section and byte of the reference.
@@ -157,6 +162,7 @@ def _tree(view):
 
 
 def _slots(view, line):
+    """F111 and F112 of a node; returns its child codes."""
     lower, upper, codes = view.node(line)
     used = codes.index(NONE) if NONE in codes else 16
     if used == 0:

@@ -11,7 +11,7 @@ VERSION = 0x00010000
 FEATURE_GRID = 1
 FEATURE_PACKED_NODES = 2
 
-OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FACES, TRIANGLE_HOMES = range(1, 10)
+OBJECT, LINES, TRIANGLE_IDS, TET_LEAVES, TETS, TET_VERTICES, TET_FACES, HULL_FACES, TRIANGLE_FACES = range(1, 10)
 POSITIONS, TRIANGLES, CORNERS, NORMALS, UVS = range(16, 21)
 PROVENANCE = 32
 SCENE, NODES, INSTANCES, TRACKS, TIMES, VALUES, CAMERAS, LIGHTS, NAMES = range(48, 57)
@@ -27,7 +27,7 @@ KINDS = {
     TET_VERTICES: ("TET_VERTICES", (16,), (1 << 31) - 1),
     TET_FACES: ("TET_FACES", (32,), (1 << 31) - 1),
     HULL_FACES: ("HULL_FACES", (20,), (1 << 31) - 1),
-    TRIANGLE_HOMES: ("TRIANGLE_HOMES", (4,), 1 << 30),
+    TRIANGLE_FACES: ("TRIANGLE_FACES", (4,), 1 << 30),
     POSITIONS: ("POSITIONS", (12,), (1 << 32) - 2),
     TRIANGLES: ("TRIANGLES", (12,), 1 << 30),
     CORNERS: ("CORNERS", (12,), 1 << 30),
@@ -104,6 +104,7 @@ class Container:
         self.by_key = {(e.object, e.kind): e for e in self.entries}
 
     def _check_entries(self, end):
+        """F006, F010 to F016 and F022; returns where the last section ends. `end` is where the table does."""
         before = None
         for i, e in enumerate(self.entries):
             at, name = HEADER.size + ENTRY.size * i, kind_name(e.kind)
@@ -126,6 +127,7 @@ class Container:
         return end
 
     def _check_objects(self):
+        """F017."""
         owners = sorted({e.object for e in self.entries} - {NONE})
         self.objects = len(owners)
         need(owners == list(range(len(owners))), "F017", f"objects {owners}", HEADER.size)
@@ -138,6 +140,7 @@ class Container:
             need(fits, "F017", f"{kind_name(e.kind)} of object {e.object}", HEADER.size)
 
     def content_id(self):
+        """The content id that the section table should have (F018)."""
         parts = [IDENTIFIER]
         for e in self.entries:
             if e.kind != PROVENANCE:

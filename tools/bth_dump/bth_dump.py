@@ -61,7 +61,7 @@ def describe(container):
 
 
 def describe_scene(view):
-    """What stands and moves, or None."""
+    """The scene as a JSON-able value; None for a file without one."""
     if not view.exists:
         return None
     scene = view.scenes[0]
@@ -92,6 +92,7 @@ def check(data, level):
 
 
 def show(description):
+    """Prints a description for people."""
     print(f"BTH {description['writer_version']}, readable from {description['minimum_reader_version']}")
     print(f"{description['file_length']} bytes, content id {description['content_id']}")
     for s in description["sections"]:

@@ -12,6 +12,7 @@ from bth_tets import FACE_BIT
 
 
 def bits(points):
+    """Points as bytes of f32, so that comparing tells 0 from -0."""
     return [struct.pack("<3f", *p) for p in points]
 
 
@@ -26,23 +27,25 @@ def side(a, b, c_, d):
 
 
 def is_zero_area(points):
+    """Whether a triangle has exactly zero area."""
     a, b, c_ = ([Fraction(x) for x in p] for p in points)
     u, v = ([p[k] - a[k] for k in range(3)] for p in (b, c_))
     return all(u[i] * v[j] == u[j] * v[i] for i, j in ((0, 1), (1, 2), (2, 0)))
 
 
 def contains(box, points):
+    """Whether a box, as (lower, upper), contains all points."""
     lower, upper = box
     return all(lower[k] <= p[k] <= upper[k] for p in points for k in range(3))
 
 
 def check_geometry(view, tets):
     """Checks an object whose indices have been checked; `tets` are the derived ones of each leaf."""
-    homes = _tree(view)
+    placed = _tree(view)
     for leaf, found in zip(view.tet_leaves, tets):
         _tet_leaf(view, leaf, found)
     _displacement(view)
-    missing = [t for t in range(view.triangles) if t not in homes]
+    missing = [t for t in range(view.triangles) if t not in placed]
     if len(missing) != view.dropped:
         raise view.invalid("F203", f"{len(missing)} triangles in no leaf, {view.dropped} dropped", c.OBJECT, 36)
     for t in missing:
@@ -56,6 +59,7 @@ def _source(view, t):
 
 
 def _displacement(view):
+    """F208."""
     for row, p in enumerate(view.positions if view.grid else ()):
         square = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(p, bth_leaves.nearest(view.grid, p)))
         if square > Fraction(view.grid.displacement) ** 2:
@@ -63,8 +67,8 @@ def _displacement(view):
 
 
 def _tree(view):
-    """Checks leaves and boxes; returns the triangles that are in a leaf or a constrained face."""
-    homes, beside = set(), [set() for _ in view.tet_leaves]
+    """F201 to F204 and F207; returns the triangles that are in a triangle leaf of the tree or are a constrained face."""
+    placed, in_subtree = set(), [set() for _ in view.tet_leaves]
 
     def triangle(t, corners, number, section, at):
         if view.source:
@@ -74,14 +78,15 @@ def _tree(view):
             if is_zero_area(source):
                 raise view.invalid("F207", f"triangle {t} has no area", section, at)
 
-    def home(t, section, at):
-        if t in homes:
+    def place(t, section, at):
+        if t in placed:
             raise view.invalid("F203", f"triangle {t} again", section, at)
-        homes.add(t)
+        placed.add(t)
 
     # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
     stack = [(view.root, [(view.lower, view.upper)], None)]
-    late = []
+    # Boxes around the triangles of each leaf, and those triangles' points.
+    found = []
     while stack:
         code, boxes, leaf_row = stack.pop()
         if code == NONE:
@@ -96,7 +101,7 @@ def _tree(view):
             for row in range(leaf.first_face, leaf.first_face + leaf.faces):
                 face = view.tet_faces[row]
                 corners = [view.tet_vertices[v][:3] for v in face.vertex]
-                home(face.triangle, c.TET_FACES, 32 * row)
+                place(face.triangle, c.TET_FACES, 32 * row)
                 triangle(face.triangle, corners, "F202", c.TET_FACES, 32 * row)
                 points += corners
             stack.append((leaf.subtree, [], index))
@@ -104,26 +109,27 @@ def _tree(view):
             for row, corners in bth_leaves.triangles(view, kind, index):
                 t = view.triangle_ids[row]
                 if leaf_row is None:
-                    home(t, c.TRIANGLE_IDS, 4 * row)
+                    place(t, c.TRIANGLE_IDS, 4 * row)
                 else:
                     leaf = view.tet_leaves[leaf_row]
-                    here = leaf.first_face <= view.triangle_homes[t] < leaf.first_face + leaf.faces
-                    if not here or t in beside[leaf_row]:
+                    here = leaf.first_face <= view.triangle_faces[t] < leaf.first_face + leaf.faces
+                    if not here or t in in_subtree[leaf_row]:
                         raise view.invalid("F203", f"triangle {t} in a subtree", c.TRIANGLE_IDS, 4 * row)
-                    beside[leaf_row].add(t)
+                    in_subtree[leaf_row].add(t)
                 triangle(t, corners, "F201", c.LINES, 32 * bth_leaves.halves(view, kind, index).start)
                 points += corners
-        late.append((boxes, points))
-    for boxes, points in late:
+        found.append((boxes, points))
+    for boxes, points in found:
         if not all(contains(box, points) for box in boxes):
             raise view.invalid("F204", "triangles outside a box above", c.LINES)
     for row, leaf in enumerate(view.tet_leaves):
-        if leaf.subtree != NONE and len(beside[row]) != leaf.faces:
-            raise view.invalid("F203", f"{len(beside[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
-    return homes
+        if leaf.subtree != NONE and len(in_subtree[row]) != leaf.faces:
+            raise view.invalid("F203", f"{len(in_subtree[row])} triangles in the subtree", c.TET_LEAVES, 64 * row)
+    return placed
 
 
 def _tet_leaf(view, leaf, found):
+    """F205 and F206; `found` has the derived vertices and links by tetrahedron."""
     def point(v):
         return view.tet_vertices[v][:3]
 

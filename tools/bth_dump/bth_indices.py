@@ -21,6 +21,7 @@ def child(code):
 
 
 def is_box(lower, upper):
+    """Whether a box is finite with lower <= upper."""
     return all(map(math.isfinite, (*lower, *upper))) and all(a <= b for a, b in zip(lower, upper))
 
 
@@ -29,17 +30,18 @@ def check_indices(view):
     _header(view)
     _sources(view)
     _tet_ranges(view)
-    _homes(view)
+    _triangle_faces(view)
     _tree(view)
     return [derive(view, leaf) for leaf in view.tet_leaves]
 
 
 def _header(view):
+    """F102, F103, F110 and F022 of the OBJECT row; ObjectView checks F101 and F104."""
     def need(condition, number, message, at):
         if not condition:
             raise view.invalid(number, message, c.OBJECT, at)
 
-    for name, rows in (("TRIANGLE_HOMES", view.triangle_homes), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
+    for name, rows in (("TRIANGLE_FACES", view.triangle_faces), ("TRIANGLES", view.source), ("CORNERS", view.corners)):
         need(len(rows) in (0, view.triangles), "F102", f"{len(rows)} rows of {name}", 32)
     need(view.triangles <= 1 << 30, "F022", f"{view.triangles} triangles", 32)
     need(view.dropped <= view.triangles, "F102", f"{view.dropped} dropped", 36)
@@ -49,6 +51,7 @@ def _header(view):
 
 
 def _sources(view):
+    """F140 and F141."""
     attributes = max(len(view.normals), len(view.uvs))
     for kind, table, rows in (
         (c.TRIANGLES, view.source, len(view.positions)),
@@ -65,6 +68,7 @@ def _sources(view):
 
 
 def _tet_ranges(view):
+    """F120 to F122 and F124."""
     rows = [len(view.tets), len(view.tet_vertices), len(view.tet_faces), len(view.hull_faces)]
     end = [0] * 4
     for i, leaf in enumerate(view.tet_leaves):
@@ -93,19 +97,21 @@ def _tet_ranges(view):
             raise view.invalid("F124", f"vertex {x} {y} {z}, {reserved}", c.TET_VERTICES, 16 * i)
 
 
-def _homes(view):
-    homes = view.triangle_homes
-    if len(homes) != (view.triangles if view.tet_leaves else 0):
-        raise view.invalid("F131", f"{len(homes)} rows", c.TRIANGLE_HOMES)
+def _triangle_faces(view):
+    """F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other."""
+    faces = view.triangle_faces
+    if len(faces) != (view.triangles if view.tet_leaves else 0):
+        raise view.invalid("F131", f"{len(faces)} rows", c.TRIANGLE_FACES)
     expected = {face.triangle: row for row, face in enumerate(view.tet_faces)}
-    if len(expected) != len(view.tet_faces) or any(t >= len(homes) for t in expected):
+    if len(expected) != len(view.tet_faces) or any(t >= len(faces) for t in expected):
         raise view.invalid("F131", "a constrained face without a triangle of its own", c.TET_FACES)
-    for triangle, home in enumerate(homes):
-        if home != expected.get(triangle, NONE):
-            raise view.invalid("F131", f"triangle {triangle} at home in {home}", c.TRIANGLE_HOMES, 4 * triangle)
+    for triangle, face in enumerate(faces):
+        if face != expected.get(triangle, NONE):
+            raise view.invalid("F131", f"triangle {triangle} leads to face {face}", c.TRIANGLE_FACES, 4 * triangle)
 
 
 def _tree(view):
+    """F105 to F118 and F123."""
     halves = len(view.lines) // 32
     claimed, referenced = set(), set()
     # Code, nodes above, first half line of the parent, whether in a subtree, section and byte of the reference.
@@ -156,6 +162,7 @@ def _tree(view):
 
 
 def _slots(view, line):
+    """F111 and F112 of a node; returns its child codes."""
     lower, upper, codes = view.node(line)
     used = codes.index(NONE) if NONE in codes else 16
     if used == 0:

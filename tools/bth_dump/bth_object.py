@@ -37,7 +37,7 @@ class ObjectView:
         self.lines = self.bytes(c.LINES)
         self.grid = self._grid(raw)
         self.triangle_ids = self.rows(c.TRIANGLE_IDS, "<I", scalar=True)
-        self.triangle_homes = self.rows(c.TRIANGLE_HOMES, "<I", scalar=True)
+        self.triangle_faces = self.rows(c.TRIANGLE_FACES, "<I", scalar=True)
         self.tet_leaves = [TetLeaf(r[:3], r[3:6], *r[6:]) for r in self.rows(c.TET_LEAVES, "<6f10I")]
         self.tet_vertices = self.rows(c.TET_VERTICES, "<3fI")
         self.tet_faces = [TetFace(r[:3], r[3], r[4:6], r[6:]) for r in self.rows(c.TET_FACES, "<8I")]
@@ -50,7 +50,7 @@ class ObjectView:
         self._read_tets()
 
     def _grid(self, raw):
-        """The grid of the leaves' coordinates; None for f32."""
+        """F104: the grid of the leaves' coordinates; None for f32."""
         bits, *exponents = struct.unpack_from("<4B", raw, 44)
         origin, displacement = struct.unpack_from("<3f", raw, 48), struct.unpack_from("<f", raw, 60)[0]
         self.packed_nodes = bits >> 7 == 1
@@ -69,6 +69,7 @@ class ObjectView:
         return grid
 
     def _read_tets(self):
+        """F101: the rows of TETS, in the structure that the object names."""
         entry = self.container.by_key.get((self.index, c.TETS))
         stride = entry.stride if entry else 0
         self.record, expected = RECORDS.get(self.record_code, (None, None))
@@ -103,7 +104,7 @@ class ObjectView:
         return lower, upper, raw[96:]
 
     def _packed_node(self, line):
-        """As node, for boxes of bytes."""
+        """As node, for a PackedNode; checks its steps, origin and reserved field (F112, F111)."""
         steps = struct.unpack_from("<96B", self.lines, 64 * line)
         codes = struct.unpack_from("<16I", self.lines, 64 * line + 96)
         origin, step = (struct.unpack_from("<3f", self.lines, 64 * line + at) for at in (160, 172))

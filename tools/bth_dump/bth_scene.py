@@ -22,7 +22,7 @@ FRAME_LIMIT = 1 << 24
 
 
 class SceneView:
-    """The scene of a file, or of a file without one: `exists` tells."""
+    """The scene sections of a file; `exists` is false for a file without any."""
 
     def __init__(self, container):
         self.container = container
@@ -49,6 +49,7 @@ class SceneView:
             raise Invalid(number, message, kind_name(kind), entry.offset if entry else 0)
 
     def check_name(self, row, kind):
+        """F153."""
         end = row.name + row.name_length
         self.need(end <= len(self.names) and row.name_length <= 4096, "F153", f"name {row.name}..{end}", kind)
         try:
@@ -95,6 +96,7 @@ def check_scene(view):
 
 
 def check_tracks(view):
+    """F155 to F157."""
     need = view.need
     before, times, values = (-1, -1), 0, 0
     for t in view.tracks:

@@ -1,4 +1,4 @@
-"""Vertices and links of tetrahedra, derived as a walk does (format-spec/README.md): F125 to F130."""
+"""Vertices and links of tetrahedra, derived as a traversal does (format-spec/README.md, "Index check"): F125 to F130."""
 
 import bth_container as c
 from bth_container import NONE
@@ -111,6 +111,7 @@ def derive(view, leaf):
 
 
 def _check_hull(view, hulls, hull_vertices, found, bad):
+    """F125: every face without a neighbour has one hull face, and every hull face is one."""
     named = set()
     for row in hulls:
         hull, four = view.hull_faces[row], hull_vertices(row)
@@ -126,6 +127,7 @@ def _check_hull(view, hulls, hull_vertices, found, bad):
 
 
 def _check_faces(view, faces, found, bad):
+    """F126: both tetrahedra of a constrained face refer to it."""
     for row in faces:
         face = view.tet_faces[row]
         for tet, opposite in zip(face.tet, face.opposite):

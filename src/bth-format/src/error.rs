@@ -1,14 +1,15 @@
-//! Why a file was refused: one stable code per numbered invariant of `format-spec/`.
+//! Why a file was refused: a stable code for each numbered invariant of the specification, with place, expected and found.
 
 use crate::layout::{NONE, kind};
 use std::path::{Path, PathBuf};
 
-/// Result of opening and checking.
+/// What opening and checking return.
 pub type Result<T> = std::result::Result<T, Error>;
 
 macro_rules! codes {
     ($($name:ident $text:literal $rule:literal)*) => {
-        /// What was violated. Codes never change their meaning; new ones may be added.
+        /// What was violated: `BTH-F` and a number for the invariants of the specification, `BTH-O` for opening, `BTH-S` for
+        /// scenes that cannot be traced. Codes never change their meaning; new ones may be added.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[non_exhaustive]
         pub enum Code {
@@ -22,7 +23,7 @@ macro_rules! codes {
             pub const fn as_str(self) -> &'static str {
                 match self { $(Code::$name => concat!("BTH-", $text),)* }
             }
-            /// The invariant in words, as the specification states it.
+            /// The invariant, in the words of the specification.
             pub const fn rule(self) -> &'static str {
                 match self { $(Code::$name => $rule,)* }
             }
@@ -33,7 +34,7 @@ macro_rules! codes {
 codes! {
     Read "O001" "The file can be read."
     Host "O002" "The machine is little-endian."
-    NoSuchObject "O003" "The object that is asked for exists."
+    NoSuchObject "O003" "The object that the caller named exists."
 
     HeaderSize "F001" "The file holds a whole header of 128 bytes."
     Identifier "F002" "The file starts with the 16 bytes of the identifier."
@@ -58,17 +59,17 @@ codes! {
     SectionHash "F021" "A section's hash is that of its bytes."
     Limit "F022" "Triangles and tetrahedra of an object number at most 2^30, lines at most 2^29."
 
-    Record "F101" "The record kind is known, fits the TETS section, and is 0 only without tet leaves."
-    Counts "F102" "Tables per triangle have as many rows as the object has triangles; no more triangles are dropped than there are."
+    Record "F101" "The record is of a known kind that has the stride of the TETS section, or 0 with neither tetrahedra nor tet leaves."
+    Counts "F102" "TRIANGLE_FACES, TRIANGLES and CORNERS are empty or have as many rows as the object has triangles; no more triangles are dropped than there are."
     ObjectBounds "F103" "Object bounds are finite with lower <= upper; without a root they are zero."
-    Coordinates "F104" "Coordinates of an object's triangle leaves are f32, with zeros in the fields of the grid, or of 16 or 21 bits on a grid all of whose points are f32, with a finite displacement; the header's features announce grids and packed nodes."
-    ChildCode "F105" "Child codes are NONE or of an assigned kind, nodes all packed or none; below a subtree of a tet leaf there are no tet leaves."
+    Coordinates "F104" "Coordinates of triangle leaves are f32, with zeros in the fields of the grid, or have 16 or 21 bits on a grid whose points are all f32, with a displacement that is finite and not negative; the header's features announce the grids and packed nodes of objects."
+    ChildCode "F105" "Child codes are NONE or of an assigned kind; the nodes of an object are all packed or none is; the subtree of a tet leaf holds no tet leaves."
     ChildRange "F106" "The block or row that a child code leads to lies within its section."
     ChildOrder "F107" "Nodes and triangle leaves lie behind the node that refers to them."
-    Overlap "F108" "Blocks do not overlap and have one reference each."
-    Unclaimed "F109" "Every line belongs to a block; on a grid its first half does, and a second half that does not is zero."
-    Depth "F110" "No path has more wide nodes than the object's depth, which is at most 96."
-    Slots "F111" "A node's used slots come first and there is at least one; empty slots hold the empty box; reserved fields of packed nodes are zero."
+    Overlap "F108" "Blocks do not overlap, and one child code leads to each."
+    Unclaimed "F109" "Every line belongs to a block; on a grid the first half of every line does, and a second half that does not is zero."
+    Depth "F110" "No path from the root has more nodes than the object's depth, which is at most 96."
+    Slots "F111" "The used slots of a node come first, and there is at least one; empty slots hold the empty box; reserved fields of packed nodes are zero."
     ChildBounds "F112" "Child boxes are finite with lower <= upper; those of packed nodes have steps that are powers of two and an origin from which every end is an f32."
     LeafCounts "F113" "A triangle leaf has 1 to 16 triangles, an indexed one 1 to 16 vertices."
     Corner "F114" "Corners of an indexed leaf are below its number of vertices."
@@ -80,26 +81,26 @@ codes! {
     TetRanges "F121" "The ranges of successive tet leaves follow each other, lie within their sections and together cover them."
     TetCounts "F122" "A tet leaf has at least one tetrahedron, four vertices, one constrained face and four hull faces."
     TetReferences "F123" "Every tet leaf is the child of exactly one node, or the root."
-    TetVertices "F124" "Vertices of tetrahedra are finite with a reserved field of zero."
-    HullFace "F125" "A hull face names four distinct vertices and a tetrahedron of its leaf with exactly these, which has no neighbour there; every face without a neighbour is named once."
-    TetFace "F126" "A constrained face names three distinct vertices of its leaf and the tetrahedron and fourth vertex on either side; both refer to it, and no other does."
-    Link "F127" "A link is NONE, a tetrahedron of the same leaf or a constrained face of the same leaf."
+    TetVertices "F124" "Vertices of tetrahedra are finite, and their reserved fields are zero."
+    HullFace "F125" "A hull face names four distinct vertices of its leaf and the tetrahedron that has exactly these, which has no neighbour across the face; every face without a neighbour is named once."
+    TetFace "F126" "A constrained face names three distinct vertices of its leaf and the tetrahedron and fourth vertex on either side; both refer to it, and no other tetrahedron does."
+    Link "F127" "A link is NONE, another tetrahedron of the same leaf or a constrained face of the same leaf."
     Neighbour "F128" "Neighbours share three vertices and refer to each other."
-    TetRecord "F129" "Vertices and exclusive ors of a record are those of its tetrahedron; opposite vertices are those of the neighbour."
+    TetRecord "F129" "Vertices and exclusive ors of a record are those of its tetrahedron; opposite vertices of Link32 are those of the neighbours."
     Unreached "F130" "Every tetrahedron of a leaf is reached from its first hull face."
-    Homes "F131" "TRIANGLE_HOMES is empty without tet leaves; else it leads from each triangle of a constrained face to that face, and from others to NONE."
+    TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it maps each triangle that is a constrained face to that face, and others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
     Positions "F141" "Positions are finite."
-    Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and zeros."
+    Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and reserved fields of zero."
     Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
-    NodeTransform "F152" "A node's transform is finite; one of parts has a quaternion that is not zero and ends with zeros."
+    NodeTransform "F152" "A node's transform is finite; one that is no matrix has a quaternion that is not zero and ends with two zeros."
     Name "F153" "Names lie within NAMES, are UTF-8 and have at most 4,096 bytes."
-    Instance "F154" "Instances refer to nodes and objects of the file; their other fields are zero."
-    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist, visibility changes in steps, of a node with a matrix only visibility, and reserved fields are zero."
+    Instance "F154" "Instances refer to nodes and objects of the file; their flags and reserved fields are zero."
+    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist; visibility changes in steps; nodes with a matrix have no other tracks than of visibility; reserved fields are zero."
     TrackRanges "F156" "A track has at least one key; the ranges of successive tracks follow each other, lie within TIMES and VALUES and together cover them."
-    TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions among them not zero, and of visibility 0 or 1."
-    Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are such as the scene manifest allows, and its reserved fields are zero."
-    Light "F159" "A light's node and kind exist; its color, intensity, range and angles are such as the scene manifest allows, and its reserved fields are zero."
+    TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions are not zero, and visibility is 0 or 1."
+    Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are finite and in the ranges of the table of Camera; its reserved fields are zero."
+    Light "F159" "A light's node and kind exist; its color, intensity, range and angles are finite and in the ranges of the table of Light; its reserved fields are zero."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
@@ -108,7 +109,7 @@ codes! {
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
     ZeroArea "F207" "Exactly the triangles of zero area are dropped."
-    Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object says."
+    Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
     NotFinite "S002" "The transform and the world box of an instance that is seen are finite."
@@ -143,16 +144,16 @@ impl std::fmt::Display for Code {
     }
 }
 
-/// The section that an error is about.
+/// The section that an error is about. Specification: "Kinds".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
-    /// One of [`kind`].
+    /// One of [`kind`], or the kind of an unknown section.
     pub kind: u32,
-    /// Object, or `NONE` for the whole file.
+    /// The object, or [`NONE`] for sections of the whole file.
     pub object: u32,
 }
 
-/// Why a file cannot be used.
+/// Why a file cannot be used: the code, the place, what is expected there and what was found.
 #[derive(Debug)]
 pub struct Error {
     code: Code,
@@ -165,13 +166,14 @@ pub struct Error {
 }
 
 impl Error {
-    /// An error about the file as a whole, at a byte of it.
-    pub fn at(code: Code, offset: u64, expected: impl Into<String>, found: impl Into<String>) -> Self {
+    /// An error outside of sections, at a byte of the file.
+    pub(crate) fn at(code: Code, offset: u64, expected: impl Into<String>, found: impl Into<String>) -> Self {
         let (expected, found) = (expected.into(), found.into());
         Self { code, section: None, offset: Some(offset), expected, found, path: None, source: None }
     }
-    /// An error within a section; `offset` counts from the section's start until [`Self::move_by`] is called.
-    pub fn within(
+    /// An error within a section of object 0; `offset` counts from the section's start. [`crate::File::locate`] turns it into
+    /// an error of the right object with an offset from the start of the file.
+    pub(crate) fn within(
         code: Code,
         kind: u32,
         offset: u64,
@@ -181,7 +183,8 @@ impl Error {
         let section = Some(Section { kind, object: 0 });
         Self { section, ..Self::at(code, offset, expected, found) }
     }
-    /// As [`Self::within`], in a section of the whole file.
+    /// An error within a section of the whole file; `offset` counts from the section's start, until
+    /// [`crate::File::locate`] turns it into an offset from the start of the file.
     pub fn within_file(
         code: Code,
         kind: u32,
@@ -191,8 +194,8 @@ impl Error {
     ) -> Self {
         Self::within(code, kind, offset, expected, found).in_object(NONE)
     }
-    /// An error of the system.
-    pub fn io(path: &Path, source: std::io::Error) -> Self {
+    /// An error of the operating system.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         let found = source.to_string();
         Self {
             offset: None,
@@ -202,14 +205,14 @@ impl Error {
         }
     }
     /// The same error with the object that its section belongs to.
-    pub fn in_object(mut self, object: u32) -> Self {
+    pub(crate) fn in_object(mut self, object: u32) -> Self {
         if let Some(section) = &mut self.section {
             section.object = object;
         }
         self
     }
     /// The same error with its offset moved from the section's start to the file's.
-    pub fn move_by(mut self, start: u64) -> Self {
+    pub(crate) fn move_by(mut self, start: u64) -> Self {
         self.offset = self.offset.map(|o| o.saturating_add(start));
         self
     }
@@ -227,7 +230,7 @@ impl Error {
     pub fn section(&self) -> Option<Section> {
         self.section
     }
-    /// Byte of the file, from 0. Errors of [`crate::check::object`] count from the section's start.
+    /// Byte of the file, from 0, where the error is about one.
     pub fn offset(&self) -> Option<u64> {
         self.offset
     }
@@ -239,7 +242,7 @@ impl Error {
     pub fn found(&self) -> &str {
         &self.found
     }
-    /// What to do about it.
+    /// What the user can do about it.
     pub fn hint(&self) -> &'static str {
         self.code.hint()
     }
@@ -286,7 +289,7 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::TET_VERTICES => "TET_VERTICES",
         kind::TET_FACES => "TET_FACES",
         kind::HULL_FACES => "HULL_FACES",
-        kind::TRIANGLE_HOMES => "TRIANGLE_HOMES",
+        kind::TRIANGLE_FACES => "TRIANGLE_FACES",
         kind::POSITIONS => "POSITIONS",
         kind::TRIANGLES => "TRIANGLES",
         kind::CORNERS => "CORNERS",

@@ -1,11 +1,24 @@
-//! The BTH file format: layout, reading, validation. Nothing here traces a ray.
+//! The BTH file format: layout, reading and validation. Nothing here traces a ray.
 //!
-//! [`file::File`] opens a file and checks its header and section table. [`check`] checks every index of an object or of the
-//! scene, after which tracing is safe; [`verify`] checks hashes, gaps and geometry too, with exact predicates ([`exact`]).
-//! The specification is `format-spec/README.md`.
+//! The specification is `format-spec/README.md`; its invariants have the numbers of the error codes ([`Code`]). A file is
+//! checked in three steps:
+//!
+//! 1. [`File::read`], [`File::map`] and [`File::from_bytes`] check the header and the section table: O(sections).
+//! 2. [`File::check`] and [`File::check_scene`] check every index of an object or of the scene, after which traversing it is
+//!    safe: O(bytes of their sections).
+//! 3. [`verify::verify`] checks hashes, gaps and geometry too, with exact predicates ([`exact`]): O(bytes of the file).
+//!
+//! ```no_run
+//! let file = bth_format::File::read("bunny.bth")?;
+//! for object in 0..file.object_count() {
+//!     let view = file.check(object)?;
+//!     println!("{} triangles from {:?} to {:?}", view.header.triangles, view.header.lower, view.header.upper);
+//! }
+//! # Ok::<(), bth_format::Error>(())
+//! ```
 #![warn(missing_docs)]
 
-pub mod check;
+mod check;
 pub mod error;
 pub mod exact;
 pub mod file;
@@ -20,4 +33,3 @@ pub use error::{Code, Error};
 pub use file::File;
 pub use object::ObjectView;
 pub use scene_view::SceneView;
-pub use unpack::Room;

@@ -1,12 +1,13 @@
-//! Every cap in one place. Files beyond them are refused by the reader and not written by the compiler.
+//! Every cap in one place. The reader refuses files beyond them, and the compiler writes none.
 
-/// Wide nodes on a path from the root; bounds the traversal stack: at every level all children but the one entered stay on it.
+/// Nodes on a path from the root (BTH-F110). Bounds the traversal stack, on which at every level all children but the one
+/// entered stay.
 pub const MAX_DEPTH: usize = 96;
-/// Entries of the section table.
+/// Entries of the section table (BTH-F008).
 pub const MAX_SECTIONS: u32 = 1 << 20;
-/// Triangles of an object.
+/// Triangles of an object (BTH-F022).
 pub const MAX_TRIANGLES: u32 = 1 << 30;
-/// Tetrahedra of an object.
+/// Tetrahedra of an object (BTH-F022).
 pub const MAX_TETS: u32 = 1 << 30;
-/// Bytes of a name of a node, camera or light.
+/// Bytes of the name of a node, camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;

@@ -1,17 +1,12 @@
-//! Triangle leaves on a grid as leaves of `f32`, exactly: what traces, checks and verifies leaves sees these only.
-// Iterators and closures would be compiled without the vectors that tracing has.
+//! Leaves on a grid and packed nodes as their counterparts of `f32`, without rounding. Tracing, checking and verifying read
+//! leaves in this form only.
+// Counted loops over arrays: closures would be compiled without the vector instructions of the kernels that inline them.
 #![allow(clippy::needless_range_loop)]
 
 use crate::layout::*;
-use crate::object::ObjectView;
-use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Room for a leaf, where vectors are read best.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub struct Room<T>(T);
-
-/// Vertices of triangles from two in a byte.
+/// Vertex numbers of the corners of 16 triangles, of which each byte holds two: triangle i the low half of byte i,
+/// triangle i + 8 the high half.
 #[inline(always)]
 fn corners(packed: &[[u8; WIDTH / 2]; 3]) -> [[u8; WIDTH]; 3] {
     let mut out = [[0; WIDTH]; 3];
@@ -25,12 +20,12 @@ fn corners(packed: &[[u8; WIDTH / 2]; 3]) -> [[u8; WIDTH]; 3] {
 }
 
 impl IndexedLeaf16 {
-    /// The same leaf of `f32`.
+    /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
         let [x, y, z] = &self.vertex;
         IndexedLeaf {
-            vertex: [grid.row(0, x), grid.row(1, y), grid.row(2, z)],
+            vertex: [grid.row_16(0, x), grid.row_16(1, y), grid.row_16(2, z)],
             corner: corners(&self.corner),
             first: self.first,
             triangles: self.triangles.into(),
@@ -41,12 +36,12 @@ impl IndexedLeaf16 {
 }
 
 impl IndexedLeaf21 {
-    /// The same leaf of `f32`.
+    /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> IndexedLeaf {
         let ([x, y, z], high) = (&self.vertex, &self.high);
         IndexedLeaf {
-            vertex: [grid.row_of_21(0, x, high), grid.row_of_21(1, y, high), grid.row_of_21(2, z, high)],
+            vertex: [grid.row_21(0, x, high), grid.row_21(1, y, high), grid.row_21(2, z, high)],
             corner: corners(&self.corner),
             first: self.first,
             triangles: self.triangles.into(),
@@ -57,13 +52,13 @@ impl IndexedLeaf21 {
 }
 
 impl RawLeaf16 {
-    /// The same leaf of `f32`.
+    /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> RawLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> RawLeaf {
         let mut corner = [[[0.0; WIDTH]; 3]; 3];
         for c in 0..3 {
             for axis in 0..3 {
-                corner[c][axis] = grid.row(axis, &self.corner[c][axis]);
+                corner[c][axis] = grid.row_16(axis, &self.corner[c][axis]);
             }
         }
         RawLeaf { corner, first: self.first, triangles: self.triangles, reserved: widened(self.reserved) }
@@ -71,20 +66,20 @@ impl RawLeaf16 {
 }
 
 impl RawLeaf21 {
-    /// The same leaf of `f32`.
+    /// The same leaf with coordinates of `f32`.
     #[inline(always)]
-    pub fn unpacked(&self, grid: &Grid) -> RawLeaf {
+    pub(crate) fn unpacked(&self, grid: &Grid) -> RawLeaf {
         let mut corner = [[[0.0; WIDTH]; 3]; 3];
         for c in 0..3 {
             for axis in 0..3 {
-                corner[c][axis] = grid.row_of_21(axis, &self.corner[c][axis], &self.high[c]);
+                corner[c][axis] = grid.row_21(axis, &self.corner[c][axis], &self.high[c]);
             }
         }
         RawLeaf { corner, first: self.first, triangles: self.triangles, reserved: widened(self.reserved) }
     }
 }
 
-/// Reserved fields keep what is not zero, for the check.
+/// The reserved fields in the width of a leaf of `f32`: what is not zero stays, so that the check finds it.
 #[inline(always)]
 fn widened(reserved: [u32; 6]) -> [u32; 14] {
     let mut out = [0; 14];
@@ -93,13 +88,14 @@ fn widened(reserved: [u32; 6]) -> [u32; 14] {
 }
 
 impl PackedNode {
-    /// An end of a box.
+    /// An end of a child's box, object space: `upper` is 0 for the lower end and 1 for the upper one. Exact where
+    /// [`Self::is_exact`].
     #[inline(always)]
     pub fn end(&self, axis: usize, upper: usize, slot: usize) -> f32 {
         self.origin[axis] + self.step[axis] * f32::from(self.bounds[axis][upper][slot])
     }
 
-    /// The same node of `f32`.
+    /// The same node with boxes of `f32`; empty slots get the empty box of a [`WideNode`].
     pub fn unpacked(&self) -> WideNode {
         let mut bounds = [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3];
         for slot in 0..WIDTH {
@@ -115,89 +111,8 @@ impl PackedNode {
         WideNode { bounds, child: self.child }
     }
 
-    /// Whether every end that a byte can stand for is an `f32`.
+    /// Whether every end that a byte can stand for is an `f32` (BTH-F112).
     pub fn is_exact(&self) -> bool {
         (0..3).all(|axis| is_exact(self.origin[axis], self.step[axis], 255))
-    }
-}
-
-impl<'a> ObjectView<'a> {
-    /// The node that a child leads to, unpacked if it is packed.
-    pub fn unpacked_node(&self, child: Child) -> Option<WideNode> {
-        match child {
-            Child::Node(line) => Some(*self.node(line)),
-            Child::Packed(line) => Some(self.packed_node(line).unpacked()),
-            Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
-        }
-    }
-
-    /// A leaf on the grid, at a half line.
-    #[inline(always)]
-    fn packed<T: FromBytes + KnownLayout + Immutable>(&self, half_line: u32) -> &'a T {
-        let bytes = &self.lines.as_bytes()[half_line as usize * HALF_LINE..][..size_of::<T>()];
-        T::ref_from_bytes(bytes).expect("half lines are aligned for every leaf")
-    }
-
-    /// The indexed leaf at an index of a child code: as it is stored, or unpacked into `room`. Panics when the lines
-    /// end before the leaf does; checked files never do.
-    #[inline(always)]
-    pub fn indexed<'r>(&self, index: u32, room: &'r mut Option<Room<IndexedLeaf>>) -> &'r IndexedLeaf
-    where
-        'a: 'r,
-    {
-        let Some(grid) = &self.grid else { return self.indexed_leaf(index) };
-        &room.insert(Room(self.unpacked_indexed(grid, index))).0
-    }
-
-    /// The raw leaf at an index of a child code; as [`Self::indexed`].
-    #[inline(always)]
-    pub fn raw<'r>(&self, index: u32, room: &'r mut Option<Room<RawLeaf>>) -> &'r RawLeaf
-    where
-        'a: 'r,
-    {
-        let Some(grid) = &self.grid else { return self.raw_leaf(index) };
-        &room.insert(Room(self.unpacked_raw(grid, index))).0
-    }
-
-    #[inline(always)]
-    fn unpacked_indexed(&self, grid: &Grid, at: u32) -> IndexedLeaf {
-        match grid.bits {
-            GridBits::B16 => self.packed::<IndexedLeaf16>(at).unpacked(grid),
-            GridBits::B21 => self.packed::<IndexedLeaf21>(at).unpacked(grid),
-        }
-    }
-
-    #[inline(always)]
-    fn unpacked_raw(&self, grid: &Grid, at: u32) -> RawLeaf {
-        match grid.bits {
-            GridBits::B16 => self.packed::<RawLeaf16>(at).unpacked(grid),
-            GridBits::B21 => self.packed::<RawLeaf21>(at).unpacked(grid),
-        }
-    }
-
-    /// Half lines of the block that a child leads to: the first, and how many; none of a tet leaf.
-    pub fn half_lines(&self, child: Child) -> Option<(u64, usize)> {
-        let [indexed, raw] = match &self.grid {
-            Some(grid) => grid.bits.half_lines(),
-            None => [2 * INDEXED_LINES, 2 * RAW_LINES],
-        };
-        let leaf = |index: u32| if self.grid.is_some() { u64::from(index) } else { 2 * u64::from(index) };
-        match child {
-            Child::Node(line) => Some((2 * u64::from(line), 2 * NODE_LINES)),
-            Child::Packed(line) => Some((2 * u64::from(line), 2 * PACKED_NODE_LINES)),
-            Child::Indexed(index) => Some((leaf(index), indexed)),
-            Child::Raw(index) => Some((leaf(index), raw)),
-            Child::Tets(_) => None,
-        }
-    }
-
-    /// Bits of a leaf that mean nothing and that an unpacked leaf does not show.
-    pub(crate) fn unused_bits(&self, child: Child) -> u16 {
-        let unused = |rows: &[[u16; WIDTH]]| rows.iter().flatten().fold(0, |all, high| all | high & 1 << 15);
-        match (child, self.grid.map(|grid| grid.bits)) {
-            (Child::Indexed(at), Some(GridBits::B21)) => unused(&[self.packed::<IndexedLeaf21>(at).high]),
-            (Child::Raw(at), Some(GridBits::B21)) => unused(&self.packed::<RawLeaf21>(at).high),
-            _ => 0,
-        }
     }
 }

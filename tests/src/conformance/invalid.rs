@@ -295,8 +295,8 @@ fn tets() -> Vec<Case> {
         broken("F130-nobody-leads-there", base, Seal::Sections, |e| {
             e.put_u32(kind::TETS, 32 * middle, NONE).put_u32(kind::TETS, 32 * middle + 4, NONE);
         }),
-        field("F131-home-of-another", base, kind::TRIANGLE_HOMES, 16, 0),
-        field("F131-home-missing", base, kind::TRIANGLE_HOMES, 0, NONE),
+        field("F131-face-of-another", base, kind::TRIANGLE_FACES, 16, 0),
+        field("F131-face-missing", base, kind::TRIANGLE_FACES, 0, NONE),
         field("F131-face-of-nothing", base, kind::TET_FACES, 12, 1000),
     ]
 }

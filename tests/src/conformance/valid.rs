@@ -289,7 +289,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         tet_vertices: &parts.vertices,
         tet_faces: &parts.faces,
         hull_faces: &parts.hulls,
-        triangle_homes: &homes,
+        triangle_faces: &homes,
         source: Some(source),
     })
 }

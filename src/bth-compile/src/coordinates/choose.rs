@@ -201,7 +201,7 @@ fn grid(bits: GridBits, bounds: Bounds) -> Option<Grid> {
             let step = 2f64.powi(exponent);
             let [low, high] = ends.map(|x| (f64::from(x) / step).round_ties_even());
             (grid.step[axis], grid.origin[axis]) = (step as f32, (low * step) as f32);
-            high - low <= f64::from(bits.most()) && grid.is_exact(axis)
+            high - low <= f64::from(bits.max_steps()) && grid.is_exact(axis)
         };
         (first_exponent(bits, ends)..=127).find(|exponent| fits(*exponent))?;
     }
@@ -272,7 +272,7 @@ mod tests {
                     for axis in 0..3 {
                         prop_assert!(on.grid.is_exact(axis));
                         let steps = on.grid.steps(axis, q[axis]);
-                        prop_assert!((0..=i64::from(bits.most())).contains(&steps), "{}", steps);
+                        prop_assert!((0..=i64::from(bits.max_steps())).contains(&steps), "{}", steps);
                         prop_assert_eq!(on.grid.coordinate(axis, steps as u32).to_bits(), q[axis].to_bits());
                         // Half a step at most, so no coordinate has left its nearest point.
                         let off = (f64::from(p[axis]) - f64::from(q[axis])).abs();

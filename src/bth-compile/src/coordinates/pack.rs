@@ -206,7 +206,7 @@ fn split(grid: &Grid, rows: &[[f32; WIDTH]; 3]) -> ([[u16; WIDTH]; 3], [u16; WID
     let low = std::array::from_fn(|axis| {
         std::array::from_fn(|i| {
             let steps = grid.steps(axis, rows[axis][i]);
-            debug_assert!((0..=i64::from(grid.bits.most())).contains(&steps));
+            debug_assert!((0..=i64::from(grid.bits.max_steps())).contains(&steps));
             high[i] |= ((steps >> 16) as u16) << (5 * axis);
             steps as u16
         })

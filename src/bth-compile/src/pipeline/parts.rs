@@ -35,7 +35,7 @@ pub(crate) fn parts<'a>(object: &'a Object, options: &Options) -> write::ObjectP
         parts.tet_vertices = &encoded.vertices;
         parts.tet_faces = &encoded.faces;
         parts.hull_faces = &encoded.hulls;
-        parts.triangle_homes = &encoded.homes;
+        parts.triangle_faces = &encoded.homes;
     }
     parts.grid = object.on_grid.as_ref().map(|on| (on.grid, on.displacement));
     parts.packed_nodes = object.packed_nodes;
@@ -63,6 +63,6 @@ pub(crate) fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.tet_vertices)
         + size_of_val(parts.tet_faces)
         + size_of_val(parts.hull_faces)
-        + size_of_val(parts.triangle_homes);
+        + size_of_val(parts.triangle_faces);
     bytes as u64
 }

@@ -81,7 +81,7 @@ impl Stored {
 
     /// Bytes of those that tracing reads.
     pub(super) fn resident_bytes(&self) -> u64 {
-        let resident = |kind: u32, length: u64| if kind <= kind::TRIANGLE_HOMES { length } else { 0 };
+        let resident = |kind: u32, length: u64| if kind <= kind::TRIANGLE_FACES { length } else { 0 };
         match self {
             Self::Read { file, object, .. } => {
                 Self::sections(file, *object).map(|s| resident(s.entry.kind, s.entry.length)).sum()

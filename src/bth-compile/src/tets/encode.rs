@@ -22,7 +22,7 @@ pub struct Encoded {
     pub faces: Vec<TetFace>,
     /// `HULL_FACES`.
     pub hulls: Vec<HullFace>,
-    /// `TRIANGLE_HOMES`: per triangle of the source its row of `TET_FACES`, or `NONE`.
+    /// `TRIANGLE_FACES`: per triangle of the source its row of `TET_FACES`, or `NONE`.
     pub homes: Vec<u32>,
 }
 

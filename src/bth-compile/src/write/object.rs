@@ -39,7 +39,7 @@ pub struct ObjectParts<'a> {
     /// Hull faces.
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
-    pub triangle_homes: &'a [u32],
+    pub triangle_faces: &'a [u32],
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -100,7 +100,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::TET_FACES, index, parts.tet_faces)?;
     builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
     if record.is_some() {
-        builder.rows(kind::TRIANGLE_HOMES, index, parts.triangle_homes)?;
+        builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_faces)?;
     }
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;

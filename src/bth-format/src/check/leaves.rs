@@ -1,11 +1,11 @@
-//! Triangle leaves and the ids that they refer to.
+//! Triangle leaves and the ids that they refer to: BTH-F113 to BTH-F118.
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
-/// Checks a triangle leaf at a byte of LINES.
+/// Checks the triangle leaf that a child leads to; `start` is its first byte in LINES.
 pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     let rows = view.triangle_ids.len();
     let checked = match child {
@@ -16,16 +16,16 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
     if view.grid.is_none() {
         return checked;
     }
-    // Places within an unpacked leaf are none of the file.
-    let whole = |e: Error| Error::within(e.code(), kind::LINES, start, e.expected(), e.found());
-    checked.map_err(whole)?;
+    // Offsets within the unpacked leaf do not exist in the file: the error names the leaf's first byte instead.
+    let at_start = |e: Error| Error::within(e.code(), kind::LINES, start, e.expected(), e.found());
+    checked.map_err(at_start)?;
     match view.unused_bits(child) {
         0 => Ok(()),
         found => Err(Error::within(Code::LeafUnused, kind::LINES, start, "0", format!("{found:#x}"))),
     }
 }
 
-/// Checks an indexed leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
+/// Checks an indexed leaf; `start` is its first byte in LINES, `rows` the number of rows of TRIANGLE_IDS.
 fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
     let fail = |code, offset: usize, expected: &str, found: String| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
@@ -38,12 +38,8 @@ fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
         for (i, &corner) in corners.iter().enumerate() {
             let offset = offset_of!(IndexedLeaf, corner) + WIDTH * k + i;
             if i < triangles && corner as usize >= vertices {
-                return fail(
-                    Code::Corner,
-                    offset,
-                    "a corner below the number of vertices",
-                    corner.to_string(),
-                );
+                let expected = "a corner below the number of vertices";
+                return fail(Code::Corner, offset, expected, corner.to_string());
             }
             if i >= triangles && corner != 0 {
                 return fail(Code::LeafUnused, offset, "0 in an unused slot", corner.to_string());
@@ -61,7 +57,7 @@ fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
     Ok(())
 }
 
-/// Checks a raw leaf at a byte of LINES; `rows` are those of TRIANGLE_IDS.
+/// Checks a raw leaf; arguments as of [`indexed`].
 fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
     counts(leaf.triangles, start + offset_of!(RawLeaf, triangles) as u64)?;
     range(leaf.first, leaf.triangles, rows, start + offset_of!(RawLeaf, first) as u64)?;
@@ -72,17 +68,13 @@ fn raw(leaf: &RawLeaf, start: u64, rows: usize) -> Result<()> {
     }
     if leaf.reserved != [0; 14] {
         let at = start + offset_of!(RawLeaf, reserved) as u64;
-        return Err(Error::within(
-            Code::LeafUnused,
-            kind::LINES,
-            at,
-            "zeros",
-            format!("{:?}", leaf.reserved),
-        ));
+        let found = format!("{:?}", leaf.reserved);
+        return Err(Error::within(Code::LeafUnused, kind::LINES, at, "zeros", found));
     }
     Ok(())
 }
 
+/// BTH-F113: a leaf has 1 to 16 triangles and vertices.
 fn counts(count: u32, at: u64) -> Result<()> {
     if (1..=WIDTH as u32).contains(&count) {
         return Ok(());
@@ -90,20 +82,16 @@ fn counts(count: u32, at: u64) -> Result<()> {
     Err(Error::within(Code::LeafCounts, kind::LINES, at, "1 to 16", count.to_string()))
 }
 
+/// BTH-F115: the rows of a leaf lie within TRIANGLE_IDS.
 fn range(first: u32, count: u32, rows: usize, at: u64) -> Result<()> {
     if first as u64 + count as u64 <= rows as u64 {
         return Ok(());
     }
-    Err(Error::within(
-        Code::LeafIds,
-        kind::LINES,
-        at,
-        format!("{count} rows below {rows}"),
-        format!("row {first}"),
-    ))
+    let (expected, found) = (format!("{count} rows below {rows}"), format!("row {first}"));
+    Err(Error::within(Code::LeafIds, kind::LINES, at, expected, found))
 }
 
-/// A coordinate in use is finite; an unused one repeats that of slot 0.
+/// BTH-F117 and BTH-F118: a coordinate in use is finite; an unused one repeats that of slot 0, bit for bit.
 fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
     if used && !x.is_finite() {
         return Err(Error::within(Code::LeafVertices, kind::LINES, at, "a finite coordinate", x.to_string()));
@@ -115,8 +103,8 @@ fn vertex(x: f32, of_slot_0: f32, used: bool, at: u64) -> Result<()> {
     Ok(())
 }
 
-/// Checks the rows of TRIANGLE_IDS.
-pub(super) fn ids(view: &ObjectView) -> Result<()> {
+/// BTH-F116: rows of TRIANGLE_IDS are below the number of triangles.
+pub(super) fn check_ids(view: &ObjectView) -> Result<()> {
     let triangles = view.header.triangles;
     match view.triangle_ids.iter().position(|id| *id >= triangles) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! Rows of the source's positions and attributes.
+//! The positions and attributes of the source, where the file keeps them: BTH-F140 and BTH-F141.
 
 use crate::error::{Code, Error, Result};
 use crate::layout::kind;
@@ -21,6 +21,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     }
 }
 
+/// BTH-F140: every number in a table of triangles is below `rows`.
 fn rows(section: u32, table: &[[u32; 3]], rows: usize) -> Result<()> {
     match table.iter().flatten().position(|v| *v as usize >= rows) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! Exact sums of products of f32 values, for the few decisions that f64 rounding leaves open.
+//! Exact sums of products of `f32` values, for the few decisions that rounding in `f64` leaves open.
 //!
 //! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
@@ -23,25 +23,32 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
     (product, al * bl - (((product - ah * bh) - al * bh) - ah * bl))
 }
 
-/// Room for [`Expansion::add_edge`]: 18 products, two additions each, of which each makes at most one part more.
-pub const EDGE: usize = 36;
-/// Room for [`Expansion::add_volume`].
-pub const VOLUME: usize = 48;
+/// Parts that [`Expansion::add_edge`] needs at most: it adds 18 products of two numbers each, and each addition makes at most
+/// one part more.
+pub const EDGE_PARTS: usize = 36;
+/// Parts that [`Expansion::add_volume`] needs at most: it adds 24 products of two numbers each.
+pub const VOLUME_PARTS: usize = 48;
 
-/// An exact sum.
+/// An exact sum, as up to `PARTS` numbers that do not overlap, in ascending order of size. Additions beyond that panic.
 pub struct Expansion<const PARTS: usize> {
     part: [f64; PARTS],
     len: usize,
 }
 
-/// p - o, where f64 holds it exactly: most often, as f32 coordinates of one scene seldom differ by a factor of 2^29.
-fn seen_from(o: [f64; 3], p: [f64; 3]) -> Option<[f64; 3]> {
+/// `p - o` where `f64` holds it exactly, which it does unless coordinates differ by a factor of about 2^29.
+fn exact_difference(o: [f64; 3], p: [f64; 3]) -> Option<[f64; 3]> {
     let differences = [0, 1, 2].map(|k| two_sum(p[k], -o[k]));
     differences.iter().all(|(_, error)| *error == 0.0).then(|| differences.map(|(difference, _)| difference))
 }
 
+impl<const PARTS: usize> Default for Expansion<PARTS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<const PARTS: usize> Expansion<PARTS> {
-    /// The sum of nothing.
+    /// The sum of no numbers: 0.
     pub fn new() -> Self {
         Expansion { part: [0.0; PARTS], len: 0 }
     }
@@ -68,13 +75,13 @@ impl<const PARTS: usize> Expansion<PARTS> {
     }
 
     /// Adds a·b·c for values of f32 precision (a·b is then exact in f64).
-    pub fn add_product(&mut self, a: f64, b: f64, c: f64) {
+    pub(super) fn add_product(&mut self, a: f64, b: f64, c: f64) {
         let (product, error) = two_product(a * b, c);
         self.add(error);
         self.add(product);
     }
 
-    /// Adds a·b·c for any values whose products are far from the least number.
+    /// Adds a·b·c for values of `f64` whose products neither over- nor underflow.
     fn add_long_product(&mut self, a: f64, b: f64, c: f64) {
         let (product, error) = two_product(a, b);
         for part in [error, product] {
@@ -86,7 +93,7 @@ impl<const PARTS: usize> Expansion<PARTS> {
         }
     }
 
-    /// Adds det[a, b, c] of differences.
+    /// Adds det[a, b, c] for values of `f64` precision.
     fn add_long_determinant(&mut self, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
         for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
             self.add_long_product(a[i], b[j], c[k]);
@@ -94,8 +101,8 @@ impl<const PARTS: usize> Expansion<PARTS> {
         }
     }
 
-    /// Adds sign · det[a, b, c].
-    pub fn add_determinant(&mut self, sign: f64, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
+    /// Adds sign · det[a, b, c] for values of `f32` precision.
+    fn add_determinant(&mut self, sign: f64, a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
         for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
             self.add_product(sign * a[i], b[j], c[k]);
             self.add_product(-sign * a[i], b[k], c[j]);
@@ -107,9 +114,10 @@ impl<const PARTS: usize> Expansion<PARTS> {
         other.part[..other.len].iter().for_each(|&part| self.add(part));
     }
 
-    /// Adds det[d, a-o, b-o]; where the differences are not exact, multiplied out so that each product is of three inputs.
+    /// Adds det[d, a-o, b-o]. Where `f64` does not hold the differences, the determinant is expanded into products of three
+    /// inputs.
     pub fn add_edge(&mut self, o: [f64; 3], d: [f64; 3], a: [f64; 3], b: [f64; 3]) {
-        if let (Some(a), Some(b)) = (seen_from(o, a), seen_from(o, b)) {
+        if let (Some(a), Some(b)) = (exact_difference(o, a), exact_difference(o, b)) {
             return self.add_long_determinant(d, a, b);
         }
         self.add_determinant(1.0, d, a, b);
@@ -117,9 +125,11 @@ impl<const PARTS: usize> Expansion<PARTS> {
         self.add_determinant(-1.0, d, a, o);
     }
 
-    /// Adds det[a-o, b-o, c-o].
+    /// Adds det[a-o, b-o, c-o]; as [`Self::add_edge`].
     pub fn add_volume(&mut self, o: [f64; 3], a: [f64; 3], b: [f64; 3], c: [f64; 3]) {
-        if let (Some(a), Some(b), Some(c)) = (seen_from(o, a), seen_from(o, b), seen_from(o, c)) {
+        if let (Some(a), Some(b), Some(c)) =
+            (exact_difference(o, a), exact_difference(o, b), exact_difference(o, c))
+        {
             return self.add_long_determinant(a, b, c);
         }
         self.add_determinant(1.0, a, b, c);
@@ -176,7 +186,7 @@ mod tests {
                     d1[i] * (p[j] * q[k] - p[k] * q[j])
                 })
                 .sum();
-            let mut e = Expansion::<EDGE>::new();
+            let mut e = Expansion::<EDGE_PARTS>::new();
             e.add_edge(wide(o), wide(d), wide(a), wide(b));
             assert_eq!(e.value().partial_cmp(&0.0), Some(want.cmp(&0)));
             zeros += (want == 0) as u32;
@@ -191,7 +201,7 @@ mod tests {
             let range = if round % 2 == 0 { 3 } else { 1 << 24 };
             let mut draw = || [(); 3].map(|()| (rng.below(2 * range) as i64 - range as i64) as f32);
             let [o, a, b, c] = [draw(), draw(), draw(), draw()];
-            let mut e = Expansion::<VOLUME>::new();
+            let mut e = Expansion::<VOLUME_PARTS>::new();
             e.add_volume(wide(o), wide(a), wide(b), wide(c));
             let p = |v: [f32; 3]| robust::Coord3D { x: v[0], y: v[1], z: v[2] };
             // robust's orient3d(a, b, c, o) is det[a-o, b-o, c-o].
@@ -218,14 +228,14 @@ mod tests {
                 })
             };
             let [o, d, a, b, c] = [draw(), draw(), draw(), draw(), draw()];
-            ways[usize::from(seen_from(o, a).is_some() && seen_from(o, b).is_some())] += 1;
-            let mut edge = Expansion::<{ 2 * EDGE }>::new();
+            ways[usize::from(exact_difference(o, a).is_some() && exact_difference(o, b).is_some())] += 1;
+            let mut edge = Expansion::<{ 2 * EDGE_PARTS }>::new();
             edge.add_edge(o, d, a, b);
             edge.add_determinant(-1.0, d, a, b);
             edge.add_determinant(1.0, d, o, b);
             edge.add_determinant(1.0, d, a, o);
             assert_eq!(edge.len, 0);
-            let mut volume = Expansion::<{ 2 * VOLUME }>::new();
+            let mut volume = Expansion::<{ 2 * VOLUME_PARTS }>::new();
             volume.add_volume(o, a, b, c);
             volume.add_determinant(-1.0, a, b, c);
             volume.add_determinant(1.0, o, b, c);

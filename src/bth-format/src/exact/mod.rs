@@ -1,7 +1,7 @@
-//! Exact arithmetic on coordinates of `f32`: sums of products without rounding, and the predicates made of them.
+//! Exact arithmetic on `f32` coordinates: sums of products without rounding, and geometric predicates made of them.
 
 mod expansion;
 mod predicates;
 
-pub use expansion::{EDGE, Expansion, VOLUME};
+pub use expansion::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 pub use predicates::{is_zero_area, side};

@@ -1,10 +1,10 @@
-//! Signs that are right whatever the rounding: f64 first, exact sums where it leaves them open.
+//! Geometric predicates with exact signs: a floating-point filter in `f64`, and exact sums where it does not decide.
 
-use super::expansion::{Expansion, VOLUME};
+use super::expansion::{Expansion, VOLUME_PARTS};
 use std::cmp::Ordering;
 
-/// On which side of the plane through a, b, c the point d lies: `Greater` where (b-a)x(c-a) points to,
-/// `Equal` on the plane. Exact for finite points.
+/// On which side of the plane through a, b and c the point d lies: `Greater` where (b-a)x(c-a) points to, `Equal` on the plane.
+/// Exact for finite points.
 pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] as f64 - a[k] as f64));
     let minors = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (u[i] * v[j], u[j] * v[i]));
@@ -14,14 +14,14 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
     if det.abs() > 16.0 * f64::EPSILON * size {
         return det.total_cmp(&0.0);
     }
-    let mut volume = Expansion::<VOLUME>::new();
+    let mut volume = Expansion::<VOLUME_PARTS>::new();
     let [a, b, c, d] = [a, b, c, d].map(|p| p.map(f64::from));
     volume.add_volume(d, a, b, c);
     // det[a-d, b-d, c-d] is positive behind the plane.
     0.0f64.total_cmp(&(volume.value() + 0.0))
 }
 
-/// Whether a triangle has exactly zero area: its projections along the axes all have.
+/// Whether a triangle has exactly zero area: whether its projections along the three axes all have. Exact for finite corners.
 pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {

@@ -1,4 +1,4 @@
-//! Memory that holds a file, aligned for every structure in it.
+//! Memory that holds the bytes of a file, aligned for every structure in it.
 
 use crate::error::{Code, Error, Result};
 use crate::layout::Line;
@@ -7,36 +7,39 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use zerocopy::IntoBytes;
 
-/// Bytes of a file at a multiple of 64.
+/// The bytes of a file, from an address that is a multiple of 64.
 #[derive(Debug)]
 pub(super) enum Buffer {
-    /// Memory of our own.
+    /// A copy in memory that this process allocated.
     Owned(Owned),
-    /// A mapping, which starts at a page.
+    /// A mapping of the file, which starts at a page.
     Mapped(Mmap),
 }
 
-/// Memory of our own, all of it writable until the file is in it.
+/// Allocated memory, writable until the file has been read into it.
 #[derive(Debug)]
 pub(super) struct Owned {
     memory: Memory,
-    /// In bytes.
+    /// Bytes in use.
     length: usize,
 }
 
 #[derive(Debug)]
 enum Memory {
     Lines(Vec<Line>),
-    /// Anonymous pages, large ones where the system has them; and the first byte in use.
-    #[cfg_attr(not(target_os = "linux"), expect(dead_code, reason = "only Linux is asked for large pages"))]
+    /// Anonymous pages, which are large ones where the system has them, and the index of the first byte in use.
+    #[cfg_attr(
+        not(target_os = "linux"),
+        expect(dead_code, reason = "large pages are requested on Linux only")
+    )]
     Pages(MmapMut, usize),
 }
 
-/// Smaller files gain nothing by large pages.
+/// Bytes of a large page. Files of fewer than two gain nothing by them.
 const LARGE_PAGE: usize = 2 << 20;
 
 impl Owned {
-    /// As many zero bytes; fails instead of aborting when there is not so much memory.
+    /// Zero bytes. `None` when there is not enough memory: the length comes from a file, so allocation must not abort.
     fn zeroed(length: usize) -> Option<Self> {
         if length >= 2 * LARGE_PAGE
             && let Some(memory) = large_pages(length)
@@ -65,13 +68,13 @@ impl Owned {
     }
 }
 
-/// Zero bytes from the start of a large page on. Rays go all over a model: with small pages most of their cache misses are
-/// misses of the page tables' cache, too.
+/// Zero bytes from the start of a large page on; `None` where there are none. Rays visit a model in no order of addresses: with
+/// small pages most of their cache misses are TLB misses too.
 fn large_pages(length: usize) -> Option<Memory> {
     #[cfg(target_os = "linux")]
     {
         let pages = MmapMut::map_anon(length.checked_add(LARGE_PAGE)?).ok()?;
-        // A wish: not every system has them.
+        // The advice may be refused: then the pages are small, and all else is the same.
         let _ = pages.advise(memmap2::Advice::HugePage);
         let first = pages.as_ptr().addr().next_multiple_of(LARGE_PAGE) - pages.as_ptr().addr();
         Some(Memory::Pages(pages, first))
@@ -84,6 +87,7 @@ fn large_pages(length: usize) -> Option<Memory> {
 }
 
 impl Buffer {
+    /// All bytes of the file.
     pub(super) fn bytes(&self) -> &[u8] {
         match self {
             Buffer::Owned(owned) => owned.bytes(),
@@ -91,17 +95,18 @@ impl Buffer {
         }
     }
 
+    /// Copies the bytes of a file.
     pub(super) fn copy(bytes: &[u8]) -> Result<Self> {
         let mut owned = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
         owned.bytes_mut().copy_from_slice(bytes);
         Ok(Buffer::Owned(owned))
     }
 
-    /// Reads a whole file. Its header is checked first, so that what is no BTH file is not read.
+    /// Reads a whole file. The header is checked first, so that a file of another format is not read to its end.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let io = |e| Error::io(path, e);
         let (mut file, length) = open(path)?;
-        let mut first = [0; super::table::HEADER];
+        let mut first = [0; super::table::HEADER_SIZE];
         let head = first.len().min(usize::try_from(length).unwrap_or(usize::MAX));
         file.read_exact(&mut first[..head]).map_err(io)?;
         super::table::check_header(&first[..head], length)?;
@@ -116,23 +121,24 @@ impl Buffer {
     /// Maps a whole file.
     ///
     /// # Safety
-    /// Until the buffer is dropped nobody, in this process or another, may write to the file,
-    /// truncate it or punch holes into it.
+    /// Until the buffer is dropped nobody, in this process or another, may write to the file, truncate it or punch holes
+    /// into it.
     #[allow(unsafe_code)]
     pub(super) unsafe fn map(path: &Path) -> Result<Self> {
         let (file, length) = open(path)?;
         if length == 0 {
             return Self::copy(&[]);
         }
-        // SAFETY: the bytes of a `Mmap` must not change while references to them live. The map is
-        // private to this buffer and read-only, and the caller promises that nobody changes or
-        // shrinks the file before the buffer is dropped.
+        // SAFETY: the bytes of a `Mmap` must neither change nor become inaccessible while references to them live. The map
+        // is read-only and owned by this buffer, which lends references for its own lifetime only, and the caller promises
+        // that nobody changes or shrinks the file before the buffer is dropped.
         let map = unsafe { Mmap::map(&file) }.map_err(|e| Error::io(path, e))?;
         Ok(Buffer::Mapped(map))
     }
 }
 
-/// Opens a regular file; pipes and devices, which may have no end, are refused before they are opened.
+/// Opens a regular file and returns its length in bytes. Pipes and devices, which may block or have no end, are refused before
+/// they are opened.
 fn open(path: &Path) -> Result<(std::fs::File, u64)> {
     let io = |e| Error::io(path, e);
     if !std::fs::metadata(path).map_err(io)?.is_file() {

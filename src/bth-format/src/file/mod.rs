@@ -1,7 +1,7 @@
-//! A BTH file in memory: read or mapped, its header and section table checked.
+//! A BTH file in memory: read or mapped, its header and section table checked. Specification: "Container" and "Opening".
 //!
-//! Opening costs O(sections) beyond reading the bytes. It does not look into the sections:
-//! [`crate::check`] does that for an object, [`crate::verify`] for everything.
+//! Opening costs O(sections) beyond reading the bytes, and does not read what is in the sections. [`File::check`] checks the
+//! indices of an object, [`File::check_scene`] those of the scene, [`crate::verify`] everything.
 
 mod buffer;
 mod table;
@@ -11,21 +11,21 @@ pub use table::{content_id, hash128, kind_stride};
 use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
-use crate::object::ObjectBounds;
-use crate::object::{ObjectView, Records};
+use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
 use buffer::Buffer;
 use std::path::Path;
 use std::sync::OnceLock;
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-/// An open file. The header and the section table hold what `format-spec/` demands of them.
+/// An open file whose header and section table have been checked: `BTH-F001` to `BTH-F019` and `BTH-F022` hold.
 #[derive(Debug)]
 pub struct File {
     buffer: Buffer,
     /// Per object and kind the row of the section table, or `NONE`.
     rows: Vec<[u32; OBJECT_KINDS]>,
-    /// Views of the objects that have been asked for. They borrow from `buffer`, not from `'static`: see [`File::view`].
+    /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` stands in for a lifetime that
+    /// cannot be named: see [`File::first_view`].
     views: Vec<OnceLock<ObjectView<'static>>>,
 }
 
@@ -42,17 +42,17 @@ pub struct SectionView<'a> {
 }
 
 impl File {
-    /// Reads a file into memory of its own and checks header and table.
+    /// Reads a file into memory and checks the header and the section table.
     ///
     /// # Errors
-    /// `BTH-O001` when the file cannot be read, `BTH-F001` to `BTH-F019` when it does not hold
-    /// what it should.
+    /// `BTH-O001` when the file cannot be read, `BTH-O002` on big-endian machines, `BTH-F001` to `BTH-F019` or `BTH-F022` for
+    /// the first invariant that the file violates.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Buffer::read(path).and_then(Self::new).map_err(|e| e.in_file(path))
     }
 
-    /// Copies the bytes of a file and checks header and table.
+    /// Copies the bytes of a file, which need no alignment, and checks the header and the section table.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -60,19 +60,18 @@ impl File {
         Self::new(Buffer::copy(bytes)?)
     }
 
-    /// Maps a file and checks header and table; pages are read when they are used.
+    /// Maps a file and checks the header and the section table. Pages are read when they are used.
     ///
     /// # Safety
-    /// Until the `File` is dropped nobody, in this process or another, may write to the file,
-    /// truncate it or punch holes into it. Replacing it by renaming another over it, or removing
-    /// its name, is fine: the mapping keeps the old content.
+    /// Until the `File` is dropped nobody, in this process or another, may write to the file, truncate it or punch holes
+    /// into it. Renaming another file over it or removing its name is allowed: the mapping keeps the old content.
     ///
     /// # Errors
     /// As [`Self::read`].
     #[allow(unsafe_code)]
     pub unsafe fn map(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        // SAFETY: the caller promises what `Buffer::map` demands, in the same words.
+        // SAFETY: the caller promises what `Buffer::map` requires, in the same words.
         let buffer = unsafe { Buffer::map(path) };
         buffer.and_then(Self::new).map_err(|e| e.in_file(path))
     }
@@ -113,66 +112,69 @@ impl File {
 
     /// The sections, in the order of the table, which is that of their offsets.
     pub fn sections(&self) -> impl ExactSizeIterator<Item = SectionView<'_>> {
-        let bytes = self.bytes();
-        self.table().iter().map(move |entry| SectionView {
-            entry,
-            bytes: &bytes[entry.offset as usize..(entry.offset + entry.length) as usize],
-        })
+        self.table().iter().map(|entry| self.section_of(entry))
     }
 
-    /// The section of this kind; `object` is `NONE` for sections of the whole file.
+    /// The section of a kind; `object` is [`NONE`] for sections of the whole file. `None` when the file lacks it.
     pub fn section(&self, object: u32, kind: u32) -> Option<SectionView<'_>> {
         let table = self.table();
         let entry = match self.rows.get(object as usize).and_then(|kinds| kinds.get(kind as usize)) {
             Some(&row) => table.get(row as usize)?,
             None => &table[table.binary_search_by_key(&(object, kind), |e| (e.object, e.kind)).ok()?],
         };
-        Some(SectionView {
-            entry,
-            bytes: &self.bytes()[entry.offset as usize..(entry.offset + entry.length) as usize],
-        })
+        Some(self.section_of(entry))
     }
 
-    /// Objects in the file.
+    /// The section of an entry of this file's table, which lies within the file (BTH-F012).
+    fn section_of<'a>(&'a self, entry: &'a SectionEntry) -> SectionView<'a> {
+        let bytes = &self.bytes()[entry.offset as usize..(entry.offset + entry.length) as usize];
+        SectionView { entry, bytes }
+    }
+
+    /// Number of objects in the file.
     #[inline]
     pub fn object_count(&self) -> u32 {
         self.rows.len() as u32
     }
 
-    /// BLAKE3 of what the file says, without how it came about: equal for equal content.
+    /// BLAKE3 of what the sections hold, provenance left out: equal for files that answer all rays equally. Specification:
+    /// "Content id".
     pub fn content_id(&self) -> [u8; 32] {
         self.header().content_id
     }
 
-    /// The provenance as UTF-8 JSON, if the file has some and it is UTF-8.
+    /// The PROVENANCE section, JSON by the specification; `None` when the file lacks it or it is not UTF-8.
     pub fn provenance(&self) -> Option<&str> {
         std::str::from_utf8(self.section(NONE, kind::PROVENANCE)?.bytes).ok()
     }
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = kind::OBJECT..=kind::TRIANGLE_HOMES;
+        let traced = kind::OBJECT..=kind::TRIANGLE_FACES;
         self.table().iter().filter(|e| e.object != NONE && traced.contains(&e.kind)).map(|e| e.length).sum()
     }
 
-    /// The sections of an object, **unchecked inside**: use [`Self::check`] before tracing.
+    /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before tracing.
     ///
     /// # Errors
-    /// `BTH-O003` when there is no such object, `BTH-F101` when its tetrahedron records are of another kind
-    /// than it says, `BTH-F104` when its coordinates are.
+    /// `BTH-O003` when there is no such object, `BTH-F101` when the kind of its tetrahedron records is not that of TETS,
+    /// `BTH-F104` when its grid is none or is not announced in the header.
     pub fn object(&self, object: u32) -> Result<ObjectView<'_>> {
         self.view(object).copied()
     }
 
-    /// Whether what is not in memory yet is read from the file when it is used.
+    /// Whether the file is mapped, so that reading bytes may wait for the disk.
     pub fn is_mapped(&self) -> bool {
         matches!(self.buffer, Buffer::Mapped(_))
     }
 
-    /// As [`Self::object`], made only once.
+    /// As [`Self::object`], made once and kept.
+    ///
+    /// # Errors
+    /// As [`Self::object`].
     #[inline]
     pub fn view(&self, object: u32) -> Result<&ObjectView<'_>> {
-        // Asked for by every query.
+        // Every query comes here: the first view of an object is made out of line.
         match self.views.get(object as usize).and_then(OnceLock::get) {
             Some(view) => Ok(view),
             None => self.first_view(object),
@@ -184,10 +186,10 @@ impl File {
     #[allow(unsafe_code)]
     fn first_view(&self, object: u32) -> Result<&ObjectView<'_>> {
         let view = self.make_view(object)?;
-        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`: memory on the heap or mapped, which
-        // does not move when `self` does, is never written to or replaced, and lives until `self` is dropped. What
-        // this function returns borrows from `self`, and `views` is private, so no view outlives `self`; dropping one
-        // does nothing.
+        // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`, which are on the heap or mapped:
+        // they do not move when `self` does, are never written to or replaced, and live until `self` is dropped. `views` is
+        // private, and what leaves this type is shortened to a borrow of `self`, so no view outlives `self`. A view has no
+        // destructor, so the order in which the fields of `self` are dropped does not matter.
         let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
         Ok(self.views[object as usize].get_or_init(|| view))
     }
@@ -229,7 +231,7 @@ impl File {
             tet_vertices: self.slice(object, kind::TET_VERTICES),
             tet_faces: self.slice(object, kind::TET_FACES),
             hull_faces: self.slice(object, kind::HULL_FACES),
-            triangle_homes: self.slice(object, kind::TRIANGLE_HOMES),
+            triangle_faces: self.slice(object, kind::TRIANGLE_FACES),
             positions: self.slice(object, kind::POSITIONS),
             triangles: self.slice(object, kind::TRIANGLES),
             corners: self.slice(object, kind::CORNERS),
@@ -238,14 +240,14 @@ impl File {
         })
     }
 
-    /// The grid of an object, which the file must announce.
+    /// BTH-F104: the grid of an object, and that the header announces grids and packed nodes.
     fn grid(&self, object: &Object) -> Result<Option<Grid>> {
         let at = std::mem::offset_of!(Object, coordinates) as u64;
         let wrong = |expected: &str, found: String| {
             Error::within(Code::Coordinates, kind::OBJECT, at, expected.to_owned(), found)
         };
         let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
-        let grid = Grid::of(object).map_err(|what| wrong(expected, what.to_owned()))?;
+        let grid = Grid::from_object(object).map_err(|what| wrong(expected, what.to_owned()))?;
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
             return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
@@ -257,7 +259,7 @@ impl File {
         Ok(grid)
     }
 
-    /// The sections of an object with every index checked: tracing it neither reads out of bounds nor loops.
+    /// The sections of an object, after checking every index in them: traversing it neither reads out of bounds nor loops.
     /// Costs O(bytes of the object).
     ///
     /// # Errors
@@ -268,18 +270,18 @@ impl File {
         Ok(view)
     }
 
-    /// The OBJECT row of an object that exists.
+    /// The OBJECT row of an object. Panics when there is no such object.
     pub fn object_header(&self, object: u32) -> &Object {
         let rows: &[Object] = self.slice(object, kind::OBJECT);
         &rows[0]
     }
 
-    /// The instances of the scene, unchecked inside.
+    /// The instances of the scene, whose indices are not checked; empty when the file has no scene.
     pub fn instances(&self) -> &[Instance] {
         self.slice(NONE, kind::INSTANCES)
     }
 
-    /// The scene sections, **unchecked inside**; `None` when the file has none of them.
+    /// The scene sections, whose **indices are not checked**; `None` when the file has none of them.
     pub fn scene(&self) -> Option<SceneView<'_>> {
         // Sections of the whole file come last.
         let of_file = self.table().iter().rev().take_while(|e| e.object == NONE);
@@ -297,18 +299,19 @@ impl File {
         })
     }
 
-    /// The scene sections, checked: instances and tracks lead nowhere but to what is there. Costs
-    /// O(bytes of these sections).
+    /// The scene sections, after checking every index in them; `None` when the file has none of them. Costs O(bytes of these
+    /// sections).
     ///
     /// # Errors
-    /// `BTH-F150` to `BTH-F159`.
+    /// The first violation of `BTH-F150` to `BTH-F159`.
     pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
         let Some(view) = self.scene() else { return Ok(None) };
         check::scene(&view, self.object_count()).map_err(|e| self.locate(e, NONE))?;
         Ok(Some(view))
     }
 
-    /// Turns an offset within a section into one within the file.
+    /// The same error with its offset counted from the start of the file instead of that of its section, which belongs to
+    /// `object`.
     pub fn locate(&self, error: Error, object: u32) -> Error {
         let start = error.section().and_then(|s| self.section(object, s.kind)).map_or(0, |s| s.entry.offset);
         error.in_object(object).move_by(start)
@@ -317,6 +320,7 @@ impl File {
     /// A section as a slice of its elements; empty when the file lacks it.
     fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
         let Some(section) = self.section(object, kind) else { return &[] };
-        <[T]>::ref_from_bytes(section.bytes).expect("the table's check made length, stride and alignment fit")
+        <[T]>::ref_from_bytes(section.bytes)
+            .expect("checking the table made length, stride and alignment fit")
     }
 }

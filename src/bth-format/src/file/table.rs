@@ -1,4 +1,5 @@
-//! Checks of the header and the section table: O(sections).
+//! Checks of the header and the section table: BTH-F001 to BTH-F019 and BTH-F022. Costs O(sections).
+//! Specification: "Opening".
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
@@ -6,14 +7,14 @@ use crate::limits;
 use std::mem::offset_of;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Bytes of the header.
-pub(super) const HEADER: usize = size_of::<Header>();
+/// Bytes of the header, and offset of the section table.
+pub(super) const HEADER_SIZE: usize = size_of::<Header>();
 /// Bytes of a section entry.
-const ENTRY: u64 = size_of::<SectionEntry>() as u64;
+const ENTRY_SIZE: u64 = size_of::<SectionEntry>() as u64;
 /// Required feature bits that this library knows.
 const KNOWN_FEATURES: u64 = FEATURE_GRID | FEATURE_PACKED_NODES;
 
-/// Whether hashes are compared. Not under fuzzing: no fuzzer guesses one, and none of the checks behind would be reached.
+/// Whether hashes are compared. Not under fuzzing: mutated files would have wrong hashes, and no check behind would be reached.
 const CHECKSUMS: bool = !cfg!(fuzzing);
 
 /// The first 128 bits of the BLAKE3 hash.
@@ -21,8 +22,8 @@ pub fn hash128(bytes: &[u8]) -> [u8; 16] {
     blake3::hash(bytes).as_bytes()[..16].try_into().expect("32 bytes hold 16")
 }
 
-/// The content id of a section table: BLAKE3 of the identifier and, in the table's order without
-/// PROVENANCE, each entry's kind, flags, object, stride, count and hash.
+/// The content id of a section table: BLAKE3 of the identifier and, in the table's order and without PROVENANCE, each entry's
+/// kind, flags, object, stride, count and hash. Specification: "Content id".
 pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&IDENTIFIER);
@@ -35,12 +36,13 @@ pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Bytes of an element of a section; `None` for unknown kinds, 0 where several are allowed (TETS).
+/// Bytes of an element of a section; `None` for unknown kinds, 0 for TETS, whose stride is that of a [`RecordKind`].
+/// Specification: "Kinds".
 pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
         kind::LINES => size_of::<Line>(),
-        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES => 4,
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::TETS => 0,
         kind::TET_VERTICES => size_of::<TetVertex>(),
@@ -60,17 +62,17 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
     })
 }
 
-/// Most elements of a section of an object.
-fn most(kind: u32) -> u64 {
+/// BTH-F022: the greatest number of elements of a section.
+fn max_count(kind: u32) -> u64 {
     match kind {
         kind::OBJECT => 1,
         kind::LINES => Child::INDEX_LIMIT as u64,
         kind::TETS => limits::MAX_TETS as u64,
-        kind::TRIANGLE_IDS | kind::TRIANGLE_HOMES | kind::TRIANGLES | kind::CORNERS => {
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS => {
             limits::MAX_TRIANGLES as u64
         }
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
-        // Rows are referred to by 31 bits in links and by u32 elsewhere; NONE is no row.
+        // Links hold rows in 31 bits, other references in 32; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,
         kind::POSITIONS | kind::NORMALS | kind::UVS => (NONE - 1) as u64,
         kind if kind::is_scene(kind) => (NONE - 1) as u64,
@@ -78,13 +80,14 @@ fn most(kind: u32) -> u64 {
     }
 }
 
-/// Checks the header against the length of the file; `bytes` are at least its first 128.
+/// BTH-F001 to BTH-F008 of the header. `bytes` are the file's first 128, or all where there are fewer or more; `length` is
+/// the number of bytes of the file.
 pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     let fail = |code, offset: usize, expected: String, found: String| {
         Err(Error::at(code, offset as u64, expected, found))
     };
     let Ok((header, _)) = Header::ref_from_prefix(bytes) else {
-        return fail(Code::HeaderSize, 0, format!("{HEADER} bytes"), bytes.len().to_string());
+        return fail(Code::HeaderSize, 0, format!("{HEADER_SIZE} bytes"), bytes.len().to_string());
     };
     if header.identifier != IDENTIFIER {
         return fail(Code::Identifier, 0, hex(&IDENTIFIER), hex(&header.identifier));
@@ -112,27 +115,31 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
         let at = offset_of!(Header, required_features);
         return fail(Code::Features, at, "known feature bits".into(), format!("unknown {unknown:#x}"));
     }
-    let room = (length - HEADER as u64) / ENTRY;
-    if header.section_offset != HEADER as u64
+    let max_entries = (length - HEADER_SIZE as u64) / ENTRY_SIZE;
+    if header.section_offset != HEADER_SIZE as u64
         || header.section_count > limits::MAX_SECTIONS
-        || header.section_count as u64 > room
+        || header.section_count as u64 > max_entries
     {
         let at = offset_of!(Header, section_offset);
-        let expected = format!("at most {} entries at byte {HEADER}", room.min(limits::MAX_SECTIONS as u64));
+        let expected =
+            format!("at most {} entries at byte {HEADER_SIZE}", max_entries.min(limits::MAX_SECTIONS as u64));
         let found = format!("{} entries at byte {}", header.section_count, header.section_offset);
         return fail(Code::Table, at, expected, found);
     }
     Ok(header)
 }
 
-/// The entries of a file whose header has been checked.
+/// The entries of the section table of a file whose header has been checked.
 pub(super) fn entries<'a>(bytes: &'a [u8], header: &Header) -> &'a [SectionEntry] {
-    let end = HEADER + header.section_count as usize * ENTRY as usize;
-    <[SectionEntry]>::ref_from_bytes(&bytes[HEADER..end])
+    let end = HEADER_SIZE + header.section_count as usize * ENTRY_SIZE as usize;
+    <[SectionEntry]>::ref_from_bytes(&bytes[HEADER_SIZE..end])
         .expect("the buffer is aligned and a table is whole entries")
 }
 
-/// Checks header and table of a whole file; returns the number of objects.
+/// Checks the header and the section table of a whole file; returns the number of objects.
+///
+/// # Errors
+/// The first violation of BTH-F001 to BTH-F019 and BTH-F022.
 pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     let header = check_header(bytes, bytes.len() as u64)?;
     let entries = entries(bytes, header);
@@ -141,12 +148,12 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
         let at = offset_of!(Header, table_hash) as u64;
         return Err(Error::at(Code::TableHash, at, hex(&hash), hex(&header.table_hash)));
     }
-    let mut end = HEADER as u64 + entries.len() as u64 * ENTRY;
+    let mut end = HEADER_SIZE as u64 + entries.len() as u64 * ENTRY_SIZE;
     for (i, e) in entries.iter().enumerate() {
         let previous = i.checked_sub(1).map(|p| &entries[p]);
         end =
             check_entry(e, previous, end, header.file_length).map_err(|(code, field, expected, found)| {
-                let at = HEADER as u64 + i as u64 * ENTRY + field as u64;
+                let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + field as u64;
                 Error::within(code, e.kind, at, expected, found).in_object(e.object)
             })?;
     }
@@ -156,7 +163,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
         let at = offset_of!(Header, content_id) as u64;
         return Err(Error::at(Code::ContentId, at, hex(&id), hex(&header.content_id)));
     }
-    // The file's length is a multiple of 64 by this, so the sum does not overflow.
+    // BTH-F019, which makes the file's length a multiple of 64. Sections end within the file, but rounding up may overflow.
     if end.checked_next_multiple_of(ALIGNMENT as u64) != Some(header.file_length) {
         let at = offset_of!(Header, file_length) as u64;
         let expected = format!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
@@ -165,10 +172,11 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     Ok(objects)
 }
 
-/// What an entry should hold: the code, the field's offset, expected and found.
+/// A violation in an entry: the code, the field's offset in the entry, what is expected and what was found.
 type Mismatch = (Code, usize, String, String);
 
-/// Checks an entry; `end` is where the one before ends. Returns where this one does.
+/// BTH-F006, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
+/// file; returns where this section ends.
 fn check_entry(
     e: &SectionEntry,
     previous: Option<&SectionEntry>,
@@ -227,14 +235,14 @@ fn check_entry(
             return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, e.stride.to_string()));
         }
     }
-    if e.kind != kind::OBJECT && e.count > most(e.kind) {
-        let expected = format!("at most {}", most(e.kind));
+    if e.kind != kind::OBJECT && e.count > max_count(e.kind) {
+        let expected = format!("at most {}", max_count(e.kind));
         return Err((Code::Limit, offset_of!(SectionEntry, count), expected, e.count.to_string()));
     }
     Ok(last)
 }
 
-/// Checks which objects there are; returns their number. The entries are sorted.
+/// BTH-F017: objects are numbered without gaps. The entries ascend by object and kind. Returns the number of objects.
 fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
     let mut objects = 0;
     for (i, e) in entries.iter().enumerate() {
@@ -250,7 +258,7 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
             e.object + 1 != objects || of_file || e.kind == 0
         };
         if wrong {
-            let at = HEADER as u64 + i as u64 * ENTRY + offset_of!(SectionEntry, object) as u64;
+            let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + offset_of!(SectionEntry, object) as u64;
             let expected =
                 format!("the one OBJECT row of object {objects}, or a section that fits its object");
             let found = format!("{} rows of kind {} in object {}", e.count, e.kind, e.object);

@@ -1,6 +1,6 @@
-//! The wide BVH: nodes and triangle leaves, in lines of 64 bytes.
+//! The wide BVH: nodes and triangle leaves, in lines of 64 bytes. Specification: "Child codes" to "RawLeaf".
 
-use super::assert_layout;
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// 64 bytes: the unit in which nodes and leaves are addressed.
@@ -8,8 +8,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 #[repr(C, align(64))]
 pub struct Line(pub [u32; 16]);
 
-/// Where a child code leads. Codes are `u32`: bit 31 set for leaves, bits 30..29
-/// the kind of leaf, the rest an index; `NONE` is an empty slot.
+/// What a child code leads to. Codes are `u32`: bits 31 to 29 are the kind of child, with bit 31 set for leaves; bits 28 to
+/// 0 are an index. [`super::NONE`] is an empty slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
     /// Line of a [`WideNode`].
@@ -27,7 +27,7 @@ pub enum Child {
 impl Child {
     /// Set in the codes of leaves.
     pub const LEAF_BIT: u32 = 1 << 31;
-    /// Of nodes, set in the codes of packed ones.
+    /// Set in the codes of packed nodes, clear in those of wide nodes.
     pub const PACKED_BIT: u32 = 1 << 29;
     /// Indices are below this.
     pub const INDEX_LIMIT: u32 = 1 << 29;
@@ -42,7 +42,7 @@ impl Child {
             Child::Tets(i) => Self::LEAF_BIT | (2 << 29) | i,
         }
     }
-    /// The child that a code stands for; `None` for `NONE` and unassigned codes.
+    /// The child that a code leads to; `None` for [`super::NONE`] and codes of no assigned kind.
     #[inline(always)]
     pub const fn from_code(code: u32) -> Option<Self> {
         let index = code & (Self::INDEX_LIMIT - 1);
@@ -57,67 +57,82 @@ impl Child {
     }
 }
 
-/// Children of a wide node, triangles and vertices of a leaf: at most 16.
+/// Slots of a node for children, and of a leaf for triangles and for vertices.
 pub const WIDTH: usize = 16;
 
-/// Inner node of the wide BVH: 7 lines. Slots are filled from 0; an empty slot has
-/// lower = `f32::MAX`, upper = `-f32::MAX` and child `NONE`.
+/// Inner node of the wide BVH: 7 lines. Used slots come first; an empty slot has lower ends of `f32::MAX`, upper ends of
+/// `-f32::MAX` and child [`super::NONE`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct WideNode {
-    /// Per axis: lower ends, then upper ends of the children's boxes, object space.
+    /// `[axis][lower, upper][slot]`: the children's boxes, object space.
     pub bounds: [[[f32; WIDTH]; 2]; 3],
-    /// Child codes; those of nodes and triangle leaves exceed the own line.
+    /// Child codes. Nodes and triangle leaves lie behind the node that refers to them.
     pub child: [u32; WIDTH],
 }
 
-/// A [`WideNode`] with boxes of bytes: 3 lines. An end is `origin + step * byte`, which takes no rounding: steps are powers
-/// of two, the origin is a multiple of the step, and no multiple exceeds 2^24. An empty slot has lower = 255, upper = 0.
+/// A [`WideNode`] whose child boxes are quantized to bytes: 3 lines. An end is `origin + step * byte` without rounding: steps
+/// are powers of two, the origin is a multiple of the step, and no end is more than 2^24 steps from 0. An empty slot has
+/// lower ends of 255, upper ends of 0 and child [`super::NONE`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct PackedNode {
-    /// As in [`WideNode`], in steps.
+    /// `[axis][lower, upper][slot]`: the children's boxes, in steps from the origin.
     pub bounds: [[[u8; WIDTH]; 2]; 3],
-    /// As in [`WideNode`].
+    /// Child codes, as in [`WideNode`].
     pub child: [u32; WIDTH],
-    /// Least point, object space.
+    /// Where byte 0 lies, per axis, object space.
     pub origin: [f32; 3],
-    /// Between neighbouring points, per axis.
+    /// Distance that one unit of a byte stands for, per axis, object space.
     pub step: [f32; 3],
     /// Zero.
     pub reserved: [u32; 2],
 }
 
-/// Triangle leaf with shared vertices: 4 lines.
+/// Triangle leaf whose triangles share vertices: 4 lines.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct IndexedLeaf {
-    /// x, y and z rows; unused slots repeat vertex 0.
+    /// `[axis][vertex]`, object space; unused slots repeat vertex 0.
     pub vertex: [[f32; WIDTH]; 3],
-    /// First, second and third vertex of each triangle, in source orientation; unused slots 0.
+    /// `[corner][triangle]`: vertices of each triangle, in the order of the source; unused slots are 0.
     pub corner: [[u8; WIDTH]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u32,
-    /// Vertices in use, 1 to 16.
+    /// Number of vertices, 1 to 16.
     pub vertices: u32,
     /// Zero.
     pub reserved: u32,
 }
 
-/// Triangle leaf without sharing: 10 lines.
+/// Triangle leaf with three corners of its own for each triangle: 10 lines.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct RawLeaf {
-    /// `[corner][axis][triangle]`; unused slots repeat triangle 0.
+    /// `[corner][axis][triangle]`, object space; unused slots repeat triangle 0.
     pub corner: [[[f32; WIDTH]; 3]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
+    /// Row of `TRIANGLE_IDS` of the first triangle; the others follow.
     pub first: u32,
-    /// Triangles, 1 to 16.
+    /// Number of triangles, 1 to 16.
     pub triangles: u32,
     /// Zero.
     pub reserved: [u32; 14],
+}
+
+impl IndexedLeaf {
+    /// Corners of the triangle in a slot. Panics where a corner is no vertex; after [`crate::File::check`] all are.
+    pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|vertices| self.vertex.map(|row| row[vertices[slot] as usize]))
+    }
+}
+
+impl RawLeaf {
+    /// Corners of the triangle in a slot.
+    pub(crate) fn triangle(&self, slot: usize) -> [[f32; 3]; 3] {
+        self.corner.map(|rows| rows.map(|row| row[slot]))
+    }
 }
 
 /// Lines that a [`WideNode`] takes.

@@ -1,101 +1,25 @@
-//! Coordinates of triangle leaves in fewer bits: points of a grid, all of which are `f32` without rounding.
+//! The grid of an object: the points that 16 or 21 bits a coordinate can stand for, each an `f32` without rounding.
+//! Specification: "Grids".
 
-use super::{Object, PACKED_NODES, WIDTH, assert_layout};
-use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+use super::bvh::WIDTH;
+use super::grid_leaves::{HALF_LINE, IndexedLeaf16, IndexedLeaf21, RawLeaf16, RawLeaf21};
+use super::object::{Object, PACKED_NODES};
 
-/// Bytes in which leaves on a grid are addressed: half a [`super::Line`].
-pub const HALF_LINE: usize = 32;
-
-/// An [`super::IndexedLeaf`] of 16-bit coordinates: 4 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct IndexedLeaf16 {
-    /// x, y and z rows: steps from the grid's origin; unused slots repeat vertex 0.
-    pub vertex: [[u16; WIDTH]; 3],
-    /// Per corner the vertices of triangles i (low four bits) and i + 8 (high ones); unused slots 0.
-    pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u8,
-    /// Vertices in use, 1 to 16.
-    pub vertices: u8,
-    /// Zero.
-    pub reserved: u16,
-}
-
-/// An [`super::IndexedLeaf`] of 21-bit coordinates: 5 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct IndexedLeaf21 {
-    /// As in [`IndexedLeaf16`]: the low 16 bits.
-    pub vertex: [[u16; WIDTH]; 3],
-    /// The high five bits of x, above them of y, above them of z; bit 15 zero.
-    pub high: [u16; WIDTH],
-    /// As in [`IndexedLeaf16`].
-    pub corner: [[u8; WIDTH / 2]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u8,
-    /// Vertices in use, 1 to 16.
-    pub vertices: u8,
-    /// Zero.
-    pub reserved: u16,
-}
-
-/// A [`super::RawLeaf`] of 16-bit coordinates: 10 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct RawLeaf16 {
-    /// `[corner][axis][triangle]`: steps from the grid's origin; unused slots repeat triangle 0.
-    pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Zero.
-    pub reserved: [u32; 6],
-}
-
-/// A [`super::RawLeaf`] of 21-bit coordinates: 13 half lines.
-#[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
-#[repr(C)]
-pub struct RawLeaf21 {
-    /// As in [`RawLeaf16`]: the low 16 bits.
-    pub corner: [[[u16; WIDTH]; 3]; 3],
-    /// Per corner the high bits, as in [`IndexedLeaf21`].
-    pub high: [[u16; WIDTH]; 3],
-    /// Row of `TRIANGLE_IDS` of the first triangle.
-    pub first: u32,
-    /// Triangles, 1 to 16.
-    pub triangles: u32,
-    /// Zero.
-    pub reserved: [u32; 6],
-}
-
-assert_layout! {
-    IndexedLeaf16 128 { corner 96, first 120, triangles 124, vertices 125, reserved 126 }
-    IndexedLeaf21 160 { high 96, corner 128, first 152, triangles 156, vertices 157, reserved 158 }
-    RawLeaf16 320 { first 288, triangles 292, reserved 296 }
-    RawLeaf21 416 { high 288, first 384, triangles 388, reserved 392 }
-}
-
-/// Bits of a coordinate.
+/// Bits of a coordinate of a triangle leaf on a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum GridBits {
-    /// 16.
+    /// 16 bits.
     B16 = 16,
-    /// 21.
+    /// 21 bits.
     B21 = 21,
 }
 
 impl GridBits {
-    /// Both, the fewest first.
+    /// All of them, the fewest bits first.
     pub const ALL: [GridBits; 2] = [GridBits::B16, GridBits::B21];
 
-    /// Half lines of an indexed leaf and of a raw one.
+    /// Half lines of an indexed leaf, and of a raw leaf.
     pub const fn half_lines(self) -> [usize; 2] {
         match self {
             GridBits::B16 => [size_of::<IndexedLeaf16>() / HALF_LINE, size_of::<RawLeaf16>() / HALF_LINE],
@@ -104,33 +28,33 @@ impl GridBits {
     }
 
     /// The greatest number of steps from the origin.
-    pub const fn most(self) -> u32 {
+    pub const fn max_steps(self) -> u32 {
         (1 << self as u32) - 1
     }
 }
 
-/// The points that coordinates can be: `origin + k * step` per axis, k from 0 to [`GridBits::most`]. Steps are powers of
-/// two, the origin is a multiple of the step, and no multiple exceeds 2^24: so every point is an `f32`, and to find it
-/// takes no rounding.
+/// The points that a vertex can be: per axis `origin + k * step`, with k from 0 to [`GridBits::max_steps`]. Steps are powers
+/// of two, the origin is a multiple of the step, and no point is more than 2^24 steps from 0: so every coordinate is an
+/// `f32`, and computing it takes no rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// Bits of a coordinate.
+    /// Bits of a coordinate of a triangle leaf on a grid.
     pub bits: GridBits,
     /// The least point, object space.
     pub origin: [f32; 3],
-    /// Between neighbouring points.
+    /// Distance of neighbouring points, per axis, object space.
     pub step: [f32; 3],
 }
 
-/// Multiples of a step up to this are `f32` for sure.
+/// Every integer up to this is an `f32`, and so is its product with a power of two within range.
 const EXACT: f64 = (1 << 24) as f64;
 
 impl Grid {
-    /// The grid of an object.
+    /// The grid of an object; `None` where coordinates are `f32`.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
-    pub fn of(object: &Object) -> Result<Option<Grid>, &'static str> {
+    /// What violates BTH-F104, in words.
+    pub(crate) fn from_object(object: &Object) -> Result<Option<Grid>, &'static str> {
         let coordinates = object.coordinates & !PACKED_NODES;
         if coordinates == 0 {
             let numbers = object.grid_origin.iter().chain([&object.displacement]);
@@ -154,44 +78,44 @@ impl Grid {
         Ok(Some(grid))
     }
 
-    /// Whether every point of an axis is an `f32`.
+    /// Whether every coordinate of an axis is an `f32`.
     pub fn is_exact(&self, axis: usize) -> bool {
-        is_exact(self.origin[axis], self.step[axis], self.bits.most())
+        is_exact(self.origin[axis], self.step[axis], self.bits.max_steps())
     }
 
-    /// The three fields of an [`Object`] that say where the grid is: `coordinates` and `grid_origin`.
+    /// The fields of an [`Object`] that define the grid: `coordinates` and `grid_origin`.
     pub fn fields(&self) -> (u32, [f32; 3]) {
         let exponent = |axis: usize| (self.step[axis].to_bits() >> 23) as u8;
         (u32::from_le_bytes([self.bits as u32 as u8, exponent(0), exponent(1), exponent(2)]), self.origin)
     }
 
-    /// Steps from the origin to the point nearest to a coordinate, ties to even multiples of the step; negative or too
-    /// many where the coordinate lies outside of the grid.
+    /// Steps from the origin to the multiple of the step nearest to a coordinate, ties to the even multiple. Below 0 or above
+    /// [`GridBits::max_steps`] where the coordinate lies outside the grid.
     pub fn steps(&self, axis: usize, x: f32) -> i64 {
         let step = f64::from(self.step[axis]);
-        // Quotients of f32 and powers of two are exact in f64.
+        // Quotients of f32 by powers of two that are f32 are exact in f64.
         let multiple = (f64::from(x) / step).round_ties_even();
         (multiple - f64::from(self.origin[axis]) / step) as i64
     }
 
-    /// The point nearest to a point in the grid's box.
+    /// The point of the grid nearest to a point, per axis; ties as in [`Self::steps`].
     pub fn nearest(&self, point: [f32; 3]) -> [f32; 3] {
         let coordinate = |axis: usize| {
-            let steps = self.steps(axis, point[axis]).clamp(0, i64::from(self.bits.most()));
+            let steps = self.steps(axis, point[axis]).clamp(0, i64::from(self.bits.max_steps()));
             self.coordinate(axis, steps as u32)
         };
         [coordinate(0), coordinate(1), coordinate(2)]
     }
 
-    /// The coordinate at so many steps from the origin; exact.
+    /// The coordinate at a number of steps from the origin, object space; exact.
     #[inline(always)]
     pub fn coordinate(&self, axis: usize, steps: u32) -> f32 {
         self.origin[axis] + steps as f32 * self.step[axis]
     }
 
-    /// Sixteen coordinates of an axis from their low bits.
+    /// Sixteen coordinates of an axis from 16 bits each.
     #[inline(always)]
-    pub fn row(&self, axis: usize, low: &[u16; WIDTH]) -> [f32; WIDTH] {
+    pub(crate) fn row_16(&self, axis: usize, low: &[u16; WIDTH]) -> [f32; WIDTH] {
         let mut out = [0.0; WIDTH];
         for i in 0..WIDTH {
             out[i] = self.coordinate(axis, u32::from(low[i]));
@@ -199,28 +123,28 @@ impl Grid {
         out
     }
 
-    /// As [`Self::row`], with the high bits of all axes.
+    /// Sixteen coordinates of an axis from their low bits and the high bits of all axes.
     #[inline(always)]
-    pub fn row_of_21(&self, axis: usize, low: &[u16; WIDTH], high: &[u16; WIDTH]) -> [f32; WIDTH] {
+    pub(crate) fn row_21(&self, axis: usize, low: &[u16; WIDTH], high: &[u16; WIDTH]) -> [f32; WIDTH] {
         let mut out = [0.0; WIDTH];
         for i in 0..WIDTH {
-            out[i] = self.coordinate(axis, steps_of_21(axis, low[i], high[i]));
+            out[i] = self.coordinate(axis, steps_21(axis, low[i], high[i]));
         }
         out
     }
 }
 
-/// Whether all points from an origin to `most` steps of a power of two behind it are `f32`.
-pub fn is_exact(origin: f32, step: f32, most: u32) -> bool {
+/// Whether `origin + k * step` is an `f32` for all k from 0 to `max_steps`. The step has to be a power of two.
+pub fn is_exact(origin: f32, step: f32, max_steps: u32) -> bool {
     let step = f64::from(step);
     let first = f64::from(origin) / step;
-    let last = first + f64::from(most);
+    let last = first + f64::from(max_steps);
     let multiples = first == first.trunc() && first.abs() <= EXACT && last <= EXACT;
     multiples && last * step <= f64::from(f32::MAX)
 }
 
-/// Steps from low and high bits.
+/// Steps from the low bits of an axis and the high bits of all axes, as [`IndexedLeaf21::high`] has them.
 #[inline(always)]
-pub fn steps_of_21(axis: usize, low: u16, high: u16) -> u32 {
+fn steps_21(axis: usize, low: u16, high: u16) -> u32 {
     u32::from(low) | (u32::from(high) >> (5 * axis) & 31) << 16
 }

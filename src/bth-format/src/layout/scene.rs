@@ -1,31 +1,32 @@
-//! The scene sections: what stands where and how it moves. They belong to the whole file.
+//! The scene: instances of objects and how they move. Its sections belong to the whole file. Specification: "Scenes".
 
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Frames and the camera to begin with.
+/// The frames and the default camera of the scene.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Scene {
     /// Frames per second: frame f shows the scene at f / rate seconds.
     pub rate: f64,
-    /// First frame.
+    /// First frame, at most 2^24 in absolute value.
     pub first_frame: i32,
-    /// Last frame.
+    /// Last frame, at most 2^24 in absolute value.
     pub last_frame: i32,
-    /// Row of `CAMERAS` that is used when none is asked for, or `NONE`.
+    /// Row of `CAMERAS` that is used when the viewer names none, or [`super::NONE`].
     pub camera: u32,
     /// Zero.
     pub reserved: [u32; 11],
 }
 
-/// A node of the hierarchy.
+/// A transform of the scene's hierarchy. It is no node of a BVH: see [`super::WideNode`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Node {
     /// From the node's space to its parent's, before tracks: translation (3), quaternion x, y, z, w (4), scale (3)
     /// and two zeros; with [`NODE_MATRIX`] three rows of four, applied to columns (x, y, z, 1).
     pub transform: [f64; 12],
-    /// Row of the node that it moves with, less than its own; `NONE` for the world.
+    /// Row of the parent, less than its own; [`super::NONE`] where the parent is the world.
     pub parent: u32,
     /// [`NODE_HIDDEN`], [`NODE_MATRIX`].
     pub flags: u32,
@@ -37,12 +38,12 @@ pub struct Node {
     pub reserved: [u32; 4],
 }
 
-/// Flag of [`Node`]: it and all below it are not seen, unless a track says so.
+/// Flag of [`Node`]: it and all nodes below it are hidden, unless a visibility track of the node shows it.
 pub const NODE_HIDDEN: u32 = 1;
 /// Flag of [`Node`]: the transform is a matrix.
 pub const NODE_MATRIX: u32 = 2;
 
-/// An object that stands at a node. Rays name instances by their row.
+/// An object placed at a node. Hits name instances by their rows.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Instance {
@@ -50,7 +51,7 @@ pub struct Instance {
     pub node: u32,
     /// Object of the file.
     pub object: u32,
-    /// Zero; deformations will be announced here.
+    /// Zero.
     pub flags: u32,
     /// Zero.
     pub reserved: u32,
@@ -68,25 +69,25 @@ pub struct Track {
     pub interpolation: u32,
     /// Number of keys.
     pub keys: u32,
-    /// Row of `TIMES` of the first key. The ranges of successive tracks follow each other, here and below.
+    /// Row of `TIMES` of the first key. In this section and in `VALUES`, the ranges of successive tracks follow each other.
     pub first_time: u32,
-    /// First row of `VALUES`.
+    /// Row of `VALUES` of the first key, which has [`Property::width`] times [`Interpolation::values_per_key`] rows.
     pub first_value: u32,
     /// Zero.
     pub reserved: [u32; 2],
 }
 
-/// What a track moves.
+/// The property of a node that a track animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum Property {
-    /// Three numbers.
+    /// Three numbers, in the parent's space.
     Translation = 0,
     /// A quaternion x, y, z, w.
     Rotation = 1,
-    /// Three numbers.
+    /// Three factors.
     Scale = 2,
-    /// One number, 0 or 1.
+    /// One number: 0 hides, 1 shows.
     Visible = 3,
 }
 
@@ -108,15 +109,15 @@ impl Property {
     }
 }
 
-/// What is between two keys.
+/// How a track's value is found between two keys. Specification: "Scenes".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum Interpolation {
     /// The value of the key before.
     Step = 0,
-    /// Linear; rotations along the great circle.
+    /// Linear; rotations along the great circle (slerp).
     Linear = 1,
-    /// Hermite splines; in-tangent, value and out-tangent per key.
+    /// Cubic Hermite splines, with in-tangent, value and out-tangent per key.
     Cubic = 2,
 }
 
@@ -128,7 +129,7 @@ impl Interpolation {
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|i| *i as u32 == code)
     }
-    /// Values of a key.
+    /// Values per key: tangents count.
     pub const fn values_per_key(self) -> usize {
         match self {
             Self::Step | Self::Linear => 1,
@@ -151,11 +152,11 @@ pub struct Camera {
     pub name_length: u32,
     /// Vertical field of view in degrees, or the height of the picture in the node's units.
     pub size: f64,
-    /// Width over height of the picture that it was made for; 0 when it is not said.
+    /// Width over height of the picture that it was made for; 0 where it is not known.
     pub aspect: f64,
-    /// Nothing nearer is seen.
+    /// Distance of the near plane, in the node's units.
     pub near: f64,
-    /// Nothing farther is seen; 0 for no end.
+    /// Distance of the far plane, in the node's units; 0 for none.
     pub far: f64,
     /// Zero.
     pub reserved: [u32; 4],
@@ -177,17 +178,17 @@ pub struct Light {
     pub color: [f64; 3],
     /// Lux for directional lights, candela for others.
     pub intensity: f64,
-    /// Distance beyond which it does not shine; 0 for no end.
+    /// Distance beyond which it does not shine; 0 for no limit.
     pub range: f64,
-    /// Of a spot: degrees from the axis at which it begins to fade; else 0.
+    /// Of a spot: degrees from the axis at which it begins to fade; of others 0.
     pub inner: f64,
-    /// Of a spot: degrees at which it ends; else 0.
+    /// Of a spot: degrees from the axis at which it ends; of others 0.
     pub outer: f64,
     /// Zero.
     pub reserved: [u32; 2],
 }
 
-super::assert_layout! {
+assert_layout! {
     Scene 64 { first_frame 8, last_frame 12, camera 16, reserved 20 }
     Node 128 { parent 96, flags 100, name 104, name_length 108, reserved 112 }
     Instance 16 { object 4, flags 8, reserved 12 }

@@ -1,9 +1,9 @@
-//! Tet leaves and their records.
+//! Tet leaves and the records of their tetrahedra. Specification: "Tetrahedralizations".
 
-use super::assert_layout;
+use super::assert_layout::assert_layout;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Which record the `TETS` section holds (`Object::record`).
+/// The record that the `TETS` section holds, as in [`super::Object::record`]. Specification: "Records".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum RecordKind {
@@ -33,7 +33,7 @@ impl RecordKind {
             Self::Tet16 => 16,
         }
     }
-    /// Lower-case name, as on the command line.
+    /// Name in lower case, as on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Link32 => "link32",
@@ -44,7 +44,7 @@ impl RecordKind {
     }
 }
 
-/// A node of the BVH that is a constrained tetrahedralization of its triangles within a box.
+/// A leaf of the BVH that is a constrained tetrahedralization: tetrahedra that fill a box and have its triangles as faces.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct TetLeaf {
@@ -52,7 +52,7 @@ pub struct TetLeaf {
     pub lower: [f32; 3],
     /// Upper end of the box.
     pub upper: [f32; 3],
-    /// First row of `TETS`. The ranges of successive leaves follow each other, here and below.
+    /// First row of `TETS`. In this section and in those below, the ranges of successive leaves follow each other.
     pub first_tet: u32,
     /// Number of tetrahedra.
     pub tets: u32,
@@ -68,7 +68,8 @@ pub struct TetLeaf {
     pub first_hull: u32,
     /// Number of hull faces.
     pub hulls: u32,
-    /// Child code of a BVH over the same triangles, for rays without a hint and where it proves faster; `NONE` when pruned.
+    /// Child code of a BVH over the same triangles, for rays that do not start in a known tetrahedron and where it is faster;
+    /// [`super::NONE`] where it was left out.
     pub subtree: u32,
     /// Zero.
     pub flags: u32,
@@ -90,7 +91,7 @@ pub struct TetVertex {
 pub struct TetFace {
     /// Vertices (rows of `TET_VERTICES`) in source order.
     pub vertex: [u32; 3],
-    /// Id in the source.
+    /// Triangle id in the source.
     pub triangle: u32,
     /// The tetrahedron on the side that (v1-v0)x(v2-v0) points to, then the one behind.
     pub tet: [u32; 2],
@@ -98,7 +99,7 @@ pub struct TetFace {
     pub opposite: [u32; 2],
 }
 
-/// A face of the hull: where rays enter a tet leaf from outside.
+/// A face of a tetrahedron with nothing beyond: rays enter a tet leaf through it.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct HullFace {
@@ -106,33 +107,34 @@ pub struct HullFace {
     pub vertex: [u32; 3],
     /// The tetrahedron inside.
     pub tet: u32,
-    /// Its fourth vertex.
+    /// Its vertex that is not of this face.
     pub opposite: u32,
 }
 
-/// What lies behind a face of a tetrahedron, as a `u32`: below 2^31 the row of the
-/// neighbour in `TETS`, else `FACE_BIT` and a row of `TET_FACES`; `NONE` outside the hull.
+/// Set in links to constrained faces. A link is a `u32` for what lies behind a face of a tetrahedron: below 2^31 the row of the
+/// neighbour in `TETS`, with this bit a row of `TET_FACES`, and [`super::NONE`] outside the hull.
 pub const FACE_BIT: u32 = 1 << 31;
 
-/// Four links in ascending order of the vertex that the link's face is opposite to.
+/// Record of 32 bytes: four links with the vertex beyond each, in ascending order of the vertex opposite to the link's face.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Link32 {
-    /// The links.
+    /// Links and the vertices beyond.
     pub link: [Link; 4],
 }
 
-/// A link of [`Link32`]. Behind a constrained face `opposite` is the vertex beyond it too; behind the hull it is `NONE`.
+/// A link of [`Link32`] and the vertex beyond it.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Link {
-    /// What lies behind the face.
+    /// The link: see [`FACE_BIT`].
     pub next: u32,
-    /// The vertex of the next tetrahedron that is not of the face.
+    /// The vertex of the tetrahedron beyond, behind a constrained face too, that is not of the face; [`super::NONE`] outside
+    /// the hull.
     pub opposite: u32,
 }
 
-/// The paper's record of 32 bytes (Aman et al. 2021, arXiv 2103.02309).
+/// The record of 32 bytes of Aman et al. 2021, arXiv 2103.02309.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Tet32 {
@@ -140,21 +142,21 @@ pub struct Tet32 {
     pub vertex: [u32; 3],
     /// Exclusive or of all four vertices.
     pub xor: u32,
-    /// Links, in ascending order of the opposite vertex.
+    /// Links in ascending order of the opposite vertex: see [`FACE_BIT`].
     pub next: [u32; 4],
 }
 
-/// The paper's record of 20 bytes.
+/// The record of 20 bytes of Aman et al. 2021, as [`Tet32`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Tet20 {
     /// Exclusive or of all four vertices.
     pub xor: u32,
-    /// Links, in ascending order of the opposite vertex.
+    /// Links in ascending order of the opposite vertex: see [`FACE_BIT`].
     pub next: [u32; 4],
 }
 
-/// The paper's record of 16 bytes.
+/// The record of 16 bytes of Aman et al. 2021, as [`Tet32`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Tet16 {

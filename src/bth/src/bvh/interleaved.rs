@@ -136,7 +136,7 @@ impl<Q: Query> RaySource<'_, Q> {
                 state.take_over(&self.rays[place as usize]);
             }
             if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
-                let root = N::node(self.object.ground(), self.root);
+                let root = N::node(self.object.node_base(), self.root);
                 pool.start_among(s, at, root, (self.hit_cache[lane], s.load(&self.enter[lane])));
             } else {
                 pool.start(at, self.root);
@@ -161,7 +161,7 @@ impl<Q: Query> RaySource<'_, Q> {
             return false;
         }
         self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
-        let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.ground(), self.root));
+        let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.node_base(), self.root));
         for lane in 0..count {
             let mut meets = true;
             if let (Some(aim), Some(root)) = (self.prepared.aim(lane), root) {

@@ -2,11 +2,11 @@
 
 use crate::intersect::boxes::ChildBoxes;
 use crate::simd::Simd;
-use bth_format::Room;
+use bth_format::object::Unpacked;
 use bth_format::layout::{
     Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode,
 };
-use bth_format::object::{Ground, ObjectView};
+use bth_format::object::{NodeBase, ObjectView};
 
 /// A kind of nodes.
 pub(crate) trait Nodes: Copy {
@@ -15,7 +15,7 @@ pub(crate) trait Nodes: Copy {
     /// Cache lines of one.
     const LINES: usize;
     /// The node that the code of a child leads to.
-    fn node(ground: Ground<'_>, code: u32) -> &Self::Node;
+    fn node(node_base: NodeBase<'_>, code: u32) -> &Self::Node;
 }
 
 /// All nodes are [`WideNode`]s.
@@ -30,8 +30,8 @@ impl Nodes for Wide {
     type Node = WideNode;
     const LINES: usize = NODE_LINES;
     #[inline(always)]
-    fn node(ground: Ground<'_>, code: u32) -> &WideNode {
-        ground.node(code)
+    fn node(node_base: NodeBase<'_>, code: u32) -> &WideNode {
+        node_base.node(code)
     }
 }
 
@@ -39,8 +39,8 @@ impl Nodes for Packed {
     type Node = PackedNode;
     const LINES: usize = PACKED_NODE_LINES;
     #[inline(always)]
-    fn node(ground: Ground<'_>, code: u32) -> &PackedNode {
-        ground.packed_node(code & !Child::PACKED_BIT)
+    fn node(node_base: NodeBase<'_>, code: u32) -> &PackedNode {
+        node_base.packed_node(code & !Child::PACKED_BIT)
     }
 }
 
@@ -48,11 +48,11 @@ impl Nodes for Packed {
 #[inline(always)]
 pub(crate) fn indexed_leaf<'r>(
     object: &'r ObjectView<'_>,
-    ground: Ground<'r>,
+    node_base: NodeBase<'r>,
     code: u32,
-    unpacked: &'r mut Option<Room<IndexedLeaf>>,
+    unpacked: &'r mut Option<Unpacked<IndexedLeaf>>,
 ) -> Option<&'r IndexedLeaf> {
-    match (ground.indexed_leaf(code), Child::from_code(code)) {
+    match (node_base.indexed_leaf(code), Child::from_code(code)) {
         (Some(leaf), _) => Some(leaf),
         (None, Some(Child::Indexed(index))) => Some(object.indexed(index, unpacked)),
         _ => None,
@@ -61,8 +61,8 @@ pub(crate) fn indexed_leaf<'r>(
 
 /// Asks for the lines of a node or of an indexed leaf.
 #[inline(always)]
-pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, ground: Ground<'_>, code: u32) {
-    let first = ground.place(code);
+pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, node_base: NodeBase<'_>, code: u32) {
+    let first = node_base.block_address(code);
     for i in 0..N::LINES.max(INDEXED_LINES) {
         s.prefetch(first.wrapping_add(i));
     }

@@ -191,16 +191,16 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     #[inline(always)]
     pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, object: &ObjectView<'_>) {
         let RayPool { slots, tops, lists, stacks, .. } = self;
-        let (mut counts, mut stacks, ground) = (self.counts, stacks.open(), object.ground());
+        let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
             for i in 0..counts.take(StepCounts::INNER) {
                 let at = usize::from(lists.inner[i]) % POOL_SIZE;
-                let (top, node) = (tops.place[at], N::node(ground, tops.code[at]));
+                let (top, node) = (tops.place[at], N::node(node_base, tops.code[at]));
                 let count = slots[at].0.enter_node(s, node, stacks.room(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.place[at], tops.code[at]) = (top, code);
-                prefetch(s, nodes, ground, code);
+                prefetch(s, nodes, node_base, code);
                 lists.sort(&mut counts, at, code);
             }
             if counts.inner() < ENOUGH && counts.leaf() | counts.bottom() > 0 {
@@ -221,13 +221,13 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, .. } = self;
-        let (mut counts, ground) = (self.counts, object.ground());
+        let (mut counts, node_base) = (self.counts, object.node_base());
         for i in 0..counts.take(StepCounts::LEAF) {
             let at = usize::from(lists.leaf[i]) % POOL_SIZE;
             let state = &mut slots[at].0;
             let (code, top) = (tops.code[at], tops.place[at]);
             let (place, mut unpacked) = (state.ray(), None);
-            let found = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
+            let found = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
                 enter_leaf(s, object, || &rays[place], state, (leaf, code))
             } else {
                 let mut unpacked = None;
@@ -251,7 +251,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             };
             let code = stacks.code(top);
             (tops.place[at], tops.code[at]) = (top, code);
-            prefetch(s, nodes, ground, code);
+            prefetch(s, nodes, node_base, code);
             lists.sort(&mut counts, at, code);
         }
         self.counts = counts;

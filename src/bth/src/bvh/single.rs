@@ -97,7 +97,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     if walked != NONE {
         walk.take_over(ray);
     }
-    let ground = object.ground();
+    let node_base = object.node_base();
     let mut code = object.header.root;
     let mut stack = stack.start(code);
     // Keys of the stack beyond this are of no interest any more.
@@ -107,7 +107,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         let planes = RaySlabLanes::new(s, &aim.slabs);
         while code & Child::LEAF_BIT == 0 {
             count.node();
-            let node = N::node(ground, code);
+            let node = N::node(node_base, code);
             let (bits, enter) = planes.children(s, node, walk.last);
             if bits & bits.wrapping_sub(1) == 0 {
                 if bits != 0 {
@@ -129,10 +129,10 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                 room.keep(count);
             }
             // A ray alone has nothing to do while it waits for that one.
-            prefetch(s, nodes, ground, stack.below());
+            prefetch(s, nodes, node_base, stack.below());
         }
         let mut unpacked = None;
-        let done = if let Some(leaf) = indexed_leaf(object, ground, code, &mut unpacked) {
+        let done = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
             count.leaf();
             count.triangles(leaf.triangles);
             enter_leaf(s, object, || ray, &mut walk, (leaf, code)) == LeafOutcome::Done

@@ -13,7 +13,7 @@
 //! Products of three differences of f32 values, and of three such with bounds, lie far from f64's limits.
 
 use crate::intersect::line::Line;
-use bth_format::exact::{EDGE, Expansion, VOLUME};
+use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
 /// t, u and v are computed exactly unless f64 gives them to 2^-28, an eighth of the rounding of f32: u and v relative to 1, t to itself.
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
@@ -257,8 +257,8 @@ impl Line {
     }
 
     /// The weight of the corner opposite an edge p→q: det[d, p-o, q-o].
-    fn edge(&self, p: [f64; 3], q: [f64; 3]) -> Expansion<EDGE> {
-        let mut sum = Expansion::<EDGE>::new();
+    fn edge(&self, p: [f64; 3], q: [f64; 3]) -> Expansion<EDGE_PARTS> {
+        let mut sum = Expansion::<EDGE_PARTS>::new();
         sum.add_edge(self.origin, self.direction, p, q);
         sum
     }
@@ -266,11 +266,11 @@ impl Line {
     /// t, u and v from exact sums.
     fn exact_crossing(&self, [a, b, c]: [[f64; 3]; 3]) -> Intersection {
         let (second, third) = (self.edge(c, a), self.edge(a, b));
-        let mut whole = Expansion::<{ 3 * EDGE }>::new();
+        let mut whole = Expansion::<{ 3 * EDGE_PARTS }>::new();
         whole.add_edge(self.origin, self.direction, b, c);
         whole.add_sum(&second);
         whole.add_sum(&third);
-        let mut volume = Expansion::<VOLUME>::new();
+        let mut volume = Expansion::<VOLUME_PARTS>::new();
         volume.add_volume(self.origin, a, b, c);
         let whole = whole.value();
         Intersection { t: volume.value() / whole, weight: [second.value(), third.value(), whole] }
@@ -288,7 +288,7 @@ mod tests {
 
     /// By how much a number differs from an exact sum.
     fn off<const PARTS: usize>(sum: &Expansion<PARTS>, x: f64) -> f64 {
-        let mut difference = Expansion::<{ VOLUME + 8 }>::new();
+        let mut difference = Expansion::<{ VOLUME_PARTS + 8 }>::new();
         difference.add_sum(sum);
         difference.add(-x);
         difference.value().abs()
@@ -333,7 +333,7 @@ mod tests {
                 let off = off(&line.edge(p, q), weight);
                 assert!(off <= error[0] * size, "round {round}: {weight} is off by {off}");
             }
-            let mut volume = Expansion::<VOLUME>::new();
+            let mut volume = Expansion::<VOLUME_PARTS>::new();
             volume.add_volume(line.origin, a, b, c);
             let off = off(&volume, seen.volume);
             assert!(off <= error[1], "round {round}: volume {} is off by {off}", seen.volume);

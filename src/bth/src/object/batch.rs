@@ -169,7 +169,7 @@ fn trace_hinted<Q: Query>(
     let mut faces = vec![NONE; rays.len()];
     let home = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
-        object.triangle_homes.get(triangle as usize).copied().unwrap_or(NONE)
+        object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE)
     };
     let mut order: Vec<u32> = match packed {
         0 => (0..rays.len() as u32).collect(),

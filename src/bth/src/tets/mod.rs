@@ -34,7 +34,7 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
     query: &mut Q,
     count: &mut C,
 ) -> TetStart {
-    let row = object.triangle_homes.get(from as usize).copied().unwrap_or(NONE);
+    let row = object.triangle_faces.get(from as usize).copied().unwrap_or(NONE);
     // Such a walk sees only what lies ahead of the origin. One ray alone is faster through the BVH, if there is one.
     if row == NONE || ray.tmin < 0.0 {
         return TetStart::Walked(NONE);

@@ -175,7 +175,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
                 let node = object.node(entry.parent);
                 code = node.child[entry.slot as usize % WIDTH];
-                prefetch(s, Wide, object.ground(), code);
+                prefetch(s, Wide, object.node_base(), code);
                 // Later: hits may have come between, which leave less of it to meet.
                 if !H::MIXED {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);

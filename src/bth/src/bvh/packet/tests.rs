@@ -154,7 +154,7 @@ impl Surface {
             tet_vertices: &[],
             tet_faces: &[],
             hull_faces: &[],
-            triangle_homes: &[],
+            triangle_faces: &[],
             positions: &[],
             triangles: &[],
             corners: &[],

@@ -1,6 +1,6 @@
-//! Tet leaves, their vertices, and where their triangles are at home.
+//! Tet leaves, their vertices, and the map from triangles to constrained faces.
 
-use super::is_box;
+use super::boxes::is_box;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -9,10 +9,10 @@ use std::mem::offset_of;
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     ranges(view)?;
     vertices(view)?;
-    homes(view)
+    triangle_faces(view)
 }
 
-/// Checks boxes, counts and ranges of the tet leaves.
+/// BTH-F120 to BTH-F122: boxes, flags, ranges and counts of the tet leaves.
 fn ranges(view: &ObjectView) -> Result<()> {
     let rows = [view.records.len(), view.tet_vertices.len(), view.tet_faces.len(), view.hull_faces.len()];
     let names = ["TETS", "TET_VERTICES", "TET_FACES", "HULL_FACES"];
@@ -27,12 +27,8 @@ fn ranges(view: &ObjectView) -> Result<()> {
             return fail(Code::TetBox, 0, "a finite box, lower < upper".into(), found);
         }
         if leaf.flags != 0 {
-            return fail(
-                Code::TetBox,
-                offset_of!(TetLeaf, flags),
-                "flags of 0".into(),
-                leaf.flags.to_string(),
-            );
+            let found = leaf.flags.to_string();
+            return fail(Code::TetBox, offset_of!(TetLeaf, flags), "flags of 0".into(), found);
         }
         let first = [leaf.first_tet, leaf.first_vertex, leaf.first_face, leaf.first_hull];
         let count = [leaf.tets, leaf.vertices, leaf.faces, leaf.hulls];
@@ -61,6 +57,7 @@ fn ranges(view: &ObjectView) -> Result<()> {
     Ok(())
 }
 
+/// BTH-F124: vertices are finite.
 fn vertices(view: &ObjectView) -> Result<()> {
     let bad = |v: &TetVertex| v.reserved != 0 || !v.position.iter().all(|x| x.is_finite());
     match view.tet_vertices.iter().position(bad) {
@@ -73,28 +70,28 @@ fn vertices(view: &ObjectView) -> Result<()> {
     }
 }
 
-/// Checks that TRIANGLE_HOMES and the triangles of TET_FACES are inverse to each other.
-fn homes(view: &ObjectView) -> Result<()> {
-    let fail = |kind, at: usize, expected: String, found: String| {
-        Err(Error::within(Code::Homes, kind, at as u64, expected, found))
+/// BTH-F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other.
+fn triangle_faces(view: &ObjectView) -> Result<()> {
+    let fail = |section, at: usize, expected: String, found: String| {
+        Err(Error::within(Code::TriangleFaces, section, at as u64, expected, found))
     };
     let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };
-    if view.triangle_homes.len() != expected {
-        let found = view.triangle_homes.len().to_string();
-        return fail(kind::TRIANGLE_HOMES, 0, format!("{expected} rows"), found);
+    if view.triangle_faces.len() != expected {
+        let found = view.triangle_faces.len().to_string();
+        return fail(kind::TRIANGLE_FACES, 0, format!("{expected} rows"), found);
     }
     for (row, face) in view.tet_faces.iter().enumerate() {
-        if view.triangle_homes.get(face.triangle as usize) != Some(&(row as u32)) {
+        if view.triangle_faces.get(face.triangle as usize) != Some(&(row as u32)) {
             let at = row * size_of::<TetFace>() + offset_of!(TetFace, triangle);
-            let expected = "a triangle whose home is this face".into();
+            let expected = "a triangle that TRIANGLE_FACES maps to this face".into();
             return fail(kind::TET_FACES, at, expected, format!("triangle {}", face.triangle));
         }
     }
-    for (triangle, &home) in view.triangle_homes.iter().enumerate() {
-        let named = view.tet_faces.get(home as usize).map(|f| f.triangle);
-        if home != NONE && named != Some(triangle as u32) {
+    for (triangle, &face) in view.triangle_faces.iter().enumerate() {
+        let named = view.tet_faces.get(face as usize).map(|f| f.triangle);
+        if face != NONE && named != Some(triangle as u32) {
             let expected = format!("NONE or the face of triangle {triangle}");
-            return fail(kind::TRIANGLE_HOMES, 4 * triangle, expected, format!("row {home}"));
+            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, format!("row {face}"));
         }
     }
     Ok(())

@@ -1,0 +1,193 @@
+//! The tree of nodes and leaves, subtrees of tet leaves included.
+//!
+//! Child codes are followed from the root with an explicit stack. A block of LINES is claimed when a code leads to it, and a
+//! half line that is claimed twice is an error. So every block is visited once, the work is O(lines), and there is no cycle.
+
+use super::bit_set::BitSet;
+use super::{leaves, nodes};
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::limits::MAX_DEPTH;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+/// A child code that is still to be followed, and where it stands.
+struct Reference {
+    code: u32,
+    /// Nodes on the path from the root to it.
+    depth: u32,
+    /// First half line of the node that holds it; `None` where no node does.
+    parent: Option<u64>,
+    /// Whether it lies in the subtree of a tet leaf.
+    in_subtree: bool,
+    /// Section that holds it.
+    section: u32,
+    /// Its byte in that section.
+    at: u64,
+}
+
+impl Reference {
+    fn error(&self, code: Code, expected: impl Into<String>, found: impl Into<String>) -> Error {
+        Error::within(code, self.section, self.at, expected, found)
+    }
+}
+
+/// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to BTH-F115, BTH-F117,
+/// BTH-F118 and BTH-F123.
+pub(super) fn check(view: &ObjectView) -> Result<()> {
+    let mut tree = Tree {
+        view,
+        claimed: BitSet::new(2 * view.lines.len()),
+        referenced: BitSet::new(view.tet_leaves.len()),
+        stack: Vec::new(),
+    };
+    let at = offset_of!(Object, root) as u64;
+    let code = view.header.root;
+    tree.stack.push(Reference { code, depth: 0, parent: None, in_subtree: false, section: kind::OBJECT, at });
+    while let Some(reference) = tree.stack.pop() {
+        if reference.code != NONE {
+            tree.follow(&reference)?;
+        }
+    }
+    tree.check_claimed()?;
+    tree.check_referenced()
+}
+
+struct Tree<'a> {
+    view: &'a ObjectView<'a>,
+    /// Half lines that belong to a block. Leaves on a grid start at any half line, all other blocks at a line.
+    claimed: BitSet,
+    /// Tet leaves that a code leads to.
+    referenced: BitSet,
+    stack: Vec<Reference>,
+}
+
+impl Tree<'_> {
+    /// Checks what a code leads to, and pushes the codes that stand there.
+    fn follow(&mut self, reference: &Reference) -> Result<()> {
+        let child = self.child(reference)?;
+        if let Child::Tets(row) = child {
+            return self.follow_tet_leaf(reference, row);
+        }
+        let first_half = self.claim(reference, child)?;
+        match child {
+            Child::Node(_) | Child::Packed(_) => self.follow_node(reference, child, first_half),
+            _ => leaves::check(self.view, child, first_half * HALF_LINE as u64),
+        }
+    }
+
+    /// BTH-F105: the code is of a kind that may stand here.
+    fn child(&self, reference: &Reference) -> Result<Child> {
+        let packed = self.view.has_packed_nodes();
+        let child = Child::from_code(reference.code).filter(|child| match child {
+            Child::Tets(_) => !reference.in_subtree,
+            Child::Node(_) => !packed,
+            Child::Packed(_) => packed,
+            Child::Indexed(_) | Child::Raw(_) => true,
+        });
+        let found = || format!("{:#010x}", reference.code);
+        child.ok_or_else(|| reference.error(Code::ChildCode, "a child code that may stand here", found()))
+    }
+
+    /// BTH-F106 and BTH-F123: the tet leaf exists, and nothing else leads to it.
+    fn follow_tet_leaf(&mut self, reference: &Reference, row: u32) -> Result<()> {
+        let Some(leaf) = self.view.tet_leaves.get(row as usize) else {
+            let expected = format!("a row below {}", self.view.tet_leaves.len());
+            return Err(reference.error(Code::ChildRange, expected, row.to_string()));
+        };
+        if self.referenced.insert(row as usize) {
+            let expected = "one reference to each tet leaf";
+            return Err(reference.error(Code::TetReferences, expected, format!("row {row} again")));
+        }
+        self.stack.push(Reference {
+            code: leaf.subtree,
+            depth: reference.depth,
+            parent: None,
+            in_subtree: true,
+            section: kind::TET_LEAVES,
+            at: u64::from(row) * size_of::<TetLeaf>() as u64 + offset_of!(TetLeaf, subtree) as u64,
+        });
+        Ok(())
+    }
+
+    /// BTH-F106 to BTH-F108: the block lies within LINES, behind the node that refers to it, and no other block overlaps it.
+    /// Returns its first half line.
+    fn claim(&mut self, reference: &Reference, child: Child) -> Result<u64> {
+        let (first, count) = self.view.half_lines(child).expect("all children but tet leaves have blocks");
+        let (line, lines) = (first / 2, self.view.lines.len());
+        if first + count as u64 > 2 * lines as u64 {
+            let expected = format!("{} lines below {lines}", count.div_ceil(2));
+            return Err(reference.error(Code::ChildRange, expected, format!("line {line}")));
+        }
+        if reference.parent.is_some_and(|parent| first <= parent) {
+            let expected = "a line behind the parent's";
+            return Err(reference.error(Code::ChildOrder, expected, format!("line {line}")));
+        }
+        let block = first as usize..first as usize + count;
+        if let Some(half) = block.into_iter().find(|&half| self.claimed.insert(half)) {
+            let found = format!("line {}, which another block has", half / 2);
+            return Err(reference.error(Code::Overlap, "a block of its own", found));
+        }
+        Ok(first)
+    }
+
+    /// BTH-F110 to BTH-F112: the node is not too deep, and its slots and boxes are as they should. Pushes its children.
+    fn follow_node(&mut self, reference: &Reference, child: Child, first_half: u64) -> Result<()> {
+        let (depth, most) = (reference.depth + 1, self.view.header.depth);
+        if depth > most.min(MAX_DEPTH as u32) {
+            let expected = format!("at most {most} (header) and {MAX_DEPTH} nodes on a path");
+            return Err(reference.error(Code::Depth, expected, depth.to_string()));
+        }
+        let start = first_half * HALF_LINE as u64;
+        let codes = if let Child::Packed(line) = child {
+            nodes::check_packed(self.view.packed_node(line), start)?;
+            offset_of!(PackedNode, child)
+        } else {
+            offset_of!(WideNode, child)
+        };
+        let node = self.view.unpacked_node(child).expect("the child is a node");
+        nodes::check_slots(&node, start, codes)?;
+        self.stack.extend(node.child.iter().enumerate().rev().map(|(slot, &code)| Reference {
+            code,
+            depth,
+            parent: Some(first_half),
+            in_subtree: reference.in_subtree,
+            section: kind::LINES,
+            at: start + (codes + 4 * slot) as u64,
+        }));
+        Ok(())
+    }
+
+    /// BTH-F109: every line belongs to a block. On a grid a second half line that does not is zero.
+    fn check_claimed(&self) -> Result<()> {
+        let is_padding = |half: usize, bytes: &[u8]| {
+            self.view.grid.is_some() && half % 2 == 1 && bytes.iter().all(|b| *b == 0)
+        };
+        let mut halves = self.view.half_line_bytes().iter().enumerate();
+        match halves.find(|(half, bytes)| !self.claimed.contains(*half) && !is_padding(*half, &bytes[..])) {
+            None => Ok(()),
+            Some((half, _)) => {
+                let at = (half * HALF_LINE) as u64;
+                Err(Error::within(
+                    Code::Unclaimed,
+                    kind::LINES,
+                    at,
+                    "a line of a block",
+                    "no reference to it",
+                ))
+            }
+        }
+    }
+
+    /// BTH-F123: a code leads to every tet leaf.
+    fn check_referenced(&self) -> Result<()> {
+        match (0..self.view.tet_leaves.len()).find(|&row| !self.referenced.contains(row)) {
+            None => Ok(()),
+            Some(row) => {
+                let at = (row * size_of::<TetLeaf>()) as u64;
+                let (expected, found) = ("a reference to each tet leaf", format!("none to row {row}"));
+                Err(Error::within(Code::TetReferences, kind::TET_LEAVES, at, expected, found))
+            }
+        }
+    }
+}

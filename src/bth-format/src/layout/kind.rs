@@ -1,0 +1,59 @@
+//! Section kinds. Specification: "Kinds". Kinds 1 to 31 belong to an object, the others to the whole file.
+
+/// One [`super::Object`].
+pub const OBJECT: u32 = 1;
+/// [`super::Line`]s that hold the nodes and triangle leaves.
+pub const LINES: u32 = 2;
+/// `u32` per triangle, in the order of the leaves: its id in the source.
+pub const TRIANGLE_IDS: u32 = 3;
+/// [`super::TetLeaf`]s.
+pub const TET_LEAVES: u32 = 4;
+/// [`super::Link32`], [`super::Tet32`], [`super::Tet20`] or [`super::Tet16`] records.
+pub const TETS: u32 = 5;
+/// [`super::TetVertex`] positions.
+pub const TET_VERTICES: u32 = 6;
+/// [`super::TetFace`]s, one per constrained face.
+pub const TET_FACES: u32 = 7;
+/// [`super::HullFace`]s.
+pub const HULL_FACES: u32 = 8;
+/// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
+pub const TRIANGLE_FACES: u32 = 9;
+/// `[f32; 3]`: distinct positions of the source, object space.
+pub const POSITIONS: u32 = 16;
+/// `[u32; 3]` per source triangle: rows of `POSITIONS`.
+pub const TRIANGLES: u32 = 17;
+/// `[u32; 3]` per source triangle: rows of `NORMALS` and `UVS`.
+pub const CORNERS: u32 = 18;
+/// `[f32; 3]`: shading normals as in the source, of any length.
+pub const NORMALS: u32 = 19;
+/// `[f32; 2]`: texture coordinates as in the source.
+pub const UVS: u32 = 20;
+/// UTF-8 JSON: how the file came about. Not part of the content id.
+pub const PROVENANCE: u32 = 32;
+/// One [`super::Scene`]. This section and the following ones belong to the whole file.
+pub const SCENE: u32 = 48;
+/// [`super::Node`]s, parents before children.
+pub const NODES: u32 = 49;
+/// [`super::Instance`]s.
+pub const INSTANCES: u32 = 50;
+/// [`super::Track`]s, ascending by node and property.
+pub const TRACKS: u32 = 51;
+/// `f64` seconds: times of the keys of all tracks.
+pub const TIMES: u32 = 52;
+/// `f64`: values of the keys of all tracks.
+pub const VALUES: u32 = 53;
+/// [`super::Camera`]s.
+pub const CAMERAS: u32 = 54;
+/// [`super::Light`]s.
+pub const LIGHTS: u32 = 55;
+/// UTF-8 bytes of the names of nodes, cameras and lights.
+pub const NAMES: u32 = 56;
+
+/// Whether sections of this kind are part of the scene.
+pub const fn is_scene(kind: u32) -> bool {
+    SCENE <= kind && kind <= NAMES
+}
+/// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
+pub const fn is_required(kind: u32) -> bool {
+    (OBJECT <= kind && kind <= TRIANGLE_FACES) || is_scene(kind)
+}

@@ -1,0 +1,16 @@
+//! A view of one object: its sections as typed slices, and its nodes and leaves by child code.
+//!
+//! [`crate::File::object`] and [`crate::File::check`] make views. Reading nodes and leaves of a view that was not checked
+//! may panic; it never reads out of bounds.
+
+mod bounds;
+mod leaves;
+mod nodes;
+mod records;
+mod view;
+
+pub use bounds::ObjectBounds;
+pub use nodes::NodeBase;
+pub use records::Records;
+pub use view::ObjectView;
+pub use leaves::Unpacked;

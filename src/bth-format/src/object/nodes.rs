@@ -1,0 +1,95 @@
+//! Nodes, and leaves of `f32`, by child code.
+
+use super::view::ObjectView;
+use crate::layout::*;
+use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+
+/// The lines of an object and how child codes index them: what a traversal loop keeps at hand.
+///
+/// Methods that return a node or leaf panic when the lines end before it does; after [`crate::File::check`] they never do.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeBase<'a> {
+    lines: &'a [Line],
+    /// [`Child::LEAF_BIT`] where leaves are on a grid, so that their indices count half lines; else 0.
+    halved: u32,
+}
+
+impl<'a> NodeBase<'a> {
+    #[inline(always)]
+    fn block<T: FromBytes + KnownLayout + Immutable>(self, line: u32, lines: usize) -> &'a T {
+        let at = line as usize;
+        let bytes = self.lines[at..at + lines].as_bytes();
+        T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")
+    }
+    /// As [`ObjectView::node`].
+    #[inline(always)]
+    pub fn node(self, line: u32) -> &'a WideNode {
+        self.block(line, NODE_LINES)
+    }
+    /// As [`ObjectView::packed_node`].
+    #[inline(always)]
+    pub fn packed_node(self, line: u32) -> &'a PackedNode {
+        self.block(line, PACKED_NODE_LINES)
+    }
+    /// The leaf that a child code leads to, if it is an indexed leaf of `f32`.
+    #[inline(always)]
+    pub fn indexed_leaf(self, code: u32) -> Option<&'a IndexedLeaf> {
+        let line = code ^ Child::LEAF_BIT;
+        // Only codes of indexed leaves, and those only without a grid, stay below the limit.
+        (line | self.halved < Child::INDEX_LIMIT).then(|| self.block(line, INDEXED_LINES))
+    }
+    /// Address of the block of a child code, to prefetch. It is not valid for every code: do not dereference it.
+    #[inline(always)]
+    pub fn block_address(self, code: u32) -> *const Line {
+        let index = code & (Child::INDEX_LIMIT - 1);
+        self.lines.as_ptr().wrapping_add((index >> ((code & self.halved) >> 31)) as usize)
+    }
+}
+
+impl<'a> ObjectView<'a> {
+    /// The object's lines, for a traversal loop.
+    #[inline(always)]
+    pub fn node_base(&self) -> NodeBase<'a> {
+        NodeBase { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
+    }
+    /// The node at a line. Panics when the lines end before the node does; after [`crate::File::check`] they never do.
+    #[inline(always)]
+    pub fn node(&self, line: u32) -> &'a WideNode {
+        self.node_base().node(line)
+    }
+    /// The packed node at a line; panics as [`Self::node`] does.
+    #[inline(always)]
+    pub fn packed_node(&self, line: u32) -> &'a PackedNode {
+        self.node_base().packed_node(line)
+    }
+    /// The indexed leaf of `f32` at a line; panics as [`Self::node`] does.
+    #[inline(always)]
+    pub fn indexed_leaf(&self, line: u32) -> &'a IndexedLeaf {
+        self.node_base().block(line, INDEXED_LINES)
+    }
+    /// The raw leaf of `f32` at a line; panics as [`Self::node`] does.
+    #[inline(always)]
+    pub fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
+        self.node_base().block(line, RAW_LINES)
+    }
+    /// The node that a child code leads to, unpacked if it is packed; `None` for leaves. Panics as [`Self::node`] does.
+    pub fn unpacked_node(&self, child: Child) -> Option<WideNode> {
+        match child {
+            Child::Node(line) => Some(*self.node(line)),
+            Child::Packed(line) => Some(self.packed_node(line).unpacked()),
+            Child::Indexed(_) | Child::Raw(_) | Child::Tets(_) => None,
+        }
+    }
+    /// The root, or that of the root's subtree where the root is a tet leaf; `None` where this is no node or does not lie
+    /// within the lines, as may be in an object that was not checked.
+    pub fn root(&self) -> Option<WideNode> {
+        let mut root = Child::from_code(self.header.root)?;
+        if let Child::Tets(row) = root {
+            root = Child::from_code(self.tet_leaves.get(row as usize)?.subtree)?;
+        }
+        let (Child::Node(line) | Child::Packed(line)) = root else { return None };
+        let lines = if matches!(root, Child::Node(_)) { NODE_LINES } else { PACKED_NODE_LINES };
+        self.lines.get(line as usize..)?.get(..lines)?;
+        self.unpacked_node(root)
+    }
+}

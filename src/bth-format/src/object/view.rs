@@ -1,0 +1,50 @@
+//! The sections of one object as typed slices, zero-copy.
+
+use super::bounds::ObjectBounds;
+use super::records::Records;
+use crate::layout::*;
+
+/// The sections of one object. Sections that the file lacks are empty. Specification: "Kinds" and "Objects".
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectView<'a> {
+    /// The OBJECT row: bounds, root and counts.
+    pub header: &'a Object,
+    /// The bounds of `header`, in the shape that tracing reads. Object space.
+    pub bounds: ObjectBounds,
+    /// The points that coordinates of triangle leaves can be; `None` where these are `f32`.
+    pub grid: Option<Grid>,
+    /// Nodes and triangle leaves.
+    pub lines: &'a [Line],
+    /// Source id of each triangle, in the order of the leaves.
+    pub triangle_ids: &'a [u32],
+    /// Tet leaves.
+    pub tet_leaves: &'a [TetLeaf],
+    /// Tetrahedra of all tet leaves.
+    pub records: Records<'a>,
+    /// Vertices of all tet leaves, object space.
+    pub tet_vertices: &'a [TetVertex],
+    /// Constrained faces of all tet leaves.
+    pub tet_faces: &'a [TetFace],
+    /// Hull faces of all tet leaves.
+    pub hull_faces: &'a [HullFace],
+    /// Per source triangle its row of `tet_faces`, or [`NONE`]; empty when there are no tet leaves.
+    pub triangle_faces: &'a [u32],
+    /// Distinct positions of the source, object space, if kept.
+    pub positions: &'a [[f32; 3]],
+    /// Per source triangle its rows of `positions`, if kept.
+    pub triangles: &'a [[u32; 3]],
+    /// Per source triangle its rows of `normals` and `uvs`, if kept.
+    pub corners: &'a [[u32; 3]],
+    /// Shading normals as in the source, if kept.
+    pub normals: &'a [[f32; 3]],
+    /// Texture coordinates, if kept.
+    pub uvs: &'a [[f32; 2]],
+}
+
+impl ObjectView<'_> {
+    /// Whether all nodes are packed; else none is.
+    #[inline(always)]
+    pub fn has_packed_nodes(&self) -> bool {
+        self.header.coordinates & PACKED_NODES != 0
+    }
+}

@@ -1,0 +1,83 @@
+//! The stored triangles compared with those of the source, where the file keeps positions.
+
+use super::triangle_marks::TriangleMarks;
+use crate::error::{Code, Error, Result};
+use crate::exact::is_zero_area;
+use crate::layout::*;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+/// Where a stored triangle stands in the file, and the code of the invariant that ties it to the source there.
+#[derive(Clone, Copy)]
+pub(super) struct Stored {
+    /// [`Code::LeafSource`] or [`Code::FaceSource`].
+    pub(super) code: Code,
+    pub(super) section: u32,
+    /// Byte of the section.
+    pub(super) at: u64,
+}
+
+/// BTH-F201 or BTH-F202, and BTH-F207: a stored triangle has the corners of its source triangle, bit for bit, and an area.
+pub(super) fn check_corners(
+    view: &ObjectView,
+    id: u32,
+    corners: [[f32; 3]; 3],
+    stored: Stored,
+) -> Result<()> {
+    let Some(source) = source_corners(view, id) else { return Ok(()) };
+    let Stored { code, section, at } = stored;
+    if source.map(|p| p.map(f32::to_bits)) != corners.map(|p| p.map(f32::to_bits)) {
+        let expected = format!("triangle {id}: {source:?}");
+        return Err(Error::within(code, section, at, expected, format!("{corners:?}")));
+    }
+    if is_zero_area(source) {
+        let found = format!("triangle {id} of zero area");
+        return Err(Error::within(Code::ZeroArea, section, at, "triangles that can be hit", found));
+    }
+    Ok(())
+}
+
+/// Corners of a source triangle, on the grid if there is one; `None` where the file does not keep them.
+fn source_corners(view: &ObjectView, id: u32) -> Option<[[f32; 3]; 3]> {
+    let corners = view.triangles.get(id as usize)?.map(|v| view.positions[v as usize]);
+    Some(view.grid.map_or(corners, |grid| corners.map(|p| grid.nearest(p))))
+}
+
+/// BTH-F203 and BTH-F207: as many triangles are left out as the header says, and all of these have zero area.
+pub(super) fn check_dropped(view: &ObjectView, marks: &TriangleMarks) -> Result<()> {
+    let left_out = view.header.triangles as usize - marks.count(TriangleMarks::PLACED);
+    if left_out != view.header.dropped as usize {
+        let at = offset_of!(Object, dropped) as u64;
+        let expected = format!("{} triangles in no leaf", view.header.dropped);
+        return Err(Error::within(Code::Coverage, kind::OBJECT, at, expected, left_out.to_string()));
+    }
+    // Without kept triangles there is nothing to compare, and the header's count must not bound a loop.
+    for id in (0..view.triangles.len()).filter(|id| !marks.has(*id as u32, TriangleMarks::PLACED)) {
+        if source_corners(view, id as u32).is_some_and(|corners| !is_zero_area(corners)) {
+            let found = format!("triangle {id}, which has an area, in no leaf");
+            let expected = "triangles of zero area to be left out";
+            return Err(Error::within(Code::ZeroArea, kind::TRIANGLES, 12 * id as u64, expected, found));
+        }
+    }
+    Ok(())
+}
+
+/// BTH-F208: no position of the source is farther from its point of the grid than the header says.
+pub(super) fn check_displacement(view: &ObjectView) -> Result<()> {
+    let Some(grid) = &view.grid else { return Ok(()) };
+    let most = f64::from(view.header.displacement);
+    for (row, position) in view.positions.iter().enumerate() {
+        let found = distance(*position, grid.nearest(*position));
+        if found > most {
+            let (at, expected) = (12 * row as u64, format!("at most {most} from the grid"));
+            return Err(Error::within(Code::Displacement, kind::POSITIONS, at, expected, found.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Distance of two points in `f64`, with a relative error of about 2^-51.
+fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+    let squares = [0, 1, 2].map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2));
+    squares.iter().sum::<f64>().sqrt()
+}

@@ -1,0 +1,173 @@
+//! Boxes of the tree contain the triangles below, and every triangle lies in it once.
+
+use super::aabb::Aabb;
+use super::source::{Stored, check_corners};
+use super::triangle_marks::TriangleMarks;
+use crate::error::{Code, Error, Result};
+use crate::layout::*;
+use crate::object::ObjectView;
+use std::mem::offset_of;
+
+/// A node or leaf of the tree.
+struct Visit {
+    child: Child,
+    /// The visit of the node that refers to it, and the slot there; `None` for the root and for roots of subtrees.
+    parent: Option<(usize, usize)>,
+    /// The tet leaf whose subtree it lies in.
+    tet_leaf: Option<u32>,
+    /// Bounds of the triangles below, as far as they have been visited.
+    content: Aabb,
+}
+
+/// Checks BTH-F201 to BTH-F204 and BTH-F207 of the stored triangles; returns which triangles the tree holds.
+pub(super) fn check(view: &ObjectView) -> Result<TriangleMarks> {
+    let mut visits = visits(view);
+    let in_subtree = vec![0; view.tet_leaves.len()];
+    let mut triangles = Triangles { view, marks: TriangleMarks::default(), in_subtree };
+    // Parents stand before their children: from the back, the content of a visit is complete when it is taken.
+    while let Some(mut visit) = visits.pop() {
+        triangles.check_leaf(&mut visit)?;
+        check_containment(view, &visit, &visits)?;
+        if let Some((parent, _)) = visit.parent {
+            visits[parent].content.merge(&visit.content);
+        }
+    }
+    triangles.check_subtrees()?;
+    Ok(triangles.marks)
+}
+
+/// All nodes and leaves, parents before their children.
+fn visits(view: &ObjectView) -> Vec<Visit> {
+    let visit = |code, parent, tet_leaf| {
+        Child::from_code(code).map(|child| Visit { child, parent, tet_leaf, content: Aabb::EMPTY })
+    };
+    let mut visits: Vec<Visit> = visit(view.header.root, None, None).into_iter().collect();
+    let mut i = 0;
+    while i < visits.len() {
+        let (child, tet_leaf) = (visits[i].child, visits[i].tet_leaf);
+        if let Child::Tets(row) = child {
+            visits.extend(visit(view.tet_leaves[row as usize].subtree, None, Some(row)));
+        } else if let Some(node) = view.unpacked_node(child) {
+            let codes = node.child.iter().enumerate();
+            visits.extend(codes.filter_map(|(slot, &code)| visit(code, Some((i, slot)), tet_leaf)));
+        }
+        i += 1;
+    }
+    visits
+}
+
+/// BTH-F204: the box of the slot that leads to a node or leaf, or the bounds of the object, contain the triangles below.
+/// `visits` are those before. The root of a subtree has no box of its own.
+fn check_containment(view: &ObjectView, visit: &Visit, visits: &[Visit]) -> Result<()> {
+    let (bounds, section, at) = if let Some((parent, slot)) = visit.parent {
+        let child = visits[parent].child;
+        let node = view.unpacked_node(child).expect("only nodes have slots");
+        let end = |upper: usize| [0, 1, 2].map(|axis| node.bounds[axis][upper][slot]);
+        (Aabb { lower: end(0), upper: end(1) }, kind::LINES, view.block_start(child))
+    } else if visit.tet_leaf.is_none() {
+        (Aabb { lower: view.header.lower, upper: view.header.upper }, kind::OBJECT, 0)
+    } else {
+        return Ok(());
+    };
+    let content = &visit.content;
+    if bounds.contains(content) {
+        return Ok(());
+    }
+    let expected = format!("a box around {:?} to {:?}", content.lower, content.upper);
+    let found = format!("{:?} to {:?}", bounds.lower, bounds.upper);
+    Err(Error::within(Code::Containment, section, at, expected, found))
+}
+
+struct Triangles<'a> {
+    view: &'a ObjectView<'a>,
+    marks: TriangleMarks,
+    /// Per tet leaf the triangles in its subtree.
+    in_subtree: Vec<u32>,
+}
+
+impl Triangles<'_> {
+    /// Checks the triangles of a leaf, and adds them to its content.
+    fn check_leaf(&mut self, visit: &mut Visit) -> Result<()> {
+        let view = self.view;
+        match visit.child {
+            Child::Node(_) | Child::Packed(_) => Ok(()),
+            Child::Tets(row) => {
+                let leaf = &view.tet_leaves[row as usize];
+                let mut faces = leaf.first_face..leaf.first_face + leaf.faces;
+                faces.try_for_each(|face| self.check_constrained_face(visit, face))
+            }
+            Child::Indexed(index) => {
+                let mut scratch = None;
+                let leaf = view.indexed(index, &mut scratch);
+                (0..leaf.triangles as usize).try_for_each(|t| {
+                    self.check_leaf_triangle(visit, leaf.first as usize + t, leaf.triangle(t))
+                })
+            }
+            Child::Raw(index) => {
+                let mut scratch = None;
+                let leaf = view.raw(index, &mut scratch);
+                (0..leaf.triangles as usize).try_for_each(|t| {
+                    self.check_leaf_triangle(visit, leaf.first as usize + t, leaf.triangle(t))
+                })
+            }
+        }
+    }
+
+    /// BTH-F203, BTH-F201 and BTH-F207 of a triangle of a leaf, given its row of TRIANGLE_IDS.
+    fn check_leaf_triangle(&mut self, visit: &mut Visit, row: usize, corners: [[f32; 3]; 3]) -> Result<()> {
+        corners.into_iter().for_each(|p| visit.content.add(p));
+        let (id, at) = (self.view.triangle_ids[row], 4 * row as u64);
+        match visit.tet_leaf {
+            Some(tet_leaf) => self.mark_in_subtree(id, tet_leaf, at)?,
+            None => self.mark_placed(id, kind::TRIANGLE_IDS, at)?,
+        }
+        let at = self.view.block_start(visit.child);
+        check_corners(self.view, id, corners, Stored { code: Code::LeafSource, section: kind::LINES, at })
+    }
+
+    /// BTH-F203, BTH-F202 and BTH-F207 of a constrained face, given its row.
+    fn check_constrained_face(&mut self, visit: &mut Visit, row: u32) -> Result<()> {
+        let face = &self.view.tet_faces[row as usize];
+        let corners = face.vertex.map(|v| self.view.tet_vertices[v as usize].position);
+        corners.into_iter().for_each(|p| visit.content.add(p));
+        let at = u64::from(row) * size_of::<TetFace>() as u64;
+        self.mark_placed(face.triangle, kind::TET_FACES, at + offset_of!(TetFace, triangle) as u64)?;
+        let stored = Stored { code: Code::FaceSource, section: kind::TET_FACES, at };
+        check_corners(self.view, face.triangle, corners, stored)
+    }
+
+    /// BTH-F203: a triangle lies in one triangle leaf or constrained face.
+    fn mark_placed(&mut self, id: u32, section: u32, at: u64) -> Result<()> {
+        if self.marks.mark(id, TriangleMarks::PLACED) {
+            return Ok(());
+        }
+        let found = format!("triangle {id} again");
+        Err(Error::within(Code::Coverage, section, at, "each triangle once", found))
+    }
+
+    /// BTH-F203: a triangle in the subtree of a tet leaf is one of its constrained faces, and lies there once.
+    fn mark_in_subtree(&mut self, id: u32, tet_leaf: u32, at: u64) -> Result<()> {
+        let leaf = &self.view.tet_leaves[tet_leaf as usize];
+        let faces = leaf.first_face..leaf.first_face + leaf.faces;
+        let is_face = faces.contains(&self.view.triangle_faces[id as usize]);
+        if is_face && self.marks.mark(id, TriangleMarks::IN_SUBTREE) {
+            self.in_subtree[tet_leaf as usize] += 1;
+            return Ok(());
+        }
+        let (expected, found) =
+            (format!("a triangle of tet leaf {tet_leaf}, once"), format!("triangle {id}"));
+        Err(Error::within(Code::Coverage, kind::TRIANGLE_IDS, at, expected, found))
+    }
+
+    /// BTH-F203: a subtree that is kept holds all triangles of its tet leaf.
+    fn check_subtrees(&self) -> Result<()> {
+        for (row, (leaf, &found)) in self.view.tet_leaves.iter().zip(&self.in_subtree).enumerate() {
+            if leaf.subtree != NONE && found != leaf.faces {
+                let at = (row * size_of::<TetLeaf>() + offset_of!(TetLeaf, subtree)) as u64;
+                let expected = format!("a subtree with all {} triangles", leaf.faces);
+                return Err(Error::within(Code::Coverage, kind::TET_LEAVES, at, expected, found.to_string()));
+            }
+        }
+        Ok(())
+    }
+}

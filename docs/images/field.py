@@ -5,7 +5,7 @@
         set -- $model; bth-scenes make $1 --faces $2 -o $1.ply
     done
     python3 docs/images/field.py > field.manifest
-    bth-play field.manifest -o field.png --mode path --size 1280x560 --spp 192
+    bth-play field.manifest -o field.png --mode path --size 1280x560 --spp 160
 """
 import math
 import random

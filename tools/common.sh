@@ -1,4 +1,4 @@
-# What the scripts in tools/ share; to be sourced, not run.
+# Functions that the scripts in tools/ share; to be sourced, not run.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root" || exit 2
@@ -6,7 +6,7 @@ target_dir=${CARGO_TARGET_DIR:-$root/target}
 
 note() { printf '%s\n' "$*" >&2; }
 
-# Ends with a hint when there is no Rust; finds one that rustup has put into the home folder.
+# Exits with a hint when there is no Rust; finds one that rustup has installed into the home folder.
 need_rust() {
     command -v cargo >/dev/null || PATH="${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
     if ! command -v cargo >/dev/null; then
@@ -28,7 +28,7 @@ have_display() { command -v Xvfb >/dev/null && command -v xdotool >/dev/null; }
 have_venv() { command -v python3 >/dev/null && python3 -c 'import venv, ensurepip' 2>/dev/null; }
 
 # install_missing python|plain: installs the system packages that are missing, where that is possible.
-# Says what stays missing and goes on: everything but the TetGen worker builds without them.
+# Reports what stays missing and goes on: everything but the TetGen worker builds without them.
 install_missing() {
     local packages=()
     command -v cc >/dev/null || packages+=(gcc libc6-dev)
@@ -50,7 +50,7 @@ install_missing() {
     if command -v apt-get >/dev/null && "${as_root[@]}" true 2>/dev/null; then
         note "Installing ${packages[*]}"
         "${as_root[@]}" apt-get update -qq >/dev/null 2>&1 || note "apt-get update failed; trying with the lists at hand"
-        # One by one: one that cannot be had does not keep the others away.
+        # One by one, so that a package that cannot be installed does not keep the others from being installed.
         local package
         for package in "${packages[@]}"; do
             "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \

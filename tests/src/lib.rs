@@ -59,7 +59,8 @@ pub fn worker() -> Option<&'static Path> {
     FOUND.get_or_init(find).as_deref()
 }
 
-/// Compiles the Rust code of the readme.
+/// Compiles the Rust code of the readme and the guide.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
-pub struct Readme;
+#[doc = include_str!("../../docs/rust.md")]
+pub struct Pages;

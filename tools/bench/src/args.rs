@@ -19,6 +19,12 @@ pub struct Arguments {
 pub enum Command {
     /// Rays per second of our structures and the rivals.
     Speed(Speed),
+    /// Whether a build of libbth is faster than another, in one interleaved run. Exit code 3 if it is slower.
+    Compare(Compare),
+    /// Measures what a definition names and appends the rows to the record of this machine.
+    Record(RecordRows),
+    /// Writes the summary of all records.
+    Summary(Summary),
     /// Run time and bytes against every kind of error, ours and rivals'.
     Accuracy(Accuracy),
     /// Opening a compiled file and tracing the first rays, against building at the start.
@@ -112,6 +118,72 @@ pub struct Speed {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub output: Output,
+}
+
+/// `compare`.
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// The build to compare with: a libbth.so.
+    pub old: PathBuf,
+    /// The build that may be faster.
+    pub new: PathBuf,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub models: Models,
+    /// Rays of a set, at most (about).
+    #[arg(long, value_name = "N", default_value_t = 65_536, value_parser = at_least_one)]
+    pub rays: usize,
+    /// Rounds of which the median counts; one more comes before and warms up.
+    #[arg(long, value_name = "N", default_value_t = 11, value_parser = at_least_one)]
+    pub rounds: usize,
+    /// Rays in a call; 1 for one ray a call.
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = at_least_one)]
+    pub batch: usize,
+    /// Only these ray sets.
+    #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
+    pub sets: Names,
+    /// Vector instructions of both builds; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME")]
+    pub isa: Option<String>,
+    /// A set is slower when its mean over the models is greater by more than this, such as `1%`.
+    #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]
+    pub worse: f64,
+    /// Small pictures and one round: whether it works, not what is faster.
+    #[arg(long)]
+    pub quick: bool,
+    /// Write JSON there.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+/// `record`.
+#[derive(Debug, Args)]
+pub struct RecordRows {
+    /// Name of a file of benchmarks/definitions, without `.toml`.
+    pub definition: String,
+    /// Folder that holds `definitions/` and `record/`.
+    #[arg(long, value_name = "DIR", default_value = "benchmarks")]
+    pub folder: PathBuf,
+    /// Folder of the models that definitions name by file.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub models: PathBuf,
+    /// Small pictures and one round; prints the rows and appends nothing.
+    #[arg(long)]
+    pub quick: bool,
+}
+
+/// `summary`.
+#[derive(Debug, Args)]
+pub struct Summary {
+    /// Folder that holds `definitions/` and `record/`; SUMMARY.md is written there.
+    #[arg(long, value_name = "DIR", default_value = "benchmarks")]
+    pub folder: PathBuf,
+    /// Draw charts of the newest values into this folder, too.
+    #[arg(long, value_name = "DIR")]
+    pub charts: Option<PathBuf>,
+    /// Only checks that SUMMARY.md is up to date.
+    #[arg(long)]
+    pub check: bool,
 }
 
 /// `accuracy`.
@@ -345,6 +417,15 @@ pub struct Probe {
     pub file: PathBuf,
     /// The rays, the first of which hits.
     pub rays: PathBuf,
+}
+
+/// A share given in per cent.
+fn share(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix('%').and_then(|n| n.trim().parse::<f64>().ok());
+    number
+        .filter(|p| (0.0..100.0).contains(p))
+        .map(|p| p / 100.0)
+        .ok_or_else(|| "expected a share such as 1%".to_owned())
 }
 
 fn at_least_one(text: &str) -> Result<usize, String> {

@@ -18,3 +18,17 @@ pub fn select(wanted: Option<&str>) -> Result<String> {
     }
     Ok(Isa::chosen().to_string())
 }
+
+/// As [`select`], for libraries of ours that are loaded later: they read the environment variable `BTH_ISA`.
+///
+/// # Errors
+/// As [`select`].
+#[allow(unsafe_code)]
+pub fn select_for_libraries(wanted: Option<&str>) -> Result<()> {
+    select(wanted)?;
+    if let Some(name) = wanted {
+        // SAFETY: called at the start of the program, before any other thread runs that could read the environment.
+        unsafe { std::env::set_var("BTH_ISA", name) };
+    }
+    Ok(())
+}

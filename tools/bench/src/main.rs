@@ -1,13 +1,20 @@
 //! `bth-bench`: measures bth beside other CPU ray tracers on identical rays.
 
 use bth_bench::args::{Arguments, Command};
-use bth_bench::{accuracy, costs, load, output, paper, quality, scenes, speed, stress};
+use bth_bench::compare::Verdict;
+use bth_bench::{accuracy, compare, costs, load, output, paper, quality, records, scenes, speed, stress};
 use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Speed(arguments) => speed::run(&arguments),
+        Command::Compare(arguments) => match compare::run(&arguments) {
+            Ok(Verdict::Slower) => return ExitCode::from(3),
+            other => other.map(drop),
+        },
+        Command::Record(arguments) => records::record(&arguments),
+        Command::Summary(arguments) => records::run_summary(&arguments),
         Command::Accuracy(arguments) => accuracy::run(&arguments),
         Command::Load(arguments) => load::run(&arguments),
         Command::LoadScenes(arguments) => load::scenes::run(&arguments),

@@ -3,8 +3,8 @@
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Context, Result};
+use bth::Scene;
 use bth::rays::{Hit, Surface};
-use bth::{Scene, Test};
 use bth_compile::coordinates::{self, Boxes};
 use bth_compile::pipeline::{self, Options, Structure};
 use bth_format::layout::{GridBits, RecordKind};
@@ -97,8 +97,6 @@ pub enum Use {
     Hinted,
     /// One ray a call, without hints.
     Single,
-    /// In batches, each ray on its own, triangles decided so.
-    By(Test),
 }
 
 /// A compiled file.
@@ -149,29 +147,6 @@ pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
     Ok(kind.uses().map(contender).collect())
 }
 
-/// The tests of triangles, each in the same walk, so that they can be compared.
-pub const TESTS: [(&str, Test); 4] = [
-    ("bvh test exact", Test::Exact),
-    ("bvh test watertight", Test::Watertight),
-    ("bvh test fast", Test::Fast),
-    ("bvh test moeller", Test::MoellerTrumbore),
-];
-
-/// A contender that decides triangles so.
-///
-/// # Errors
-/// As [`contenders`].
-pub fn tested(name: &str, test: Test, compiled: &Compiled) -> Result<Contender> {
-    let scene = Arc::new(bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?);
-    Ok(Contender {
-        name: name.to_owned(),
-        ours: true,
-        build_s: compiled.seconds,
-        bytes: Some(scene.resident_bytes()),
-        tracer: Box::new(Ours { scene, usage: Use::By(test) }),
-    })
-}
-
 /// A tracer of a compiled file.
 ///
 /// # Errors
@@ -196,10 +171,6 @@ impl Tracer for Ours {
             return;
         }
         for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            if let Use::By(test) = self.usage {
-                self.scene.nearest_batch_by(test, batch.rays, hits);
-                continue;
-            }
             self.scene.nearest_batch(batch.rays, self.hints(&batch), hits);
         }
     }

@@ -44,6 +44,20 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some((values[low] + values[high]) / 2.0)
 }
 
+/// Lower quartile, median and upper quartile, by linear interpolation; NaN where there are no values.
+pub fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_by(f64::total_cmp);
+    [0.25, 0.5, 0.75].map(|share| {
+        let at = share * values.len().saturating_sub(1) as f64;
+        let (low, part) = (at.floor() as usize, at.fract());
+        match (values.get(low), values.get(low + 1)) {
+            (Some(a), Some(b)) => a + (b - a) * part,
+            (Some(a), None) => *a,
+            (None, _) => f64::NAN,
+        }
+    })
+}
+
 /// The geometric mean of positive values.
 pub fn geometric_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, n), value| (sum + value.ln(), n + 1));
@@ -70,6 +84,8 @@ mod tests {
         assert_eq!(median(vec![]), None);
         assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(quartiles(vec![5.0, 1.0, 2.0, 3.0, 4.0]), [2.0, 3.0, 4.0]);
+        assert_eq!(quartiles(vec![7.0]), [7.0; 3]);
         assert_eq!(geometric_mean([]), None);
         assert!((geometric_mean([1.0, 4.0]).unwrap() - 2.0).abs() < 1e-12);
     }

@@ -9,7 +9,7 @@ use crate::rivals::RIVALS;
 use crate::speed::record::LeftOut;
 use crate::tracer::Contender;
 use anyhow::Result;
-use bth::{Isa, Test};
+use bth::Isa;
 use std::rc::Rc;
 
 /// A way to trace a model.
@@ -63,8 +63,7 @@ pub(super) fn names() -> Vec<String> {
         let others = Isa::ALL.into_iter().filter(|_| on_every_isa(kind));
         std::iter::once(kind.name.to_owned()).chain(others.map(|isa| format!("{} {isa}", kind.name)))
     });
-    let tests = ours::TESTS.iter().map(|(name, _)| (*name).to_owned());
-    own.chain(tests).chain(RIVALS.iter().map(|rival| rival.name.to_owned())).collect()
+    own.chain(RIVALS.iter().map(|rival| rival.name.to_owned())).collect()
 }
 
 impl Subjects {
@@ -103,16 +102,6 @@ impl Subjects {
                     all.left_out.push(LeftOut { name: kind.name.to_owned(), why });
                 }
             }
-        }
-        for (name, test) in ours::TESTS.into_iter().filter(|(name, _)| names.select(name)) {
-            all.subjects.push(Subject {
-                name: name.to_owned(),
-                group: group(name),
-                contender: Rc::new(ours::tested(name, test, bvh)?),
-                isa: Some(Isa::best()),
-                geometry: 0,
-                exact: test == Test::Exact,
-            });
         }
         for rival in RIVALS.iter().filter(|rival| names.select(rival.name)) {
             progress.say(format!("{}: building {}", model.name, rival.name));

@@ -3,7 +3,6 @@
 use super::judge::Defects;
 use super::record::{AccuracyRecord, Errors, ModelErrors, ORDINARY, Summary};
 use crate::markdown::{count, table};
-use crate::ours::TESTS;
 
 /// All tables of a record.
 pub fn markdown(record: &AccuracyRecord) -> String {
@@ -11,7 +10,6 @@ pub fn markdown(record: &AccuracyRecord) -> String {
     if record.models.len() > 1 {
         text.push_str(&summary(record));
     }
-    text.push_str(&tests(record));
     for model in &record.models {
         text.push_str(&page(model));
     }
@@ -79,55 +77,6 @@ fn summary(record: &AccuracyRecord) -> String {
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",
         record.models.len(),
-        table(&head(&names), &rows)
-    )
-}
-
-/// What exact answers cost: the same walk with four tests of triangles. The mean is that of ordinary rays.
-fn tests(record: &AccuracyRecord) -> String {
-    let row = |name: String, times: &[f64]| {
-        let fastest = times[1..].iter().copied().fold(f64::INFINITY, f64::min);
-        let mut row = vec![name];
-        row.extend(times.iter().map(|ns| format!("{ns:.0}")));
-        let others = [times[1], fastest];
-        row.extend(others.iter().map(|other| format!("{:+.1} %", 100.0 * (times[0] / other - 1.0))));
-        row
-    };
-    let (mut rows, mut ordinary): (Vec<_>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-    for model in &record.models {
-        let ns = |test: &str, set: &str| {
-            model.tracers.iter().find(|t| t.name == test)?.nanoseconds.get(set).copied()
-        };
-        for set in model.rays.keys() {
-            let times: Option<Vec<f64>> = TESTS.iter().map(|(name, _)| ns(name, set)).collect();
-            let Some(times) = times else { continue };
-            rows.push(row(format!("{}, {set}", model.name), &times));
-            if ORDINARY.contains(&&**set) {
-                ordinary.push(times);
-            }
-        }
-    }
-    if rows.is_empty() {
-        return String::new();
-    }
-    if !ordinary.is_empty() {
-        let mean = |test: usize| {
-            (ordinary.iter().map(|times| times[test].ln()).sum::<f64>() / ordinary.len() as f64).exp()
-        };
-        let means: Vec<f64> = (0..TESTS.len()).map(mean).collect();
-        rows.push(row("**ordinary rays, geometric mean**".to_owned(), &means));
-    }
-    let names = [
-        "rays",
-        "exact",
-        "watertight",
-        "fast",
-        "Möller-Trumbore",
-        "exact over watertight",
-        "exact over the fastest",
-    ];
-    format!(
-        "## Tests of triangles\n\nns a ray with the same walk, each ray on its own (`Scene::nearest_batch_by`).\n\n{}\n",
         table(&head(&names), &rows)
     )
 }

@@ -1,0 +1,111 @@
+//! A build of `libbth.so`, loaded at run time through the C interface.
+#![allow(unsafe_code)]
+
+use anyhow::{Context, Result, bail, ensure};
+use bth::rays::{Hit, Ray};
+use libloading::{Library, Symbol};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::path::Path;
+
+/// `bth_open` with the flag `BTH_READ`.
+const READ: u32 = 0;
+
+type Open = unsafe extern "C" fn(*const c_char, u32, *mut *mut c_void) -> c_int;
+type Close = unsafe extern "C" fn(*mut c_void);
+type LastError = unsafe extern "C" fn() -> *const c_char;
+type Nearest = unsafe extern "C" fn(*mut c_void, *const Ray, *const c_void, *mut Hit, usize);
+type Any = unsafe extern "C" fn(*mut c_void, *const Ray, *const c_void, *mut bool, usize);
+
+/// The functions of one build.
+pub(super) struct Build {
+    open: Open,
+    close: Close,
+    last_error: LastError,
+    nearest: Nearest,
+    any: Any,
+}
+
+impl Build {
+    /// Loads a build. It is never unloaded, so its functions stay valid.
+    ///
+    /// # Errors
+    /// If the file is no shared library, or lacks one of the functions.
+    pub(super) fn load(path: &Path) -> Result<Build> {
+        let path = path.canonicalize().with_context(|| format!("{}: no such file", path.display()))?;
+        // SAFETY: the user names a build of libbth, whose initializers are those of Rust's standard library.
+        let library = unsafe { Library::new(&path) }.with_context(|| path.display().to_string())?;
+        let library: &'static Library = Box::leak(Box::new(library));
+        let lacks =
+            |name: &str| format!("{}: no function {name}: expected a build of libbth", path.display());
+        // SAFETY: the types are those of bth.h for these names, which have not changed since the first version.
+        unsafe {
+            let open: Symbol<'_, Open> = library.get(b"bth_open\0").with_context(|| lacks("bth_open"))?;
+            let close: Symbol<'_, Close> = library.get(b"bth_close\0").with_context(|| lacks("bth_close"))?;
+            let last_error: Symbol<'_, LastError> =
+                library.get(b"bth_last_error\0").with_context(|| lacks("bth_last_error"))?;
+            let nearest: Symbol<'_, Nearest> =
+                library.get(b"bth_nearest\0").with_context(|| lacks("bth_nearest"))?;
+            let any: Symbol<'_, Any> = library.get(b"bth_any\0").with_context(|| lacks("bth_any"))?;
+            Ok(Build { open: *open, close: *close, last_error: *last_error, nearest: *nearest, any: *any })
+        }
+    }
+
+    /// Opens a compiled file with this build.
+    ///
+    /// # Errors
+    /// What the build reports.
+    pub(super) fn open(&self, file: &Path) -> Result<Opened<'_>> {
+        let name = CString::new(file.as_os_str().as_encoded_bytes()).context("a path without zero bytes")?;
+        let mut scene = std::ptr::null_mut();
+        // SAFETY: a zero-terminated path and a place for the scene, as bth.h demands.
+        let code = unsafe { (self.open)(name.as_ptr(), READ, &mut scene) };
+        if code != 0 {
+            // SAFETY: bth_last_error returns a zero-terminated text that stays until the next call of this thread.
+            let text = unsafe { CStr::from_ptr((self.last_error)()) };
+            bail!("{}: {}", file.display(), text.to_string_lossy());
+        }
+        ensure!(!scene.is_null(), "{}: bth_open returned no scene", file.display());
+        Ok(Opened { build: self, scene })
+    }
+}
+
+/// A file that a build has opened; closed when it is dropped.
+pub(super) struct Opened<'a> {
+    build: &'a Build,
+    scene: *mut c_void,
+}
+
+impl Opened<'_> {
+    /// Nearest hits, in calls of `batch` rays, without hints.
+    pub(super) fn nearest(&self, rays: &[Ray], hits: &mut [Hit], batch: usize) {
+        for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
+            // SAFETY: as many rays and places for hits as the count says; no hints; the scene is open.
+            unsafe {
+                (self.build.nearest)(
+                    self.scene,
+                    rays.as_ptr(),
+                    std::ptr::null(),
+                    hits.as_mut_ptr(),
+                    rays.len(),
+                );
+            }
+        }
+    }
+
+    /// Whether rays hit anything, as [`Self::nearest`].
+    pub(super) fn any(&self, rays: &[Ray], found: &mut [bool], batch: usize) {
+        for (rays, found) in rays.chunks(batch).zip(found.chunks_mut(batch)) {
+            // SAFETY: as above; the library writes 0 or 1 to each byte.
+            unsafe {
+                (self.build.any)(self.scene, rays.as_ptr(), std::ptr::null(), found.as_mut_ptr(), rays.len());
+            }
+        }
+    }
+}
+
+impl Drop for Opened<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the scene was opened by this build and is closed once.
+        unsafe { (self.build.close)(self.scene) }
+    }
+}

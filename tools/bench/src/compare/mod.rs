@@ -1,0 +1,125 @@
+//! `compare`: whether one build of `libbth.so` is faster than another, in one interleaved run.
+//!
+//! Both builds are loaded into this process and answer the same rays from the same file in turn, so that what else the
+//! machine does falls on both. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
+//! median over the rounds, and the verdict that of the geometric mean over the models.
+
+mod library;
+mod report;
+
+pub use report::{Comparison, ModelComparison, SetComparison, Verdict};
+
+use self::library::{Build, Opened};
+use crate::args::Compare;
+use crate::clock::Clock;
+use crate::model::Model;
+use crate::progress::Progress;
+use crate::rays::{self, Finder, RaySet};
+use crate::rounds::quartiles;
+use crate::{isa, ours};
+use anyhow::{Context, Result, bail, ensure};
+use bth::rays::Hit;
+use std::io::Write;
+
+/// Smaller sets are not timed: that would measure the clock.
+const FEWEST: usize = 1024;
+/// Pixels of the cameras; a quick run has fewer.
+const SIZE: (u32, u32) = (1024, 576);
+const QUICK_SIZE: (u32, u32) = (128, 72);
+
+/// Measures, prints and writes the comparison; tells whether a set is slower than was allowed.
+///
+/// # Errors
+/// If a library, model or option cannot be used, or if the builds give different answers.
+pub fn run(arguments: &Compare) -> Result<Verdict> {
+    if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
+        bail!("--set {name}: there are {}", rays::NAMES.join(", "));
+    }
+    isa::select_for_libraries(arguments.isa.as_deref())?;
+    let [old, new] = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
+    let progress = Progress::new();
+    let mut comparison = Comparison { batch: arguments.batch, worse: arguments.worse, models: Vec::new() };
+    for which in &arguments.models.models {
+        comparison.models.push(model(which, arguments, [&old, &new], &progress)?);
+    }
+    drop(progress);
+    if let Some(path) = &arguments.json {
+        let text = format!("{:#}\n", serde_json::to_value(&comparison)?);
+        std::fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    std::io::stdout().lock().write_all(comparison.markdown().as_bytes())?;
+    let differing = comparison.differing();
+    ensure!(differing.is_empty(), "the builds give different answers: {}", differing.join(", "));
+    Ok(comparison.verdict())
+}
+
+fn model(
+    which: &str,
+    arguments: &Compare,
+    builds: [&Build; 2],
+    progress: &Progress,
+) -> Result<ModelComparison> {
+    let model = Model::load(which)?;
+    progress.say(format!("{}: compiling", model.name));
+    let compiled = ours::compile(&model, &ours::BTH)?;
+    let scene = bth::from_bytes(&compiled.bytes)?;
+    progress.say(format!("{}: making rays", model.name));
+    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
+    let (_, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
+    sets.retain(|set| set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= FEWEST);
+
+    let folder = tempfile::tempdir()?;
+    let file = folder.path().join("model.bth");
+    std::fs::write(&file, &compiled.bytes)?;
+    let opened = [builds[0].open(&file)?, builds[1].open(&file)?];
+    let mut out = ModelComparison { name: model.name.clone(), sets: Vec::new() };
+    for set in &sets {
+        progress.say(format!("{}: {}", model.name, set.name));
+        out.sets.push(compare(set, &opened, arguments));
+    }
+    Ok(out)
+}
+
+/// Times one set with both builds, round by round.
+fn compare(set: &RaySet, builds: &[Opened<'_>; 2], arguments: &Compare) -> SetComparison {
+    let (batch, rounds) = (arguments.batch, if arguments.quick { 1 } else { arguments.rounds });
+    let rays = &set.rays;
+    let mut hits = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
+    let mut found = [vec![false; rays.len()], vec![false; rays.len()]];
+    let mut seconds = [Vec::new(), Vec::new()];
+    for round in 0..=rounds {
+        let mut of_round = [0.0; 2];
+        // Each build goes first in every other round.
+        for turn in 0..2 {
+            let which = (turn + round) % 2;
+            of_round[which] = Clock::ThreadCpu.time(|| {
+                if set.any {
+                    builds[which].any(rays, &mut found[which], batch);
+                } else {
+                    builds[which].nearest(rays, &mut hits[which], batch);
+                }
+            });
+        }
+        // The first round warms up the caches.
+        if round > 0 {
+            seconds[0].push(of_round[0]);
+            seconds[1].push(of_round[1]);
+        }
+    }
+    let ratios = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
+    let ns = |seconds: &[f64]| quartiles(seconds.to_vec())[1] * 1e9 / rays.len() as f64;
+    let bits =
+        |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.surface.instance, h.surface.triangle];
+    let [low, ratio, high] = quartiles(ratios);
+    SetComparison {
+        name: set.name.to_owned(),
+        rays: rays.len(),
+        old_ns: ns(&seconds[0]),
+        new_ns: ns(&seconds[1]),
+        ratio,
+        low,
+        high,
+        same: found[0] == found[1] && hits[0].iter().zip(&hits[1]).all(|(a, b)| bits(a) == bits(b)),
+    }
+}

@@ -1,0 +1,148 @@
+//! A row of a record: one figure.
+
+use anyhow::{Result, bail};
+
+/// The columns.
+pub const HEAD: &str = "commit,benchmark,engine,model,set,threads,isa,value,unit,low,high,rounds";
+
+/// One figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The commit that was measured, 12 digits; `?` where it is not known.
+    pub commit: String,
+    /// Name of the benchmark's definition.
+    pub benchmark: String,
+    /// What was measured, such as `bth` or `embree`.
+    pub engine: String,
+    /// Name of the model, or `mean` of all of the definition.
+    pub model: String,
+    /// Name of the ray set, or of another figure.
+    pub set: String,
+    /// Threads that traced.
+    pub threads: usize,
+    /// Instruction set of our kernels, or `-`.
+    pub isa: String,
+    /// The figure.
+    pub value: f64,
+    /// Its unit, such as `ns/ray`, `Mrays/s`, `times embree`.
+    pub unit: String,
+    /// Least or lower quartile, where it is known.
+    pub low: Option<f64>,
+    /// Greatest or upper quartile, where it is known.
+    pub high: Option<f64>,
+    /// Rounds that the figure is the median of; 0 where that is not known.
+    pub rounds: usize,
+}
+
+/// Five significant digits, without an exponent.
+fn number(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 15) as usize;
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+impl Row {
+    /// A line of the file. Commas within names become spaces.
+    pub fn line(&self) -> String {
+        let name = |text: &str| text.replace([',', '\n', '"'], " ");
+        let optional = |x: Option<f64>| x.map(number).unwrap_or_default();
+        [
+            name(&self.commit),
+            name(&self.benchmark),
+            name(&self.engine),
+            name(&self.model),
+            name(&self.set),
+            self.threads.to_string(),
+            name(&self.isa),
+            number(self.value),
+            name(&self.unit),
+            optional(self.low),
+            optional(self.high),
+            self.rounds.to_string(),
+        ]
+        .join(",")
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// If it does not have the columns of [`HEAD`], or a number is none.
+    pub fn parse(line: &str) -> Result<Row> {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [commit, benchmark, engine, model, set, threads, isa, value, unit, low, high, rounds] = cells[..]
+        else {
+            bail!("expected 12 columns, found {}: {line}", cells.len());
+        };
+        let optional = |text: &str| if text.is_empty() { Ok(None) } else { text.parse().map(Some) };
+        Ok(Row {
+            commit: commit.to_owned(),
+            benchmark: benchmark.to_owned(),
+            engine: engine.to_owned(),
+            model: model.to_owned(),
+            set: set.to_owned(),
+            threads: threads.parse()?,
+            isa: isa.to_owned(),
+            value: value.parse()?,
+            unit: unit.to_owned(),
+            low: optional(low)?,
+            high: optional(high)?,
+            rounds: rounds.parse()?,
+        })
+    }
+}
+
+/// The folder of a processor's records, made of its name: `intel-xeon-family-6-model-167`.
+pub fn cpu_folder(cpu: &str) -> String {
+    let mut out = String::new();
+    let plain = cpu.replace("(R)", "").replace("(TM)", "").replace("Processor", "");
+    for c in plain.to_lowercase().chars() {
+        if c.is_ascii_alphanumeric() {
+            out.push(c);
+        } else if !out.ends_with('-') && !out.is_empty() {
+            out.push('-');
+        }
+    }
+    out.trim_end_matches('-').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_from_their_lines() {
+        let row = Row {
+            commit: "0123456789ab".into(),
+            benchmark: "speed".into(),
+            engine: "embree hq packet16".into(),
+            model: "igea".into(),
+            set: "ao".into(),
+            threads: 1,
+            isa: "-".into(),
+            value: 12.345,
+            unit: "Mrays/s".into(),
+            low: Some(12.0),
+            high: None,
+            rounds: 5,
+        };
+        let line = row.line();
+        assert_eq!(line, "0123456789ab,speed,embree hq packet16,igea,ao,1,-,12.345,Mrays/s,12,,5");
+        assert_eq!(Row::parse(&line).unwrap(), row);
+        assert!(Row::parse("a,b").is_err());
+        assert!(Row::parse(&line.replace("12.345", "fast")).is_err());
+    }
+
+    #[test]
+    fn numbers_keep_five_digits() {
+        assert_eq!([123456.7, 0.00012345678, 1.0, 0.0].map(number), ["123457", "0.00012346", "1", "0"]);
+    }
+
+    #[test]
+    fn folders_name_the_processor() {
+        let name = cpu_folder("Intel(R) Xeon(R) Processor (family 6, model 167)");
+        assert_eq!(name, "intel-xeon-family-6-model-167");
+    }
+}

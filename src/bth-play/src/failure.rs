@@ -1,4 +1,4 @@
-//! How the program ends when something goes wrong.
+//! Errors: messages, codes, and exit codes.
 
 use serde_json::json;
 use std::io::Write;
@@ -22,7 +22,7 @@ pub(crate) enum Failure {
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
     Window(String),
-    /// Standard output was closed by its reader.
+    /// Standard output was closed by its reader, which is no error.
     ClosedOutput,
 }
 
@@ -78,11 +78,11 @@ impl Failure {
         }
     }
 
-    /// Says what went wrong and gives the exit code.
+    /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
         let (code, exit_code, message) = self.parts();
         if exit_code != 0 {
-            // Nothing can be done when the output is closed: the exit code tells.
+            // Where the outputs are closed, the exit code is all that can be reported.
             let _ = writeln!(std::io::stderr().lock(), "error: {message}");
             if wants_json {
                 let error = json!({"error": {"code": code, "message": message, "exit_code": exit_code}});
@@ -95,7 +95,7 @@ impl Failure {
 
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
-    // As above for a closed output.
+    // Where the output is closed, the exit code is all that can be reported.
     let _ = error.print();
     if !error.use_stderr() {
         return ExitCode::SUCCESS;

@@ -1,23 +1,27 @@
-//! Scene manifests and models: compiled by the `bthc` beside this program into the cache, and mapped there.
+//! Scene manifests and models as input: `bthc`, in the folder of this program, compiles them into the cache, from which they
+//! are mapped.
 
 use crate::failure::Failure;
 use bth_cache::{DEFAULT_CAP, Digest, Pin, Store};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What `bthc` compiles, by extension.
+/// Extensions of the files that `bthc` compiles.
 const SOURCES: [&str; 8] = ["manifest", "toml", "gltf", "glb", "obj", "ply", "stl", "off"];
 
-/// Whether a file is to be compiled first, by its extension.
+/// Whether a file must be compiled first, by its extension.
 pub(crate) fn is_source(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     extension.is_some_and(|e| SOURCES.contains(&e.as_str()))
 }
 
-/// The compiled file of a scene or model, checked, in the cache; compiled now if it is not there. It stays there while the
-/// value lives.
+/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. The cache does not evict
+/// it while the returned pin lives.
+///
+/// # Errors
+/// If the manifest is malformed, the source cannot be compiled, or the cache cannot be used.
 pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failure> {
-    // Its errors name the line.
+    // Read here, too, since the errors of this reader have their own codes, with line and column.
     if source
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("manifest") || e.eq_ignore_ascii_case("toml"))
@@ -35,11 +39,11 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
     })?;
     let store = Store::open(&folder, DEFAULT_CAP)
         .map_err(|e| Failure::File { path: folder.clone(), message: e.to_string() })?;
-    // An entry that is damaged, or evicted in between, is made again.
+    // An entry that is damaged, or evicted before it is pinned, is compiled again.
     for _ in 0..3 {
         let key = compile(source, &folder).map_err(&failed)?;
         let pin = store.find_id(&key).and_then(|record| store.pin(&record));
-        store.take_notes().iter().for_each(|note| crate::report::warn(note));
+        store.take_notes().iter().for_each(|note| crate::messages::warn(note));
         if let Some(pin) = pin {
             return Ok(pin);
         }
@@ -47,7 +51,7 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
     Err(failed("the compiled file does not stay in the cache".to_owned()))
 }
 
-/// Has `bthc` compile into the cache; the key, or what failed.
+/// Runs `bthc` to compile into the cache. Returns the key of the entry, or what failed.
 fn compile(source: &Path, cache: &Path) -> Result<Digest, String> {
     let bthc = std::env::current_exe()
         .ok()

@@ -1,9 +1,9 @@
-//! The legend of the heat map: a bar of its colours with numbers.
+//! The color bar of the heat map: its colours, with numbers.
 
-use crate::picture::{Picture, quantized};
-use crate::ramp;
+use super::color_map;
+use super::picture::{Picture, quantized};
 
-/// Digits of 3×5 pixels, a row of three bits each, from the top.
+/// Digits of 3×5 pixels: rows from the top, three bits each.
 const DIGITS: [[u8; 5]; 10] = [
     [7, 5, 5, 5, 7],
     [2, 6, 2, 2, 7],
@@ -19,7 +19,7 @@ const DIGITS: [[u8; 5]; 10] = [
 /// Numbers beside the bar.
 const TICKS: u32 = 4;
 
-/// Draws the legend for values from 0 to `maximum` at the right edge, if there is room.
+/// Draws the color bar for values from 0 to `maximum` at the right edge, if there is room.
 pub(crate) fn draw(picture: &mut Picture, maximum: u32) {
     let scale = (picture.height / 240).max(1);
     let digits = maximum.to_string().len() as u32;
@@ -32,10 +32,10 @@ pub(crate) fn draw(picture: &mut Picture, maximum: u32) {
     let left = picture.width - width - gap;
     for y in 0..height {
         let value = 1.0 - y as f32 / (height - 1).max(1) as f32;
-        let color = quantized(ramp::color(value));
+        let color = quantized(color_map::color(value));
         (0..bar).for_each(|x| picture.set(left + x, top + y, color));
     }
-    frame(picture, left, top, bar, height);
+    border(picture, left, top, bar, height);
     for tick in 0..=TICKS {
         let y = top + (height - 1) * (TICKS - tick) / TICKS;
         let value = (f64::from(maximum) * f64::from(tick) / f64::from(TICKS)).round() as u32;
@@ -44,7 +44,7 @@ pub(crate) fn draw(picture: &mut Picture, maximum: u32) {
     }
 }
 
-fn frame(picture: &mut Picture, left: u32, top: u32, width: u32, height: u32) {
+fn border(picture: &mut Picture, left: u32, top: u32, width: u32, height: u32) {
     for x in 0..width {
         picture.set(left + x, top, [255; 3]);
         picture.set(left + x, top + height - 1, [255; 3]);
@@ -56,11 +56,11 @@ fn frame(picture: &mut Picture, left: u32, top: u32, width: u32, height: u32) {
 }
 
 fn number(picture: &mut Picture, value: u32, left: u32, top: u32, scale: u32) {
-    for (place, digit) in value.to_string().bytes().enumerate() {
+    for (position, digit) in value.to_string().bytes().enumerate() {
         let rows = DIGITS[usize::from(digit - b'0')];
         for (y, row) in rows.into_iter().enumerate() {
             for x in (0..3).filter(|x| row >> (2 - x) & 1 == 1) {
-                let at = (left + (place as u32 * 4 + x) * scale, top + y as u32 * scale);
+                let at = (left + (position as u32 * 4 + x) * scale, top + y as u32 * scale);
                 for i in 0..scale * scale {
                     picture.set(at.0 + i % scale, at.1 + i / scale, [255; 3]);
                 }

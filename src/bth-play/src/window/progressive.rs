@@ -1,12 +1,11 @@
-//! The picture in the window: coarse while things move, refined sample by sample while they do not.
+//! Progressive rendering for the window: coarse while camera or scene move, refined sample by sample while they do not.
 
 use crate::args::Args;
-use crate::camera::Camera;
-use crate::develop::develop;
+use crate::camera::{Camera, SceneSetup};
 use crate::failure::Failure;
-use crate::frame::{Frame, Tile, pixel_count, tile_count};
-use crate::picture::Picture;
-use crate::stage::Stage;
+use crate::output::{Picture, to_picture};
+use crate::render::{Tile, pixel_count, render_tile, tile_count};
+use crate::shading::{FrameContext, Shader};
 use bth::Scene;
 use glam::Vec3;
 use rayon::ThreadPool;
@@ -14,37 +13,37 @@ use rayon::prelude::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// A picture while things move takes about so long.
+/// Target time of a picture while something moves.
 const MOVING: Duration = Duration::from_millis(40);
-/// Work that is done before the window looks at its events again.
+/// Time that is spent on rendering before the window handles its events.
 const SLICE: Duration = Duration::from_millis(25);
-/// Coarsest picture: the side of the squares of pixels that get one sample.
+/// Greatest side of the squares of pixels that share a sample.
 const COARSEST: u32 = 8;
 
-/// What is seen, and how.
-pub(crate) struct Canvas {
-    /// Of the program, but for the mode and the size, which are those of the picture at work.
+/// A picture that is refined over time.
+pub(super) struct ProgressiveRenderer {
+    /// The options of the program, but with the mode and size of the picture that is being rendered.
     args: Args,
-    /// Pixels of the window.
+    /// Width and height of the window, pixels.
     size: (u32, u32),
     /// Side of the squares of pixels that share a sample.
     block: u32,
     /// Sums of the samples of each pixel.
     sums: Vec<Vec3>,
-    /// Samples that all pixels have.
+    /// Samples that every pixel has got.
     passes: u32,
-    /// Tiles of the next sample that are done.
+    /// Tiles of the next sample that are finished.
     tiles: u32,
-    /// Time that this sample took so far.
+    /// Time spent on the next sample so far.
     spent: Duration,
-    /// Seconds that a sample of a pixel took last.
+    /// Seconds per pixel of the last finished sample.
     cost: f64,
 }
 
-impl Canvas {
-    /// An empty canvas.
-    pub(crate) fn new(args: &Args) -> Self {
-        let mut canvas = Self {
+impl ProgressiveRenderer {
+    /// A renderer without any samples.
+    pub(super) fn new(args: &Args) -> Self {
+        let mut renderer = Self {
             args: args.clone(),
             size: args.size,
             block: 1,
@@ -54,43 +53,44 @@ impl Canvas {
             spent: Duration::ZERO,
             cost: 0.0,
         };
-        canvas.restart(false);
-        canvas
+        renderer.restart(false);
+        renderer
     }
 
-    /// Options, with the size of the window.
-    pub(crate) fn args(&self) -> Args {
+    /// The options, with the current mode and the size of the window.
+    pub(super) fn args(&self) -> Args {
         let mut args = self.args.clone();
         args.size = self.size;
         args
     }
 
-    /// Pixels of the window.
-    pub(crate) fn size(&self) -> (u32, u32) {
+    /// Width and height of the window, pixels.
+    pub(super) fn size(&self) -> (u32, u32) {
         self.size
     }
 
-    /// Samples that all pixels have; 0 while the picture is coarse.
-    pub(crate) fn samples(&self) -> u32 {
+    /// Samples that every pixel has got; 0 while the picture is coarse.
+    pub(super) fn samples(&self) -> u32 {
         if self.block == 1 { self.passes } else { 0 }
     }
 
-    /// Shows another mode.
-    pub(crate) fn set_mode(&mut self, mode: crate::args::Mode) {
+    /// Switches to another mode.
+    pub(super) fn set_mode(&mut self, mode: crate::args::Mode) {
         self.args.mode = mode;
         self.restart(false);
     }
 
-    /// The window has another size.
-    pub(crate) fn resize(&mut self, size: (u32, u32)) {
+    /// Adapts to the size of the window.
+    pub(super) fn resize(&mut self, size: (u32, u32)) {
         if size != self.size {
             self.size = size;
             self.restart(false);
         }
     }
 
-    /// What was drawn is no longer what there is to see. While things move, pictures are so coarse that they come fast.
-    pub(crate) fn restart(&mut self, moving: bool) {
+    /// Discards all samples, since camera, scene or mode changed. While something moves, pictures become coarse enough to be
+    /// rendered in about [`MOVING`].
+    pub(super) fn restart(&mut self, moving: bool) {
         self.block = 1;
         let pixels = pixel_count(self.size) as f64;
         while moving
@@ -108,39 +108,40 @@ impl Canvas {
         (self.passes, self.tiles, self.spent) = (0, 0, Duration::ZERO);
     }
 
-    /// Whether all is drawn, with so many samples.
-    pub(crate) fn is_done(&self, samples: u32) -> bool {
+    /// Whether every pixel of the fine picture has so many samples.
+    pub(super) fn is_done(&self, samples: u32) -> bool {
         self.block == 1 && self.passes >= samples
     }
 
-    /// Goes on drawing for a moment; returns the picture when all pixels have got another sample.
+    /// Renders for about [`SLICE`]; returns the picture when all pixels have got another sample.
     ///
     /// # Errors
     /// If the file lacks what the mode needs.
-    pub(crate) fn draw(
+    pub(super) fn render(
         &mut self,
         scene: &Scene,
         file: &Path,
-        stage: &Stage,
+        setup: &SceneSetup,
         camera: Camera,
         pool: &ThreadPool,
     ) -> Result<Option<Picture>, Failure> {
         if self.block > 1 && self.passes > 0 {
-            // It was coarse, and nothing has moved since.
+            // A coarse picture is finished, and nothing has moved since it was begun.
             self.block = 1;
             self.clear();
         }
         let start = Instant::now();
-        let frame = Frame::new(scene, file, stage, camera, &self.args)?;
-        let shader = frame.shader();
+        let frame = FrameContext::new(scene, file, setup, camera, &self.args)?;
+        let shader = Shader::new(&frame);
         let (count, width) = (tile_count(self.args.size), self.args.size.0);
         let step = 4 * pool.current_num_threads() as u32;
         while self.tiles < count && start.elapsed() < SLICE {
             let end = (self.tiles + step).min(count);
-            let draw = |number: u32| frame.tile(number, self.passes..self.passes + 1, &shader);
-            let tiles: Vec<Tile> = pool.install(|| (self.tiles..end).into_par_iter().map(draw).collect());
+            let indices = self.passes..self.passes + 1;
+            let render = |number: u32| render_tile(&frame, number, indices.clone(), &shader);
+            let tiles: Vec<Tile> = pool.install(|| (self.tiles..end).into_par_iter().map(render).collect());
             for tile in &tiles {
-                tile.place(&mut self.sums, width, |sum, color| *sum += color);
+                tile.write_to(&mut self.sums, width, |sum, color| *sum += color);
             }
             self.tiles = end;
         }
@@ -152,6 +153,6 @@ impl Canvas {
         self.passes += 1;
         (self.tiles, self.spent) = (0, Duration::ZERO);
         let means: Vec<Vec3> = self.sums.iter().map(|sum| *sum / self.passes as f32).collect();
-        Ok(Some(develop(&means, &self.args)))
+        Ok(Some(to_picture(&means, &self.args)))
     }
 }

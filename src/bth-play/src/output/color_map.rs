@@ -1,4 +1,4 @@
-//! The colours of the heat map: black over violet and orange to pale yellow.
+//! The color map of the heat map: black over violet and orange to pale yellow.
 
 /// Inferno-like stops (after the map of Smith and van der Walt, 2015), sRGB.
 const STOPS: [[f32; 3]; 9] = [

@@ -12,8 +12,8 @@ pub(crate) struct Picture {
     pub(crate) pixels: Vec<[u8; 3]>,
 }
 
-/// A linear component in sRGB (IEC 61966-2-1).
-pub(crate) fn srgb(linear: f32) -> f32 {
+/// A linear component in sRGB (IEC 61966-2-1); values above 1 are clipped.
+pub(super) fn srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 {
         linear.max(0.0) * 12.92
     } else {
@@ -21,14 +21,14 @@ pub(crate) fn srgb(linear: f32) -> f32 {
     }
 }
 
-/// Rounds a component from 0 to 1 to 8 bits.
-pub(crate) fn quantized(color: [f32; 3]) -> [u8; 3] {
+/// Rounds components from 0 to 1 to 8 bits.
+pub(super) fn quantized(color: [f32; 3]) -> [u8; 3] {
     color.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
 impl Picture {
-    /// Sets a pixel; outside the picture nothing happens.
-    pub(crate) fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
+    /// Sets a pixel, if it lies within the picture.
+    pub(super) fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
         if x < self.width && y < self.height {
             self.pixels[y as usize * self.width as usize + x as usize] = color;
         }
@@ -38,38 +38,44 @@ impl Picture {
     fn encoded(&self) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
-        describe(&mut encoder);
+        set_format(&mut encoder);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(self.pixels.as_flattened())?;
         writer.finish()?;
         Ok(bytes)
     }
 
-    /// Writes a PNG file that is whole or absent.
+    /// Writes a PNG file, atomically.
+    ///
+    /// # Errors
+    /// `BTH-P002` if it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
         let bytes =
             self.encoded().map_err(|e| Failure::File { path: path.into(), message: e.to_string() })?;
-        write_whole(path, &bytes)
+        write_atomically(path, &bytes)
     }
 }
 
-/// Sets what all our PNG files have in common.
-pub(crate) fn describe<W: Write>(encoder: &mut png::Encoder<'_, W>) {
+/// Sets the pixel format and color space of a PNG file or animation.
+pub(super) fn set_format<W: Write>(encoder: &mut png::Encoder<'_, W>) {
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
 }
 
-/// Whether a file is a whole PNG file of this size.
-pub(crate) fn is_whole(path: &Path, (width, height): (u32, u32)) -> bool {
+/// Whether a file is a complete PNG file of this size.
+pub(super) fn is_complete(path: &Path, (width, height): (u32, u32)) -> bool {
     let Ok(bytes) = std::fs::read(path) else { return false };
     let end = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
     let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
     bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(16..24) == Some(&size) && bytes.ends_with(&end)
 }
 
-/// Writes a file that is whole or absent.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+/// Writes a file by renaming a finished temporary one, so that it is never seen in part.
+///
+/// # Errors
+/// `BTH-P002` if it cannot be written.
+pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let failed = |e: &dyn std::fmt::Display| Failure::File { path: path.into(), message: e.to_string() };
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -79,7 +85,7 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     builder.prefix(".bth-play-").suffix(".tmp");
     #[cfg(unix)]
     {
-        // As for any new file: what the umask leaves of these.
+        // The permissions of any new file, which the umask reduces; temporary files get fewer by default.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }

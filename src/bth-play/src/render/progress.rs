@@ -1,18 +1,17 @@
 //! Progress on a terminal.
 
+use super::tile::tile_count;
 use crate::args::Args;
-use crate::frame::TILE;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 
-/// A bar that counts tiles; none where standard error is no terminal.
-pub(crate) struct Progress(ProgressBar);
+/// A bar that counts tiles, shown only where standard error is a terminal.
+pub(super) struct Progress(ProgressBar);
 
 impl Progress {
-    /// For so many frames.
-    pub(crate) fn new(frames: &[i32], args: &Args) -> Self {
-        let (width, height) = args.size;
-        let tiles = u64::from(width.div_ceil(TILE)) * u64::from(height.div_ceil(TILE)) * frames.len() as u64;
+    /// A bar for the tiles of all these frames.
+    pub(super) fn new(frames: &[i32], args: &Args) -> Self {
+        let tiles = u64::from(tile_count(args.size)) * frames.len() as u64;
         let visible = std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(tiles), target);
@@ -26,13 +25,13 @@ impl Progress {
         Self(bar)
     }
 
-    /// A tile is done.
-    pub(crate) fn tile_done(&self) {
+    /// Counts a finished tile.
+    pub(super) fn tile_done(&self) {
         self.0.inc(1);
     }
 
-    /// Ends a frame.
-    pub(crate) fn done(&self) {
+    /// Redraws the bar after a frame.
+    pub(super) fn frame_done(&self) {
         self.0.tick();
     }
 }

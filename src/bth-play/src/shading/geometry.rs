@@ -1,25 +1,26 @@
-//! The geometry that rays hit, as kept in the file: normals of instances in the world.
+//! Normals at hits, computed from the source geometry that the file keeps, in world space.
 
 use crate::failure::Failure;
 use bth::Scene;
 use bth::rays::{Hit, Surface};
 use bth_format::object::ObjectView;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::path::Path;
 
-/// Surfaces of a scene at its time. Computed in f64, so that no product of two f32 lengths overflows or underflows.
-pub(crate) struct Surfaces<'a> {
+/// The geometry of a scene at the time to which it is set. Normals are computed in f64, so that no product of two f32
+/// lengths overflows or underflows.
+pub(crate) struct ShadingGeometry<'a> {
     scene: &'a Scene,
     objects: Vec<ObjectView<'a>>,
-    /// Per instance its object.
+    /// The object of each instance.
     object_of: Vec<u32>,
 }
 
-pub(crate) fn wide(p: [f32; 3]) -> DVec3 {
-    DVec3::from_array(p.map(f64::from))
+fn to_f64(p: [f32; 3]) -> DVec3 {
+    Vec3::from_array(p).as_dvec3()
 }
 
-impl<'a> Surfaces<'a> {
+impl<'a> ShadingGeometry<'a> {
     pub(crate) fn new(scene: &'a Scene) -> Self {
         Self {
             scene,
@@ -28,8 +29,8 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Fails when the file was compiled without the source's geometry, which normals need.
-    pub(crate) fn require_geometry(&self, file: &Path) -> Result<(), Failure> {
+    /// Fails when the file was compiled without the source's positions and triangles, which normals need.
+    pub(crate) fn require_triangles(&self, file: &Path) -> Result<(), Failure> {
         if self.objects.iter().all(|view| view.triangles.len() == view.header.triangles as usize) {
             return Ok(());
         }
@@ -46,7 +47,7 @@ impl<'a> Surfaces<'a> {
 
     fn to_world(&self, surface: Surface, normal: DVec3) -> Option<DVec3> {
         let normal = DVec3::from_array(self.scene.normal_to_world(surface.instance, normal.to_array()));
-        // Scaled first: the square of a tiny length is no number any more.
+        // Scaled first, since the square of a tiny length underflows.
         (normal / normal.abs().max_element()).try_normalize()
     }
 
@@ -54,9 +55,9 @@ impl<'a> Surfaces<'a> {
     pub(crate) fn geometric_normal(&self, surface: Surface, towards: DVec3) -> DVec3 {
         let object = self.object(surface);
         let [a, b, c] =
-            object.triangles[surface.triangle as usize].map(|v| wide(object.positions[v as usize]));
+            object.triangles[surface.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
         let (e, f) = (b - a, c - a);
-        // As above: the cross product of edges of 1e-20 is still far from underflow in f64, its square is not.
+        // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
         let scale = e.abs().max_element().max(f.abs().max_element());
         let normal = self.to_world(surface, (e / scale).cross(f / scale)).unwrap_or(towards);
         if normal.dot(towards) < 0.0 { -normal } else { normal }
@@ -70,7 +71,7 @@ impl<'a> Surfaces<'a> {
         if object.normals.is_empty() {
             return geometric;
         }
-        let [a, b, c] = corners.map(|row| wide(object.normals[row as usize]));
+        let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         match self.to_world(hit.surface, a * (1.0 - u - v) + b * u + c * v) {
             Some(normal) if normal.dot(geometric) < 0.0 => -normal,

@@ -3,7 +3,6 @@
 pub mod conformance;
 pub mod crowd;
 pub mod rays;
-pub mod rng;
 pub mod stress;
 pub mod structures;
 

@@ -113,7 +113,9 @@ fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
         return near(a.u, b.u) && near(a.v, b.v);
     }
     let named = triangles.iter().find(|t| t.id == a.surface.triangle);
-    named.and_then(|t| oracle::crossing(ray, t.corners)).is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
+    named
+        .and_then(|t| oracle::intersection(ray, t.corners))
+        .is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
 }
 
 /// Nearest and any hits, in batches, coherent ones too, and alone, with every instruction set, against every triangle.

@@ -1,8 +1,10 @@
 //! A whole scene: every triangle of every instance, transformed exactly.
 
-use crate::crossing::{Crossing, Point, clearly_missed, cross, crossing, has_line, integer};
 use crate::geometry::{Triangle, triangles};
-use crate::nearest::{Truth, nearest_of};
+use crate::intersection::{
+    Intersection, Point, certainly_missed, has_line, integer, intersect_exactly, intersection,
+};
+use crate::nearest::{ExactHit, nearest_of};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use num_bigint::BigInt;
@@ -59,8 +61,8 @@ impl World {
     }
 
     /// The nearest exact hit.
-    pub fn nearest(&self, ray: &Ray) -> Option<Truth<Surface>> {
-        nearest_of(ray, self.crossings(ray))
+    pub fn nearest(&self, ray: &Ray) -> Option<ExactHit<Surface>> {
+        nearest_of(ray, self.intersections(ray))
     }
 
     /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
@@ -77,16 +79,16 @@ impl World {
 
     /// Whether anything is hit.
     pub fn any(&self, ray: &Ray) -> bool {
-        self.crossings(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
+        self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }
 
-    fn crossings<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Crossing)> + 'a {
+    fn intersections<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Intersection)> + 'a {
         self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
             instance.triangles.iter().filter_map(move |triangle| {
                 let surface = Surface { instance: instance.number, triangle: triangle.id };
                 let at = match &instance.to_world {
-                    None => crossing(ray, triangle.corners)?,
-                    Some(rows) => crossing_in_world(ray, rows, triangle.corners)?,
+                    None => intersection(ray, triangle.corners)?,
+                    Some(rows) => intersection_in_world(ray, rows, triangle.corners)?,
                 };
                 Some((surface, at))
             })
@@ -94,8 +96,8 @@ impl World {
     }
 }
 
-/// As [`crossing`], of a triangle that a transform moves.
-fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Crossing> {
+/// As [`intersection`], of a triangle that a transform moves.
+fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Intersection> {
     let wide = |v: [f32; 3]| v.map(f64::from);
     let (origin, direction) = (wide(ray.origin), wide(ray.direction));
     let mut magnitude: f64 = 0.0;
@@ -108,7 +110,7 @@ fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) ->
             terms.iter().sum()
         })
     });
-    if clearly_missed(direction, from, magnitude) {
+    if certainly_missed(direction, from, magnitude) {
         return None;
     }
     let widen = |v: [f32; 3]| v.map(|x| integer(x) << UNITS[0]);
@@ -119,5 +121,5 @@ fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) ->
             a * &p[0] + b * &p[1] + c * &p[2] + (moved << UNITS[1])
         })
     };
-    cross(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
+    intersect_exactly(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
 }

@@ -28,17 +28,18 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
     {
         bth_scene::read(source)?;
     }
-    let failed = |message: String| Failure::Manifest {
+    let failed = |(message, exit): (String, u8)| Failure::Source {
         path: source.into(),
         message,
+        exit,
         hint: format!("run: bthc compile {} -o scene.bth, then play scene.bth", source.display()),
     };
     let folder = cache.map(Path::to_owned).or_else(bth_cache::folder);
     let folder = folder.ok_or_else(|| {
-        failed("there is no folder for the cache; BTH_CACHE_DIR or --cache-dir names one".to_owned())
+        failed(("there is no folder for the cache; BTH_CACHE_DIR or --cache-dir names one".to_owned(), 3))
     })?;
     let store = Store::open(&folder, DEFAULT_CAP)
-        .map_err(|e| Failure::File { path: folder.clone(), message: e.to_string() })?;
+        .map_err(|e| Failure::File { path: folder.clone(), message: format!("cannot be the cache: {e}") })?;
     // An entry that is damaged, or evicted before it is pinned, is compiled again.
     for _ in 0..3 {
         let key = compile(source, &folder).map_err(&failed)?;
@@ -48,29 +49,30 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
             return Ok(pin);
         }
     }
-    Err(failed("the compiled file does not stay in the cache".to_owned()))
+    Err(failed(("the compiled file does not stay in the cache".to_owned(), 3)))
 }
 
-/// Runs `bthc` to compile into the cache. Returns the key of the entry, or what failed.
-fn compile(source: &Path, cache: &Path) -> Result<Digest, String> {
+/// Runs `bthc` to compile into the cache. Returns the key of the entry, or what failed and the exit code for it.
+fn compile(source: &Path, cache: &Path) -> Result<Digest, (String, u8)> {
     let bthc = std::env::current_exe()
         .ok()
         .map(|exe| exe.with_file_name(format!("bthc{}", std::env::consts::EXE_SUFFIX)))
         .filter(|bthc| bthc.is_file());
     let Some(bthc) = bthc else {
-        return Err("it is not compiled yet, and there is no bthc beside this program".to_owned());
+        return Err(("it is not compiled yet, and there is no bthc beside this program".to_owned(), 3));
     };
     let mut command = Command::new(&bthc);
     command.arg("compile").arg(source).arg("--in-cache").arg("--cache-dir").arg(cache).arg("--json");
     let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
     let output = match output {
         Ok(output) => output,
-        Err(e) => return Err(format!("{} cannot be started: {e}", bthc.display())),
+        Err(e) => return Err((format!("{} cannot be started: {e}", bthc.display()), 3)),
     };
     if !output.status.success() {
-        return Err(format!("{} ended with {}", bthc.display(), output.status));
+        let exit = if output.status.code() == Some(4) { 4 } else { 3 };
+        return Err((format!("{} ended with {}", bthc.display(), output.status), exit));
     }
     let json: Option<serde_json::Value> = serde_json::from_slice(&output.stdout).ok();
     let key = json.as_ref().and_then(|json| Digest::parse(json["cache"]["key"].as_str()?));
-    key.ok_or_else(|| format!("{} did not say where it put the compiled file", bthc.display()))
+    key.ok_or_else(|| (format!("{} did not name the entry of the compiled file", bthc.display()), 3))
 }

@@ -16,8 +16,8 @@ pub(crate) enum Failure {
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
     /// A scene manifest that does not follow the format (exit code 3, or 4 when it could not be read).
     BadManifest(bth_scene::Error),
-    /// A scene manifest that is not compiled (exit code 3).
-    Manifest { path: PathBuf, message: String, hint: String },
+    /// A scene or model that could not be compiled (exit code 3, or 4 when it could not be read).
+    Source { path: PathBuf, message: String, hint: String, exit: u8 },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
@@ -51,7 +51,7 @@ impl From<bth_scene::Error> for Failure {
 impl Failure {
     fn parts(&self) -> (&str, u8, String) {
         match self {
-            Self::Usage(message) => ("BTH-U001", 2, message.clone()),
+            Self::Usage(message) => ("BTH-U001", 2, format!("BTH-U001: {message}")),
             Self::Runtime(error) => (
                 error.code().as_str(),
                 if error.code() == bth::Code::Read { 4 } else { 3 },
@@ -61,8 +61,8 @@ impl Failure {
                 let exit = if error.code == bth_scene::error::code::READ { 4 } else { 3 };
                 (error.code, exit, error.to_string())
             }
-            Self::Manifest { path, message, hint } => {
-                ("BTH-P003", 3, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
+            Self::Source { path, message, hint, exit } => {
+                ("BTH-P003", *exit, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
             }
             Self::Lacks { file, what, hint } => {
                 ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))

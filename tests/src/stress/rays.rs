@@ -2,7 +2,7 @@
 
 use super::grid::{GridRay, LIMIT, Point};
 use super::shapes::Shape;
-use crate::rng::Rng;
+use bth_random::Rng;
 
 /// How a ray was made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,7 +71,7 @@ fn sub(a: Point, b: Point) -> Point {
 
 /// `count` rays, of the kinds in turn.
 pub fn rays(shape: &Shape, count: usize, seed: u64) -> Vec<Aimed> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     // What leaves the grid, or does not move, is drawn again.
     let draw = |i: usize| loop {
         let aimed = ray(shape, Kind::ALL[i % Kind::ALL.len()], &mut rng);

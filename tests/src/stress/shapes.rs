@@ -1,7 +1,7 @@
 //! The catalogue: closed surfaces that are hard.
 
 use super::grid::{Grid, LIMIT, Point};
-use crate::rng::Rng;
+use bth_random::Rng;
 use bth_scenes::Model;
 use std::collections::BTreeMap;
 
@@ -155,7 +155,7 @@ fn append(grid: &mut Grid, other: &Grid, by: Point) {
 
 /// Small cubes at random places, which may overlap.
 fn scattered(name: &'static str, count: i32) -> Shape {
-    let (mut grid, mut rng) = (Grid { exponent: -8, ..Grid::default() }, Rng(77));
+    let (mut grid, mut rng) = (Grid { exponent: -8, ..Grid::default() }, Rng::new(77));
     let small = cube("", 1, 1024).grid;
     let mut inside = Vec::new();
     for _ in 0..count {

@@ -101,7 +101,7 @@ impl Tally {
         let ray = &aimed.ray;
         if hit.is_hit() {
             self.hits += 1;
-            let exact = shape.grid.crossing(ray, hit.surface.triangle);
+            let exact = shape.grid.intersection(ray, hit.surface.triangle);
             if exact.is_none() || !within(ray.range, hit.t) {
                 self.ghosts += 1;
                 self.example("ghost", shape, aimed, hit);
@@ -132,7 +132,7 @@ impl Tally {
         let (grid, mut nearest) = (&shape.grid, f32::INFINITY);
         let mut least = u32::MAX;
         for row in 0..grid.triangles.len() as u32 {
-            let Some(t) = grid.crossing(&aimed.ray, row).map(|t| t.value() as f32) else { continue };
+            let Some(t) = grid.intersection(&aimed.ray, row).map(|t| t.value() as f32) else { continue };
             if within(aimed.ray.range, t) && t < nearest {
                 (nearest, least) = (t, row);
             }
@@ -161,5 +161,5 @@ fn known(shape: &Shape, aimed: &Aimed) -> Option<Quotient> {
     };
     let around = shape.around[vertex as usize].iter();
     let mut at = around.filter(|row| shape.grid.triangles[**row as usize].contains(&other));
-    at.find_map(|row| shape.grid.crossing(&aimed.ray, *row))
+    at.find_map(|row| shape.grid.intersection(&aimed.ray, *row))
 }

@@ -92,7 +92,7 @@ fn check(model: &Model, seed: u64) -> Result<(), TestCaseError> {
             "t: {hit:?}, exactly {truth:?}"
         );
         if !truth.triangles.contains(&hit.surface.triangle) {
-            let at = oracle::crossing(ray, corners[hit.surface.triangle as usize]);
+            let at = oracle::intersection(ray, corners[hit.surface.triangle as usize]);
             let gap = at.map(|at| (oracle::to_f64(&at.t) - truth.t_f64()).abs());
             prop_assert!(
                 gap.is_some_and(|gap| gap <= truth.t_f64().abs() * 1e-12),

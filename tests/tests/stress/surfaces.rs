@@ -42,7 +42,7 @@ fn a_missed_and_a_made_up_hit_are_counted() {
         tally.check(shape, &aimed, &Hit::MISS);
         assert_eq!(tally.leaks, u64::from(aimed.kind == Kind::Inside), "{aimed:?}");
         let missed = (0..shape.grid.triangles.len() as u32)
-            .find(|row| shape.grid.crossing(&aimed.ray, *row).is_none());
+            .find(|row| shape.grid.intersection(&aimed.ray, *row).is_none());
         let surface = Surface { instance: 0, triangle: missed.expect("no ray meets all") };
         tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, surface });
         assert_eq!(tally.ghosts, 1, "{aimed:?}");

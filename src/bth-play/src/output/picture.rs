@@ -71,12 +71,21 @@ pub(super) fn is_complete(path: &Path, (width, height): (u32, u32)) -> bool {
     bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(16..24) == Some(&size) && bytes.ends_with(&end)
 }
 
+/// The text of an error number of the system.
+fn system_message(number: i32) -> String {
+    std::io::Error::from_raw_os_error(number).to_string()
+}
+
 /// Writes a file by renaming a finished temporary one, so that it is never seen in part.
 ///
 /// # Errors
 /// `BTH-P002` if it cannot be written.
 pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |e: &dyn std::fmt::Display| Failure::File { path: path.into(), message: e.to_string() };
+    // The message of the system alone: errors of temporary files also name these.
+    let failed = |e: &std::io::Error| {
+        let reason = e.raw_os_error().map_or_else(|| e.to_string(), system_message);
+        Failure::File { path: path.into(), message: format!("cannot write: {reason}") }
+    };
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -94,7 +94,7 @@ fn all(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> Result<(), Fa
     let report = |(job, result): (&Job, Result<Done, Failure>)| match result {
         Ok(done) => done.json,
         Err(failure) => {
-            failure.say();
+            failure.print();
             json!({"model": job.model.to_string_lossy(), "error": failure.json()})
         }
     };

@@ -36,7 +36,7 @@ pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> R
             match with_threads(setting.args.threads, || one(setting, job, progress))? {
                 Ok(done) => output::text(&format!("{}\n", done.line))?,
                 Err(Failure::Compile(bth_compile::Error::Cancelled)) => break,
-                Err(failure) => failure.say(),
+                Err(failure) => failure.print(),
             }
         }
         if progress.cancelled() {

@@ -1,17 +1,17 @@
-//! One line and one triangle.
+//! The exact intersection of a line and a triangle.
 
 use bth::rays::Ray;
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive, Zero};
 
-/// A point in integer coordinates; the unit is the caller's.
+/// A point in integer coordinates, in a unit that the caller chooses.
 pub(crate) type Point = [BigInt; 3];
 
-/// Where a line meets a triangle.
+/// The point at which a line meets a triangle.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Crossing {
-    /// In units of the direction.
+pub struct Intersection {
+    /// Parameter of the point along the ray: origin + t * direction.
     pub t: BigRational,
     /// Barycentric weight of the second corner.
     pub u: BigRational,
@@ -19,7 +19,7 @@ pub struct Crossing {
     pub v: BigRational,
 }
 
-/// A number rounded to f64.
+/// A quotient rounded to the nearest f64.
 pub fn to_f64(t: &BigRational) -> f64 {
     t.to_f64().expect("quotients of f32 input are within the range of f64")
 }
@@ -49,9 +49,9 @@ pub(crate) fn has_line(ray: &Ray) -> bool {
     ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) && ray.direction != [0.0; 3]
 }
 
-/// Whether a line certainly passes by a triangle. Corners are seen from the line's origin, each coordinate off by at
-/// most 2^-52 of `magnitude` and of itself.
-pub(crate) fn clearly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnitude: f64) -> bool {
+/// Whether a line certainly misses a triangle. The corners are relative to the origin of the line; each coordinate has an
+/// error of at most 2^-52 times the sum of `magnitude` and itself.
+pub(crate) fn certainly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnitude: f64) -> bool {
     let (mut positive, mut negative) = (false, false);
     for (p, q) in [(0, 1), (1, 2), (2, 0)] {
         let (mut value, mut size) = (0.0, 0.0);
@@ -61,7 +61,7 @@ pub(crate) fn clearly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnit
             value += direction[i] * (x - y);
             size += direction[i].abs() * (reach(p, j) * reach(q, k) + reach(p, k) * reach(q, j));
         }
-        // Below, products of transformed corners may have underflowed.
+        // The bound on the rounding error does not hold where products have underflowed.
         if size > 1e-280 {
             positive |= value > 1e-13 * size;
             negative |= value < -1e-13 * size;
@@ -70,36 +70,40 @@ pub(crate) fn clearly_missed(direction: [f64; 3], corners: [[f64; 3]; 3], magnit
     positive && negative
 }
 
-/// Where the line through `origin` along `direction` meets a closed triangle; all in the same unit.
-pub(crate) fn cross(origin: &Point, direction: &Point, corners: &[Point; 3]) -> Option<Crossing> {
+/// The intersection of the line through `origin` along `direction` with a closed triangle; all in the same unit.
+pub(crate) fn intersect_exactly(
+    origin: &Point,
+    direction: &Point,
+    corners: &[Point; 3],
+) -> Option<Intersection> {
     let [a, b, c] = [0, 1, 2].map(|i| sub(&corners[i], origin));
     let sides =
         [determinant(direction, &b, &c), determinant(direction, &c, &a), determinant(direction, &a, &b)];
     let (positive, negative) = (sides.iter().any(Signed::is_positive), sides.iter().any(Signed::is_negative));
-    // Neither: the line lies in the plane, or the triangle has no area as seen along it.
+    // Both signs: the line misses. Neither sign: the line lies in the plane, or the triangle has no area as seen along it.
     if positive == negative {
         return None;
     }
     let whole: BigInt = sides.iter().sum();
     debug_assert!(!whole.is_zero());
     let [_, u, v] = sides;
-    Some(Crossing {
+    Some(Intersection {
         t: BigRational::new(determinant(&a, &b, &c), whole.clone()),
         u: BigRational::new(u, whole.clone()),
         v: BigRational::new(v, whole),
     })
 }
 
-/// Where the line of a ray, both ways and whatever its range, meets a closed triangle.
-pub fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Crossing> {
+/// The intersection of the whole line of a ray, in both directions and whatever its range, with a closed triangle.
+pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     if !has_line(ray) {
         return None;
     }
     let from = corners.map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(ray.origin[k])));
-    if clearly_missed(ray.direction.map(f64::from), from, 0.0) {
+    if certainly_missed(ray.direction.map(f64::from), from, 0.0) {
         return None;
     }
-    cross(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
+    intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
 }
 
 #[cfg(test)]
@@ -140,15 +144,15 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(3000))]
-        /// The filter skips nothing that is met.
+        /// The filter never skips a triangle that the line meets.
         #[test]
-        fn what_is_clearly_missed_is_not_crossed(ray in ray(), corners in prop::array::uniform3(prop::array::uniform3(number()))) {
+        fn the_filter_changes_no_intersection(ray in ray(), corners in prop::array::uniform3(prop::array::uniform3(number()))) {
             prop_assume!(has_line(&ray));
-            let exact = cross(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)));
-            prop_assert_eq!(crossing(&ray, corners), exact);
+            let exact = intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)));
+            prop_assert_eq!(intersection(&ray, corners), exact);
         }
 
-        /// A point with weights on a triangle is met from anywhere off its plane, with t, u and v as they were made.
+        /// A ray aimed at a point of a triangle from outside its plane meets it with the t, u and v of that point.
         #[test]
         fn a_point_of_a_triangle_is_met_there(
             corners in prop::array::uniform3(prop::array::uniform3(-50i32..50)),
@@ -162,9 +166,9 @@ mod tests {
             let (origin, scaled) = (f(origin), corners.map(f));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) / 4.0);
             let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
-            if let Some(found) = crossing(&ray, scaled) {
+            if let Some(found) = intersection(&ray, scaled) {
                 let eighth = |n: i32| BigRational::new(n.into(), 8.into());
-                prop_assert_eq!(found, Crossing { t: eighth(32), u: eighth(b), v: eighth(c) });
+                prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });
             } else {
                 // Only when the line lies in the plane or the triangle has no area.
                 let p = |q: [f32; 3]| sub(&q.map(integer), &origin.map(integer));

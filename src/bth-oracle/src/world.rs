@@ -1,8 +1,8 @@
-//! A whole scene: every triangle of every instance, transformed exactly.
+//! Exact queries to a whole scene: every triangle of every instance, transformed exactly.
 
 use crate::geometry::{Triangle, triangles};
 use crate::intersection::{
-    Intersection, Point, certainly_missed, has_line, integer, intersect_exactly, intersection,
+    Intersection, Point, certainly_missed, has_line, integer, intersect_exactly, intersection, to_f64,
 };
 use crate::nearest::{ExactHit, nearest_of};
 use bth::Scene;
@@ -12,9 +12,10 @@ use num_bigint::BigInt;
 /// The units of f64, 2^-1074, and of f32, 2^-149.
 const UNITS: [u32; 2] = [1074, 149];
 
-/// The instances of a scene at its time. Instances are where their transforms, as f64 numbers, put them: no rounding
-/// comes after, while tracing rounds the ray once in each object's space. So answers for transformed instances differ
-/// from the runtime's by that rounding; those for objects as they are do not.
+/// The visible instances of a scene at the time to which it is set. Vertices are transformed to world space by the f64
+/// matrix of the instance without any rounding, whereas the runtime transforms the ray into the space of the object and
+/// rounds it there. Answers for transformed instances therefore differ from the runtime's by that rounding; answers for
+/// instances without a transform are those of the runtime.
 #[derive(Debug)]
 pub struct World {
     instances: Vec<Instance>,
@@ -23,7 +24,7 @@ pub struct World {
 #[derive(Debug)]
 struct Instance {
     number: u32,
-    /// Rows of four; `None` for the identity.
+    /// From object to world space, rows of the matrix; `None` for the identity.
     to_world: Option<[[f64; 4]; 3]>,
     triangles: Vec<Triangle>,
 }
@@ -40,7 +41,7 @@ fn integer_f64(x: f64) -> BigInt {
 }
 
 impl World {
-    /// Collects what can be seen.
+    /// Collects the triangles of the visible instances.
     pub fn new(scene: &Scene) -> Self {
         let identity: [[f64; 4]; 3] =
             std::array::from_fn(|row| std::array::from_fn(|k| f64::from(u8::from(row == k))));
@@ -68,7 +69,7 @@ impl World {
     /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
     /// instance and triangle.
     pub fn hit(&self, ray: &Ray) -> Hit {
-        let rounded = |x: &_| crate::to_f64(x) as f32;
+        let rounded = |x: &_| to_f64(x) as f32;
         self.nearest(ray).map_or(Hit::MISS, |truth| Hit {
             t: rounded(&truth.at.t),
             u: rounded(&truth.at.u),
@@ -96,7 +97,7 @@ impl World {
     }
 }
 
-/// As [`intersection`], of a triangle that a transform moves.
+/// The intersection with a triangle that the rows of a matrix transform to world space.
 fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Intersection> {
     let wide = |v: [f32; 3]| v.map(f64::from);
     let (origin, direction) = (wide(ray.origin), wide(ray.direction));
@@ -105,7 +106,7 @@ fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]
         std::array::from_fn(|k| {
             let [a, b, c, moved] = rows[k];
             let terms = [a * p[0], b * p[1], c * p[2], moved, -origin[k]];
-            // Five terms, each with one rounding, and four sums: below 8 units of rounding of their sizes.
+            // Five terms with one rounding each and four sums: below 8 roundings of the sum of their magnitudes.
             magnitude = magnitude.max(8.0 * terms.iter().map(|x| x.abs()).sum::<f64>());
             terms.iter().sum()
         })

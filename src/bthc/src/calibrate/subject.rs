@@ -1,7 +1,7 @@
 //! A model to measure on: its structures, rays, and the steps that these take.
 
 use crate::failure::Failure;
-use crate::measure::{Rays, Run, Way, nanoseconds};
+use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth::Scene;
 use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
 use bth_compile::pipeline::{self, Options, Structure};
@@ -49,7 +49,7 @@ pub(crate) struct Timed {
     pub(crate) tets: [f64; 4],
     /// Nanoseconds through the tetrahedra one ray a call, by record.
     pub(crate) single: [f64; 4],
-    /// Tetrahedra on the way.
+    /// Tetrahedra on the query.
     pub(crate) steps: f64,
     /// Share of the rays that end at a triangle.
     pub(crate) hits: f64,
@@ -173,13 +173,13 @@ impl Subject {
     /// The scenes and the rays, in new places in memory.
     fn placed(&self) -> Result<Placed, Failure> {
         let scenes = self.files.iter().map(|file| bth::from_bytes(file)).collect::<Result<_, _>>()?;
-        let kinds = self.kinds().map(|(kind, way)| (kind.rays.clone(), way)).collect();
+        let kinds = self.kinds().map(|(kind, query)| (kind.rays.clone(), query)).collect();
         Ok(Placed { scenes, nothing: self.nothing.clone(), kinds })
     }
 
-    fn kinds(&self) -> impl Iterator<Item = (&Kind, Way)> {
-        let bounces = self.bounces.iter().map(|kind| (kind, Way::Nearest));
-        [(&self.outside, Way::Nearest), (&self.short, Way::Any)].into_iter().chain(bounces)
+    fn kinds(&self) -> impl Iterator<Item = (&Kind, QueryKind)> {
+        let bounces = self.bounces.iter().map(|kind| (kind, QueryKind::Nearest));
+        [(&self.outside, QueryKind::Nearest), (&self.short, QueryKind::Any)].into_iter().chain(bounces)
     }
 
     /// Takes the times of `runs` apart.
@@ -212,18 +212,18 @@ impl Subject {
 struct Placed {
     scenes: Vec<Scene>,
     nothing: Rays,
-    kinds: Vec<(Rays, Way)>,
+    kinds: Vec<(Rays, QueryKind)>,
 }
 
 impl Placed {
     /// What is timed: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
-    fn runs(&self) -> Vec<Run<'_>> {
+    fn runs(&self) -> Vec<TimedRun<'_>> {
         let (bvh, tets) = (&self.scenes[0], &self.scenes[1..]);
-        let mut runs: Vec<Run<'_>> = vec![(bvh, &self.nothing, Way::Nearest)];
-        for (rays, way) in &self.kinds {
-            runs.push((bvh, rays, *way));
-            runs.extend(tets.iter().map(|scene| (scene, rays, *way)));
-            runs.extend(tets.iter().map(|scene| (scene, rays, Way::Single)));
+        let mut runs: Vec<TimedRun<'_>> = vec![(bvh, &self.nothing, QueryKind::Nearest)];
+        for (rays, query) in &self.kinds {
+            runs.push((bvh, rays, *query));
+            runs.extend(tets.iter().map(|scene| (scene, rays, *query)));
+            runs.extend(tets.iter().map(|scene| (scene, rays, QueryKind::Single)));
         }
         runs
     }
@@ -236,7 +236,7 @@ impl Placed {
 /// If it was stopped.
 pub(crate) fn measure(
     subjects: &[Subject],
-    beside: Run<'_>,
+    beside: TimedRun<'_>,
     rounds: usize,
     stop: impl Fn() -> bool,
 ) -> Result<(Vec<Times>, f64), Failure> {

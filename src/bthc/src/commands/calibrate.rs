@@ -3,7 +3,7 @@
 use crate::args::Calibrate;
 use crate::calibrate::{Measured, Subject, fit, measure};
 use crate::failure::Failure;
-use crate::measure::{Rays, Way};
+use crate::measure::{QueryKind, Rays};
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes};
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         .collect::<Result<Vec<_>, _>>()?;
     progress.stage("measure", None);
     let (scene, rays) = leaf(&progress)?;
-    let beside = (&scene, &rays, Way::Nearest);
+    let beside = (&scene, &rays, QueryKind::Nearest);
     let (all, leaf) = measure(&subjects, beside, args.rounds, || progress.cancelled())?;
     measured.leaf = leaf;
     for times in all {

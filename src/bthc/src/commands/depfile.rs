@@ -1,7 +1,6 @@
 //! Which files outputs depend on, in the form that Make and Ninja read.
 
-use super::compile::{Job, Setting};
-use super::deliver::Target;
+use super::job::{Job, JobContext, Target};
 use super::scene;
 use crate::failure::Failure;
 use bth_compile::{cached, write};
@@ -12,11 +11,11 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When a source cannot be read any more, or the file not be written.
-pub(super) fn write(path: &Path, setting: &Setting<'_>, jobs: &[Job]) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
     let mut text = String::new();
     for job in jobs {
         if let Target::File(output) = &job.target {
-            text.push_str(&rule(output, &inputs(setting, job)?));
+            text.push_str(&rule(output, &inputs(context, job)?));
         }
     }
     Ok(write::write_atomically(path, text.as_bytes())?)
@@ -26,8 +25,8 @@ pub(super) fn write(path: &Path, setting: &Setting<'_>, jobs: &[Job]) -> Result<
 ///
 /// # Errors
 /// When one cannot be read that names others.
-pub(super) fn inputs(setting: &Setting<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
-    match scene::is_scene(&job.model, setting.args) {
+pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
+    match scene::is_scene(&job.model, context.args) {
         true => scene::inputs(&job.model),
         false => Ok(cached::files(&job.model)?),
     }

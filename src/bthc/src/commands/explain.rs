@@ -1,6 +1,6 @@
 //! `bthc explain`: which nodes would be tetrahedralized, which not, and why.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Explain;
 use crate::explain::{Explained, MeasuredNode, measure, picture};
 use crate::failure::Failure;

@@ -1,6 +1,6 @@
 //! `bthc marks`: the triangles of a model that are in bad contact with others.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Marks;
 use crate::failure::Failure;
 use crate::progress::Progress;

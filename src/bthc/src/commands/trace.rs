@@ -1,6 +1,6 @@
 //! `bthc trace`: the rays of a file, traced, or with `--exact` compared with every triangle.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Trace;
 use crate::failure::Failure;
 use crate::progress::{self, Progress};

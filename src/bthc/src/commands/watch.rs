@@ -1,8 +1,9 @@
 //! Compiles again whenever a file changes.
 
-use super::compile::{Job, Setting, one};
+use super::compile_one::compile_one;
 use super::depfile::inputs;
-use super::with_threads;
+use super::job::{Job, JobContext};
+use super::threads::with_threads;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
@@ -20,11 +21,11 @@ type Look = Vec<(PathBuf, Option<(SystemTime, u64)>)>;
 ///
 /// # Errors
 /// Cancelled, or standard output closed.
-pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
+pub(super) fn run(context: &JobContext<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
     let mut seen: Vec<Option<Look>> = jobs.iter().map(|_| None).collect();
     loop {
         for (job, seen) in jobs.iter().zip(&mut seen) {
-            let files = look(setting, job);
+            let files = look(context, job);
             if seen.as_ref() == Some(&files) {
                 continue;
             }
@@ -32,8 +33,8 @@ pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> R
             if seen.is_some() {
                 std::thread::sleep(PAUSE / 4);
             }
-            *seen = Some(look(setting, job));
-            match with_threads(setting.args.threads, || one(setting, job, progress))? {
+            *seen = Some(look(context, job));
+            match with_threads(context.args.threads, || compile_one(context, job, progress))? {
                 Ok(done) => output::text(&format!("{}\n", done.line))?,
                 Err(Failure::Compile(bth_compile::Error::Cancelled)) => break,
                 Err(failure) => failure.print(),
@@ -46,9 +47,9 @@ pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> R
     }
 }
 
-fn look(setting: &Setting<'_>, job: &Job) -> Look {
+fn look(context: &JobContext<'_>, job: &Job) -> Look {
     // A scene that cannot be read is looked at until it can.
-    let files = inputs(setting, job).unwrap_or_else(|_| vec![job.model.clone()]);
+    let files = inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
     let state = |path: &PathBuf| {
         let m = std::fs::metadata(path).ok()?;
         Some((m.modified().ok()?, m.len()))

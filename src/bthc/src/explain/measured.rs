@@ -1,7 +1,7 @@
 //! Predicted beside measured costs of the nodes that became tet leaves.
 
 use super::Explained;
-use crate::measure::{Rays, Run, Way, nanoseconds};
+use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth_compile::costs::{SampleRay, TetWalker, from_surface};
 use serde::Serialize;
 
@@ -38,11 +38,11 @@ pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) 
         let walked: Vec<f64> =
             long.iter().filter_map(|ray| walker.walk(ray)).map(|w| f64::from(w.steps)).collect();
         let [long, short] = [long, short].map(|samples| Rays::new(&samples));
-        let runs: [Run<'_>; 4] = [
-            (of.compiled, &long, Way::Nearest),
-            (of.compiled, &short, Way::Any),
-            (of.plain, &long, Way::Nearest),
-            (of.plain, &short, Way::Any),
+        let runs: [TimedRun<'_>; 4] = [
+            (of.compiled, &long, QueryKind::Nearest),
+            (of.compiled, &short, QueryKind::Any),
+            (of.plain, &long, QueryKind::Nearest),
+            (of.plain, &short, QueryKind::Any),
         ];
         let times = nanoseconds(&runs, ROUNDS, &stop)?;
         // Cells of a node that failed have no prediction of their own.

@@ -1,4 +1,4 @@
-//! Which files outputs depend on, in the form that Make and Ninja read.
+//! Dependency files: the inputs of each output, in the syntax of Make, which Ninja reads, too.
 
 use super::job::{Job, JobContext, Target};
 use super::scene;
@@ -24,7 +24,7 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
 /// All files that a job reads.
 ///
 /// # Errors
-/// When one cannot be read that names others.
+/// When a file that refers to others cannot be read.
 pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
     match scene::is_scene(&job.model, context.args) {
         true => scene::inputs(&job.model),
@@ -41,7 +41,7 @@ fn rule(output: &Path, inputs: &[PathBuf]) -> String {
     text + "\n"
 }
 
-/// As Make wants it: blanks and `#` behind a backslash, dollars doubled.
+/// A path in the syntax of Make: blanks and `#` get a backslash, dollars are doubled.
 fn escaped(path: &Path) -> String {
     let mut text = String::new();
     for c in path.to_string_lossy().chars() {
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_escaped_as_make_wants_it() {
+    fn names_are_escaped_for_make() {
         let inputs = ["a b.obj".into(), "c$#.ply".into()];
         assert_eq!(rule(Path::new("out.bth"), &inputs), "out.bth: \\\n  a\\ b.obj \\\n  c$$\\#.ply\n");
     }

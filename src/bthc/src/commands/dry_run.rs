@@ -1,4 +1,4 @@
-//! What a compilation would do, and why.
+//! Dry run: shows what a compilation would do, and why.
 
 use super::job::{Job, JobContext, Target, cache};
 use super::scene;
@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use bth_compile::pipeline::{self, Foreseen};
 use serde_json::json;
 
-/// Says for each job what would be done.
+/// Prints for each job what would be done.
 ///
 /// # Errors
 /// When a source cannot be read.

@@ -1,4 +1,4 @@
-//! `bthc trace`: the rays of a file, traced, or with `--exact` compared with every triangle.
+//! `bthc trace`: traces the rays of a file, or with `--exact` tests them against every triangle.
 
 use super::threads::with_threads;
 use crate::args::Trace;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde_json::json;
 use std::time::Instant;
 
-/// Rays per task: enough to pay for starting one.
+/// Rays per task: enough to make the cost of starting a task negligible.
 const CHUNK: usize = 4096;
 
 pub(crate) fn run(args: &Trace) -> Result<(), Failure> {

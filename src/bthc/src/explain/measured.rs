@@ -1,4 +1,4 @@
-//! Predicted beside measured costs of the nodes that became tet leaves.
+//! Predicted and measured costs of the nodes that became tet leaves.
 
 use super::Explained;
 use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
@@ -10,14 +10,14 @@ const RAYS: usize = 8192;
 /// Rounds of which the fastest counts.
 const ROUNDS: usize = 7;
 
-/// A tet leaf; nanoseconds are of a ray that starts on it, half of them short.
+/// A tet leaf. Costs are nanoseconds per ray that starts on it; half of the rays are short.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct MeasuredNode {
     /// Index in the binary BVH.
     pub(crate) node: u32,
     /// Its triangles.
     pub(crate) triangles: u32,
-    /// Mean steps of bounces: estimated before the tetrahedra were there, and counted.
+    /// Mean steps of bounced rays: estimated before tetrahedralization, and counted.
     pub(crate) steps: [f64; 2],
     /// With the tetrahedra: predicted and measured.
     pub(crate) cost_tet: [f64; 2],
@@ -25,7 +25,7 @@ pub(crate) struct MeasuredNode {
     pub(crate) cost_bvh: [f64; 2],
 }
 
-/// Measures so many of the tet leaves, in their order; `None` when it was stopped.
+/// Measures the first `most` tet leaves; `None` if it was stopped.
 pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) -> Option<Vec<MeasuredNode>> {
     let mut nodes = Vec::new();
     for (node, tets) in of.built.iter().take(most) {
@@ -45,7 +45,7 @@ pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) 
             (of.plain, &short, QueryKind::Any),
         ];
         let times = nanoseconds(&runs, ROUNDS, &stop)?;
-        // Cells of a node that failed have no prediction of their own.
+        // Descendants that replaced a failed node have no prediction of their own.
         let verdict = of.choice.verdicts.iter().find(|v| v.node == *node);
         let predicted = |value: fn(&bth_compile::costs::Verdict) -> f64| verdict.map_or(f64::NAN, value);
         nodes.push(MeasuredNode {

@@ -1,4 +1,4 @@
-//! Rays for tests, also those that tracers lose.
+//! Rays for tests, including those for which ray tracers tend to miss hits.
 
 use bth::rays::{Hit, Ray, Surface};
 use bth_random::Rng;
@@ -48,7 +48,7 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
                 3 => ray.tmax = 1.0,
                 4 => ray.tmin = 1.0,
                 5 => ray.tmin = -1.0,
-                // By powers of two, so that what was aimed exactly still is; huge ones stay finite.
+                // Scaled by powers of two, so that exactly aimed rays stay exact; long ones stay finite.
                 6 => ray.direction = ray.direction.map(|d| d * 2f32.powi(-20)),
                 7 => ray.direction = ray.direction.map(|d| d * 2f32.powi(20)),
                 _ => {}

@@ -1,4 +1,4 @@
-//! Batches with hints against the same rays one at a time, bit for bit, on every instruction set.
+//! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Hinted, Isa, Scene, Test};

@@ -1,5 +1,5 @@
-//! Leaves on a grid: no vertex moves farther than the file says, answers are exact for the triangles as they are stored,
-//! and files are as small as is promised.
+//! Quantized leaves: no vertex moves farther than the file states, answers are exact for the triangles as they are stored, and
+//! files are as small as documented.
 #![allow(clippy::print_stdout, reason = "says what was skipped")]
 
 #[allow(dead_code)]

@@ -1,4 +1,4 @@
-//! The static models compile, verify, and answer rays alike with and without tetrahedra.
+//! The downloaded static models compile, verify, and give the same answers to rays with and without tetrahedra.
 #![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
 
 mod corpus_support;

@@ -1,4 +1,4 @@
-//! Every structure and record against the exact oracle, and against each other bit for bit.
+//! Every structure and record agrees with the exact oracle, and with each other bit for bit.
 
 use bth::Steps;
 use bth::rays::{Hit, Ray, Surface};

@@ -1,4 +1,4 @@
-//! Many processes, one store, random kills: nothing damaged is served, nothing partial stays, and the store verifies.
+//! Many processes and one store, with random kills: no damaged entry is used, no partial file stays, and the store verifies.
 
 use crate::cache::{cached, scene};
 use crate::support::{command, run_with};

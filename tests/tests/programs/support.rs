@@ -1,4 +1,4 @@
-//! Runs the programs and makes small models.
+//! Running the programs, and small models for them.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

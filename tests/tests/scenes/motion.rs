@@ -1,4 +1,4 @@
-//! Time: what moves, what is hidden, what cannot be shown.
+//! Animation: motion, visibility, and transforms that cannot be used.
 
 use crate::support::{compiled, manifest, models, varied};
 use bth::rays::{Hit, Ray, Surface};

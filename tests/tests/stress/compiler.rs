@@ -1,4 +1,4 @@
-//! Models that compilers choke on: every one compiles, verifies, and is traced as the plain BVH traces it.
+//! Models that are hard for compilers: every one compiles, verifies, and gives the answers of the plain BVH.
 
 use bth::rays::Hit;
 use bth_compile::Silent;

@@ -1,4 +1,4 @@
-//! Instances under transforms: closed surfaces stay closed, and hits stay within a stated distance of the truth.
+//! Instances under transforms: closed surfaces stay closed, and hits stay within a documented distance of the exact ones.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};

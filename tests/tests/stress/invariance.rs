@@ -1,4 +1,4 @@
-//! Changes of a model that must change no answer: another order, other names, exact motions, cuts into instances.
+//! Changes of a model that change no answer: another order, exact motions, and cuts into instances.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};

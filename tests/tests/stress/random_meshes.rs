@@ -1,4 +1,4 @@
-//! Random meshes, clean ones and hopeless ones, in every structure against the exact oracle.
+//! Random meshes, with and without defects, in every structure against the exact oracle.
 
 use bth::rays::{Hit, Surface};
 use bth_scenes::Model;

@@ -1,4 +1,4 @@
-//! What was found, counted.
+//! Counts of hits and defects over many rays.
 
 use super::grid::Quotient;
 use super::rays::{Aimed, Kind, Target};
@@ -10,7 +10,7 @@ const BINS: usize = 8 * 8 + 1;
 
 /// Counts over many rays.
 #[derive(Clone, Debug)]
-pub struct Tally {
+pub struct Statistics {
     /// Rays, each of which went through all structures.
     pub rays: u64,
     /// Rays traced, over structures, instruction sets and kinds of query.
@@ -19,7 +19,7 @@ pub struct Tally {
     pub hits: u64,
     /// Rays compared with every triangle.
     pub compared: u64,
-    /// A triangle that the line surely meets within the range was not found, nor one before it.
+    /// Neither a triangle that the line is known to meet within the range was found, nor one before it.
     pub misses: u64,
     /// A ray from inside a closed surface found nothing.
     pub leaks: u64,
@@ -37,9 +37,9 @@ pub struct Tally {
     pub examples: Vec<String>,
 }
 
-impl Default for Tally {
+impl Default for Statistics {
     fn default() -> Self {
-        Tally {
+        Statistics {
             rays: 0,
             traced: 0,
             hits: 0,
@@ -56,7 +56,7 @@ impl Default for Tally {
     }
 }
 
-impl Tally {
+impl Statistics {
     /// Defects of every kind.
     pub fn defects(&self) -> u64 {
         self.misses + self.leaks + self.ghosts + self.different + self.wrong
@@ -74,7 +74,7 @@ impl Tally {
     }
 
     /// Adds another.
-    pub fn add(&mut self, other: &Tally) {
+    pub fn add(&mut self, other: &Statistics) {
         self.rays += other.rays;
         self.traced += other.traced;
         self.hits += other.hits;
@@ -95,7 +95,7 @@ impl Tally {
         }
     }
 
-    /// Checks an answer by what is known of its ray.
+    /// Checks an answer against what is known about its ray.
     pub fn check(&mut self, shape: &Shape, aimed: &Aimed, hit: &Hit) {
         self.rays += 1;
         let ray = &aimed.ray;
@@ -138,7 +138,7 @@ impl Tally {
             }
         }
         let right = match hit.is_hit() {
-            // t is told to half an ulp: of triangles at the same one any may come first in truth.
+            // t is rounded to half an ulp, so among triangles at the same rounded t any may be the nearest.
             true => hit.t <= nearest && (hit.surface.triangle == least || hit.t == nearest),
             false => nearest == f32::INFINITY,
         };
@@ -153,7 +153,8 @@ fn within([tmin, tmax]: [f32; 2], t: f32) -> bool {
     tmin <= t && t <= tmax && t < f32::INFINITY
 }
 
-/// The t at which the line surely meets something. Where it lies in the plane of a triangle, one beside it counts.
+/// The t at which the line is known to meet a triangle: one at the target vertex or edge whose plane does not contain the
+/// line.
 fn known(shape: &Shape, aimed: &Aimed) -> Option<Quotient> {
     let (vertex, other) = match aimed.through? {
         Target::Vertex(vertex) => (vertex, vertex),

@@ -1,13 +1,16 @@
-//! Scenes that move: manifests, and the models that they refer to. The first three are after those of the paper.
+//! Animated scenes: manifests, and the models that they refer to. The first three are modelled on the animations of the
+//! BTH paper.
 
-use crate::math::{Random, add, scale, sin_cos};
+use crate::math::sin_cos;
 use crate::{Model, blob, gyroid, hairball, knot};
+use bth_random::Rng;
 use bth_scene::{
     Camera, Frames, Interpolation, Lens, Light, LightKind, Manifest, Node, Object, Property, Source, Track,
     Transform,
 };
+use glam::DVec3;
 
-/// A scene that can be made by name.
+/// An animated scene that can be made by name.
 #[derive(Clone, Copy, Debug)]
 pub struct Animation {
     /// Name, as on the command line.
@@ -89,9 +92,9 @@ impl Builder {
         });
     }
 
-    /// Turns about an axis, so many times within some seconds.
+    /// Adds a track that rotates a node about an axis, `turns` times within `seconds`.
     fn turn(&mut self, node: usize, axis: [f64; 3], turns: f64, seconds: f64) {
-        // Keys a third of a turn apart, as rotations take the shorter way.
+        // Interpolation between two keys takes the shorter rotation, so keys are at most a third of a turn apart.
         let count = (turns.abs() * 3.0).ceil().max(1.0) as u32;
         let key = |i: u32| {
             let part = f64::from(i) / f64::from(count);
@@ -118,7 +121,7 @@ impl Builder {
     }
 }
 
-/// To four decimals, so that manifests stay short.
+/// Rounds to four decimals, so that manifests stay short.
 fn short(x: f64) -> f64 {
     (x * 1e4 + 0.5).floor() / 1e4
 }
@@ -128,7 +131,8 @@ fn quaternion(axis: [f64; 3], turns: f64) -> [f64; 4] {
     [axis[0] * s, axis[1] * s, axis[2] * s, c].map(short)
 }
 
-/// A rotation that lowers the view by so many turns, after one about the vertical.
+/// The rotation of a camera or light as a quaternion: first downwards by `pitch` turns about its own x axis, then by
+/// `yaw` turns about the vertical.
 fn view(yaw: f64, pitch: f64) -> [f64; 4] {
     let ((sy, cy), (sp, cp)) = (sin_cos(yaw / 2.0), sin_cos(-pitch / 2.0));
     [cy * sp, sy * cp, -sy * sp, cy * cp].map(short)
@@ -153,22 +157,22 @@ fn swarm() -> Scene {
     let mut b = Builder::new(95, 24.0);
     let knot = b.object("knot", "models/knot.ply");
     let blob = b.object("blob", "models/blob.ply");
-    let mut random = Random::new(101);
+    let mut rng = Rng::new(101);
     for i in 0..101 {
         let object = if i % 2 == 0 { knot } else { blob };
-        let size = short(random.range(0.5, 1.1));
+        let size = short(rng.between(0.5, 1.1));
         let node = b.node(format!("object {i}"), None, Some(object), parts([0.0; 3], size));
-        let mut place = scale(random.in_ball(), 9.0);
+        let mut position = DVec3::from_array(rng.point_in_ball()) * 9.0;
         let keys: Vec<_> = (0..=4)
             .map(|key| {
-                let here = place.map(short).to_vec();
-                place = add(place, scale(random.in_ball(), 4.0));
-                (f64::from(key), here)
+                let value = position.to_array().map(short).to_vec();
+                position += DVec3::from_array(rng.point_in_ball()) * 4.0;
+                (f64::from(key), value)
             })
             .collect();
         b.track(node, Property::Translation, keys);
-        let axis = random.direction().map(short);
-        b.turn(node, axis, short(random.range(-2.0, 2.0)), 4.0);
+        let axis = rng.unit_vector().map(short);
+        b.turn(node, axis, short(rng.between(-2.0, 2.0)), 4.0);
     }
     let models = vec![("models/knot.ply", knot::torus_knot(12_000)), ("models/blob.ply", blob::blob(20_000))];
     Scene { manifest: b.manifest, models }
@@ -179,11 +183,11 @@ fn falling() -> Scene {
     let hair = b.object("hairball", "models/hairball.ply");
     let ground = b.object("floor", "models/floor.ply");
     b.node("floor".into(), None, Some(ground), parts([0.0; 3], 16.0));
-    let mut random = Random::new(100);
+    let mut rng = Rng::new(100);
     for i in 0..100 {
         let node = b.node(format!("hairball {i}"), None, Some(hair), parts([0.0; 3], 1.0));
         let (x, z) = (short(f64::from(i % 10) * 2.2 - 9.9), short(f64::from(i / 10) * 2.2 - 9.9));
-        let height = random.range(3.0, 14.0);
+        let height = rng.between(3.0, 14.0);
         // Falls freely, rebounds once with half its speed, and comes to rest.
         let fall = (2.0 * (height - 0.9) / 9.81).sqrt();
         let rise = (height - 0.9) / 4.0;
@@ -199,8 +203,8 @@ fn falling() -> Scene {
             (t, vec![x, short(y), z])
         });
         b.track(node, Property::Translation, keys.collect::<Vec<_>>());
-        let axis = random.direction().map(short);
-        b.turn(node, axis, short(random.range(-1.5, 1.5)), 3.0);
+        let axis = rng.unit_vector().map(short);
+        b.turn(node, axis, short(rng.between(-1.5, 1.5)), 3.0);
     }
     let eye =
         Transform::Parts { translation: [0.0, 13.0, 24.0], rotation: view(0.0, 0.075), scale: [1.0; 3] };

@@ -1,20 +1,21 @@
-//! A bumpy sphere: star-shaped, so closed and free of self-intersections.
+//! A bumpy sphere. It is star-shaped, and therefore closed and free of self-intersections.
 
 use std::collections::HashMap;
 
 use crate::Model;
-use crate::math::{normalize, scale, side_for, sin_cos};
+use crate::math::{resolution_for, sin_cos};
+use glam::DVec3;
 
 /// A bumpy sphere of 8·n² faces for the n that comes nearest to `faces`.
 pub fn blob(faces: u32) -> Model {
-    let n = side_for(faces, 8, 1) as i32;
+    let n = resolution_for(faces, 8, 1) as i32;
     let mut model = Model::default();
     let mut rows = HashMap::new();
-    // Points of an octahedron with whole coordinates, |x| + |y| + |z| = n, pushed outwards.
+    // The vertices are the points with whole coordinates of the octahedron |x| + |y| + |z| = n, moved outwards.
     let mut row = |model: &mut Model, p: [i32; 3]| {
         *rows.entry(p).or_insert_with(|| {
-            let direction = normalize(p.map(f64::from));
-            model.push(scale(direction, radius(direction)))
+            let direction = DVec3::from_array(p.map(f64::from)).normalize();
+            model.push(direction * radius(direction))
         })
     };
     for octant in 0..8 {
@@ -40,7 +41,8 @@ pub fn blob(faces: u32) -> Model {
 }
 
 /// Distance of the surface from the centre along a unit direction.
-fn radius([x, y, z]: [f64; 3]) -> f64 {
+fn radius(direction: DVec3) -> f64 {
+    let DVec3 { x, y, z } = direction;
     let wave = |turns: f64| sin_cos(turns).0;
     1.0 + 0.12 * wave(0.7 * x + 0.3) * wave(0.8 * y + 0.1)
         + 0.07 * wave(1.3 * z + 0.4 * x)

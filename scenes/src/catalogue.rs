@@ -1,4 +1,4 @@
-//! The models by name.
+//! The catalogue: the models that can be made, by name.
 
 use crate::{Model, blob, gyroid, hairball, hall, knot, soup};
 
@@ -15,7 +15,7 @@ pub struct Entry {
     pub make: fn(u32) -> Model,
 }
 
-/// More faces than this are refused: larger models overflow nothing but patience.
+/// The greatest number of faces that can be asked for: some hundred times what tests and benchmarks use.
 pub const MAX_FACES: u32 = 50_000_000;
 
 /// All models.

@@ -8,7 +8,8 @@
 use std::collections::HashMap;
 
 use crate::Model;
-use crate::math::{Vec3, add, cross, dot, length, scale, sin_cos, sub};
+use crate::math::sin_cos;
+use glam::DVec3;
 
 /// Faces for a grid of n³ cubes are about this times n².
 const FACES_PER_CELL_AREA: f64 = 32.0;
@@ -24,20 +25,20 @@ pub fn gyroid(faces: u32) -> Model {
 }
 
 /// Negative inside: one of the two labyrinths of the gyroid, within the ball.
-fn field(p: Vec3) -> f64 {
-    let [(sx, cx), (sy, cy), (sz, cz)] = p.map(|x| sin_cos(x * PERIODS / 2.0));
+fn field(p: DVec3) -> f64 {
+    let [(sx, cx), (sy, cy), (sz, cz)] = p.to_array().map(|x| sin_cos(x * PERIODS / 2.0));
     let labyrinth = (sx * cy + sy * cz + sz * cx) / 4.0;
     // The greater of both, rounded where they meet.
-    let ball = length(p) - 1.0;
+    let ball = p.length() - 1.0;
     let apart = labyrinth - ball;
     0.5 * (labyrinth + ball + (apart * apart + 0.01).sqrt())
 }
 
 /// The zero surface of `field` in the cube from -1.1 to 1.1, cut into n³ cubes of six
 /// tetrahedra each (Kuhn's subdivision, which fits across the cubes' faces).
-fn marching_tetrahedra(n: u32, field: impl Fn(Vec3) -> f64) -> Model {
+fn marching_tetrahedra(n: u32, field: impl Fn(DVec3) -> f64) -> Model {
     let side = n + 1;
-    let point = |g: [u32; 3]| g.map(|k| -1.1 + 2.2 * f64::from(k) / f64::from(n));
+    let point = |g: [u32; 3]| DVec3::from_array(g.map(|k| -1.1 + 2.2 * f64::from(k) / f64::from(n)));
     let row = |g: [u32; 3]| (g[2] * side + g[1]) * side + g[0];
     let mut values = Vec::with_capacity((side * side * side) as usize);
     for z in 0..side {
@@ -54,7 +55,7 @@ fn marching_tetrahedra(n: u32, field: impl Fn(Vec3) -> f64) -> Model {
         let (a, b) = if row(a) < row(b) { (a, b) } else { (b, a) };
         *on_edge.entry((row(a), row(b))).or_insert_with(|| {
             let t = (value(a) / (value(a) - value(b))).clamp(MARGIN, 1.0 - MARGIN);
-            model.push(add(point(a), scale(sub(point(b), point(a)), t)))
+            model.push(point(a) + (point(b) - point(a)) * t)
         })
     };
     for z in 0..n {
@@ -77,7 +78,7 @@ fn marching_tetrahedra(n: u32, field: impl Fn(Vec3) -> f64) -> Model {
                         }
                         _ => continue,
                     };
-                    let outwards = sub(point(outside[0]), point(inside[0]));
+                    let outwards = point(outside[0]) - point(inside[0]);
                     orient_and_push(&mut model, polygon, outwards);
                 }
             }
@@ -87,14 +88,14 @@ fn marching_tetrahedra(n: u32, field: impl Fn(Vec3) -> f64) -> Model {
 }
 
 /// Adds a triangle or quadrilateral so that its normal goes with `outwards`, which crosses it.
-fn orient_and_push(model: &mut Model, mut polygon: Vec<u32>, outwards: Vec3) {
-    let p = |k: usize| model.positions[polygon[k] as usize].map(f64::from);
+fn orient_and_push(model: &mut Model, mut polygon: Vec<u32>, outwards: DVec3) {
+    let p = |k: usize| model.position(polygon[k]);
     // The diagonals of a quadrilateral, or two edges of a triangle: their product is its normal.
     let normal = match polygon.len() {
-        3 => cross(sub(p(1), p(0)), sub(p(2), p(0))),
-        _ => cross(sub(p(2), p(0)), sub(p(3), p(1))),
+        3 => (p(1) - p(0)).cross(p(2) - p(0)),
+        _ => (p(2) - p(0)).cross(p(3) - p(1)),
     };
-    if dot(normal, outwards) < 0.0 {
+    if normal.dot(outwards) < 0.0 {
         polygon.reverse();
     }
     match polygon[..] {

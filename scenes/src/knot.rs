@@ -1,7 +1,8 @@
 //! Torus knots: tubes along a trefoil, closed and free of self-intersections.
 
 use crate::Model;
-use crate::math::{Vec3, add, cross, normalize, scale, side_for, sin_cos, sub};
+use crate::math::{resolution_for, sin_cos};
+use glam::{DVec3, Vec3};
 
 /// Segments along the knot for each side around the tube.
 const SEGMENTS_PER_SIDE: u32 = 10;
@@ -10,14 +11,14 @@ const TUBE: f64 = 0.42;
 
 /// A trefoil with 20·n² faces for the n that comes nearest to `faces` (2,880 gives 2,880).
 pub fn torus_knot(faces: u32) -> Model {
-    let sides = side_for(faces, 2 * SEGMENTS_PER_SIDE, 3);
+    let sides = resolution_for(faces, 2 * SEGMENTS_PER_SIDE, 3);
     let segments = SEGMENTS_PER_SIDE * sides;
     let mut model = Model::default();
     for i in 0..segments {
         let [centre, side, up] = frame(f64::from(i) / f64::from(segments));
         for j in 0..sides {
             let (s, c) = sin_cos(f64::from(j) / f64::from(sides));
-            model.push(add(centre, add(scale(side, TUBE * c), scale(up, TUBE * s))));
+            model.push(centre + (side * (TUBE * c) + up * (TUBE * s)));
         }
     }
     for i in 0..segments {
@@ -37,12 +38,12 @@ pub fn torus_knots_in_a_box(faces: u32) -> Model {
     let knot = torus_knot((faces.saturating_sub(12) / 27).max(1));
     let mut model = Model::default();
     for cell in 0..27u32 {
-        let place = [cell % 3, cell / 3 % 3, cell / 9].map(|k| SPACING * (f64::from(k) - 1.0));
+        let offset = [cell % 3, cell / 3 % 3, cell / 9].map(|k| SPACING * (f64::from(k) - 1.0));
         let mut copy = knot.clone();
         for p in &mut copy.positions {
             // Turn a copy's axes so that neighbours do not look alike.
             p.rotate_left((cell % 3) as usize);
-            *p = add(p.map(f64::from), place).map(|x| x as f32);
+            *p = (Vec3::from_array(*p).as_dvec3() + DVec3::from_array(offset)).as_vec3().to_array();
         }
         model.append(&copy);
     }
@@ -56,20 +57,18 @@ pub fn torus_knots_in_a_box(faces: u32) -> Model {
     model
 }
 
-/// Point of the knot at `s` in [0, 1), and two unit vectors across it. They are functions of
+/// The point of the knot at `s` in [0, 1), and two unit vectors perpendicular to the curve there. They are functions of
 /// the point and the tangent alone, so the tube closes without a twist.
-fn frame(s: f64) -> [Vec3; 3] {
+fn frame(s: f64) -> [DVec3; 3] {
     let ((sin2, cos2), (sin3, cos3)) = (sin_cos(2.0 * s), sin_cos(3.0 * s));
     let ring = 2.0 + cos3;
-    let centre = [ring * cos2, ring * sin2, sin3];
+    let centre = DVec3::new(ring * cos2, ring * sin2, sin3);
     // Derivative by s, without the common factor of one turn.
-    let tangent = normalize([
-        -2.0 * ring * sin2 - 3.0 * sin3 * cos2,
-        2.0 * ring * cos2 - 3.0 * sin3 * sin2,
-        3.0 * cos3,
-    ]);
+    let tangent =
+        DVec3::new(-2.0 * ring * sin2 - 3.0 * sin3 * cos2, 2.0 * ring * cos2 - 3.0 * sin3 * sin2, 3.0 * cos3)
+            .normalize();
     // From the middle of the torus's cross-section outwards; never along the tangent.
-    let outwards = sub(centre, [2.0 * cos2, 2.0 * sin2, 0.0]);
-    let up = normalize(cross(tangent, outwards));
-    [centre, cross(up, tangent), up]
+    let outwards = centre - DVec3::new(2.0 * cos2, 2.0 * sin2, 0.0);
+    let up = tangent.cross(outwards).normalize();
+    [centre, up.cross(tangent), up]
 }

@@ -1,7 +1,8 @@
 //! Generators of the models that tests, demos and benchmarks use.
 //!
 //! Every generator uses only `+`, `-`, `*`, `/`, `sqrt` and `floor` on `f64`, which IEEE 754
-//! defines to the last bit, so a model has the same bytes on every machine.
+//! defines to the last bit, so a model has the same bytes on every machine. Vectors are those of `glam`, whose `f64`
+//! operations are these same ones; its functions that call the system's mathematics library are not used.
 #![warn(missing_docs)]
 
 pub mod animations;
@@ -16,6 +17,8 @@ pub mod planted;
 pub mod soup;
 pub mod topology;
 pub mod write;
+
+use glam::{DVec3, Vec3};
 
 /// An indexed triangle model; lengths have no unit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,10 +35,15 @@ impl Model {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
 
-    /// Adds a position and returns its row.
-    fn push(&mut self, p: [f64; 3]) -> u32 {
+    /// The position in a row, exactly.
+    fn position(&self, row: u32) -> DVec3 {
+        Vec3::from_array(self.positions[row as usize]).as_dvec3()
+    }
+
+    /// Adds a position, rounded to `f32`, and returns its row.
+    fn push(&mut self, p: impl Into<DVec3>) -> u32 {
         let row = u32::try_from(self.positions.len()).expect("generators stay below 2^32 positions");
-        self.positions.push(p.map(|x| x as f32));
+        self.positions.push(p.into().as_vec3().to_array());
         row
     }
 

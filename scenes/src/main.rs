@@ -1,17 +1,19 @@
-//! Makes the models of the catalogue and the scenes that move.
+//! `bth-scenes`: writes the models of the catalogue and the animated scenes.
 
-use std::io::Write;
-use std::path::PathBuf;
+mod failure;
 
-use anyhow::{Context, Result, ensure};
 use bth_scenes::animations::{self, ANIMATIONS};
-use bth_scenes::catalogue::{ENTRIES, MAX_FACES, find};
+use bth_scenes::catalogue::{self, ENTRIES, MAX_FACES};
 use bth_scenes::{topology, write};
 use clap::Parser;
+use failure::{EXIT_CODES, Failure};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Makes models and scenes for tests, demos and benchmarks; the same bytes on every machine.
 #[derive(Parser)]
-#[command(version)]
+#[command(version, after_help = EXIT_CODES)]
 enum Command {
     /// Lists the models and scenes.
     List,
@@ -20,13 +22,13 @@ enum Command {
         /// Name of a model (see `list`).
         name: String,
         /// About how many faces [default: see `list`].
-        #[arg(long, value_name = "N")]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_FACES)))]
         faces: Option<u32>,
         /// File to write; its extension (.obj, .ply or .stl) names the format.
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
-    /// Makes a scene that moves: NAME.manifest and its models.
+    /// Makes an animated scene: NAME.manifest and its models.
     Scene {
         /// Name of a scene (see `list`).
         name: String,
@@ -36,52 +38,72 @@ enum Command {
     },
 }
 
-fn main() -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    match Command::parse() {
-        Command::List => {
-            for e in &ENTRIES {
-                writeln!(out, "{:22}{:>8} faces  {}", e.name, e.faces, e.about)?;
-            }
-            for a in &ANIMATIONS {
-                writeln!(out, "{:22}   scene        {}", a.name, a.about)?;
-            }
-        }
-        Command::Make { name, faces, output } => {
-            let entry = find(&name).with_context(|| format!("no model `{name}`; `list` shows all"))?;
-            let faces = faces.unwrap_or(entry.faces);
-            ensure!((1..=MAX_FACES).contains(&faces), "--faces must be from 1 to {MAX_FACES}");
-            let model = (entry.make)(faces);
-            write::file(&model, &output)?;
-            let t = topology::topology(&model);
-            writeln!(
-                out,
-                "{}: {} faces, {} positions, {} components, {}",
-                output.display(),
-                model.triangles.len(),
-                model.positions.len(),
-                t.components,
-                if t.is_closed() { "closed" } else { "not closed" }
-            )?;
-        }
-        Command::Scene { name, output } => {
-            let animation =
-                animations::find(&name).with_context(|| format!("no scene `{name}`; `list` shows all"))?;
-            let scene = (animation.make)();
-            for (path, model) in &scene.models {
-                let path = output.join(path);
-                let folder = path.parent().context("models lie in a folder")?;
-                std::fs::create_dir_all(folder)
-                    .with_context(|| format!("cannot make {}", folder.display()))?;
-                write::file(model, &path)?;
-                writeln!(out, "{}: {} faces", path.display(), model.triangles.len())?;
-            }
-            let path = output.join(format!("{name}.manifest"));
-            std::fs::write(&path, scene.manifest.to_toml())
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            let frames = scene.manifest.frames;
-            writeln!(out, "{}: frames {} to {}", path.display(), frames.first, frames.last)?;
-        }
+fn main() -> ExitCode {
+    let result = match Command::parse() {
+        Command::List => list(),
+        Command::Make { name, faces, output } => make(&name, faces, &output),
+        Command::Scene { name, output } => scene(&name, &output),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
     }
+}
+
+/// A name that is not in the catalogue of `kind`s; `names` are those that are.
+fn unknown<'a>(kind: &str, found: &str, names: impl Iterator<Item = &'a str>) -> Failure {
+    let names: Vec<&str> = names.collect();
+    Failure::Usage {
+        message: format!("expected the name of a {kind}, found {found:?}"),
+        hint: format!("the {kind}s are {}", names.join(", ")),
+    }
+}
+
+fn list() -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    for e in &ENTRIES {
+        writeln!(out, "{:22}{:>8} faces  {}", e.name, e.faces, e.about)?;
+    }
+    for a in &ANIMATIONS {
+        writeln!(out, "{:22}   scene        {}", a.name, a.about)?;
+    }
+    Ok(())
+}
+
+fn make(name: &str, faces: Option<u32>, output: &Path) -> Result<(), Failure> {
+    let entry =
+        catalogue::find(name).ok_or_else(|| unknown("model", name, ENTRIES.iter().map(|e| e.name)))?;
+    let model = (entry.make)(faces.unwrap_or(entry.faces));
+    write::file(&model, output)?;
+    let topology = topology::topology(&model);
+    writeln!(
+        std::io::stdout().lock(),
+        "{}: {} faces, {} positions, {} components, {}",
+        output.display(),
+        model.triangles.len(),
+        model.positions.len(),
+        topology.components,
+        if topology.is_closed() { "closed" } else { "not closed" }
+    )?;
+    Ok(())
+}
+
+fn scene(name: &str, folder: &Path) -> Result<(), Failure> {
+    let animation =
+        animations::find(name).ok_or_else(|| unknown("scene", name, ANIMATIONS.iter().map(|a| a.name)))?;
+    let mut out = std::io::stdout().lock();
+    let scene = (animation.make)();
+    for (path, model) in &scene.models {
+        let path = folder.join(path);
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(|e| Failure::file(parent, e))?;
+        }
+        write::file(model, &path)?;
+        writeln!(out, "{}: {} faces", path.display(), model.triangles.len())?;
+    }
+    let path = folder.join(format!("{name}.manifest"));
+    std::fs::write(&path, scene.manifest.to_toml()).map_err(|e| Failure::file(&path, e))?;
+    let frames = scene.manifest.frames;
+    writeln!(out, "{}: frames {} to {}", path.display(), frames.first, frames.last)?;
     Ok(())
 }

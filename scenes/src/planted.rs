@@ -15,16 +15,22 @@ pub struct Case {
     pub bad: bool,
 }
 
-/// All cases. Coordinates are small whole numbers, halves or one ulp from them, so exact.
+/// All cases. Coordinates are small whole numbers, halves, or one ulp from such a number, and so all are exact.
 pub fn cases() -> Vec<Case> {
+    [without_shared_vertices(), with_shared_vertices()].concat()
+}
+
+/// The corners of the triangle that comes first in nearly all cases.
+const FIRST: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+fn case(name: &'static str, bad: bool, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Case {
+    Case { name, model: Model { positions: positions.to_vec(), triangles: triangles.to_vec() }, bad }
+}
+
+/// Pairs of triangles that share no vertex by index.
+fn without_shared_vertices() -> Vec<Case> {
     let above = 1.0f32.next_up();
-    let case = |name, bad, positions: &[[f32; 3]], triangles: &[[u32; 3]]| Case {
-        name,
-        model: Model { positions: positions.to_vec(), triangles: triangles.to_vec() },
-        bad,
-    };
-    // The triangle (0,0,0) (4,0,0) (0,4,0) comes first nearly everywhere.
-    let [o, x, y] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let [o, x, y] = FIRST;
     let two = [[0, 1, 2], [3, 4, 5]];
     vec![
         case("apart", false, &[o, x, y, [0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 4.0, 1.0]], &two),
@@ -71,6 +77,13 @@ pub fn cases() -> Vec<Case> {
             &two,
         ),
         case("equal positions", true, &[o, x, y, o, x, y], &two),
+    ]
+}
+
+/// Groups of triangles that share vertices by index.
+fn with_shared_vertices() -> Vec<Case> {
+    let [o, x, y] = FIRST;
+    vec![
         case("duplicate", true, &[o, x, y], &[[0, 1, 2], [0, 1, 2]]),
         case("reversed duplicate", true, &[o, x, y], &[[0, 1, 2], [0, 2, 1]]),
         case("shared edge", false, &[o, x, y, [4.0, 4.0, 3.0]], &[[0, 1, 2], [2, 1, 3]]),

@@ -1,12 +1,25 @@
 //! Writers: OBJ, binary little-endian PLY and binary STL.
 
 use std::fmt::Write as _;
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
 
 use crate::Model;
-use crate::math::{cross, dot, sub};
+
+/// Why a model was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The extension names no format that can be written.
+    #[error("{}: expected a name that ends with .obj, .ply or .stl", .0.display())]
+    Extension(PathBuf),
+    /// The file or its folder cannot be written.
+    #[error("{}: cannot write: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The message of the system.
+        source: std::io::Error,
+    },
+}
 
 /// Text of a Wavefront OBJ file; each number is the shortest that reads back as the same `f32`.
 pub fn obj(model: &Model) -> String {
@@ -43,10 +56,10 @@ pub fn stl(model: &Model) -> Vec<u8> {
     bytes.extend((model.triangles.len() as u32).to_le_bytes());
     for index in 0..model.triangles.len() {
         let corners = model.corners(index);
-        let [a, b, c] = corners.map(|p| p.map(f64::from));
-        let normal = cross(sub(b, a), sub(c, a));
-        let length = dot(normal, normal).sqrt();
-        let unit = normal.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 });
+        let [a, b, c] = model.triangles[index].map(|row| model.position(row));
+        let normal = (b - a).cross(c - a);
+        let length = normal.length();
+        let unit = normal.to_array().map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 });
         bytes.extend(unit.iter().chain(corners.iter().flatten()).flat_map(|x| x.to_le_bytes()));
         bytes.extend([0, 0]);
     }
@@ -57,12 +70,12 @@ pub fn stl(model: &Model) -> Vec<u8> {
 ///
 /// # Errors
 /// Fails on another extension, or when the file cannot be written.
-pub fn file(model: &Model, path: &Path) -> Result<()> {
+pub fn file(model: &Model, path: &Path) -> Result<(), Error> {
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("obj") => obj(model).into_bytes(),
         Some("ply") => ply(model),
         Some("stl") => stl(model),
-        _ => bail!("{}: expected a name that ends in .obj, .ply or .stl", path.display()),
+        _ => return Err(Error::Extension(path.into())),
     };
-    std::fs::write(path, bytes).with_context(|| path.display().to_string())
+    std::fs::write(path, bytes).map_err(|source| Error::Write { path: path.into(), source })
 }

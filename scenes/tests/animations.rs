@@ -1,4 +1,4 @@
-//! The scenes that move: committed manifests are those that are made, and can be read.
+//! Animated scenes: the committed manifests are those that the generators make, and they can be read.
 
 use bth_scenes::animations::ANIMATIONS;
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! What the generators promise.
+//! The properties that the generators guarantee: bytes, face counts, topology and self-intersections.
 
 use bth_scenes::catalogue::{ENTRIES, find};
 use bth_scenes::topology::topology;
@@ -99,7 +99,7 @@ fn messy_models_intersect_themselves() {
 }
 
 #[test]
-fn planted_cases_are_what_they_say() {
+fn planted_cases_are_in_bad_contact_exactly_where_marked() {
     for case in bth_scenes::planted::cases() {
         assert!(topology(&case.model).degenerate == 0, "{}", case.name);
         // The oracle below sees only triangles without shared vertices.
@@ -235,8 +235,8 @@ fn segment_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
     s.iter().all(|&x| x >= 0.0) || s.iter().all(|&x| x <= 0.0)
 }
 
-/// The same in a plane: an end inside, or a crossing with an edge, seen along an axis that the
-/// plane does not contain.
+/// As [`segment_meets`] for a segment in the plane of the triangle: an end inside it, or a crossing with an edge. Both
+/// are projected along a coordinate axis that is not parallel to the plane.
 fn coplanar_meets(p: [f32; 3], q: [f32; 3], t: [[f32; 3]; 3]) -> bool {
     let area = |a: [f32; 3], b: [f32; 3], c: [f32; 3], drop: usize| {
         let f = |p: [f32; 3]| robust::Coord { x: p[(drop + 1) % 3], y: p[(drop + 2) % 3] };

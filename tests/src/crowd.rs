@@ -1,8 +1,8 @@
 //! Many instances of one small object, for measurements of the top level.
 
-use crate::rng::Rng;
 use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
 use bth_format::layout::*;
+use bth_random::Rng;
 use zerocopy::IntoBytes;
 
 /// A file of so many instances that all move: every node has a track of its own, or only the root has one.
@@ -30,8 +30,8 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
         triangle_ids: &[0],
         ..ObjectParts::default()
     };
-    let mut rng = Rng(1);
-    let mut random = |scale: f64| (f64::from(rng.unit()) - 0.5) * scale;
+    let mut rng = Rng::new(1);
+    let mut random = |scale: f64| (f64::from(rng.unit_f32()) - 0.5) * scale;
     let side = f64::from(count).cbrt() * 2.0;
     let node = |translation: [f64; 3], parent| {
         let mut transform = [0.0; 12];

@@ -3,7 +3,6 @@
 pub mod conformance;
 pub mod crowd;
 pub mod rays;
-pub mod rng;
 pub mod stress;
 pub mod structures;
 
@@ -20,9 +19,9 @@ pub fn target_folder() -> PathBuf {
     if deps.ends_with("deps") { deps.parent().expect("a folder").into() } else { deps.into() }
 }
 
-/// Builds packages of the workspace into [`target_folder`], since cargo builds the programs of other packages
-/// for no test; returns that folder. With `BTH_BUILT` they have been built: cargo would build some anew, as fewer packages
-/// want fewer features of their dependencies.
+/// Builds packages of the workspace into [`target_folder`], and returns that folder. Cargo does not build the programs of
+/// other packages for a test. Where `BTH_BUILT` is set, the programs exist already: building a part of the workspace would
+/// rebuild dependencies with fewer features.
 pub fn built(packages: &[&str]) -> PathBuf {
     let folder = target_folder();
     if std::env::var_os("BTH_BUILT").is_some() {
@@ -43,8 +42,8 @@ pub fn built(packages: &[&str]) -> PathBuf {
     folder
 }
 
-/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Says so when there is none,
-/// since what needs it is skipped then.
+/// The tetrahedralization worker: `BTH_TETGEN`, or the one built beside the tests. Prints a line where there is none, since
+/// tests with tetrahedra are skipped then.
 #[allow(clippy::print_stderr)]
 pub fn worker() -> Option<&'static Path> {
     static FOUND: OnceLock<Option<PathBuf>> = OnceLock::new();

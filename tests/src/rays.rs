@@ -1,7 +1,7 @@
-//! Rays for tests, also those that tracers lose.
+//! Rays for tests, including those for which ray tracers tend to miss hits.
 
-use crate::rng::Rng;
 use bth::rays::{Hit, Ray, Surface};
+use bth_random::Rng;
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])
@@ -10,7 +10,7 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 /// Rays of every kind: through the model, exactly through vertices and edge midpoints, along axes and
 /// in the planes of faces, from vertices, with ranges that end about hits, with tiny and huge directions.
 pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let bound = |pick: fn(f32, f32) -> f32, start: f32| {
         [0, 1, 2].map(|k| corners.iter().flatten().map(|p| p[k]).fold(start, pick))
     };
@@ -21,8 +21,9 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
         .map(|i| {
             let corner = corners[rng.below(corners.len() as u64) as usize];
             let mut inside = |margin: f32| {
-                [0, 1, 2]
-                    .map(|k| lower[k] + extent[k] * 0.5 + (extent[k] + margin * size) * (rng.unit() - 0.5))
+                [0, 1, 2].map(|k| {
+                    lower[k] + extent[k] * 0.5 + (extent[k] + margin * size) * (rng.unit_f32() - 0.5)
+                })
             };
             let target = match i % 3 {
                 0 => corner[0],
@@ -47,7 +48,7 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
                 3 => ray.tmax = 1.0,
                 4 => ray.tmin = 1.0,
                 5 => ray.tmin = -1.0,
-                // By powers of two, so that what was aimed exactly still is; huge ones stay finite.
+                // Scaled by powers of two, so that exactly aimed rays stay exact; long ones stay finite.
                 6 => ray.direction = ray.direction.map(|d| d * 2f32.powi(-20)),
                 7 => ray.direction = ray.direction.map(|d| d * 2f32.powi(20)),
                 _ => {}
@@ -60,15 +61,15 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
 /// Rays that start where others hit, with the surface that they start on; and some with wild hints, wrong ones
 /// and ones out of range.
 pub fn onward(rays: &[Ray], hits: &[Hit], triangles: usize, seed: u64) -> Vec<(Ray, Surface)> {
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let mut from = |(ray, hit): (&Ray, &Hit)| {
         if !hit.is_hit() || rng.below(8) == 0 {
             let triangle = rng.below(triangles as u64 + 3) as u32;
             return (*ray, Surface { instance: 0, triangle });
         }
-        let back = hit.t * (1.0 - 1e-4 * rng.unit());
+        let back = hit.t * (1.0 - 1e-4 * rng.unit_f32());
         let origin = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k] * back);
-        let direction = [(); 3].map(|()| rng.unit() - 0.5);
+        let direction = [(); 3].map(|()| rng.unit_f32() - 0.5);
         (Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }, hit.surface)
     };
     rays.iter().zip(hits).map(&mut from).collect()

@@ -16,7 +16,7 @@ pub struct Traced {
     pub scene: Scene,
 }
 
-/// Options that give even small models tet leaves wherever they can have them.
+/// Options with which even small models get tet leaves wherever these are possible.
 pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> Options {
     let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
     options.costs.minimum_triangles = 32;
@@ -26,7 +26,7 @@ pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) ->
     options
 }
 
-/// Compiles a model; the outcome passed the checks of opening.
+/// Compiles a model and opens the result, with its checks.
 ///
 /// # Panics
 /// If it does not compile or open.
@@ -38,8 +38,8 @@ pub fn compiled(model: &Model, options: &Options) -> Scene {
     bth::from_bytes(&compiled.bytes).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The model in every structure, the BVH first. Those with tetrahedra only when the worker program is there, and
-/// one tetrahedralization of the whole only for models that have one (`whole`).
+/// The model in every structure, the BVH first. Structures with tetrahedra are included where the worker exists, and a
+/// tetrahedralization of the whole model only if `whole` tells that the model has one.
 pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
     let mut packed = bvh.clone();

@@ -1,13 +1,13 @@
-//! Batches with hints against the same rays one at a time, bit for bit, on every instruction set.
+//! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Hinted, Isa, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure, compile};
 use bth_format::layout::RecordKind;
+use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{assorted, onward};
-use bth_tests::rng::Rng;
 use std::sync::{Mutex, MutexGuard};
 
 /// The instruction set is the process's: tests that choose it take turns.
@@ -40,7 +40,7 @@ fn hinted_rays(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64
     let mut hits = vec![Hit::MISS; first.len()];
     plain.nearest_batch(&first, None, &mut hits);
     let mut rays = onward(&first, &hits, corners.len(), seed + 1);
-    let mut rng = Rng(seed + 2);
+    let mut rng = Rng::new(seed + 2);
     for i in 0..rays.len() {
         let (mut ray, from) = rays[i];
         match i % 7 {
@@ -152,7 +152,7 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
     let model = torus_knot(4_000);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, true);
-    let mut rng = Rng(5);
+    let mut rng = Rng::new(5);
     let mut within = || {
         let [a, b, c] = corners[rng.below(corners.len() as u64) as usize];
         let [u, v] = [0, 1].map(|_| rng.below(1 << 20) as f32 / (1 << 21) as f32);

@@ -1,4 +1,4 @@
-//! The C interface, used by C programs (`tests/c`) that know `bth.h` and `libbth` only.
+//! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
 
 use bth::rays::{Ray, Surface};
 use bth_compile::Silent;

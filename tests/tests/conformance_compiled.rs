@@ -1,4 +1,4 @@
-//! What the compiler writes is what the specification demands, to the last reader.
+//! Files that the compiler writes satisfy the specification, as the reader, the verifier and the reader in Python check it.
 #![allow(clippy::print_stdout)] // a test that cannot run says so
 
 use bth_compile::Silent;

@@ -1,4 +1,4 @@
-//! The reader in `tools/bth_dump`, written from the specification alone, takes and refuses the same files.
+//! The reader in `tools/bth_dump`, written from the specification alone, accepts and rejects the same files.
 #![allow(clippy::print_stdout)] // a test that cannot run says so
 
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The specification says what the code does: byte tables, kinds, invariants and the worked hexdump.
+//! The specification agrees with the code: byte tables, kinds, invariants and the worked hexdump.
 
 use bth_format::error::kind_name;
 use bth_format::layout::*;

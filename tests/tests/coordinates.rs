@@ -1,5 +1,5 @@
-//! Leaves on a grid: no vertex moves farther than the file says, answers are exact for the triangles as they are stored,
-//! and files are as small as is promised.
+//! Quantized leaves: no vertex moves farther than the file states, answers are exact for the triangles as they are stored, and
+//! files are as small as documented.
 #![allow(clippy::print_stdout, reason = "says what was skipped")]
 
 #[allow(dead_code)]
@@ -113,7 +113,9 @@ fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
         return near(a.u, b.u) && near(a.v, b.v);
     }
     let named = triangles.iter().find(|t| t.id == a.surface.triangle);
-    named.and_then(|t| oracle::crossing(ray, t.corners)).is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
+    named
+        .and_then(|t| oracle::intersection(ray, t.corners))
+        .is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
 }
 
 /// Nearest and any hits, in batches, coherent ones too, and alone, with every instruction set, against every triangle.

@@ -1,4 +1,4 @@
-//! Our own models and planted cases are marked as what they were made to be.
+//! In generated models and planted cases exactly the triangles in bad contact are marked.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! The static models compile, verify, and answer rays alike with and without tetrahedra.
+//! The downloaded static models compile, verify, and give the same answers to rays with and without tetrahedra.
 #![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
 
 mod corpus_support;
@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Hinted, Isa};
+use bth_random::Rng;
 use zerocopy::IntoBytes;
 
 use corpus_support::{Ended, data_and_compiler, listed_triangles, models, program, run};
@@ -100,15 +101,11 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
     let object = *bvh.object(0).header;
     let (lower, upper) = (object.lower, object.upper);
     let size = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f32::max);
-    let mut state = 1u64;
-    let mut unit = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1u64 << 24) as f32
-    };
+    let mut rng = Rng::new(1);
     let mut hits = 0;
     for _ in 0..20_000 {
         let mut point =
-            || [0, 1, 2].map(|k| lower[k] - 0.1 * size + (upper[k] - lower[k] + 0.2 * size) * unit());
+            || [0, 1, 2].map(|k| lower[k] - 0.1 * size + (upper[k] - lower[k] + 0.2 * size) * rng.unit_f32());
         let (origin, target) = (point(), point());
         let ray = Ray {
             origin,
@@ -144,17 +141,13 @@ fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<Surface>) {
         rays.push(Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY });
         from.push(Surface::NONE);
     }
-    let mut state = 5u64;
-    let mut unit = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1u64 << 24) as f32
-    };
+    let mut rng = Rng::new(5);
     for i in 0..rays.len() {
         let hit = bvh.nearest(&rays[i], Surface::NONE);
         if hit.is_hit() {
             let (o, d) = (rays[i].origin, rays[i].direction);
             let origin = [0, 1, 2].map(|k| o[k] + hit.t * d[k]);
-            let direction = [(); 3].map(|()| (unit() - 0.5) * size);
+            let direction = [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);
             let tmax = if i % 3 == 0 { 0.1 } else { f32::INFINITY };
             rays.push(Ray { origin, tmin: 1e-4, direction, tmax });
             from.push(hit.surface);

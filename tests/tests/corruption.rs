@@ -1,4 +1,4 @@
-//! Whatever happens to a file, opening and checking it ends in a result.
+//! However a file is corrupted, opening and checking it ends in a result, never in a panic.
 
 use bth_tests::conformance::{Editor, Seal, valid};
 

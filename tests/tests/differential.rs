@@ -1,4 +1,4 @@
-//! Every structure and record against the exact oracle, and against each other bit for bit.
+//! Every structure and record agrees with the exact oracle, and with each other bit for bit.
 
 use bth::Steps;
 use bth::rays::{Hit, Ray, Surface};
@@ -22,7 +22,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
     let id = hit.surface.triangle;
     if !truth.triangles.contains(&id) {
         // Another triangle at the same t but for less than the rounding of f64.
-        let other = oracle::crossing(ray, corners[id as usize]).map(|at| oracle::to_f64(&at.t));
+        let other = oracle::intersection(ray, corners[id as usize]).map(|at| oracle::to_f64(&at.t));
         let gap = other.map(|t| (t - truth.t_f64()).abs());
         assert!(gap.is_some_and(|g| g <= truth.t_f64().abs() * 1e-12), "other triangle: {}", context());
     }

@@ -1,5 +1,5 @@
-//! What rebuilding the top level takes, against what we promise: the least of many frames, so that other programs on the machine
-//! do not show. Even with debug assertions it holds.
+//! Rebuilding the top level takes at most the documented time: the least of many frames, so that other programs on the machine do
+//! not matter. The bound holds even with debug assertions.
 #![allow(clippy::print_stdout)]
 
 /// Seconds of the fastest rebuilding for a crowd of which each instance, or only the root, has a track.

@@ -1,7 +1,7 @@
-"""Shares the work on a scene out over the workers of a Dask cluster.
+"""Distributes the work on a scene over the workers of a Dask cluster.
 
-The tasks are the ordinary programs with `--shard I/N`: `bthc compile --in-cache`, whose results meet in a cache that all
-workers see, and `bth-play`, whose frames meet in a folder. Both do what is left to do and no more, so a task may be run any
+The tasks are the ordinary programs with `--shard I/N`: `bthc compile --in-cache`, whose results go to a cache that all
+workers share, and `bth-play`, whose frames go to a shared folder. Both skip what exists already, so a task may be run any
 number of times: when a worker is lost, Dask runs its tasks elsewhere.
 """
 
@@ -24,7 +24,7 @@ USAGE, FAILED, LOST = 2, 1, 4
 
 
 class Failure(Exception):
-    """A part that failed, with what its program said."""
+    """A part that failed, with the last line of its program's error output."""
 
     def __init__(self, message, code=FAILED):
         super().__init__(message)
@@ -35,7 +35,7 @@ class Failure(Exception):
 
 
 def program(name):
-    """The path of a program: what the variable of its name says (`BTHC`, `BTH_PLAY`), else on the PATH, else built here."""
+    """The path of a program: named by a variable (`BTHC`, `BTH_PLAY`), else on the PATH, else built here."""
     named = os.environ.get(name.upper().replace("-", "_"))
     target = Path(os.environ.get("CARGO_TARGET_DIR", Path(__file__).resolve().parents[2] / "target"))
     found = named or shutil.which(name) or shutil.which(name, path=str(target / "release"))
@@ -45,9 +45,9 @@ def program(name):
 
 
 def run_part(name, arguments, environment):
-    """Runs a program on the worker that this is called on; its JSON. Exit codes 2 to 5 are faults of the input, which
-    would be the same everywhere."""
-    # The variables of the one who calls, not of the worker: all workers are to use one cache.
+    """Runs a program on the calling worker and returns its JSON. Exit codes 2 to 5 are errors of the input, which would be
+    the same on every worker, so they are returned rather than raised, and not tried again."""
+    # The variables of the caller, not of the worker, so that all workers use one cache.
     command = [program(name), *arguments, "--json"]
     done = subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True)
     if done.returncode == 0:
@@ -60,7 +60,8 @@ def run_part(name, arguments, environment):
 
 
 def run_parts(client, parts, environment, on_done=lambda done: None):
-    """Runs parts, each a program and its arguments; their JSON in order. `on_done` is told how many are done."""
+    """Runs parts, each a program and its arguments; their JSON in order. `on_done` is called with the number of finished
+    parts."""
     futures = [
         client.submit(run_part, name, arguments, environment, pure=False, retries=RETRIES) for name, arguments in parts
     ]
@@ -123,7 +124,7 @@ def arguments(argv):
 
 
 def environment_of(args):
-    """What the programs find in their environment."""
+    """The variables of the environment that the programs get."""
     wanted = {"BTH_CACHE_DIR": args.cache_dir, "BTH_SHARED_CACHE": args.shared_cache}
     names = ["BTH_CACHE_DIR", "BTH_SHARED_CACHE", "BTH_CACHE_SIZE", "BTH_TETGEN"]
     kept = {name: os.environ[name] for name in names if name in os.environ}

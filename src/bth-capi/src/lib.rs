@@ -50,7 +50,7 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
     if scene.is_null() || path.is_null() {
         return fail(ERROR_ARGUMENT, "bth_open: path and scene must not be null".into());
     }
-    // SAFETY: not null, and the caller lets us write it.
+    // SAFETY: not null, and writable by contract.
     unsafe { *scene = std::ptr::null_mut() };
     // SAFETY: not null, and the caller passes a C string.
     let Ok(path) = unsafe { CStr::from_ptr(path) }.to_str() else {
@@ -58,7 +58,7 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
     };
     let opened = catch_unwind(|| match flags {
         READ => Some(runtime::open(Path::new(path))),
-        // SAFETY: by asking to map, the caller takes over the contract of `map`.
+        // SAFETY: with the map flag the caller guarantees the contract of `map`.
         MAP => Some(unsafe { runtime::map(Path::new(path)) }),
         _ => None,
     });
@@ -92,13 +92,13 @@ pub extern "C" fn bth_last_error() -> *const c_char {
     LAST_ERROR.with(|last| last.borrow().as_ptr())
 }
 
-/// Scene, rays and, unless null, the surfaces that they start on.
+/// Scene, rays and, unless null, the primitives on which they start.
 type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [Surface]>);
 
 /// The arguments of a query as slices; `None` when there is nothing to do.
 ///
 /// # Safety
-/// Each pointer is null or leads to what `bth.h` says, and outlives the result.
+/// Each pointer is null or points to what `bth.h` requires, which outlives the result.
 unsafe fn batch<'a>(
     scene: *const Scene,
     rays: *const Ray,
@@ -135,7 +135,7 @@ pub unsafe extern "C" fn bth_nearest(
     }
     // SAFETY: not null, `count` elements by contract; any bits are a valid `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
-    // Unwinding must not reach C. Of a panic, which would be a defect, nothing is left but misses.
+    // Unwinding must not reach C. After a panic, which would be a defect of the library, all rays miss.
     if catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits))).is_err() {
         hits.fill(Hit::MISS);
     }
@@ -160,8 +160,8 @@ pub unsafe extern "C" fn bth_any(
     }
     // SAFETY: not null, `count` bytes by contract.
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
-    // `bool` has invalid bit patterns, so the caller's memory is not passed on as one. A ray alone need not pay for room
-    // that it has no use for.
+    // `bool` has invalid bit patterns, so the bytes of the caller are not used as `bool`. A single ray takes a path without
+    // the buffer of a part.
     if let [hit] = hit {
         let mut found = [false];
         let traced = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut found)));

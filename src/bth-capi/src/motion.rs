@@ -1,4 +1,4 @@
-//! The part of the C interface that moves scenes and looks at their instances.
+//! The part of the C interface that sets the time of scenes and describes their instances.
 
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
 use runtime::{Error, Scene};
@@ -27,7 +27,7 @@ pub unsafe extern "C" fn bth_frames(scene: *const Scene, first: *mut i32, last: 
     let view = unsafe { scene.as_ref() }.and_then(Scene::description);
     let found =
         view.map_or((0, 0, 1.0), |v| (v.scene[0].first_frame, v.scene[0].last_frame, v.scene[0].rate));
-    // SAFETY: each is null, and then passed over, or may be written by contract.
+    // SAFETY: each is null, and then skipped, or writable by contract.
     unsafe {
         first.as_mut().into_iter().for_each(|out| *out = found.0);
         last.as_mut().into_iter().for_each(|out| *out = found.1);
@@ -54,8 +54,8 @@ pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32
     if !seconds.is_finite() {
         return fail(ERROR_ARGUMENT, format!("bth_set_seconds: expected a finite time, found {seconds}"));
     }
-    // SAFETY: handed on.
-    unsafe { moved(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
+    // SAFETY: the caller's contract.
+    unsafe { update(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
 }
 
 /// Moves a scene to a frame; see `bth.h`.
@@ -64,14 +64,16 @@ pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32
 /// As for [`bth_set_seconds`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_frame(scene: *mut Scene, frame: i32) -> i32 {
-    // SAFETY: handed on.
-    unsafe { moved(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
+    // SAFETY: the caller's contract.
+    unsafe { update(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
 }
 
+/// Calls `go` with the scene; turns errors and panics into codes.
+///
 /// # Safety
 /// As for [`bth_set_seconds`].
-unsafe fn moved(scene: *mut Scene, name: &str, go: impl FnOnce(&mut Scene) -> Result<(), Error>) -> i32 {
-    // SAFETY: null or open, and ours alone by contract.
+unsafe fn update(scene: *mut Scene, name: &str, go: impl FnOnce(&mut Scene) -> Result<(), Error>) -> i32 {
+    // SAFETY: null or open, and not used by anything else, by contract.
     let Some(scene) = (unsafe { scene.as_mut() }) else {
         return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
     };

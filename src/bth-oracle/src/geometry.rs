@@ -23,8 +23,8 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                 stack.extend(object.unpacked_node(child).expect("a node").child);
             }
             Some(Child::Indexed(line)) => {
-                let mut room = None;
-                let leaf = object.indexed(line, &mut room);
+                let mut unpacked = None;
+                let leaf = object.indexed(line, &mut unpacked);
                 for row in 0..leaf.triangles as usize {
                     let corners = [0, 1, 2].map(|c| {
                         let vertex = usize::from(leaf.corner[c][row]);
@@ -34,14 +34,14 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                 }
             }
             Some(Child::Raw(line)) => {
-                let mut room = None;
-                let leaf = object.raw(line, &mut room);
+                let mut unpacked = None;
+                let leaf = object.raw(line, &mut unpacked);
                 for row in 0..leaf.triangles as usize {
                     let corners = leaf.corner.map(|axes| axes.map(|values| values[row]));
                     found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
                 }
             }
-            // A subtree beside it holds the same triangles.
+            // A subtree that may accompany the tet leaf holds the same triangles, so it is not visited.
             Some(Child::Tets(row)) => {
                 let leaf = &object.tet_leaves[row as usize];
                 let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];

@@ -1,16 +1,23 @@
-//! The slow and obvious truth: every triangle against the ray, in exact arithmetic, at any scale of finite input.
+//! The one slow and obvious reference for ray queries, which tests, fuzzers, `bthc trace --exact` and the accuracy
+//! benchmarks compare with: every triangle against the ray, in exact arithmetic.
 //!
-//! Triangles are closed; a ray that lies in the plane of a triangle misses it; t is the exact quotient. Nothing of the
-//! runtime's tracing is used: points become integers (in units of the least positive f32), signs are signs of integer
-//! determinants. A filter in f64 only skips triangles that the line misses by far more than rounding.
+//! Exact are, for finite rays and vertices of any magnitude, the decision whether the line of a ray meets a triangle, the
+//! order of the intersections along the ray, and t, u and v as quotients. Triangles are closed: edges and vertices belong
+//! to them. A line in the plane of a triangle misses it. Coordinates are integers in units of the least positive f32, and
+//! signs are those of integer determinants. The one rounding is that of t to f32, as the runtime reports it, before it is
+//! compared with the range of the ray. The vertices of an instance are transformed exactly by its f64 matrix, whereas the
+//! runtime rounds the ray into the space of the object; see [`World`].
+//!
+//! Of the runtime only the ray types and the reader of compiled files are used, nothing of its traversal or intersection.
+//! A filter in f64 skips triangles that the line misses by far more than its rounding error, and decides nothing else.
 #![warn(missing_docs)]
 
-mod crossing;
 mod geometry;
+mod intersection;
 mod nearest;
 mod world;
 
-pub use crossing::{Crossing, crossing, to_f64};
 pub use geometry::{Triangle, triangles};
-pub use nearest::{Truth, any, nearest};
+pub use intersection::{Intersection, intersection, to_f64};
+pub use nearest::{ExactHit, any, nearest};
 pub use world::World;

@@ -1,19 +1,19 @@
-//! Nearest and any hit among all triangles.
+//! The nearest hit and any hit among all triangles, by testing every one.
 
-use crate::crossing::{Crossing, crossing, to_f64};
+use crate::intersection::{Intersection, intersection, to_f64};
 use bth::rays::Ray;
 use num_rational::BigRational;
 
 /// An exact nearest hit.
 #[derive(Clone, Debug)]
-pub struct Truth<Id = u32> {
-    /// Where the first of `triangles` is met.
-    pub at: Crossing,
-    /// All triangles that are met at exactly this t, ascending.
+pub struct ExactHit<Id = u32> {
+    /// The intersection with the first of `triangles`.
+    pub at: Intersection,
+    /// All triangles with an intersection at exactly this t, ascending.
     pub triangles: Vec<Id>,
 }
 
-impl<Id> Truth<Id> {
+impl<Id> ExactHit<Id> {
     /// t of the nearest hit.
     pub fn t(&self) -> &BigRational {
         &self.at.t
@@ -30,20 +30,20 @@ fn in_range(ray: &Ray, t: &BigRational) -> bool {
     ray.tmin <= reported && reported <= ray.tmax && reported < f32::INFINITY
 }
 
-/// The nearest of crossings that come in ascending order of their triangles.
+/// The nearest of the intersections, which must come in ascending order of their triangles.
 pub(crate) fn nearest_of<Id: Clone>(
     ray: &Ray,
-    crossings: impl Iterator<Item = (Id, Crossing)>,
-) -> Option<Truth<Id>> {
-    let mut best: Option<Truth<Id>> = None;
-    for (id, at) in crossings {
+    intersections: impl Iterator<Item = (Id, Intersection)>,
+) -> Option<ExactHit<Id>> {
+    let mut best: Option<ExactHit<Id>> = None;
+    for (id, at) in intersections {
         if !in_range(ray, &at.t) {
             continue;
         }
         match &mut best {
             Some(b) if at.t > b.at.t => {}
             Some(b) if at.t == b.at.t => b.triangles.push(id),
-            _ => best = Some(Truth { at, triangles: vec![id] }),
+            _ => best = Some(ExactHit { at, triangles: vec![id] }),
         }
     }
     best
@@ -51,12 +51,12 @@ pub(crate) fn nearest_of<Id: Clone>(
 
 /// The nearest exact hit whose t, rounded to f32 as it is reported, lies within the ray's range. Ids are rows of
 /// `corners`.
-pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Option<Truth> {
+pub fn nearest(corners: &[[[f32; 3]; 3]], ray: &Ray) -> Option<ExactHit> {
     let rows = corners.iter().enumerate();
-    nearest_of(ray, rows.filter_map(|(id, &triangle)| Some((id as u32, crossing(ray, triangle)?))))
+    nearest_of(ray, rows.filter_map(|(id, &triangle)| Some((id as u32, intersection(ray, triangle)?))))
 }
 
 /// Whether any triangle is hit within the ray's range.
 pub fn any(corners: &[[[f32; 3]; 3]], ray: &Ray) -> bool {
-    corners.iter().any(|&triangle| crossing(ray, triangle).is_some_and(|at| in_range(ray, &at.t)))
+    corners.iter().any(|&triangle| intersection(ray, triangle).is_some_and(|at| in_range(ray, &at.t)))
 }

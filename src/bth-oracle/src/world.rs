@@ -1,8 +1,10 @@
-//! A whole scene: every triangle of every instance, transformed exactly.
+//! Exact queries to a whole scene: every triangle of every instance, transformed exactly.
 
-use crate::crossing::{Crossing, Point, clearly_missed, cross, crossing, has_line, integer};
 use crate::geometry::{Triangle, triangles};
-use crate::nearest::{Truth, nearest_of};
+use crate::intersection::{
+    Intersection, Point, certainly_missed, has_line, integer, intersect_exactly, intersection, to_f64,
+};
+use crate::nearest::{ExactHit, nearest_of};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use num_bigint::BigInt;
@@ -10,9 +12,10 @@ use num_bigint::BigInt;
 /// The units of f64, 2^-1074, and of f32, 2^-149.
 const UNITS: [u32; 2] = [1074, 149];
 
-/// The instances of a scene at its time. Instances are where their transforms, as f64 numbers, put them: no rounding
-/// comes after, while tracing rounds the ray once in each object's space. So answers for transformed instances differ
-/// from the runtime's by that rounding; those for objects as they are do not.
+/// The visible instances of a scene at the time to which it is set. Vertices are transformed to world space by the f64
+/// matrix of the instance without any rounding, whereas the runtime transforms the ray into the space of the object and
+/// rounds it there. Answers for transformed instances therefore differ from the runtime's by that rounding; answers for
+/// instances without a transform are those of the runtime.
 #[derive(Debug)]
 pub struct World {
     instances: Vec<Instance>,
@@ -21,7 +24,7 @@ pub struct World {
 #[derive(Debug)]
 struct Instance {
     number: u32,
-    /// Rows of four; `None` for the identity.
+    /// From object to world space, rows of the matrix; `None` for the identity.
     to_world: Option<[[f64; 4]; 3]>,
     triangles: Vec<Triangle>,
 }
@@ -38,7 +41,7 @@ fn integer_f64(x: f64) -> BigInt {
 }
 
 impl World {
-    /// Collects what can be seen.
+    /// Collects the triangles of the visible instances.
     pub fn new(scene: &Scene) -> Self {
         let identity: [[f64; 4]; 3] =
             std::array::from_fn(|row| std::array::from_fn(|k| f64::from(u8::from(row == k))));
@@ -59,14 +62,14 @@ impl World {
     }
 
     /// The nearest exact hit.
-    pub fn nearest(&self, ray: &Ray) -> Option<Truth<Surface>> {
-        nearest_of(ray, self.crossings(ray))
+    pub fn nearest(&self, ray: &Ray) -> Option<ExactHit<Surface>> {
+        nearest_of(ray, self.intersections(ray))
     }
 
     /// The nearest exact hit as the runtime reports hits: t, u and v rounded to f32; of equal ones that of the least
     /// instance and triangle.
     pub fn hit(&self, ray: &Ray) -> Hit {
-        let rounded = |x: &_| crate::to_f64(x) as f32;
+        let rounded = |x: &_| to_f64(x) as f32;
         self.nearest(ray).map_or(Hit::MISS, |truth| Hit {
             t: rounded(&truth.at.t),
             u: rounded(&truth.at.u),
@@ -77,16 +80,16 @@ impl World {
 
     /// Whether anything is hit.
     pub fn any(&self, ray: &Ray) -> bool {
-        self.crossings(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
+        self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }
 
-    fn crossings<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Crossing)> + 'a {
+    fn intersections<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Intersection)> + 'a {
         self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
             instance.triangles.iter().filter_map(move |triangle| {
                 let surface = Surface { instance: instance.number, triangle: triangle.id };
                 let at = match &instance.to_world {
-                    None => crossing(ray, triangle.corners)?,
-                    Some(rows) => crossing_in_world(ray, rows, triangle.corners)?,
+                    None => intersection(ray, triangle.corners)?,
+                    Some(rows) => intersection_in_world(ray, rows, triangle.corners)?,
                 };
                 Some((surface, at))
             })
@@ -94,8 +97,8 @@ impl World {
     }
 }
 
-/// As [`crossing`], of a triangle that a transform moves.
-fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Crossing> {
+/// The intersection with a triangle that the rows of a matrix transform to world space.
+fn intersection_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) -> Option<Intersection> {
     let wide = |v: [f32; 3]| v.map(f64::from);
     let (origin, direction) = (wide(ray.origin), wide(ray.direction));
     let mut magnitude: f64 = 0.0;
@@ -103,12 +106,12 @@ fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) ->
         std::array::from_fn(|k| {
             let [a, b, c, moved] = rows[k];
             let terms = [a * p[0], b * p[1], c * p[2], moved, -origin[k]];
-            // Five terms, each with one rounding, and four sums: below 8 units of rounding of their sizes.
+            // Five terms with one rounding each and four sums: below 8 roundings of the sum of their magnitudes.
             magnitude = magnitude.max(8.0 * terms.iter().map(|x| x.abs()).sum::<f64>());
             terms.iter().sum()
         })
     });
-    if clearly_missed(direction, from, magnitude) {
+    if certainly_missed(direction, from, magnitude) {
         return None;
     }
     let widen = |v: [f32; 3]| v.map(|x| integer(x) << UNITS[0]);
@@ -119,5 +122,5 @@ fn crossing_in_world(ray: &Ray, rows: &[[f64; 4]; 3], corners: [[f32; 3]; 3]) ->
             a * &p[0] + b * &p[1] + c * &p[2] + (moved << UNITS[1])
         })
     };
-    cross(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
+    intersect_exactly(&widen(ray.origin), &widen(ray.direction), &corners.map(exact))
 }

@@ -109,7 +109,7 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Mode {
-    /// Clay under two lights.
+    /// A matte material under two lights.
     Shaded,
     /// Normals as colours.
     Normals,
@@ -123,7 +123,7 @@ pub(crate) enum Mode {
     Instances,
 }
 
-/// Where the camera is.
+/// The camera that the options name.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum View {
     /// Eye and target.
@@ -139,12 +139,12 @@ pub(crate) enum Axis {
 }
 
 impl Args {
-    /// The compiled file or source; clap has seen to it that it is there.
+    /// The compiled file or source, which clap requires.
     pub(crate) fn file(&self) -> Result<&Path, Failure> {
         self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
     }
 
-    /// Where pictures go; clap has seen to it that it is there unless they go to a window.
+    /// Where pictures go, which clap requires unless they go to a window.
     pub(crate) fn output(&self) -> Result<&Path, Failure> {
         self.output.as_deref().ok_or_else(|| Failure::Usage("an output is needed".to_owned()))
     }
@@ -184,7 +184,7 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((parse(parts.0)?, parse(parts.1)?))
 }
 
-/// Six numbers, or else a name; other numbers of numbers are more likely a slip than a name.
+/// Six numbers, or else a name. A list of fewer or more numbers is an error, since it is hardly the name of a camera.
 fn parse_camera(text: &str) -> Result<View, String> {
     let parts: Vec<&str> = text.split(',').collect();
     let numbers: Vec<f64> = parts.iter().map_while(|s| s.trim().parse().ok()).collect();

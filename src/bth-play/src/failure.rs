@@ -1,4 +1,4 @@
-//! How the program ends when something goes wrong.
+//! Errors: messages, codes, and exit codes.
 
 use serde_json::json;
 use std::io::Write;
@@ -16,13 +16,13 @@ pub(crate) enum Failure {
     Lacks { file: PathBuf, what: &'static str, hint: &'static str },
     /// A scene manifest that does not follow the format (exit code 3, or 4 when it could not be read).
     BadManifest(bth_scene::Error),
-    /// A scene manifest that is not compiled (exit code 3).
-    Manifest { path: PathBuf, message: String, hint: String },
+    /// A scene or model that could not be compiled (exit code 3, or 4 when it could not be read).
+    Source { path: PathBuf, message: String, hint: String, exit: u8 },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
     Window(String),
-    /// Standard output was closed by its reader.
+    /// Standard output was closed by its reader, which is no error.
     ClosedOutput,
 }
 
@@ -51,7 +51,7 @@ impl From<bth_scene::Error> for Failure {
 impl Failure {
     fn parts(&self) -> (&str, u8, String) {
         match self {
-            Self::Usage(message) => ("BTH-U001", 2, message.clone()),
+            Self::Usage(message) => ("BTH-U001", 2, format!("BTH-U001: {message}")),
             Self::Runtime(error) => (
                 error.code().as_str(),
                 if error.code() == bth::Code::Read { 4 } else { 3 },
@@ -61,8 +61,8 @@ impl Failure {
                 let exit = if error.code == bth_scene::error::code::READ { 4 } else { 3 };
                 (error.code, exit, error.to_string())
             }
-            Self::Manifest { path, message, hint } => {
-                ("BTH-P003", 3, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
+            Self::Source { path, message, hint, exit } => {
+                ("BTH-P003", *exit, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
             }
             Self::Lacks { file, what, hint } => {
                 ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))
@@ -78,11 +78,11 @@ impl Failure {
         }
     }
 
-    /// Says what went wrong and gives the exit code.
+    /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
         let (code, exit_code, message) = self.parts();
         if exit_code != 0 {
-            // Nothing can be done when the output is closed: the exit code tells.
+            // Where the outputs are closed, the exit code is all that can be reported.
             let _ = writeln!(std::io::stderr().lock(), "error: {message}");
             if wants_json {
                 let error = json!({"error": {"code": code, "message": message, "exit_code": exit_code}});
@@ -95,7 +95,7 @@ impl Failure {
 
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
-    // As above for a closed output.
+    // Where the output is closed, the exit code is all that can be reported.
     let _ = error.print();
     if !error.use_stderr() {
         return ExitCode::SUCCESS;

@@ -2,25 +2,14 @@
 
 mod args;
 mod camera;
-mod clay;
-mod develop;
+mod compile_source;
 mod failure;
-mod frame;
-mod inside;
-mod legend;
-mod lights;
-mod manifests;
-mod occlusion;
-mod path;
-mod picture;
-mod progress;
-mod ramp;
+mod messages;
+mod output;
+mod render;
 mod report;
 mod sampling;
-mod sequence;
-mod sink;
-mod stage;
-mod surface;
+mod shading;
 mod window;
 
 use clap::{CommandFactory, Parser};
@@ -43,7 +32,7 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     if let Some(shell) = args.completions {
         let mut script = Vec::new();
         clap_complete::generate(shell, &mut args::Args::command(), "bth-play", &mut script);
-        return report::print(&String::from_utf8_lossy(&script));
+        return messages::print(&String::from_utf8_lossy(&script));
     }
     let isa = match args.isa {
         Some(isa) => isa.choose(),
@@ -51,11 +40,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     };
     isa.map_err(|error| Failure::Usage(error.to_string()))?;
     let file = args.file()?;
-    // What is mapped from the cache is not evicted before the end of the program.
-    let compiled;
-    let (file, mut scene) = if manifests::is_source(file) {
-        compiled = manifests::compiled(file, args.cache_dir.as_deref())?;
-        (compiled.path.as_path(), open(&compiled.path, true)?)
+    // Keeps the entry from being evicted from the cache until the end of the program.
+    let pinned;
+    let (file, mut scene) = if compile_source::is_source(file) {
+        pinned = compile_source::compiled(file, args.cache_dir.as_deref())?;
+        (pinned.path.as_path(), open(&pinned.path, true)?)
     } else {
         (file, open(file, args.map)?)
     };
@@ -69,17 +58,17 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         return report::window(args, &shown);
     }
     let output = args.output()?;
-    let (report, quiet) = pool.install(|| sequence::render(&mut scene, file, output, args))?;
+    let (report, quiet) = pool.install(|| render::render_sequence(&mut scene, file, output, args))?;
     report::show(args, &scene, file, &report, threads, quiet)
 }
 
 #[allow(unsafe_code)]
 fn open(file: &std::path::Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
-        // SAFETY: the contract of `map` is that the file is one that bthc wrote, and that nobody
-        // changes or shrinks it while it is mapped. The user takes that over with `--map`, whose
-        // help says so. Entries of the cache are written once, read-only, by linking a finished file;
-        // no program of ours opens one for writing, and this one had the hash of what bthc wrote.
+        // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it while it
+        // is mapped. With `--map` the user guarantees this, as its help tells. Entries of the cache are
+        // read-only and are created by linking a finished file; no program of the workspace opens one for
+        // writing, and the hash of this one was compared with what bthc wrote.
         unsafe { bth::map(file) }
     } else {
         bth::open(file)

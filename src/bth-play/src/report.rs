@@ -1,37 +1,17 @@
-//! What the program says when the pictures are written.
+//! The report on standard output: time, rays and memory of the frames, or what a window showed.
 
 use crate::args::Args;
 use crate::failure::Failure;
-use crate::sequence::Report;
-use crate::window::Shown;
+use crate::messages::{note, print};
+use crate::render::{FrameReport, Report};
+use crate::window::WindowSummary;
 use bth::Scene;
 use serde::Serialize;
 use serde_json::json;
-use std::io::Write;
 use std::path::Path;
 
-/// Prints a warning.
-pub(crate) fn warn(text: &str) {
-    // Nothing can be done when standard error is closed.
-    let _ = writeln!(std::io::stderr().lock(), "warning: {text}");
-}
-
-/// Says something on standard error.
-pub(crate) fn note(text: &str) {
-    // As above.
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
-}
-
-/// Prints text on standard output.
-pub(crate) fn print(text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    out.flush()?;
-    Ok(())
-}
-
-/// Prints what a window showed until it was closed, for people or as JSON.
-pub(crate) fn window(args: &Args, shown: &Shown) -> Result<(), Failure> {
+/// Prints a summary of what a window showed, for people or as JSON.
+pub(crate) fn window(args: &Args, shown: &WindowSummary) -> Result<(), Failure> {
     if args.json {
         return print(&format!("{:#}\n", json!({ "window": shown })));
     }
@@ -41,11 +21,11 @@ pub(crate) fn window(args: &Args, shown: &Shown) -> Result<(), Failure> {
     ))
 }
 
-/// Memory and what of the file was used.
+/// Memory, and how much of the file was used.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Stats {
     file_bytes: u64,
-    /// 0 when the file was read.
+    /// 0 when the file was read instead of mapped.
     mapped_bytes: u64,
     /// Bytes of the file in memory of this process; null where the system does not tell.
     resident_bytes: Option<u64>,
@@ -82,7 +62,7 @@ fn resident(file: &Path) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib << 10)
 }
 
-/// Prints what the frames took, for people or as JSON; on standard error when pictures went to standard output.
+/// Prints time and rays of the frames, for people or as JSON; on standard error when the pictures went to standard output.
 pub(crate) fn show(
     args: &Args,
     scene: &Scene,
@@ -91,69 +71,89 @@ pub(crate) fn show(
     threads: usize,
     quiet: bool,
 ) -> Result<(), Failure> {
-    let sum = |field: fn(&crate::sequence::FrameReport) -> f64| report.frames.iter().map(field).sum::<f64>();
-    let seconds = sum(|f| f.summary.seconds);
-    let rays = sum(|f| (f.summary.nearest_rays + f.summary.any_rays) as f64);
-    let rate = rays / seconds.max(1e-9);
-    let (width, height) = args.size;
     let stats = args.stats.then(|| Stats::new(scene, file, args.map));
-    let text = if args.json {
-        let json = json!({
-            "width": width,
-            "height": height,
-            "mode": args.mode.name(),
-            "samples_per_pixel": args.spp,
-            "threads": threads,
-            "resident_bytes": scene.resident_bytes(),
-            "rays_per_second": rate,
-            "frame": if report.frames.len() == 1 { json!(report.frames[0]) } else { json!(null) },
-            "frames": report.frames,
-            "frames_skipped": report.skipped,
-            "stats": stats,
-        });
-        format!("{json:#}\n")
-    } else {
-        let mut text = format!(
-            "{width}x{height}, {} samples a pixel: {seconds:.3} s, {:.1} million rays at {:.2} million rays/s on {threads} threads\n",
-            args.spp,
-            rays / 1e6,
-            rate / 1e6,
-        );
-        if report.frames.len() != 1 || report.skipped > 0 {
-            text = format!("{} frames ({} were there already), {text}", report.frames.len(), report.skipped);
-        }
-        if let [frame] = report.frames.as_slice()
-            && let Some(steps) = &frame.summary.steps
-        {
-            text.push_str(&format!(
-                "per camera ray: {:.1} nodes, {:.1} leaves, {:.1} triangles, {:.1} tetrahedra\n",
-                steps.nodes, steps.leaves, steps.triangles, steps.tets
-            ));
-        }
-        if let Some(stats) = stats {
-            text.push_str(&table(report, &stats));
-        }
-        text
+    let text = match args.json {
+        true => format!("{:#}\n", json(args, scene, report, threads, stats)),
+        false => text(args, report, threads, stats),
     };
-    if !quiet {
-        return print(&text);
+    if quiet {
+        note(text.trim_end());
+        return Ok(());
     }
-    // Nothing can be done when standard error is closed.
-    let _ = std::io::stderr().lock().write_all(text.as_bytes());
-    Ok(())
+    print(&text)
 }
 
+/// Seconds and rays of all frames.
+fn totals(report: &Report) -> (f64, f64) {
+    let sum = |field: fn(&FrameReport) -> f64| report.frames.iter().map(field).sum::<f64>();
+    (sum(|f| f.summary.seconds), sum(|f| (f.summary.nearest_rays + f.summary.any_rays) as f64))
+}
+
+fn rate(rays: f64, seconds: f64) -> f64 {
+    rays / seconds.max(1e-9)
+}
+
+fn json(
+    args: &Args,
+    scene: &Scene,
+    report: &Report,
+    threads: usize,
+    stats: Option<Stats>,
+) -> serde_json::Value {
+    let (seconds, rays) = totals(report);
+    json!({
+        "width": args.size.0,
+        "height": args.size.1,
+        "mode": args.mode.name(),
+        "samples_per_pixel": args.spp,
+        "threads": threads,
+        "resident_bytes": scene.resident_bytes(),
+        "rays_per_second": rate(rays, seconds),
+        "frame": if report.frames.len() == 1 { json!(report.frames[0]) } else { json!(null) },
+        "frames": report.frames,
+        "frames_skipped": report.skipped,
+        "stats": stats,
+    })
+}
+
+fn text(args: &Args, report: &Report, threads: usize, stats: Option<Stats>) -> String {
+    let (width, height) = args.size;
+    let (seconds, rays) = totals(report);
+    let mut text = format!(
+        "{width}x{height}, {} samples a pixel: {seconds:.3} s, {:.1} million rays at {:.2} million rays/s on {threads} threads\n",
+        args.spp,
+        rays / 1e6,
+        rate(rays, seconds) / 1e6,
+    );
+    if report.frames.len() != 1 || report.skipped > 0 {
+        text = format!("{} frames ({} were there already), {text}", report.frames.len(), report.skipped);
+    }
+    if let [frame] = report.frames.as_slice()
+        && let Some(steps) = &frame.summary.steps
+    {
+        text.push_str(&format!(
+            "per camera ray: {:.1} nodes, {:.1} leaves, {:.1} triangles, {:.1} tetrahedra\n",
+            steps.nodes, steps.leaves, steps.triangles, steps.tets
+        ));
+    }
+    if let Some(stats) = stats {
+        text.push_str(&table(report, &stats));
+    }
+    text
+}
+
+/// A row of times for each frame, then memory.
 fn table(report: &Report, stats: &Stats) -> String {
     let mut text = String::from("frame    update  top level     trace   rays/s  placed\n");
     for f in &report.frames {
-        let rays = (f.summary.nearest_rays + f.summary.any_rays) as f64 / f.summary.seconds.max(1e-9);
+        let rays = (f.summary.nearest_rays + f.summary.any_rays) as f64;
         text.push_str(&format!(
             "{:>5}  {:>5.2} ms  {:>6.2} ms  {:>5.1} ms  {:>5.2} M  {:>6}\n",
             f.frame,
             1e3 * f.update_seconds,
             1e3 * f.top_level_seconds,
             1e3 * f.summary.seconds,
-            rays / 1e6,
+            rate(rays, f.summary.seconds) / 1e6,
             f.instances_placed,
         ));
     }

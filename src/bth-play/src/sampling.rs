@@ -1,6 +1,7 @@
-//! Sample points: a low-discrepancy sequence, rotated per pixel by a hash, so that a picture
-//! depends on neither threads nor time.
+//! Sample points: a low-discrepancy sequence, rotated by a hash of the pixel, so that a picture is the same on every run and
+//! with any number of threads; and maps from the unit square to directions.
 
+use bth_random::mix;
 use glam::{DVec2, DVec3};
 
 /// The sample points of one pixel.
@@ -14,39 +15,31 @@ impl Sampler {
         Self { pixel: mix((u64::from(y) << 32) | u64::from(x)) }
     }
 
-    /// Point `index` of the sequence for `purpose`, in the unit square: the R2 sequence of
-    /// Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018), with a
-    /// Cranley-Patterson rotation.
-    pub(crate) fn point(&self, purpose: u64, index: u32) -> DVec2 {
+    /// Point `index` in the unit square of the sequence for one dimension pair, such as the lens or a bounce: the R2 sequence
+    /// of Roberts ("The unreasonable effectiveness of quasirandom sequences", 2018), with a Cranley-Patterson rotation that
+    /// decorrelates pixels and dimension pairs.
+    pub(crate) fn point(&self, dimension: u64, index: u32) -> DVec2 {
         const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
-        let shift = mix(self.pixel ^ mix(purpose + 1));
+        let shift = mix(self.pixel ^ mix(dimension + 1));
         let unit = |bits: u64| (bits & 0xffff_ffff) as f64 / 4_294_967_296.0;
         (DVec2::new(unit(shift), unit(shift >> 32)) + STEP * f64::from(index)).fract()
     }
 }
 
-/// The finalizer of SplitMix64 (Steele et al. 2014).
-fn mix(mut z: u64) -> u64 {
-    z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-/// A direction around the unit `normal`, distributed like the cosine of the angle to it.
+/// A unit direction around the unit `normal`, with a density proportional to the cosine of the angle to it.
 pub(crate) fn cosine_hemisphere(normal: DVec3, point: DVec2) -> DVec3 {
     let (radius, angle) = (point.x.sqrt(), std::f64::consts::TAU * point.y);
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     tangent * (radius * angle.cos()) + bitangent * (radius * angle.sin()) + normal * (1.0 - point.x).sqrt()
 }
 
-/// A point of the unit disc, uniformly distributed.
-pub(crate) fn disc(point: DVec2) -> DVec2 {
+/// A point of the unit disc, uniformly distributed for uniform points of the unit square.
+pub(crate) fn uniform_disc(point: DVec2) -> DVec2 {
     DVec2::from_angle(std::f64::consts::TAU * point.y) * point.x.sqrt()
 }
 
-/// `count` directions spread evenly (a Fibonacci sphere).
-pub(crate) fn sphere(count: u32) -> impl Iterator<Item = DVec3> {
+/// `count` unit directions spread evenly: a Fibonacci sphere.
+pub(crate) fn fibonacci_sphere(count: u32) -> impl Iterator<Item = DVec3> {
     (0..count).map(move |i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
         let angle = f64::from(i) * std::f64::consts::PI * (3.0 - 5f64.sqrt());
@@ -70,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn points_differ_by_pixel_purpose_and_index() {
+    fn points_differ_by_pixel_dimension_and_index() {
         let a = Sampler::new(0, 0).point(0, 0);
         assert_ne!(a, Sampler::new(1, 0).point(0, 0));
         assert_ne!(a, Sampler::new(0, 0).point(1, 0));

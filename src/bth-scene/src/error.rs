@@ -1,4 +1,4 @@
-//! What can be wrong with a manifest, each with a stable code, a place and a hint.
+//! Errors of manifests, each with a stable code, a place and a hint.
 
 use std::path::PathBuf;
 
@@ -13,13 +13,13 @@ pub struct Error {
     pub code: &'static str,
     /// The manifest.
     pub path: PathBuf,
-    /// Line, from 1; 0 when the file as a whole is meant.
+    /// Line, from 1; 0 for an error of the file as a whole.
     pub line: usize,
     /// Column in characters, from 1; 0 with line 0.
     pub column: usize,
     /// What was expected and what was found.
     pub message: String,
-    /// What to do.
+    /// How to correct it.
     pub hint: String,
 }
 
@@ -35,13 +35,13 @@ pub mod code {
     pub const TYPE: &str = "BTH-M004";
     /// A value that the format does not allow.
     pub const VALUE: &str = "BTH-M005";
-    /// A key that must be there is not.
+    /// A required key is missing.
     pub const MISSING_KEY: &str = "BTH-M006";
     /// A manifest of another version.
     pub const VERSION: &str = "BTH-M007";
     /// A name that is empty or used twice.
     pub const NAME: &str = "BTH-M008";
-    /// A name that nothing has.
+    /// A reference to a name that does not exist.
     pub const REFERENCE: &str = "BTH-M009";
     /// A node that is its own ancestor.
     pub const CYCLE: &str = "BTH-M010";

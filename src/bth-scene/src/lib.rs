@@ -1,6 +1,6 @@
-//! Scene manifests: what stands in a scene and how it moves, as TOML that a person can write.
+//! Scene manifests: the objects, hierarchy, cameras, lights and animation of a scene, as TOML that a person can write.
 //!
-//! `format-spec/scene-manifest.md` says what each key means. [`read`] is strict: unknown keys, wrong types,
+//! `format-spec/scene-manifest.md` specifies every key. [`read`] is strict: unknown keys, wrong types,
 //! cycles, missing names and paths that leave the manifest's folder are errors with line and column.
 //! [`Manifest::to_toml`] writes what [`read`] reads back to an equal value.
 #![warn(missing_docs)]
@@ -19,10 +19,7 @@ pub use error::{Error, Result};
 pub use model::*;
 pub use read::{parse, read};
 
-/// Version of the manifest format that this crate reads and writes.
-pub const VERSION: i64 = 1;
-
-/// The keys that may stand in each table, by the name of the table in the specification.
+/// The keys that are allowed in each table, by the name of the table in the specification.
 pub const KEYS: &[(&str, &[&str])] = &[
     ("scene", read::SCENE_KEYS),
     ("frames", read::FRAMES_KEYS),

@@ -1,11 +1,14 @@
-//! A scene as a manifest describes it. References are rows of the tables here.
+//! A scene as a manifest describes it. References to nodes and objects are indices into the vectors of [`Manifest`].
+
+/// Version of the manifest format that this crate reads and writes.
+pub const VERSION: i64 = 1;
 
 /// A scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Manifest {
-    /// Which frames there are.
+    /// The range of frames and their rate.
     pub frames: Frames,
-    /// Row of `cameras` that is used when none is asked for.
+    /// Row of `cameras` that is used by default.
     pub camera: Option<usize>,
     /// Geometries, each in its own space.
     pub objects: Vec<Object>,
@@ -15,7 +18,7 @@ pub struct Manifest {
     pub cameras: Vec<Camera>,
     /// Lights.
     pub lights: Vec<Light>,
-    /// What moves; no two of the same node and property.
+    /// Animated properties; no two of the same node and property.
     pub tracks: Vec<Track>,
 }
 
@@ -79,26 +82,26 @@ impl Source {
 pub struct Node {
     /// Unique among nodes.
     pub name: String,
-    /// Node that it moves with; `None` for the world.
+    /// Parent in the hierarchy; `None` for the world.
     pub parent: Option<usize>,
     /// From its own space to its parent's, before tracks.
     pub transform: Transform,
-    /// Object of which an instance stands here.
+    /// Object of which the node is an instance.
     pub object: Option<usize>,
-    /// Whether it and what is below it can be seen, before tracks.
+    /// Whether the node and its descendants are visible, before tracks.
     pub visible: bool,
 }
 
 /// From a node's space to its parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Transform {
-    /// Scales, then rotates, then moves. All finite.
+    /// Scales, then rotates, then translates. All numbers are finite.
     Parts {
         /// Units of the parent.
         translation: [f64; 3],
         /// Quaternion x, y, z, w; not zero, normalized when used.
         rotation: [f64; 4],
-        /// Per axis; a zero hides.
+        /// Factor of each axis; an instance with a factor of zero is invisible.
         scale: [f64; 3],
     },
     /// Rows of a matrix that is applied to columns (x, y, z, 1). All finite. Cannot be animated.
@@ -116,15 +119,15 @@ impl Default for Transform {
 pub struct Camera {
     /// Unique among cameras.
     pub name: String,
-    /// Node that carries it.
+    /// Node to which it is attached.
     pub node: usize,
-    /// How it projects.
+    /// Its projection.
     pub lens: Lens,
     /// Width over height of the picture that it was made for.
     pub aspect: Option<f64>,
-    /// Nothing nearer is seen.
+    /// Distance of the near plane.
     pub near: Option<f64>,
-    /// Nothing farther is seen.
+    /// Distance of the far plane.
     pub far: Option<f64>,
 }
 
@@ -143,7 +146,7 @@ pub enum Lens {
 pub struct Light {
     /// Unique among lights.
     pub name: String,
-    /// Node that carries it.
+    /// Node to which it is attached.
     pub node: usize,
     /// What kind of light.
     pub kind: LightKind,
@@ -175,11 +178,11 @@ pub enum LightKind {
 /// last the track has the value of that key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// Which node; it has no matrix, unless the property is its visibility.
+    /// The animated node. It has no matrix, unless the property is its visibility.
     pub node: usize,
-    /// Which property.
+    /// The animated property.
     pub property: Property,
-    /// What is between keys.
+    /// How values between keys are computed.
     pub interpolation: Interpolation,
     /// Seconds, strictly ascending, at least one.
     pub times: Vec<f64>,
@@ -188,7 +191,7 @@ pub struct Track {
     pub values: Vec<f64>,
 }
 
-/// What a track moves.
+/// A property of a node that a track animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Property {
     /// Three numbers.
@@ -213,7 +216,7 @@ impl Property {
             Self::Visible => 1,
         }
     }
-    /// As in a manifest.
+    /// The word that manifests use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Translation => "translation",
@@ -224,7 +227,7 @@ impl Property {
     }
 }
 
-/// What is between two keys.
+/// How values between two keys are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// The value of the key before.
@@ -246,7 +249,7 @@ impl Interpolation {
             Self::Cubic => 3,
         }
     }
-    /// As in a manifest.
+    /// The word that manifests use.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Step => "step",

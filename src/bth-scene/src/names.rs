@@ -1,4 +1,4 @@
-//! Names: each unique within its table, references looked up.
+//! Names: unique within their table, and the lookup of references to them.
 
 use crate::error::{Result, code};
 use crate::limits::MAX_NAME;

@@ -21,7 +21,7 @@ pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspe
 pub(crate) const LIGHT_KEYS: &[&str] =
     &["name", "node", "kind", "color", "intensity", "range", "inner", "outer"];
 
-/// Frames are within this of 0: their times are exact enough at any rate.
+/// Greatest magnitude of a frame number: their times are exact enough at any rate.
 const FRAME_LIMIT: i64 = 1 << 24;
 
 /// Reads a manifest file.
@@ -37,7 +37,7 @@ pub fn read(path: &Path) -> Result<Manifest> {
         failed(format!("cannot read: {e}"), "check the path and its permissions; manifests are UTF-8")
     };
     let mut text = String::new();
-    // One byte more than allowed tells that there is more, however long the file says that it is.
+    // Reading one byte more than allowed detects longer files without trusting the size that the system reports.
     let file = std::fs::File::open(path).map_err(cannot)?;
     file.take(MAX_MANIFEST + 1).read_to_string(&mut text).map_err(cannot)?;
     if text.len() as u64 > MAX_MANIFEST {
@@ -87,10 +87,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
 
 fn check_version(value: &Value<'_>) -> Result<()> {
     let version = value.integer(1..=i64::MAX)?;
-    if version == crate::VERSION {
+    if version == VERSION {
         return Ok(());
     }
-    let message = format!("expected version {}, found {version}", crate::VERSION);
+    let message = format!("expected version {}, found {version}", VERSION);
     Err(value.error(code::VERSION, message, "a newer version of bthc can read the manifest"))
 }
 
@@ -153,7 +153,7 @@ fn node(table: &Table<'_>, nodes: &Names<'_>, objects: &Names<'_>) -> Result<Nod
     })
 }
 
-/// Fails when a node is its own ancestor. Every node is walked up from once.
+/// Fails when a node is its own ancestor. Every node is visited once.
 fn check_cycles(tables: &[Table<'_>], nodes: &[Node]) -> Result<()> {
     const UNSEEN: usize = usize::MAX;
     let mut seen_from = vec![UNSEEN; nodes.len()];
@@ -163,7 +163,7 @@ fn check_cycles(tables: &[Table<'_>], nodes: &[Node]) -> Result<()> {
             seen_from[at] = start;
             next = nodes[at].parent;
         }
-        // Seen on this very way up: the way leads in a circle.
+        // A node that was visited from this same start closes a cycle.
         if let Some(at) = next.filter(|at| seen_from[*at] == start) {
             let message = format!("the node \"{}\" is its own ancestor", nodes[at].name);
             let value = tables[at].need("parent")?;

@@ -1,4 +1,4 @@
-//! Transforms: parts, matrices, and the forms that people prefer to quaternions.
+//! Transforms: translation, rotation and scale, matrices, and rotations given as axis and angle or as a point to look at.
 
 use crate::error::{Result, code};
 use crate::model::Transform;
@@ -69,7 +69,8 @@ pub(crate) fn rotation(value: &Value<'_>) -> Result<[f64; 4]> {
     Ok([x, y, z, half.cos()])
 }
 
-/// `{ from = [..], to = [..], up = [..] }`: stands at `from` and looks along negative z at `to`.
+/// `{ from = [..], to = [..], up = [..] }`: the translation and rotation of a node at `from` whose negative z axis points to
+/// `to`.
 fn look(value: &Value<'_>) -> Result<([f64; 3], [f64; 4])> {
     let table = value.table(LOOK_KEYS)?;
     let from: [f64; 3] = table.need("from")?.numbers()?;
@@ -90,7 +91,7 @@ fn look(value: &Value<'_>) -> Result<([f64; 3], [f64; 4])> {
     Ok((from, quaternion(axes)))
 }
 
-/// The same direction with length 1; `None` for zero or lengths that f64 cannot hold.
+/// The vector normalized; `None` for zero and for vectors that are not finite.
 fn unit<const N: usize>(v: [f64; N]) -> Option<[f64; N]> {
     let greatest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let scaled = v.map(|x| x / greatest);
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn quaternions_turn_the_axes_where_they_should() {
+    fn quaternions_rotate_the_axes_to_those_they_are_made_from() {
         for i in 0..200u32 {
             let part = |k: u32| f64::from((i * 7919 + k * 104_729) % 1000) / 500.0 - 1.0;
             let Some(q) = unit([part(1), part(2), part(3), part(4)]) else { continue };

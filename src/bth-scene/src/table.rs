@@ -1,4 +1,4 @@
-//! TOML tables and values with their places, read strictly.
+//! TOML tables and values, read strictly, with their places in the text for errors.
 
 use crate::error::{Error, Result, code};
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// The text of a manifest and where it stands.
+/// The text of a manifest and its path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Document<'a> {
     pub(crate) path: &'a Path,
@@ -62,13 +62,13 @@ impl<'a> Table<'a> {
         Ok(Self { doc, entries, span, keys })
     }
 
-    /// The value of a key, if it is there.
+    /// The value of a key, if the table has it.
     pub(crate) fn get(&self, key: &'static str) -> Option<Value<'a>> {
         debug_assert!(self.keys.contains(&key), "{key} is not in the list of keys");
         self.entries.get(key).map(|value| Value { doc: self.doc, key, value })
     }
 
-    /// The value of a key that must be there.
+    /// The value of a required key.
     pub(crate) fn need(&self, key: &'static str) -> Result<Value<'a>> {
         self.get(key).ok_or_else(|| {
             self.error(code::MISSING_KEY, format!("the key `{key}` is missing"), "add it".to_owned())
@@ -91,7 +91,7 @@ impl<'a> Table<'a> {
         self.doc.error(self.span.clone(), code, message, hint)
     }
 
-    /// Fails when both keys are there.
+    /// Fails when the table has both keys.
     pub(crate) fn exclude(&self, a: &'static str, b: &'static str) -> Result<()> {
         match (self.get(a), self.get(b)) {
             (Some(_), Some(value)) => Err(value.error(
@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// A value, with the key that it stands under.
+/// A value, with its key.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Value<'a> {
     doc: Document<'a>,
@@ -174,7 +174,7 @@ impl<'a> Value<'a> {
         parsed.filter(|n| n.is_finite()).ok_or_else(|| self.not_allowed("a finite number", text))
     }
 
-    /// A finite number that holds to a condition.
+    /// A finite number that satisfies a condition; `expected` describes it.
     pub(crate) fn number_that(&self, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64> {
         let number = self.number()?;
         if holds(number) { Ok(number) } else { Err(self.not_allowed(expected, number)) }
@@ -185,7 +185,7 @@ impl<'a> Value<'a> {
         Ok(array.iter().map(|value| Value { value, ..*self }).collect())
     }
 
-    /// An array of so many finite numbers.
+    /// An array of `N` finite numbers.
     pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N]> {
         let array = self.array()?;
         if array.len() != N {

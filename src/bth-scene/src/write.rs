@@ -3,7 +3,7 @@
 use crate::model::*;
 use std::fmt::Write;
 
-/// Keys on a line of a track.
+/// Keyframes on a line of a track.
 const KEYS_PER_LINE: usize = 8;
 
 impl Manifest {
@@ -15,7 +15,7 @@ impl Manifest {
     }
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "version = {}", crate::VERSION)?;
+        writeln!(out, "version = {}", VERSION)?;
         if let Some(camera) = self.camera {
             writeln!(out, "camera = {}", text(&self.cameras[camera].name))?;
         }
@@ -53,7 +53,7 @@ impl Manifest {
         match node.transform {
             Transform::Matrix(rows) => writeln!(out, "matrix = {rows:?}"),
             Transform::Parts { translation, rotation, scale } => {
-                // By bits: a negative zero is no default.
+                // Compared by bits, so that a negative zero is kept.
                 let is =
                     |a: &[f64], b: &[f64]| a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()));
                 if !is(&translation, &[0.0; 3]) {
@@ -122,7 +122,7 @@ impl Manifest {
     }
 }
 
-/// An array over lines.
+/// An array, over several lines if it is long.
 fn list(out: &mut String, key: &str, items: impl Iterator<Item = String>) -> std::fmt::Result {
     let items: Vec<_> = items.collect();
     if items.len() <= KEYS_PER_LINE {

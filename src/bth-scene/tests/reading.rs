@@ -1,4 +1,4 @@
-//! What manifests mean, and where they are refused.
+//! The meaning of manifests, and the errors of malformed ones with their places.
 
 use bth_scene::{Error, Interpolation, Lens, LightKind, Manifest, Property, Source, Transform, parse};
 use std::path::Path;

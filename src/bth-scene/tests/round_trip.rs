@@ -1,4 +1,4 @@
-//! Any scene that can be written is read back equal.
+//! Every scene that can be written is read back as an equal value.
 
 use bth_scene::*;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! The specification and the JSON Schema say what the reader does.
+//! The specification and the JSON Schema list the same keys as the reader.
 
 use bth_scene::{KEYS, parse};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! How the program ends when something goes wrong: exit code, message, and JSON when asked for.
+//! Errors: exit codes, messages, and JSON for `--json`.
 
 use crate::output;
 use serde_json::json;
@@ -16,11 +16,11 @@ pub(crate) enum Failure {
     Manifest(bth_scene::Error),
     /// Arguments that do not fit together (exit code 2).
     Usage { message: String, hint: &'static str },
-    /// Jobs failed, and it has been said why; the exit code of the first.
+    /// Jobs failed whose errors are printed already; the exit code of the first.
     Reported(u8),
-    /// A check failed; what there was to say has been said on standard output.
+    /// A check failed; the findings are printed already.
     Check,
-    /// Standard output was closed by its reader (`bthc ... | head`).
+    /// Standard output was closed by its reader (`bthc ... | head`), which is no error.
     ClosedOutput,
 }
 
@@ -117,10 +117,10 @@ impl Failure {
         }
     }
 
-    /// Says what went wrong and gives the exit code.
+    /// Prints the error, with `--json` as an object too, and returns the exit code.
     pub(crate) fn report(&self, wants_json: bool) -> ExitCode {
         if !matches!(self, Self::Check | Self::Reported(_) | Self::ClosedOutput) {
-            self.say();
+            self.print();
             if wants_json {
                 print_json_error(self.json(), self.exit_code());
             }
@@ -128,14 +128,14 @@ impl Failure {
         ExitCode::from(self.exit_code())
     }
 
-    /// Says what went wrong.
-    pub(crate) fn say(&self) {
+    /// Prints the error on standard error.
+    pub(crate) fn print(&self) {
         let text = match self {
             Self::Check | Self::Reported(_) | Self::ClosedOutput => return,
             Self::Compile(error) => error.to_string(),
             Self::Runtime(error) => error.to_string(),
             Self::Manifest(error) => error.to_string(),
-            Self::Usage { message, hint } => format!("{message} (hint: {hint})"),
+            Self::Usage { message, hint } => format!("BTH-U001: {message} (hint: {hint})"),
         };
         output::error(&text);
     }
@@ -156,13 +156,13 @@ pub(crate) fn runtime_json(error: &bth::Error) -> serde_json::Value {
 
 fn print_json_error(mut error: serde_json::Value, exit_code: u8) {
     error["exit_code"] = exit_code.into();
-    // Nothing is left to do when standard output is closed: the exit code tells.
+    // Where standard output is closed, the exit code is all that can be reported.
     let _ = output::json(&json!({ "error": error }));
 }
 
 /// Reports a wrong command line, or shows help or the version.
 pub(crate) fn usage(error: &clap::Error, wants_json: bool) -> ExitCode {
-    // As above for a closed output.
+    // Where the output is closed, the exit code is all that can be reported.
     let _ = error.print();
     if error.use_stderr() && wants_json {
         let first =

@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What the kernels use: what the command line says, else the environment.
+/// Chooses the instruction set of the kernels: by the command line, else by the environment.
 fn choose_isa(wanted: Option<bth::Isa>) -> Result<(), failure::Failure> {
     let chosen = match wanted {
         Some(isa) => isa.choose(),

@@ -1,4 +1,4 @@
-//! Times of rays through compiled objects, on one thread.
+//! Measures the time of rays through compiled objects, on one thread.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
@@ -11,7 +11,7 @@ const BATCH: usize = 1024;
 #[derive(Clone, Debug)]
 pub(crate) struct Rays {
     rays: Vec<Ray>,
-    /// Where each starts.
+    /// The primitive on which each ray starts.
     from: Vec<Surface>,
 }
 
@@ -40,36 +40,36 @@ impl Rays {
     }
 }
 
-/// How rays are traced.
+/// How rays are traced; always with the primitives on which they start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Way {
-    /// In batches, nearest hits, with the surfaces that they start on.
+pub(crate) enum QueryKind {
+    /// In batches, nearest hits.
     Nearest,
-    /// In batches, any hits, with the surfaces that they start on.
+    /// In batches, any hits.
     Any,
-    /// One a call, nearest hits, with the surfaces that they start on.
+    /// One a call, nearest hits.
     Single,
 }
 
-/// Rays, what they go through and how.
-pub(crate) type Run<'a> = (&'a Scene, &'a Rays, Way);
+/// A scene, the rays that are traced through it, and the kind of query.
+pub(crate) type TimedRun<'a> = (&'a Scene, &'a Rays, QueryKind);
 
-/// Rays of one turn of batches, which repeat fewer. Rays one a call don't: repeated in a row, they teach the branch
-/// predictor.
+/// Rays of one turn of batches; sets with fewer rays are repeated. Single rays are not repeated, since the branch predictor
+/// learns a short sequence.
 const TURN: usize = 16384;
 
-/// Nanoseconds of a ray in each run: the least over so many rounds, in which the runs take turns. What else the
-/// machine does can only add.
-pub(crate) fn nanoseconds(runs: &[Run<'_>], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<f64>> {
+/// Nanoseconds of a ray in each run: the least over the rounds, in which the runs take turns, since other work of the machine
+/// can only add time. `None` if it was stopped.
+pub(crate) fn nanoseconds(runs: &[TimedRun<'_>], rounds: usize, stop: impl Fn() -> bool) -> Option<Vec<f64>> {
     let mut least = vec![f64::INFINITY; runs.len()];
     for _ in 0..=rounds {
-        for ((scene, rays, way), least) in runs.iter().zip(&mut least) {
+        for ((scene, rays, query), least) in runs.iter().zip(&mut least) {
             if stop() {
                 return None;
             }
-            let again = if *way == Way::Single { 1 } else { TURN / rays.len().max(1) };
+            let again = if *query == QueryKind::Single { 1 } else { TURN / rays.len().max(1) };
             for _ in 0..again.max(1) {
-                let seconds = once(scene, rays, *way);
+                let seconds = once(scene, rays, *query);
                 *least = least.min(1e9 * seconds / rays.len().max(1) as f64);
             }
         }
@@ -77,14 +77,14 @@ pub(crate) fn nanoseconds(runs: &[Run<'_>], rounds: usize, stop: impl Fn() -> bo
     Some(least)
 }
 
-fn once(scene: &Scene, rays: &Rays, way: Way) -> f64 {
+fn once(scene: &Scene, rays: &Rays, query: QueryKind) -> f64 {
     let (mut hits, mut found) = (vec![Hit::MISS; BATCH], vec![false; BATCH]);
     let start = thread_seconds();
     for (batch, from) in rays.rays.chunks(BATCH).zip(rays.from.chunks(BATCH)) {
-        match way {
-            Way::Nearest => scene.nearest_batch(batch, Some(from), &mut hits[..batch.len()]),
-            Way::Any => scene.any_batch(batch, Some(from), &mut found[..batch.len()]),
-            Way::Single => {
+        match query {
+            QueryKind::Nearest => scene.nearest_batch(batch, Some(from), &mut hits[..batch.len()]),
+            QueryKind::Any => scene.any_batch(batch, Some(from), &mut found[..batch.len()]),
+            QueryKind::Single => {
                 for ((ray, from), hit) in batch.iter().zip(from).zip(&mut hits) {
                     *hit = scene.nearest(ray, *from);
                 }
@@ -95,7 +95,7 @@ fn once(scene: &Scene, rays: &Rays, way: Way) -> f64 {
     thread_seconds() - start
 }
 
-/// CPU seconds of this thread, which leave out the time in which other jobs run.
+/// CPU seconds of this thread, which exclude the time of other processes.
 #[cfg(unix)]
 fn thread_seconds() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);

@@ -6,7 +6,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Set by Ctrl-C; stages look at it a few times a second.
+/// Set by Ctrl-C; stages poll it a few times a second.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 
 /// Makes Ctrl-C stop the compilation cleanly; a second one ends the program at once.
@@ -19,9 +19,9 @@ pub(crate) fn listen_for_interrupts() {
     });
 }
 
-/// Units a second, without digits behind the point.
+/// Units per second, without decimals.
 fn whole_rate(state: &ProgressState, out: &mut dyn std::fmt::Write) {
-    // Drawing goes on whatever the writer says.
+    // An error of the writer does not stop the bar.
     let _ = write!(out, "{}/s", HumanCount(state.per_sec() as u64));
 }
 
@@ -41,27 +41,27 @@ impl Progress {
 }
 
 impl Progress {
-    /// Counts jobs from now on.
+    /// Turns the bar into one that counts jobs.
     pub(crate) fn of_jobs(self, total: u64) -> Self {
         self.stage("models", Some(total));
         self
     }
 
-    /// One job is done.
+    /// Counts a finished job.
     pub(crate) fn done(&self) {
         self.bar.inc(1);
     }
 
-    /// Prints a line without getting into the way of the bar.
+    /// Prints a line above the bar.
     pub(crate) fn print(&self, line: &str) {
-        // Nothing is left to say to a closed output; the files are written all the same.
+        // A closed standard output is ignored, since the files are written all the same.
         self.bar.suspend(|| {
             let _ = crate::output::text(&format!("{line}\n"));
         });
     }
 }
 
-/// Watches one of many jobs: shows no stages, and names the model in warnings.
+/// Monitor of one of many jobs: shows no stages, and names the model in warnings.
 pub(crate) struct Quiet<'a> {
     all: &'a Progress,
     model: &'a Path,

@@ -23,7 +23,7 @@ pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
         .collect())
 }
 
-/// Reads a `.from` file: the u32 id of the triangle that each ray starts on, or none.
+/// Reads a `.from` file: for each ray the u32 id of the triangle on which it starts, or 2^32 - 1 for none.
 pub(crate) fn read_from(path: &Path, rays: usize) -> Result<Vec<Surface>, Failure> {
     let data = read(path, b"FROM", 4)?;
     let (ids, _) = data[HEADER..].as_chunks::<4>();

@@ -1,36 +1,36 @@
-//! Plain text tables and numbers for people.
+//! Plain text tables, and numbers, for people.
 
-/// A table whose first column is aligned left and whose others are aligned right.
-#[derive(Debug, Default)]
-pub(crate) struct Table {
-    rows: Vec<Vec<String>>,
+use comfy_table::{CellAlignment, presets};
+
+/// A table without lines, whose first column is aligned left and whose others are aligned right.
+#[derive(Debug)]
+pub(crate) struct Table(comfy_table::Table);
+
+impl Default for Table {
+    fn default() -> Self {
+        let mut table = comfy_table::Table::new();
+        table.load_preset(presets::NOTHING);
+        Self(table)
+    }
 }
 
 impl Table {
     /// Adds a row.
     pub(crate) fn row<const N: usize>(&mut self, cells: [&str; N]) {
-        self.rows.push(cells.iter().map(|c| (*c).to_owned()).collect());
+        self.0.add_row(cells);
     }
 
-    /// The text, one line a row.
-    pub(crate) fn render(&self) -> String {
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let width = |c: usize| {
-            self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..columns).map(width).collect();
-        let mut text = String::new();
-        for row in &self.rows {
-            let mut line = String::new();
-            for (column, cell) in row.iter().enumerate() {
-                let padding = " ".repeat(widths[column] - cell.chars().count());
-                if column == 0 {
-                    line.push_str(&format!("{cell}{padding}"));
-                } else {
-                    line.push_str(&format!("  {padding}{cell}"));
-                }
-            }
-            text.push_str(line.trim_end());
+    /// The text, one line a row, without trailing blanks and without terminal codes.
+    pub(crate) fn render(mut self) -> String {
+        for (i, column) in self.0.column_iter_mut().enumerate() {
+            let (left_padding, alignment) = match i {
+                0 => (0, CellAlignment::Left),
+                _ => (2, CellAlignment::Right),
+            };
+            column.set_padding((left_padding, 0)).set_cell_alignment(alignment);
+        }
+        let mut text = self.0.trim_fmt();
+        if !text.is_empty() {
             text.push('\n');
         }
         text
@@ -91,5 +91,15 @@ mod tests {
         table.row(["stage", "s"]);
         table.row(["a", "12.5"]);
         assert_eq!(table.render(), "stage     s\na      12.5\n");
+        assert_eq!(Table::default().render(), "");
+    }
+
+    #[test]
+    fn long_cells_are_not_wrapped_and_wide_characters_are_aligned() {
+        let (long, mut table) = ("x".repeat(300), Table::default());
+        table.row([&long, "1"]);
+        table.row(["日本", "22"]);
+        let blanks = " ".repeat(300 - 4 + 2);
+        assert_eq!(table.render(), format!("{long}   1\n日本{blanks}22\n"));
     }
 }

@@ -86,7 +86,7 @@ impl Grid {
     }
 
     /// Where a ray's line meets a triangle, in t; `None` also where it lies in the triangle's plane.
-    pub fn crossing(&self, ray: &GridRay, triangle: u32) -> Option<Quotient> {
+    pub fn intersection(&self, ray: &GridRay, triangle: u32) -> Option<Quotient> {
         let [a, b, c] =
             self.triangles[triangle as usize].map(|v| sub(self.positions[v as usize], ray.origin));
         let d = ray.direction.map(i128::from);

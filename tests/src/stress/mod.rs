@@ -1,17 +1,17 @@
-//! Rays that tracers lose, on surfaces that tracers lose them on, with answers that are checked exactly.
+//! Rays and surfaces for which ray tracers tend to miss hits, with answers that are checked exactly.
 //!
-//! Shapes and rays have integer coordinates times a power of two, so that a ray aimed at a vertex meets that very
-//! vertex, and what a ray must or must not meet is decided in integers, ray by ray: fast enough for 100 million.
+//! Shapes and rays have integer coordinates times a power of two, so that a ray aimed at a vertex passes exactly through it,
+//! and each answer is checked in integer arithmetic: fast enough for 100 million rays.
 
 mod grid;
 mod rays;
 mod shapes;
-mod tally;
+mod statistics;
 
 pub use grid::{Grid, GridRay, LIMIT, Point, Quotient};
 pub use rays::{Aimed, Kind, Target, rays};
 pub use shapes::{Shape, shapes};
-pub use tally::Tally;
+pub use statistics::Statistics;
 
 use crate::structures::{Traced, bits};
 use bth::Isa;
@@ -22,35 +22,42 @@ const BATCH: usize = 1024;
 
 /// Traces about `count` rays of every kind through all structures of a shape, with every instruction set of this
 /// machine in turn, and adds what was found. One of `one_in` rays is compared with every triangle.
-pub fn run(shape: &Shape, structures: &[Traced], count: usize, one_in: usize, seed: u64, tally: &mut Tally) {
+pub fn run(
+    shape: &Shape,
+    structures: &[Traced],
+    count: usize,
+    one_in: usize,
+    seed: u64,
+    statistics: &mut Statistics,
+) {
     let isas: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
     for batch in 0..count.div_ceil(BATCH) {
         let aimed = rays(shape, BATCH.min(count - batch * BATCH), seed ^ ((batch as u64 + 1) << 20));
         let rays: Vec<Ray> = aimed.iter().map(|a| shape.grid.ray(&a.ray)).collect();
         let mut expected = vec![Hit::MISS; rays.len()];
         for (i, traced) in structures.iter().enumerate() {
-            // The instruction sets take turns, and each structure meets each of them.
+            // The instruction sets take turns, so that each structure is traced with each of them.
             isas[(batch + i) % isas.len()].choose().expect("it is available");
             let mut hits = vec![Hit::MISS; rays.len()];
             traced.scene.nearest_batch(&rays, None, &mut hits);
             if i == 0 {
                 expected = hits;
             } else {
-                tally.different += differing(&expected, &hits);
+                statistics.different += differing(&expected, &hits);
             }
             let mut found = vec![false; rays.len()];
             traced.scene.any_batch(&rays, None, &mut found);
-            tally.different +=
+            statistics.different +=
                 expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
-            tally.traced += 2 * rays.len() as u64;
+            statistics.traced += 2 * rays.len() as u64;
             if batch % 4 == i % 4 {
-                hinted(traced, &rays, &expected, tally);
+                hinted(traced, &rays, &expected, statistics);
             }
         }
         for (i, (aimed, hit)) in aimed.iter().zip(&expected).enumerate() {
-            tally.check(shape, aimed, hit);
+            statistics.check(shape, aimed, hit);
             if one_in > 0 && i % one_in == batch % one_in {
-                tally.compare_with_all(shape, aimed, hit);
+                statistics.compare_with_all(shape, aimed, hit);
             }
         }
     }
@@ -59,16 +66,16 @@ pub fn run(shape: &Shape, structures: &[Traced], count: usize, one_in: usize, se
 }
 
 /// Rays with hints, right and wrong ones, and one by one: the same bits.
-fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], tally: &mut Tally) {
+fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
     let from: Vec<Surface> = expected.iter().map(|hit| hit.surface).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     traced.scene.nearest_batch(rays, Some(&from), &mut hits);
-    tally.different += differing(expected, &hits);
-    tally.traced += rays.len() as u64;
+    statistics.different += differing(expected, &hits);
+    statistics.traced += rays.len() as u64;
     for (ray, hit) in rays.iter().zip(expected).step_by(16) {
         let one = traced.scene.nearest(ray, Surface::NONE);
-        tally.different += u64::from(bits(&one) != bits(hit));
-        tally.traced += 1;
+        statistics.different += u64::from(bits(&one) != bits(hit));
+        statistics.traced += 1;
     }
 }
 

@@ -1,8 +1,8 @@
-//! The rays: aimed exactly at what tracers miss.
+//! Rays that are aimed exactly at vertices, at edges, and along faces.
 
 use super::grid::{GridRay, LIMIT, Point};
 use super::shapes::Shape;
-use crate::rng::Rng;
+use bth_random::Rng;
 
 /// How a ray was made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,18 +45,18 @@ impl Kind {
     ];
 }
 
-/// A ray and what is known of it.
+/// A ray and what is known about its hits.
 #[derive(Clone, Debug)]
 pub struct Aimed {
     /// How it was made.
     pub kind: Kind,
     /// The ray.
     pub ray: GridRay,
-    /// What its line surely meets.
+    /// A vertex or edge that its line passes through exactly, if any.
     pub through: Option<Target>,
 }
 
-/// Through what a line passes exactly.
+/// What a line passes through exactly.
 #[derive(Clone, Copy, Debug)]
 pub enum Target {
     /// A vertex.
@@ -71,8 +71,8 @@ fn sub(a: Point, b: Point) -> Point {
 
 /// `count` rays, of the kinds in turn.
 pub fn rays(shape: &Shape, count: usize, seed: u64) -> Vec<Aimed> {
-    let mut rng = Rng(seed);
-    // What leaves the grid, or does not move, is drawn again.
+    let mut rng = Rng::new(seed);
+    // A ray outside the grid, or with a zero direction, is drawn again.
     let draw = |i: usize| loop {
         let aimed = ray(shape, Kind::ALL[i % Kind::ALL.len()], &mut rng);
         let ray = &aimed.ray;
@@ -95,7 +95,7 @@ fn ray(shape: &Shape, kind: Kind, rng: &mut Rng) -> Aimed {
     let [vertex, next, last] = [0, 1, 2].map(|i| grid.triangles[row as usize][(turn + i) % 3]);
     let [a, b, c] = [vertex, next, last].map(|v| grid.positions[v as usize]);
     let middle = [0, 1, 2].map(|k| (b[k] + c[k]) / 2);
-    // Where the middle is no point of the grid, a corner takes its place.
+    // Where the middle is not a point of the grid, a corner is used instead.
     let middle = if (0..3).all(|k| 2 * middle[k] == b[k] + c[k]) { middle } else { b };
     let somewhere = about(shape, rng);
     let mut ray = GridRay {

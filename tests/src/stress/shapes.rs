@@ -1,7 +1,7 @@
-//! The catalogue: closed surfaces that are hard.
+//! The catalogue of closed surfaces that are hard to trace.
 
 use super::grid::{Grid, LIMIT, Point};
-use crate::rng::Rng;
+use bth_random::Rng;
 use bth_scenes::Model;
 use std::collections::BTreeMap;
 
@@ -12,13 +12,13 @@ pub struct Shape {
     pub name: &'static str,
     /// Its triangles.
     pub grid: Grid,
-    /// Points that are surely inside: rays from there must hit.
+    /// Points inside the surface, from which every ray must hit.
     pub inside: Vec<Point>,
     /// Bounds, in units of the grid.
     pub bounds: [Point; 2],
     /// Triangles at each vertex.
     pub around: Vec<Vec<u32>>,
-    /// Whether the whole has one tetrahedralization: no bad contacts.
+    /// Whether the whole shape can be tetrahedralized at once, having no bad contacts.
     pub whole: bool,
 }
 
@@ -124,7 +124,7 @@ fn sphere(name: &'static str, segments: i32, radius: i32) -> Shape {
     Shape::new(name, grid, vec![[0; 3]], true)
 }
 
-/// Two apexes over a ring of `n`: as thin as one likes.
+/// Two apexes above and below a ring of `n` vertices; `height` makes it as thin as needed.
 fn bipyramid(name: &'static str, n: i32, radius: i32, height: i32) -> Shape {
     let mut grid = Grid { exponent: -20, ..Grid::default() };
     grid.positions = vec![[0, 0, height], [0, 0, -height]];
@@ -138,7 +138,7 @@ fn bipyramid(name: &'static str, n: i32, radius: i32, height: i32) -> Shape {
     Shape::new(name, grid, vec![[0; 3]], true)
 }
 
-/// Spheres within spheres, the next a hair smaller.
+/// Three nested spheres, the second slightly smaller than the first.
 fn nested(name: &'static str, segments: i32) -> Shape {
     let mut grid = Grid { exponent: -16, ..Grid::default() };
     for radius in [1 << 18, (1 << 18) - (1 << 14), 1 << 16] {
@@ -155,7 +155,7 @@ fn append(grid: &mut Grid, other: &Grid, by: Point) {
 
 /// Small cubes at random places, which may overlap.
 fn scattered(name: &'static str, count: i32) -> Shape {
-    let (mut grid, mut rng) = (Grid { exponent: -8, ..Grid::default() }, Rng(77));
+    let (mut grid, mut rng) = (Grid { exponent: -8, ..Grid::default() }, Rng::new(77));
     let small = cube("", 1, 1024).grid;
     let mut inside = Vec::new();
     for _ in 0..count {

@@ -1,4 +1,4 @@
-//! No allocation is larger than the input justifies, whatever the input says of itself.
+//! No allocation is larger than the size of the input justifies, whatever sizes the input declares.
 #![allow(unsafe_code, reason = "an allocator that measures")]
 
 use bth_compile::Silent;

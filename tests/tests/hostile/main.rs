@@ -1,4 +1,4 @@
-//! Files that lie about their size, and files that shrink.
+//! Files that declare wrong sizes, and files that are truncated while they are in use.
 #![cfg(target_os = "linux")]
 
 mod allocation;

@@ -1,4 +1,4 @@
-//! A file that is truncated while it is in use.
+//! A file that is truncated while it is in use gives an error.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};

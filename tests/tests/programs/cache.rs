@@ -1,4 +1,4 @@
-//! What is made once is not made again, and what is not as it was made is not used.
+//! The cache: unchanged sources are not compiled again, and damaged entries are never used.
 
 use crate::support::{Run, command, folder, run_with, sphere};
 use serde_json::Value;

@@ -1,3 +1,5 @@
+//! `bthc compile`: outputs, structures, options and reports.
+
 use crate::support::{bthc, crossing, folder, run, sphere};
 
 #[test]

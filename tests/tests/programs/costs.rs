@@ -1,3 +1,5 @@
+//! `bthc explain` and `bthc calibrate`: selection of nodes, budgets and profiles.
+
 use crate::support::{bthc, command, folder, run_with, sphere};
 
 const CHEAP: [&str; 4] = ["--c-tet", "0.001", "--min-tet-triangles", "64"];

@@ -1,3 +1,5 @@
+//! Exit codes and error messages of wrong usage, missing files and malformed models.
+
 use crate::support::{bthc, folder, run, sphere};
 
 #[test]

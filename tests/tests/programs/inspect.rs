@@ -1,3 +1,5 @@
+//! `bthc info`, `verify`, `marks` and `diff`: what they report about files and models.
+
 use crate::support::{bthc, crossing, folder, sphere};
 
 #[test]

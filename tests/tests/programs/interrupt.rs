@@ -1,4 +1,4 @@
-//! Whenever the compiler is stopped, its output is whole or absent.
+//! Whenever the compiler is interrupted, its output is complete or absent.
 
 use crate::support::{bthc, command, folder, sphere, wait};
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! The programs `bthc` and `bth-play`, from the command line to the files they write.
-// Tests say what they skip.
+//! The programs `bthc`, `bth-play` and `bth-scenes`, from the command line to the files that they write.
+// Tests print what they skip.
 #![allow(clippy::print_stdout)]
 
 mod cache;
@@ -8,6 +8,7 @@ mod costs;
 mod errors;
 mod inspect;
 mod interrupt;
+mod mistakes;
 mod pipelines;
 mod play;
 mod previous;

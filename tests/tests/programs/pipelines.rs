@@ -1,4 +1,4 @@
-//! Many models, build systems, filters and watching.
+//! Several models at once, build systems, standard input and output, and watching.
 
 use crate::support::{Run, bthc, command, folder, run_with, sphere, wait};
 use std::io::{BufRead, BufReader, Write};

@@ -1,3 +1,5 @@
+//! `bth-play`: pictures of every mode, the same with any number of threads.
+
 use crate::support::{bthc, folder, run, sphere};
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What has not changed of a scene is taken from the file that the last compilation left, if it is whole: the result is the
+//! The unchanged parts of a scene are taken from the file of the last compilation if that is complete, and the result is the
 //! same as without.
 
 use crate::cache::{compile, found, scene};

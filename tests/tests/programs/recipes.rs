@@ -1,5 +1,5 @@
-//! The recipes of `docs/pipelines.md` as they stand there: each tool runs the compiler when, and only when, something
-//! changed. A recipe is skipped where its tool is missing; `tools/test` says which that are.
+//! The recipes of `docs/pipelines.md`: each build tool runs the compiler when, and only when, something changed. A recipe is
+//! skipped where its tool is missing; `tools/test` prints which tools these are.
 
 use crate::support::{folder, sphere, sphere_mesh};
 use std::path::{Path, PathBuf};

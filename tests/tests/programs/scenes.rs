@@ -1,3 +1,5 @@
+//! Scenes: import, compilation, sequences of frames and animations.
+
 use crate::support::{Run, command, data, folder, run_with, sphere};
 use std::path::Path;
 

@@ -1,8 +1,8 @@
-//! Many processes, one store, random kills: nothing damaged is served, nothing partial stays, and the store verifies.
+//! Many processes and one store, with random kills: no damaged entry is used, no partial file stays, and the store verifies.
 
 use crate::cache::{cached, scene};
 use crate::support::{command, run_with};
-use bth_tests::rng::Rng;
+use bth_random::Rng;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -49,7 +49,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
     let (kills, whole) = std::thread::scope(|scope| {
         let process = |number: u64| {
             move || {
-                let mut rng = Rng(number);
+                let mut rng = Rng::new(number);
                 let (mut kills, mut whole) = (0, 0);
                 while Instant::now() < end {
                     let input = &inputs[rng.below(inputs.len() as u64) as usize];

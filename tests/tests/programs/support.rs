@@ -1,4 +1,4 @@
-//! Runs the programs and makes small models.
+//! Running the programs, and small models for them.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -29,13 +29,13 @@ impl Run {
 /// Folder of the built programs.
 fn programs() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| bth_tests::built(&["bthc", "bth-play"]))
+    FOLDER.get_or_init(|| bth_tests::built(&["bthc", "bth-play", "bth-scenes"]))
 }
 
 /// The command for a program, in a folder.
 pub(crate) fn command(program: &str, folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(programs().join(program));
-    // What one test compiled must not spare another one the work.
+    // Without the cache: no test may profit from what another one compiled.
     command.args(args).current_dir(folder).stdin(Stdio::null()).env("BTH_NO_CACHE", "1");
     command
 }
@@ -147,7 +147,7 @@ pub(crate) fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-/// Folder of the larger models, or `None` with a printed line.
+/// Folder of the downloaded models; `None`, and a printed line, where it does not exist.
 pub(crate) fn data() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folder = std::env::var_os("BTH_DATA").map_or(beside, PathBuf::from);

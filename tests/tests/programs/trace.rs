@@ -1,3 +1,5 @@
+//! `bthc trace`: ray files, hints, and the exact answers of `--exact`.
+
 use crate::support::{bthc, command, folder, sphere};
 use bth::rays::{Ray, Surface};
 

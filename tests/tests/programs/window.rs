@@ -1,4 +1,4 @@
-//! The viewer on a virtual display, driven by the keys of one.
+//! The window of `bth-play` on a virtual display, driven by its keys.
 
 use crate::scenes::{compiled, run};
 use crate::support::{command, wait};

@@ -4,7 +4,7 @@ use crate::support::{animated, compiled, imported, models, options, varied};
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::Silent;
 use bth_compile::pipeline::compile;
-use bth_tests::rng::Rng;
+use bth_random::Rng;
 
 /// The scene's visible geometry, and the first flat triangle of each instance.
 fn flatten(scene: &bth::Scene) -> (bth::Scene, Vec<(u32, u32)>) {
@@ -32,7 +32,7 @@ fn flatten(scene: &bth::Scene) -> (bth::Scene, Vec<(u32, u32)>) {
 
 fn rays(flat: &bth::Scene, count: usize, seed: u64) -> Vec<Ray> {
     let object = flat.object(0);
-    let mut rng = Rng(seed);
+    let mut rng = Rng::new(seed);
     let extent = [0, 1, 2].map(|k| object.header.upper[k] - object.header.lower[k]);
     let size = extent.into_iter().fold(0.0, f32::max);
     (0..count)
@@ -42,7 +42,7 @@ fn rays(flat: &bth::Scene, count: usize, seed: u64) -> Vec<Ray> {
                 .map(|v| object.positions[v as usize]);
             let target = [0, 1, 2].map(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
             let distance = if i % 2 == 0 { size } else { 0.02 * size };
-            let origin = target.map(|x| x + distance * (rng.unit() - 0.5));
+            let origin = target.map(|x| x + distance * (rng.unit_f32() - 0.5));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) * 0.7);
             Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }
         })
@@ -110,10 +110,10 @@ fn size(flat: &bth::Scene, ray: &Ray) -> f32 {
 
 /// Answers for rays that are shifted by a few roundings of what they see.
 fn shifted<'a>(flat: &'a bth::Scene, ray: &'a Ray) -> impl Iterator<Item = Hit> + 'a {
-    let mut rng = Rng(77);
+    let mut rng = Rng::new(77);
     let size = size(flat, ray);
     (0..400).map(move |_| {
-        let mut near = |p: [f32; 3]| p.map(|x| x + size * 32.0 * f32::EPSILON * (rng.unit() - 0.5));
+        let mut near = |p: [f32; 3]| p.map(|x| x + size * 32.0 * f32::EPSILON * (rng.unit_f32() - 0.5));
         let target = near([0, 1, 2].map(|k| ray.origin[k] + ray.direction[k]));
         let origin = near(ray.origin);
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);

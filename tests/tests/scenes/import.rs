@@ -1,4 +1,4 @@
-//! What of a glTF scene becomes a manifest, and what is refused.
+//! Which parts of a glTF scene become a manifest, and which are refused.
 
 use crate::support::{animated, compiled};
 use bth_compile::scene::{self, Chosen, ImportOptions, ImportReport};

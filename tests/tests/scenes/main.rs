@@ -1,4 +1,4 @@
-//! Scenes from end to end: what is imported and compiled stands, moves and is hit as it should.
+//! Scenes from end to end: import, compilation, animation and rays.
 #![allow(clippy::print_stdout)] // a test that cannot run says so
 
 mod flattened;

@@ -1,15 +1,15 @@
-//! Time: what moves, what is hidden, what cannot be shown.
+//! Animation: motion, visibility, and transforms that cannot be used.
 
 use crate::support::{compiled, manifest, models, varied};
 use bth::rays::{Hit, Ray, Surface};
-use bth_tests::rng::Rng;
+use bth_random::Rng;
 
 fn rays(count: usize) -> Vec<Ray> {
-    let mut rng = Rng(8);
+    let mut rng = Rng::new(8);
     (0..count)
         .map(|_| {
-            let origin = [(); 3].map(|()| 40.0 * rng.unit() - 20.0);
-            let target = [(); 3].map(|()| 12.0 * rng.unit() - 6.0);
+            let origin = [(); 3].map(|()| 40.0 * rng.unit_f32() - 20.0);
+            let target = [(); 3].map(|()| 12.0 * rng.unit_f32() - 6.0);
             let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
             Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }
         })

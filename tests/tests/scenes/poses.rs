@@ -1,4 +1,4 @@
-//! World matrices against an independent reader of glTF.
+//! World matrices agree with an independent reader of glTF.
 
 use crate::support::{animated, compiled, imported};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! Folders, files and small scenes.
+//! Folders, files and small scenes for the tests.
 
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure};

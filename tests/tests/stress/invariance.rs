@@ -1,13 +1,13 @@
-//! Changes of a model that must change no answer: another order, other names, exact motions, cuts into instances.
+//! Changes of a model that change no answer: another order, exact motions, and cuts into instances.
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure};
+use bth_random::Rng;
 use bth_scenes::Model;
 use bth_scenes::{blob::blob, soup::soup};
 use bth_tests::rays::assorted;
-use bth_tests::rng::Rng;
 use bth_tests::structures::every_structure;
 use std::fmt::Write;
 
@@ -30,7 +30,7 @@ fn models() -> [Model; 2] {
 }
 
 fn shuffled(count: usize, seed: u64) -> Vec<u32> {
-    let (mut rows, mut rng): (Vec<u32>, _) = ((0..count as u32).collect(), Rng(seed));
+    let (mut rows, mut rng): (Vec<u32>, _) = ((0..count as u32).collect(), Rng::new(seed));
     for i in (1..count).rev() {
         rows.swap(i, rng.below(i as u64 + 1) as usize);
     }

@@ -1,4 +1,4 @@
-//! Numerical stress: hard rays, hard models, and changes that must change no answer.
+//! Numerical stress: hard rays, hard models, and changes that must not change answers.
 
 mod compiler;
 mod instances;

@@ -3,14 +3,14 @@
 use bth::rays::{Hit, Surface};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
-use bth_tests::stress::{Kind, Tally, rays, run, shapes};
+use bth_tests::stress::{Kind, Statistics, rays, run, shapes};
 use bth_tests::structures::{Traced, compiled, every_structure, options};
 
 #[test]
 fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
     for (i, shape) in shapes(1).iter().enumerate() {
         let structures = every_structure(&shape.grid.model(), shape.whole);
-        let mut tally = Tally::default();
+        let mut tally = Statistics::default();
         run(shape, &structures, 2048, 32, i as u64, &mut tally);
         assert_eq!(tally.defects(), 0, "{}: {tally:#?}", shape.name);
         assert!(tally.hits > tally.rays / 3 && tally.compared >= 64, "{}: {tally:?}", shape.name);
@@ -25,7 +25,7 @@ fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
 fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
     for shape in shapes(4).iter().filter(|shape| shape.name.contains("scale 2^")) {
         let scene = compiled(&shape.grid.model(), &options(Structure::Bvh, RecordKind::Link32, false));
-        let mut tally = Tally::default();
+        let mut tally = Statistics::default();
         // Three batches: one for each instruction set.
         run(shape, &[Traced { name: "bvh".into(), scene }], 3 * 4096, 0, 8, &mut tally);
         assert_eq!(tally.defects(), 0, "{}: {tally:#?}", shape.name);
@@ -36,13 +36,13 @@ fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
 #[test]
 fn a_missed_and_a_made_up_hit_are_counted() {
     let shape = &shapes(1)[0];
-    let mut all = Tally::default();
+    let mut all = Statistics::default();
     for aimed in rays(shape, 200, 3) {
-        let mut tally = Tally::default();
+        let mut tally = Statistics::default();
         tally.check(shape, &aimed, &Hit::MISS);
         assert_eq!(tally.leaks, u64::from(aimed.kind == Kind::Inside), "{aimed:?}");
         let missed = (0..shape.grid.triangles.len() as u32)
-            .find(|row| shape.grid.crossing(&aimed.ray, *row).is_none());
+            .find(|row| shape.grid.intersection(&aimed.ray, *row).is_none());
         let surface = Surface { instance: 0, triangle: missed.expect("no ray meets all") };
         tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, surface });
         assert_eq!(tally.ghosts, 1, "{aimed:?}");

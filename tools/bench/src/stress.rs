@@ -5,7 +5,7 @@ use crate::markdown::{count, table};
 use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
-use bth_tests::stress::{Shape, Tally, run as trace, shapes};
+use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
 use bth_tests::structures::{Traced, every_structure};
 use serde_json::{Value, json};
 
@@ -16,7 +16,7 @@ const ROUND: usize = 12 * 1024;
 struct Run {
     shape: Shape,
     structures: Vec<Traced>,
-    tally: Tally,
+    tally: Statistics,
 }
 
 /// Traces rounds of all shapes until enough rays are traced of each, and writes the record after every round: what was
@@ -32,7 +32,7 @@ pub fn run(arguments: &Stress) -> Result<()> {
     let compiled = shapes.into_iter().map(|shape| {
         progress.say(format!("{}: compiling", shape.name));
         let structures = every_structure(&shape.grid.model(), shape.whole);
-        Run { shape, structures, tally: Tally::default() }
+        Run { shape, structures, tally: Statistics::default() }
     });
     let mut runs: Vec<Run> = compiled.collect();
     let mut round = 0;
@@ -56,13 +56,13 @@ pub fn run(arguments: &Stress) -> Result<()> {
     }
 }
 
-fn total(runs: &[Run]) -> Tally {
-    let mut all = Tally::default();
+fn total(runs: &[Run]) -> Statistics {
+    let mut all = Statistics::default();
     runs.iter().for_each(|run| all.add(&run.tally));
     all
 }
 
-fn record(arguments: &Stress, runs: &[Run], all: &Tally, seconds: u64, is_last: bool) -> Result<()> {
+fn record(arguments: &Stress, runs: &[Run], all: &Statistics, seconds: u64, is_last: bool) -> Result<()> {
     let mut rows: Vec<_> = runs
         .iter()
         .map(|run| row(run.shape.name, run.triangles(), run.structures.len(), &run.tally))
@@ -116,7 +116,7 @@ fn body(rows: &[Vec<String>]) -> String {
     )
 }
 
-fn row(name: &str, triangles: usize, structures: usize, tally: &Tally) -> Vec<String> {
+fn row(name: &str, triangles: usize, structures: usize, tally: &Statistics) -> Vec<String> {
     let mut cells = vec![name.to_owned(), count(triangles as u64)];
     cells.push(if structures == 0 { String::new() } else { structures.to_string() });
     let numbers = [
@@ -136,7 +136,7 @@ fn row(name: &str, triangles: usize, structures: usize, tally: &Tally) -> Vec<St
     cells
 }
 
-fn json(shape: &Shape, structures: usize, tally: &Tally) -> Value {
+fn json(shape: &Shape, structures: usize, tally: &Statistics) -> Value {
     json!({
         "name": shape.name,
         "triangles": shape.grid.triangles.len(),

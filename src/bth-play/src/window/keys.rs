@@ -1,9 +1,9 @@
-//! What the keys do.
+//! The keys of the window.
 
 use crate::args::Mode;
 use winit::keyboard::KeyCode;
 
-/// What the window answers to H, and README and help promise.
+/// The list of keys that H prints. The README and the help of the program promise these keys.
 pub(crate) const HELP: &str = "\
 1 2 3 4 5 6     mode: shaded, normals, ao, steps, path, instances
 Space           play, pause
@@ -20,11 +20,11 @@ H               print this
 Escape          close
 ";
 
-/// What a key asks for at once.
+/// What pressing a key does at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     Mode(Mode),
-    Toggle,
+    TogglePlayback,
     Step(i32),
     First,
     Last,
@@ -35,7 +35,7 @@ pub(crate) enum Action {
     Close,
 }
 
-/// What pressing a key asks for. Keys are meant by their place, as on a keyboard of the United States.
+/// The action of a key. Keys are identified by their position, named as on a keyboard of the United States.
 pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
     let step = if shift { 10 } else { 1 };
     Some(match key {
@@ -45,7 +45,7 @@ pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
         KeyCode::Digit4 | KeyCode::Numpad4 => Action::Mode(Mode::ALL[3]),
         KeyCode::Digit5 | KeyCode::Numpad5 => Action::Mode(Mode::ALL[4]),
         KeyCode::Digit6 | KeyCode::Numpad6 => Action::Mode(Mode::ALL[5]),
-        KeyCode::Space => Action::Toggle,
+        KeyCode::Space => Action::TogglePlayback,
         KeyCode::ArrowLeft => Action::Step(-step),
         KeyCode::ArrowRight => Action::Step(step),
         KeyCode::Home => Action::First,
@@ -59,8 +59,8 @@ pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
     })
 }
 
-/// The direction that a key flies in while it is down: right, up, forward.
-pub(crate) fn flight(key: KeyCode) -> Option<[f64; 3]> {
+/// The direction in which the camera moves while a key is down: right, up, forward.
+pub(crate) fn fly_direction(key: KeyCode) -> Option<[f64; 3]> {
     Some(match key {
         KeyCode::KeyW => [0.0, 0.0, 1.0],
         KeyCode::KeyS => [0.0, 0.0, -1.0],

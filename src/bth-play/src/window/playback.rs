@@ -1,4 +1,4 @@
-//! Which frame is shown: playing, paused, stepping.
+//! Playback: which frame is shown while the window plays, pauses, steps and scrubs.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ pub(crate) struct Playback {
     /// Frames per second.
     rate: f64,
     frame: i32,
-    /// Since when it plays, and from which frame.
+    /// While playing: the time at which playing began, and the frame shown at that time.
     playing: Option<(Duration, i32)>,
 }
 
@@ -31,7 +31,7 @@ impl Playback {
     }
 
     /// Whether there is more than one frame.
-    pub(crate) fn moves(&self) -> bool {
+    pub(crate) fn is_animated(&self) -> bool {
         self.first < self.last
     }
 
@@ -43,26 +43,26 @@ impl Playback {
     /// Plays or pauses.
     pub(crate) fn toggle(&mut self, now: Duration) {
         self.playing = match self.playing {
-            None if self.moves() => Some((now, self.frame)),
+            None if self.is_animated() => Some((now, self.frame)),
             _ => None,
         };
     }
 
-    /// Goes to the frame of a time while it plays, over and over; frames that come too fast are left out. Whether it is another
-    /// than before.
+    /// While playing, goes to the frame of a time, in a loop; frames are skipped where they come faster than they are shown.
+    /// Returns whether the frame changed.
     pub(crate) fn advance(&mut self, now: Duration) -> bool {
         let Some((since, from)) = self.playing else { return false };
-        let passed = (now.saturating_sub(since).as_secs_f64() * self.rate) as i64;
-        self.set(i64::from(from) + passed)
+        let elapsed_frames = (now.saturating_sub(since).as_secs_f64() * self.rate) as i64;
+        self.set(i64::from(from) + elapsed_frames)
     }
 
-    /// Pauses, and goes so many frames on or back, around the ends.
+    /// Pauses, and goes forward or back by a number of frames, in a loop. Returns whether the frame changed.
     pub(crate) fn step(&mut self, by: i32) -> bool {
         self.playing = None;
         self.set(i64::from(self.frame) + i64::from(by))
     }
 
-    /// Pauses at a part of the whole, from 0 to 1.
+    /// Pauses at a fraction of the whole, from 0 to 1. Returns whether the frame changed.
     pub(crate) fn scrub(&mut self, part: f64) -> bool {
         self.playing = None;
         let frames = f64::from(self.last) - f64::from(self.first) + 1.0;

@@ -1,19 +1,20 @@
-//! Pictures onto the pixels of the window, with the bar that shows and sets the frame.
+//! The pixels of the window: a picture, and the playback bar that shows and sets the frame.
 
 use crate::failure::Failure;
-use crate::picture::Picture;
+use crate::output::Picture;
 use std::num::NonZeroU32;
 use std::rc::Rc;
 use winit::window::Window;
 
-/// Height of the bar, pixels.
+/// Height of the playback bar, pixels.
 const BAR: u32 = 5;
-/// A drag that begins so near to the bottom of the window scrubs.
+/// A drag scrubs if it begins within this distance of the bottom of the window, pixels.
 pub(crate) const GRIP: f64 = 14.0;
-const PASSED: u32 = 0x00e8_9a3c;
-const TO_COME: u32 = 0x0040_4448;
+/// Colours of the bar, as 0RGB: left and right of the current frame.
+const PLAYED: u32 = 0x00e8_9a3c;
+const REMAINING: u32 = 0x0040_4448;
 
-/// What is drawn on.
+/// A window and its pixels.
 pub(crate) struct Screen {
     pub(crate) window: Rc<Window>,
     surface: softbuffer::Surface<Rc<Window>, Rc<Window>>,
@@ -23,7 +24,7 @@ impl Screen {
     /// The pixels of a window.
     ///
     /// # Errors
-    /// If the display does not give them.
+    /// If the display does not provide them.
     pub(crate) fn new(window: Window) -> Result<Self, Failure> {
         let window = Rc::new(window);
         let context = softbuffer::Context::new(window.clone()).map_err(failed)?;
@@ -31,7 +32,7 @@ impl Screen {
         Ok(Self { window, surface })
     }
 
-    /// Shows a picture, stretched to a size, with a bar that is filled to a part of its width.
+    /// Shows a picture, scaled to a size, with a bar that is filled to the fraction `bar` of its width.
     ///
     /// # Errors
     /// If the display fails.
@@ -70,7 +71,7 @@ fn draw(pixels: &mut [u32], picture: &Picture, (width, height): (u32, u32), bar:
         let top = height.saturating_sub(BAR) as usize * width as usize;
         for (i, pixel) in pixels[top..].iter_mut().enumerate() {
             let x = (i % width as usize) as f64 / f64::from(width);
-            *pixel = if x < part { PASSED } else { TO_COME };
+            *pixel = if x < part { PLAYED } else { REMAINING };
         }
     }
 }
@@ -80,12 +81,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coarse_pictures_fill_the_window_and_the_bar_its_part() {
+    fn coarse_pictures_fill_the_window_and_the_bar_its_fraction() {
         let picture = Picture { width: 2, height: 1, pixels: vec![[1, 2, 3], [255, 0, 9]] };
         let mut pixels = vec![7; 4 * 8];
         draw(&mut pixels, &picture, (4, 8), Some(0.25));
         assert_eq!(pixels[..4], [0x0001_0203, 0x0001_0203, 0x00ff_0009, 0x00ff_0009]);
         assert_eq!(pixels[8..12], pixels[..4]);
-        assert_eq!(pixels[28..], [PASSED, TO_COME, TO_COME, TO_COME]);
+        assert_eq!(pixels[28..], [PLAYED, REMAINING, REMAINING, REMAINING]);
     }
 }

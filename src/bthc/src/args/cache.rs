@@ -1,6 +1,6 @@
-//! Options of the cache, and the commands that look after it.
+//! Options of the cache, and the commands that maintain it.
 
-use crate::args::EXIT_CODES;
+use super::common::EXIT_CODES;
 use crate::failure::Failure;
 use bth_cache::{DEFAULT_CAP, Store, parse_bytes};
 use clap::{Args as Group, Subcommand};
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Which folder is the cache, and how large it may be.
 #[derive(Clone, Debug, Group)]
 #[command(next_help_heading = "Cache")]
-pub(crate) struct Place {
+pub(crate) struct CacheLocation {
     /// Folder of the cache; by default BTH_CACHE_DIR, else `bth` in the user's folder for caches.
     #[arg(long, global = true, value_name = "FOLDER")]
     pub(crate) cache_dir: Option<PathBuf>,
@@ -23,7 +23,7 @@ pub(crate) struct Place {
 #[command(next_help_heading = "Cache")]
 pub(crate) struct Keeping {
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) location: CacheLocation,
     /// A folder that machines share, or with the feature s3 a place such as s3://bucket/prefix: what the cache lacks is looked
     /// for there, what is made is put there too. By default
     /// BTH_SHARED_CACHE.
@@ -44,7 +44,7 @@ pub(crate) struct Cache {
     #[command(subcommand)]
     pub(crate) command: Command,
     #[command(flatten)]
-    pub(crate) place: Place,
+    pub(crate) location: CacheLocation,
     /// Print one JSON object.
     #[arg(long, global = true)]
     pub(crate) json: bool,
@@ -73,8 +73,8 @@ pub(crate) enum Command {
     Clear,
 }
 
-impl Place {
-    /// The store; nothing when there is no folder for it.
+impl CacheLocation {
+    /// The store; `None` if no folder for it is known.
     ///
     /// # Errors
     /// `BTH-O060` when its folder cannot be used, `BTH-U001` for a size that is none.
@@ -98,17 +98,17 @@ impl Place {
 }
 
 impl Keeping {
-    /// The store, if one is wanted. A default folder that cannot be used is a warning and no more.
+    /// The store, unless the options exclude it. A default folder that cannot be used is only a warning.
     ///
     /// # Errors
-    /// As [`Place::store`] for a folder that was asked for.
+    /// As [`CacheLocation::store`] for a folder that was asked for.
     pub(crate) fn store(&self, warn: &dyn Fn(&str)) -> Result<Option<Store>, Failure> {
         let set = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
-        let asked = self.place.cache_dir.is_some() || self.in_cache;
+        let asked = self.location.cache_dir.is_some() || self.in_cache;
         if self.no_cache || !asked && set("BTH_NO_CACHE").is_some() {
             return Ok(None);
         }
-        let store = match self.place.store() {
+        let store = match self.location.store() {
             Err(Failure::Compile(e)) if !asked => {
                 warn(&format!("going on without the cache: {e}"));
                 return Ok(None);
@@ -123,7 +123,7 @@ impl Keeping {
     }
 }
 
-/// A shared cache by its name.
+/// The shared cache of a name: a folder or an address.
 fn remote(name: &str) -> Result<Box<dyn bth_cache::Remote>, Failure> {
     #[cfg(feature = "s3")]
     if name.starts_with("s3://") {

@@ -1,4 +1,4 @@
-//! Options that are one of a few words, and what the compiler calls them.
+//! Options with a few named values, and their conversion to the types of the compiler.
 
 use bth_import::Keep;
 use clap::ValueEnum;

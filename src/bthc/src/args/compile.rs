@@ -1,9 +1,9 @@
-//! What `bthc compile` and the commands beside it are told of models and of what is to be built.
+//! Options of `bthc compile`, and those that it shares with `import` and `explain`.
 
 use super::cache::Keeping;
 use super::choices::*;
+use super::common::{EXIT_CODES, threads};
 use super::jobs::Jobs;
-use super::{EXIT_CODES, threads};
 use bth_format::layout::GridBits;
 use clap::Args as Group;
 use std::path::PathBuf;
@@ -166,7 +166,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 impl Compile {
-    /// The options of the compiler that this command line stands for.
+    /// The options of the compiler.
     ///
     /// # Errors
     /// If the profile cannot be used.
@@ -196,7 +196,7 @@ impl Compile {
 
     fn coordinates(&self) -> bth_compile::coordinates::Options {
         let (bits, max_error) = match self.coordinates {
-            // Asked for by name: nothing moves, whatever may.
+            // An explicit f32 keeps all vertices in place, whatever --max-error allows.
             Some(Coordinates::F32) => (None, None),
             Some(Coordinates::B21) => (Some(GridBits::B21), self.max_error),
             Some(Coordinates::B16) => (Some(GridBits::B16), self.max_error),

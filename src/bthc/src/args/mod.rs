@@ -2,6 +2,7 @@
 
 pub(crate) mod cache;
 mod choices;
+mod common;
 mod compile;
 mod jobs;
 
@@ -9,18 +10,8 @@ pub(crate) use cache::*;
 pub(crate) use compile::*;
 
 use clap::{Args as Group, Parser, Subcommand};
+use common::{EXIT_CODES, threads};
 use std::path::PathBuf;
-
-pub(crate) const EXIT_CODES: &str = "\
-Exit codes:
-    0  done
-    1  a check failed (verify, cache verify), or files differ (diff)
-    2  wrong usage
-    3  bad input: the model or the compiled file cannot be used
-    4  a file could not be read or written
-    5  the model exceeds a limit of the format
-   70  internal error; please report it
-  130  cancelled";
 
 /// Compiles triangle models into BTH files, for tracing rays without building anything at the start.
 #[derive(Debug, Parser)]
@@ -203,18 +194,10 @@ pub(crate) struct Completions {
     pub(crate) shell: clap_complete::Shell,
 }
 
-/// A number of rounds that ends.
+/// Parses a number of rounds.
 fn rounds(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(n) if (1..=10_000).contains(&n) => Ok(n),
         _ => Err("expected a number from 1 to 10000".to_owned()),
-    }
-}
-
-/// A number of threads that a machine may have.
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n <= 4096 => Ok(n),
-        _ => Err("expected a number from 0 to 4096".to_owned()),
     }
 }

@@ -1,12 +1,12 @@
-//! From times and steps to costs.
+//! Fits costs to measured times and steps.
 
 use super::subject::{Timed, Times};
 use bth_compile::costs::{self, BvhCosts, Profile, TetCosts, Walk};
 use bth_format::layout::RecordKind;
 use std::collections::BTreeMap;
 
-/// What was measured on models whose tetrahedra fit the caches, on models whose don't, and on a model of a
-/// single leaf.
+/// Measurements on models whose tetrahedra fit the caches, on models whose tetrahedra do not, and on a model of a single
+/// leaf.
 pub(crate) struct Measured {
     pub(crate) small: Vec<Times>,
     pub(crate) large: Vec<Times>,
@@ -19,7 +19,7 @@ fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// Entry, hit and the two costs of a step that explain the times of these rays best; none below 0.
+/// Entry, hit and the two costs of a step that fit the times of these rays best; none below 0.
 fn walk<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Timed) -> f64) -> Walk {
     let rows: Vec<([f64; 4], f64)> = times
         .map(|(t, large)| {
@@ -29,11 +29,12 @@ fn walk<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Timed
         .filter(|(_, time)| *time > 0.0 && time.is_finite())
         .collect();
     let [entry, hit, small, large] = costs::fit(&rows).unwrap_or([0.0; 4]).map(|x| x.max(0.0));
-    // Larger tetrahedralizations are never cheaper; where it seems so, that is noise.
+    // A step in a larger tetrahedralization is never cheaper; a fit that tells otherwise is noise.
     Walk { entry, hit, step: [small, large.max(small)] }
 }
 
-/// The same for rays one a call, which take ten times as long: what a hit adds is lost in that, and is in the entry.
+/// As [`walk`] for rays traced one a call, which take ten times as long. The cost of a hit is too small beside that to be
+/// fitted, and is part of the entry.
 fn alone<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Timed) -> f64) -> Walk {
     let rows: Vec<([f64; 3], f64)> = times
         .map(|(t, large)| (if large { [1.0, 0.0, t.steps] } else { [1.0, t.steps, 0.0] }, time(t)))
@@ -47,7 +48,7 @@ fn alone<'a>(times: impl Iterator<Item = (&'a Timed, bool)>, time: impl Fn(&Time
 pub(crate) fn fit(measured: &Measured, isa: &str, hints: bool) -> Profile {
     let all = || measured.small.iter().chain(&measured.large);
     let ray = all().map(|t| t.nothing).fold(f64::INFINITY, f64::min);
-    // Over small and large models alike: the logarithm of their number is in the count of the visits.
+    // Small and large models alike, since the number of visits grows with the logarithm of the size.
     let a_visit = |t: &Timed| ((t.bvh - ray) / t.visits.max(1.0)).max(0.0);
     let block = (measured.leaf - ray).max(0.0);
     let node = |t: &Times| ((t.outside.bvh - ray - block * t.wide[1]) / t.wide[0].max(1.0)).max(0.0);
@@ -64,7 +65,7 @@ pub(crate) fn fit(measured: &Measured, isa: &str, hints: bool) -> Profile {
         let from_surfaces = || sized.iter().flat_map(|(t, large)| t.bounces.iter().map(move |b| (b, *large)));
         let surface = walk(from_surfaces(), |t| t.tets[row]);
         let alone = alone(from_surfaces(), |t| t.single[row]);
-        // From outside only finding the first tetrahedron differs.
+        // Rays from outside differ only in finding the first tetrahedron.
         let entry = |walk: &Walk, time: fn(&Timed, usize) -> f64| {
             mean(measured.small.iter().map(|t| {
                 let t = &t.outside;

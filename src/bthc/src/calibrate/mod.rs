@@ -1,7 +1,7 @@
-//! Measures what tracing costs on this machine: the profile that the compiler selects by.
+//! Measures the costs of tracing on this machine, as the profile by which the compiler selects nodes.
 //!
-//! `subject` prepares models in all structures and counts the steps of sampled rays through them; `fit` turns
-//! times and counts into costs.
+//! `subject` compiles models into all structures and counts the steps of sampled rays through them; `fit` turns times and
+//! counts into costs.
 
 mod fit;
 mod subject;

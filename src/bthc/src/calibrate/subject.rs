@@ -1,7 +1,7 @@
-//! A model to measure on: its structures, rays, and the steps that these take.
+//! A model to measure on: its compiled structures, sampled rays, and the traversal steps that these take.
 
 use crate::failure::Failure;
-use crate::measure::{Rays, Run, Way, nanoseconds};
+use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth::Scene;
 use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
 use bth_compile::pipeline::{self, Options, Structure};
@@ -11,21 +11,22 @@ use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use std::time::Instant;
 
-/// Rays of each kind to a small model: they and the model stay in the caches nearest to the core however the system places
-/// their pages.
+/// Rays of each kind to a small model: few enough that they and the model stay in the caches of the core wherever the system
+/// places their pages.
 const RAYS: usize = 4096;
-/// The same to a large one.
+/// Rays of each kind to a large model.
 const RAYS_TO_LARGE: usize = 16384;
 /// Rays whose steps are counted.
 const COUNTED: usize = 4096;
 
 /// Triangles of the largest small model.
 const SMALL: usize = 20_000;
-/// So many times small models are tetrahedralized again.
+/// Number of times that small models are tetrahedralized to measure the time.
 const AGAIN: usize = 16;
 
-/// Times that models and rays get new places in memory in the course of the rounds: what shares a set of the cache is luck.
-const PLACES: usize = 3;
+/// Number of times that models and rays are copied to new addresses during the rounds, since the addresses decide which data
+/// share a set of a cache.
+const COPIES: usize = 3;
 
 /// Rays of one kind and their mean steps.
 #[derive(Clone)]
@@ -36,6 +37,24 @@ struct Kind {
     steps: f64,
     /// Share that ends at a triangle.
     hits: f64,
+}
+
+impl Kind {
+    /// Counts the steps of the first [`COUNTED`] rays.
+    fn new(samples: &[SampleRay], mesh: &Mesh, tree: &bvh::BinaryBvh, walker: &TetWalker<'_>) -> Kind {
+        let counted = &samples[..samples.len().min(COUNTED)];
+        let visits: f64 = counted.iter().map(|r| f64::from(costs::walk(mesh, tree, r, |_| {}).visits)).sum();
+        let walked: Vec<Walked> = counted.iter().filter_map(|r| walker.walk(r)).collect();
+        let mean = |of: fn(&Walked) -> u32| {
+            walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / counted.len().max(1) as f64
+        };
+        Kind {
+            rays: Rays::new(samples),
+            visits: visits / counted.len().max(1) as f64,
+            steps: mean(|w| w.steps),
+            hits: mean(|w| u32::from(w.hit)),
+        }
+    }
 }
 
 /// Times of one kind of rays, with their steps.
@@ -49,7 +68,7 @@ pub(crate) struct Timed {
     pub(crate) tets: [f64; 4],
     /// Nanoseconds through the tetrahedra one ray a call, by record.
     pub(crate) single: [f64; 4],
-    /// Tetrahedra on the way.
+    /// Tetrahedra on the query.
     pub(crate) steps: f64,
     /// Share of the rays that end at a triangle.
     pub(crate) hits: f64,
@@ -62,7 +81,7 @@ pub(crate) struct Times {
     pub(crate) nothing: f64,
     /// Lines from outside.
     pub(crate) outside: Timed,
-    /// Bounces that end at a triangle and that don't, of each those of few steps and of many.
+    /// Bounces that miss and that hit a triangle, of each those of few steps and those of many.
     pub(crate) bounces: [Timed; 4],
     /// Short rays from surfaces.
     pub(crate) short: Timed,
@@ -110,16 +129,11 @@ impl Subject {
             }
             .into());
         };
-        let mut seconds: f64 = report.nodes.iter().map(|n| n.seconds).sum();
         let small = mesh.triangles.len() <= SMALL;
-        if small {
-            let (before, start) = (worker_seconds(), Instant::now());
-            for _ in 0..AGAIN {
-                tets::build(mesh, &tree, &[0], &options.tets, monitor)?;
-            }
-            let spent = before.and_then(|before| Some(worker_seconds()? - before));
-            seconds = spent.unwrap_or(start.elapsed().as_secs_f64()) / AGAIN as f64;
-        }
+        let seconds = match small {
+            true => repeated_seconds(mesh, &tree, &options, monitor)?,
+            false => report.nodes.iter().map(|n| n.seconds).sum(),
+        };
         let file = |built: &[(u32, tets::TetMesh)], record: RecordKind| {
             let options = Options { record, geometry: false, ..options.clone() };
             pipeline::assemble(mesh, &tree, built, &options, monitor).map(|compiled| compiled.bytes)
@@ -132,7 +146,7 @@ impl Subject {
         let root = &tree.nodes[0];
         let count = if small { RAYS } else { RAYS_TO_LARGE };
         let lines = costs::outside(root.lower, root.upper, count, 11);
-        // Away from the model: the other half of each line.
+        // The opposite half of each line leads away from the model.
         let away = |ray: &SampleRay| SampleRay { direction: ray.direction.map(|x| -x), ..*ray };
         let nothing: Vec<SampleRay> = lines.iter().map(away).collect();
         let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 6 * count, 12);
@@ -141,21 +155,7 @@ impl Subject {
         short.truncate(count);
         let walker = TetWalker::new(tets);
         let bounces = parts(&walker, &bounce);
-        let kind = |samples: &[SampleRay]| {
-            let counted = &samples[..samples.len().min(COUNTED)];
-            let visits: f64 =
-                counted.iter().map(|r| f64::from(costs::walk(mesh, &tree, r, |_| {}).visits)).sum();
-            let walked: Vec<Walked> = counted.iter().filter_map(|r| walker.walk(r)).collect();
-            let mean = |of: fn(&Walked) -> u32| {
-                walked.iter().map(|w| f64::from(of(w))).sum::<f64>() / counted.len().max(1) as f64
-            };
-            Kind {
-                rays: Rays::new(samples),
-                visits: visits / counted.len().max(1) as f64,
-                steps: mean(|w| w.steps),
-                hits: mean(|w| u32::from(w.hit)),
-            }
-        };
+        let kind = |samples: &[SampleRay]| Kind::new(samples, mesh, &tree, &walker);
         let outside = kind(&lines);
         Ok(Subject {
             wide: wide(&plain, &lines[..lines.len().min(COUNTED)]),
@@ -170,19 +170,19 @@ impl Subject {
         })
     }
 
-    /// The scenes and the rays, in new places in memory.
-    fn placed(&self) -> Result<Placed, Failure> {
+    /// A copy of the scenes and the rays at new addresses.
+    fn copied(&self) -> Result<SubjectCopy, Failure> {
         let scenes = self.files.iter().map(|file| bth::from_bytes(file)).collect::<Result<_, _>>()?;
-        let kinds = self.kinds().map(|(kind, way)| (kind.rays.clone(), way)).collect();
-        Ok(Placed { scenes, nothing: self.nothing.clone(), kinds })
+        let kinds = self.kinds().map(|(kind, query)| (kind.rays.clone(), query)).collect();
+        Ok(SubjectCopy { scenes, nothing: self.nothing.clone(), kinds })
     }
 
-    fn kinds(&self) -> impl Iterator<Item = (&Kind, Way)> {
-        let bounces = self.bounces.iter().map(|kind| (kind, Way::Nearest));
-        [(&self.outside, Way::Nearest), (&self.short, Way::Any)].into_iter().chain(bounces)
+    fn kinds(&self) -> impl Iterator<Item = (&Kind, QueryKind)> {
+        let bounces = self.bounces.iter().map(|kind| (kind, QueryKind::Nearest));
+        [(&self.outside, QueryKind::Nearest), (&self.short, QueryKind::Any)].into_iter().chain(bounces)
     }
 
-    /// Takes the times of `runs` apart.
+    /// Assigns the times of the runs to the kinds of rays and structures, in the order of [`SubjectCopy::runs`].
     fn times(&self, times: &[f64]) -> Times {
         let kinds: Vec<&Kind> = self.kinds().map(|(kind, _)| kind).collect();
         let timed = |row: usize| {
@@ -208,58 +208,75 @@ impl Subject {
     }
 }
 
-/// A model and its rays where they are timed.
-struct Placed {
+/// The scenes and rays of a subject while they are timed.
+struct SubjectCopy {
     scenes: Vec<Scene>,
     nothing: Rays,
-    kinds: Vec<(Rays, Way)>,
+    kinds: Vec<(Rays, QueryKind)>,
 }
 
-impl Placed {
-    /// What is timed: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
-    fn runs(&self) -> Vec<Run<'_>> {
+impl SubjectCopy {
+    /// The runs: rays that miss, then every kind through the BVH and through the tetrahedra in each record.
+    fn runs(&self) -> Vec<TimedRun<'_>> {
         let (bvh, tets) = (&self.scenes[0], &self.scenes[1..]);
-        let mut runs: Vec<Run<'_>> = vec![(bvh, &self.nothing, Way::Nearest)];
-        for (rays, way) in &self.kinds {
-            runs.push((bvh, rays, *way));
-            runs.extend(tets.iter().map(|scene| (scene, rays, *way)));
-            runs.extend(tets.iter().map(|scene| (scene, rays, Way::Single)));
+        let mut runs: Vec<TimedRun<'_>> = vec![(bvh, &self.nothing, QueryKind::Nearest)];
+        for (rays, query) in &self.kinds {
+            runs.push((bvh, rays, *query));
+            runs.extend(tets.iter().map(|scene| (scene, rays, *query)));
+            runs.extend(tets.iter().map(|scene| (scene, rays, QueryKind::Single)));
         }
         runs
     }
 }
 
-/// Times all kinds of rays through all structures of all models in turn, so that a busy minute of the machine does not fall
-/// on one model; and nanoseconds of a ray of another run beside them.
+/// Times all kinds of rays through all structures of all models in turn, so that other work of the machine does not distort
+/// the times of one model only; and the nanoseconds of a ray of the additional run `beside`.
 ///
 /// # Errors
 /// If it was stopped.
 pub(crate) fn measure(
     subjects: &[Subject],
-    beside: Run<'_>,
+    beside: TimedRun<'_>,
     rounds: usize,
     stop: impl Fn() -> bool,
 ) -> Result<(Vec<Times>, f64), Failure> {
     let mut least: Vec<f64> = Vec::new();
     let mut before = Vec::new();
-    for _ in 0..PLACES {
-        // What was there before is kept until now, or the new would take its place.
-        let placed = subjects.iter().map(Subject::placed).collect::<Result<Vec<_>, _>>()?;
+    for _ in 0..COPIES {
+        // The previous copies are kept until here, so that the new ones get other addresses.
+        let copies = subjects.iter().map(Subject::copied).collect::<Result<Vec<_>, _>>()?;
         let mut runs = vec![beside];
-        runs.extend(placed.iter().flat_map(Placed::runs));
-        let times = nanoseconds(&runs, rounds.div_ceil(PLACES), &stop).ok_or(Error::Cancelled)?;
+        runs.extend(copies.iter().flat_map(SubjectCopy::runs));
+        let times = nanoseconds(&runs, rounds.div_ceil(COPIES), &stop).ok_or(Error::Cancelled)?;
         least.resize(times.len(), f64::INFINITY);
         least.iter_mut().zip(times).for_each(|(least, time)| *least = least.min(time));
-        drop(std::mem::replace(&mut before, placed));
+        drop(std::mem::replace(&mut before, copies));
     }
     let each = least[1..].chunks(least[1..].len() / subjects.len().max(1));
     let times = subjects.iter().zip(each).map(|(subject, times)| subject.times(times)).collect();
     Ok((times, least[0]))
 }
 
-/// CPU seconds of the processes that this one has waited for, where the system says: what other jobs take is left out.
+/// Seconds of one tetrahedralization of a small model, as the mean of [`AGAIN`]: CPU seconds of the worker where the system
+/// counts them, else wall clock.
+fn repeated_seconds(
+    mesh: &Mesh,
+    tree: &bvh::BinaryBvh,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<f64, Failure> {
+    let (before, start) = (worker_seconds(), Instant::now());
+    for _ in 0..AGAIN {
+        tets::build(mesh, tree, &[0], &options.tets, monitor)?;
+    }
+    let spent = before.and_then(|before| Some(worker_seconds()? - before));
+    Ok(spent.unwrap_or(start.elapsed().as_secs_f64()) / AGAIN as f64)
+}
+
+/// CPU seconds of the child processes that this one has waited for, which exclude the time of other processes. `None` where
+/// the system does not count them.
 fn worker_seconds() -> Option<f64> {
-    /// Of all systems that have this file.
+    /// Clock ticks of the counters in this file, on all systems that have it.
     const TICKS_A_SECOND: f64 = 100.0;
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
     // After the name, which may hold anything: cutime and cstime are the 14th and 15th.
@@ -268,8 +285,8 @@ fn worker_seconds() -> Option<f64> {
     Some(ticks.sum::<Option<f64>>()? / TICKS_A_SECOND)
 }
 
-/// Rays that end at a triangle and rays that don't, of each the third of fewest steps and that of most, in their order: what
-/// lies between says little of what a step costs.
+/// Rays that miss and rays that hit a triangle, of each the third with the fewest steps and the third with the most. The rays
+/// between tell little about the cost of a step and are left out.
 fn parts(walker: &TetWalker<'_>, rays: &[SampleRay]) -> [Vec<SampleRay>; 4] {
     let mut parts = [const { Vec::new() }; 4];
     for hit in [true, false] {

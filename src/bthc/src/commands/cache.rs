@@ -1,4 +1,4 @@
-//! `bthc cache`: looks after the cache.
+//! `bthc cache`: shows and maintains the cache.
 
 use crate::args::cache::{Cache, Command};
 use crate::failure::Failure;
@@ -10,7 +10,7 @@ use bth_compile::Monitor;
 use serde_json::{Value, json};
 
 pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
-    let Some(store) = args.place.store()? else {
+    let Some(store) = args.location.store()? else {
         let message = "there is no folder for the cache".to_owned();
         return Err(Failure::Usage { message, hint: "name one with --cache-dir or BTH_CACHE_DIR" });
     };

@@ -1,9 +1,9 @@
-//! `bthc calibrate`: what tracing costs on this machine.
+//! `bthc calibrate`: measures the costs of tracing on this machine.
 
 use crate::args::Calibrate;
 use crate::calibrate::{Measured, Subject, fit, measure};
 use crate::failure::Failure;
-use crate::measure::{Rays, Way};
+use crate::measure::{QueryKind, Rays};
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes};
@@ -15,10 +15,10 @@ use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
 
-/// Faces of the synthetic models: tetrahedra of a quarter of a megabyte, and of many times the caches.
+/// Faces of the generated models: their tetrahedra take a quarter of a megabyte, and many times the caches.
 const SMALL: u32 = 2_400;
 const LARGE: u32 = 220_000;
-/// Bytes between those of small and large tetrahedra: where models of the user are put.
+/// Bytes of tetrahedra from which a model counts as large.
 const BETWEEN: f64 = 6e6;
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
         .collect::<Result<Vec<_>, _>>()?;
     progress.stage("measure", None);
     let (scene, rays) = leaf(&progress)?;
-    let beside = (&scene, &rays, Way::Nearest);
+    let beside = (&scene, &rays, QueryKind::Nearest);
     let (all, leaf) = measure(&subjects, beside, args.rounds, || progress.cancelled())?;
     measured.leaf = leaf;
     for times in all {
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     drop(progress);
 
     let isa = bth::Isa::chosen();
-    // The library takes rays with hints into tetrahedra beside a BVH with AVX-512 only.
+    // Only with AVX-512 does the library use hints to start rays in tetrahedra that have a subtree beside them.
     let profile = fit(&measured, &isa.to_string(), isa == bth::Isa::Avx512);
     let mut text = serde_json::to_string_pretty(&profile).map_err(std::io::Error::from)?;
     text.push('\n');

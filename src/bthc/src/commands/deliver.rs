@@ -1,106 +1,41 @@
-//! Where a compiled file goes: to its path unless it is there, to standard output, or nowhere but into the cache.
+//! Brings a compiled file to its target: to its path unless that is up to date, to standard output, or only into the cache.
 
-use super::compile::{Job, Setting};
+use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
 use crate::table::{bytes, seconds};
-use bth_cache::{Digest, Record, Store};
+use bth_cache::{Record, Store};
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::Outcome;
 use bth_compile::write::{self, Content};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
-
-/// Where a compiled file goes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Target {
-    File(PathBuf),
-    Stdout,
-    Cache,
-}
-
-/// What is said about a job.
-pub(super) struct Done {
-    pub(super) json: Value,
-    /// Several lines, for one job.
-    pub(super) text: String,
-    /// One line, for one of many.
-    pub(super) line: String,
-}
-
-impl Target {
-    /// Whether the bytes of a kept file are needed.
-    pub(super) fn needs(&self, record: &Record, store: Option<&Store>) -> bool {
-        match self {
-            Self::File(path) => !contains(path, record, store),
-            Self::Stdout => true,
-            // What is not there is made again.
-            Self::Cache => !store.is_some_and(|store| store.holds(record)),
-        }
-    }
-
-    /// The file, if it is one.
-    pub(super) fn path(&self) -> Option<&Path> {
-        match self {
-            Self::File(path) => Some(path),
-            Self::Stdout | Self::Cache => None,
-        }
-    }
-
-    pub(super) fn name(&self) -> String {
-        match self {
-            Self::File(path) => path.display().to_string(),
-            Self::Stdout => "standard output".to_owned(),
-            Self::Cache => "the cache".to_owned(),
-        }
-    }
-}
-
-/// Whether a file has the content of a record: by its stamp, else by reading it.
-fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
-    if store.and_then(|store| store.stamped(path)) == Some(record.blob) {
-        return true;
-    }
-    let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
-    let same = || {
-        let found = match record.whole {
-            true => File::open(path).and_then(Digest::of_reader).ok().map(|(digest, _)| digest),
-            false => write::name_if_whole(path),
-        };
-        found == Some(record.blob)
-    };
-    let same = same_size && same();
-    if let (true, Some(store)) = (same, store) {
-        store.stamp(path, record.blob);
-    }
-    same
-}
 
 /// Brings the outcome of a job to its target. `inputs` are the files that it was made from.
 ///
 /// # Errors
 /// When it cannot be written.
 pub(super) fn deliver<R>(
-    setting: &Setting<'_>,
+    context: &JobContext<'_>,
     job: &Job,
     outcome: &Outcome<R>,
     cache: &Cache<'_>,
     inputs: &dyn Fn() -> bth_compile::Result<Vec<PathBuf>>,
-) -> Result<Done, Failure> {
+) -> Result<JobReport, Failure> {
     let start = Instant::now();
     match (&job.target, &outcome.content) {
         (Target::File(path), Some(content)) => {
             write::write_content(path, content)?;
-            if let (Some(store), Some(record)) = (&setting.store, &outcome.record) {
+            if let (Some(store), Some(record)) = (&context.store, &outcome.record) {
                 store.stamp(path, record.blob);
             }
         }
         (Target::File(path), None) => {
             if inputs()?.iter().any(|input| modified(input) > modified(path)) {
-                // Build systems compare times: what is up to date must look so.
-                touch(path, outcome.record.as_ref(), setting.store.as_ref())?;
+                // Build systems compare modification times, so an output that is up to date must be newer than its inputs.
+                touch(path, outcome.record.as_ref(), context.store.as_ref())?;
             }
         }
         (Target::Stdout, Some(content)) => {
@@ -126,8 +61,8 @@ pub(super) fn deliver<R>(
     let name = job.target.name();
     let key = outcome.record.as_ref().map(|r| r.key.id());
     let log = cache.log();
-    // Scenes that are put together from others have none.
-    let kept = outcome.record.as_ref().filter(|record| record.whole).zip(setting.store.as_ref());
+    // Scenes assembled from cached objects have no entry of their own.
+    let kept = outcome.record.as_ref().filter(|record| record.whole).zip(context.store.as_ref());
     let state = json!({
         "key": key,
         "hit": outcome.built.is_none(),
@@ -138,7 +73,7 @@ pub(super) fn deliver<R>(
     let took = if outcome.content.is_some() { seconds(start.elapsed().as_secs_f64()) } else { String::new() };
     let mut text = if outcome.built.is_none() { format!("{from}\n") } else { String::new() };
     text.push_str(&format!("{wrote} {name}\n"));
-    Ok(Done {
+    Ok(JobReport {
         json: json!({
             "model": job.model.to_string_lossy(),
             "output": name,

@@ -1,7 +1,6 @@
-//! Which files outputs depend on, in the form that Make and Ninja read.
+//! Dependency files: the inputs of each output, in the syntax of Make, which Ninja reads, too.
 
-use super::compile::{Job, Setting};
-use super::deliver::Target;
+use super::job::{Job, JobContext, Target};
 use super::scene;
 use crate::failure::Failure;
 use bth_compile::{cached, write};
@@ -12,11 +11,11 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When a source cannot be read any more, or the file not be written.
-pub(super) fn write(path: &Path, setting: &Setting<'_>, jobs: &[Job]) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Result<(), Failure> {
     let mut text = String::new();
     for job in jobs {
         if let Target::File(output) = &job.target {
-            text.push_str(&rule(output, &inputs(setting, job)?));
+            text.push_str(&rule(output, &inputs(context, job)?));
         }
     }
     Ok(write::write_atomically(path, text.as_bytes())?)
@@ -25,9 +24,9 @@ pub(super) fn write(path: &Path, setting: &Setting<'_>, jobs: &[Job]) -> Result<
 /// All files that a job reads.
 ///
 /// # Errors
-/// When one cannot be read that names others.
-pub(super) fn inputs(setting: &Setting<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
-    match scene::is_scene(&job.model, setting.args) {
+/// When a file that refers to others cannot be read.
+pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
+    match scene::is_scene(&job.model, context.args) {
         true => scene::inputs(&job.model),
         false => Ok(cached::files(&job.model)?),
     }
@@ -42,7 +41,7 @@ fn rule(output: &Path, inputs: &[PathBuf]) -> String {
     text + "\n"
 }
 
-/// As Make wants it: blanks and `#` behind a backslash, dollars doubled.
+/// A path in the syntax of Make: blanks and `#` get a backslash, dollars are doubled.
 fn escaped(path: &Path) -> String {
     let mut text = String::new();
     for c in path.to_string_lossy().chars() {
@@ -60,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_escaped_as_make_wants_it() {
+    fn names_are_escaped_for_make() {
         let inputs = ["a b.obj".into(), "c$#.ply".into()];
         assert_eq!(rule(Path::new("out.bth"), &inputs), "out.bth: \\\n  a\\ b.obj \\\n  c$$\\#.ply\n");
     }

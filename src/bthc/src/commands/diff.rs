@@ -1,4 +1,4 @@
-//! `bthc diff`: what differs between two compiled files.
+//! `bthc diff`: shows the differences between two compiled files.
 
 use crate::args::Diff;
 use crate::failure::Failure;
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Diff) -> Result<(), Failure> {
     if same { Ok(()) } else { Err(Failure::Check) }
 }
 
-/// A section that one of the files lacks, or that differs.
+/// A section that differs, or that one of the files lacks.
 struct Difference {
     object: u32,
     kind: u32,
@@ -64,7 +64,7 @@ impl Difference {
     }
 }
 
-/// The sections that differ: by the hashes that the files give, which `bthc verify` checks.
+/// The sections that differ, by the hashes that the files store and `bthc verify` checks.
 fn sections(first: &bth_format::File, second: &bth_format::File) -> Vec<Difference> {
     let mut all: BTreeMap<(u32, u32), [Option<SectionEntry>; 2]> = BTreeMap::new();
     for (side, file) in [first, second].into_iter().enumerate() {

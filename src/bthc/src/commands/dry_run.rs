@@ -1,7 +1,6 @@
-//! What a compilation would do, and why.
+//! Dry run: shows what a compilation would do, and why.
 
-use super::compile::{Job, Setting, cache};
-use super::deliver::Target;
+use super::job::{Job, JobContext, Target, cache};
 use super::scene;
 use crate::failure::Failure;
 use crate::output;
@@ -9,20 +8,20 @@ use crate::progress::Progress;
 use bth_compile::pipeline::{self, Foreseen};
 use serde_json::json;
 
-/// Says for each job what would be done.
+/// Prints for each job what would be done.
 ///
 /// # Errors
 /// When a source cannot be read.
-pub(super) fn show(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> Result<(), Failure> {
+pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -> Result<(), Failure> {
     let mut reports = Vec::new();
     let mut text = String::new();
     for job in jobs {
-        let cache = cache(setting, &job.model);
-        let foreseen = match scene::is_scene(&job.model, setting.args) {
-            true => scene::foresee(setting, job, &cache, &progress)?,
-            false => pipeline::foresee(&job.model, &setting.options, &cache, &progress)?,
+        let cache = cache(context, &job.model);
+        let foreseen = match scene::is_scene(&job.model, context.args) {
+            true => scene::foresee(context, job, &cache, &progress)?,
+            false => pipeline::foresee(&job.model, &context.options, &cache, &progress)?,
         };
-        let (what, why) = action(setting, job, &foreseen);
+        let (what, why) = action(context, job, &foreseen);
         let why = why.join(", ");
         let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };
         text.push_str(&format!("{}: {what}{behind}\n", job.target.name()));
@@ -39,15 +38,15 @@ pub(super) fn show(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> R
         }));
     }
     drop(progress);
-    if setting.args.json {
+    if context.args.json {
         return Ok(output::json(&json!({ "jobs": reports }))?);
     }
     Ok(output::text(&text)?)
 }
 
-fn action<'a>(setting: &Setting<'_>, job: &Job, foreseen: &'a Foreseen) -> (&'static str, &'a [String]) {
+fn action<'a>(context: &JobContext<'_>, job: &Job, foreseen: &'a Foreseen) -> (&'static str, &'a [String]) {
     match &foreseen.record {
-        Some(record) if !job.target.needs(record, setting.store.as_ref()) => ("nothing to do", &[]),
+        Some(record) if !job.target.needs(record, context.store.as_ref()) => ("nothing to do", &[]),
         Some(_) if job.target == Target::Cache => ("make again", &foreseen.because),
         Some(_) => ("take from the cache", &[]),
         None => ("compile", &foreseen.because),

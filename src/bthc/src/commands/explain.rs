@@ -1,6 +1,6 @@
-//! `bthc explain`: which nodes would be tetrahedralized, which not, and why.
+//! `bthc explain`: shows which nodes would be tetrahedralized, which not, and why.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Explain;
 use crate::explain::{Explained, MeasuredNode, measure, picture};
 use crate::failure::Failure;
@@ -109,14 +109,14 @@ fn table(verdicts: &[&Verdict]) -> String {
     table.render()
 }
 
-/// Predicted beside measured.
+/// Predicted and measured values side by side.
 fn measured_table(nodes: &[MeasuredNode]) -> String {
     if nodes.is_empty() {
         return "no node became a tet leaf, so there is nothing to measure\n".to_owned();
     }
     let mut table = Table::default();
     table.row(["node", "triangles", "steps", "counted", "with tets", "measured", "BVH alone", "measured"]);
-    // Where there was no prediction there is none to show.
+    // A missing prediction is NaN.
     let number = |x: f64| if x.is_nan() { "-".to_owned() } else { format!("{x:.1}") };
     for n in nodes {
         table.row([

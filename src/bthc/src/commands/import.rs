@@ -1,4 +1,4 @@
-//! `bthc import`: a scene manifest from a glTF file.
+//! `bthc import`: writes a scene manifest for a glTF file.
 
 use super::scene::{folder, is_gltf};
 use crate::args::Import;
@@ -31,12 +31,12 @@ pub(crate) fn run(args: &Import) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A text without what would end a comment.
+/// A text that can stand in a comment: control characters become blanks.
 fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// The path of a model as it stands in a manifest of a folder.
+/// The path of a model, relative to the folder of the manifest.
 fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
     let usage = |message: String| Failure::Usage {
         message,

@@ -1,4 +1,4 @@
-//! `bthc info`: what a compiled file contains.
+//! `bthc info`: shows the contents of a compiled file.
 
 use crate::args::Info;
 use crate::failure::Failure;
@@ -35,7 +35,7 @@ fn record(view: &ObjectView<'_>) -> &'static str {
     RecordKind::from_code(view.header.record).map_or("none", RecordKind::name)
 }
 
-/// How the file came about, as JSON if it is that.
+/// The provenance record, as JSON if it is JSON, else as text.
 fn provenance(file: &File) -> Value {
     file.provenance().map_or(Value::Null, |text| serde_json::from_str(text).unwrap_or_else(|_| text.into()))
 }
@@ -71,7 +71,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
     }))
 }
 
-/// What stands and moves; null without scene sections.
+/// The scene; null without scene sections.
 fn scene(file: &File) -> Result<Value, Failure> {
     let Some(view) = file.check_scene()? else { return Ok(Value::Null) };
     let scene = &view.scene[0];

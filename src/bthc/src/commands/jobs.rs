@@ -1,15 +1,16 @@
-//! Many models at once.
+//! Several jobs at once: how many threads and how much memory each gets.
 
-use super::compile::Job;
+use super::job::Job;
 use crate::args::Compile;
 use bth_compile::jobs;
 
-/// Memory of a compilation, as a multiple of its source file (measured: 8 for text, 14 for binary meshes)...
+/// Estimated memory of a compilation, as a multiple of the size of its source file (measured: 8 for text, 14 for binary
+/// meshes).
 const MEMORY_PER_BYTE: u64 = 16;
-/// ...and in any case, with the worker for tetrahedra.
+/// Memory of a compilation in addition, with the worker for tetrahedra.
 const MEMORY_AT_LEAST: u64 = 64 << 20;
 
-/// Threads of all jobs.
+/// Threads of all jobs together.
 fn threads(args: &Compile) -> usize {
     match args.threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -17,7 +18,7 @@ fn threads(args: &Compile) -> usize {
     }
 }
 
-/// Jobs of so many that run at once.
+/// The number of jobs that run at once.
 fn at_once(args: &Compile, jobs: usize) -> usize {
     args.jobs.jobs.map_or(threads(args), |n| n as usize).clamp(1, jobs.max(1))
 }
@@ -35,7 +36,7 @@ pub(super) fn memory_of_objects(args: &Compile, jobs: usize) -> u64 {
     }
 }
 
-/// Runs the jobs, several at once; results in the order of the jobs. `work` gets the threads for a job.
+/// Runs the jobs, several at once; the results are in the order of the jobs. `work` gets the number of threads of a job.
 pub(super) fn run<T: Send>(args: &Compile, all: &[Job], work: impl Fn(&Job, usize) -> T + Sync) -> Vec<T> {
     let at_once = at_once(args, all.len());
     let share = (threads(args) / at_once).max(1);

@@ -1,6 +1,6 @@
-//! `bthc marks`: the triangles of a model that are in bad contact with others.
+//! `bthc marks`: lists the triangles of a model that are in bad contact with others.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Marks;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -14,7 +14,7 @@ pub(crate) fn run(args: &Marks) -> Result<(), Failure> {
     let progress = Progress::new(args.json);
     let (mesh, contacts) = with_threads(args.threads, || -> bth_compile::Result<_> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
-        // The contacts do not depend on the tree; the quickest one will do.
+        // The contacts do not depend on the tree, so the fastest builder is used.
         let options = bvh::Options { quality: bvh::Quality::Fast };
         let (tree, _) = bvh::build(&mesh, &options, &progress)?;
         let contacts = marks::bad_pairs(&mesh, &tree, &progress)?;

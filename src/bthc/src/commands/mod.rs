@@ -3,6 +3,7 @@
 mod cache;
 mod calibrate;
 mod compile;
+mod compile_one;
 mod deliver;
 mod depfile;
 mod diff;
@@ -10,9 +11,12 @@ mod dry_run;
 mod explain;
 mod import;
 mod info;
+mod job;
 mod jobs;
 mod marks;
 mod scene;
+mod summary;
+mod threads;
 mod trace;
 mod verify;
 mod watch;
@@ -58,15 +62,4 @@ fn manual() -> Result<(), Failure> {
         man.render_options_section(&mut page)?;
     }
     Ok(output::text(&String::from_utf8_lossy(&page))?)
-}
-
-/// Runs work with a number of threads (0: one per processor).
-fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
-        Failure::Compile(bth_compile::Error::Limit {
-            code: "BTH-L090",
-            message: format!("cannot start {threads} threads: {e}"),
-        })
-    })?;
-    Ok(pool.install(work))
 }

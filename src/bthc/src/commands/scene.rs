@@ -1,7 +1,8 @@
 //! `bthc compile` of scenes: glTF files and manifests.
 
-use super::compile::{Job, Setting, nonzero, note};
-use super::deliver::{Done, Target, deliver};
+use super::deliver::deliver;
+use super::job::{self, Job, JobContext, JobReport, Target};
+use super::summary::{row_unless_zero, worker_note};
 use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
 use crate::table::{Table, bytes, count, seconds};
@@ -31,7 +32,7 @@ pub(super) fn is_gltf(path: &Path) -> bool {
     has_extension(path, &["gltf", "glb"])
 }
 
-/// The folder that paths of a scene count from.
+/// The folder to which paths in a scene are relative.
 pub(super) fn folder(scene: &Path) -> &Path {
     scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -51,34 +52,38 @@ fn read(
 }
 
 /// Compiles a scene.
-pub(super) fn compile(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -> Result<Done, Failure> {
-    let (manifest, import) = read(&job.model, &setting.args.gltf, monitor)?;
-    let cache = super::compile::cache(setting, &job.model);
+pub(super) fn compile(
+    context: &JobContext<'_>,
+    job: &Job,
+    monitor: &dyn Monitor,
+) -> Result<JobReport, Failure> {
+    let (manifest, import) = read(&job.model, &context.args.gltf, monitor)?;
+    let cache = job::cache(context, &job.model);
     let place = Place { folder: folder(&job.model), name: &job.model };
-    if let Some(shard) = setting.args.jobs.shard {
-        let built = scene::compile_objects(&manifest, place, &setting.options, &cache, shard, monitor)?;
-        return Ok(shard_done(job, &cache, built));
+    if let Some(shard) = context.args.jobs.shard {
+        let built = scene::compile_objects(&manifest, place, &context.options, &cache, shard, monitor)?;
+        return Ok(shard_report(job, &cache, built));
     }
     let keep = Keep {
         whole: job.target == Target::Cache,
-        needed: &|record| job.target.needs(record, setting.store.as_ref()),
+        needed: &|record| job.target.needs(record, context.store.as_ref()),
         target: job.target.path(),
     };
-    let outcome = scene::compile_cached(&manifest, place, &setting.options, &cache, keep, monitor)?;
-    let mut done = deliver(setting, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
-    done.json["scene"] = outcome.report;
-    done.json["import"] = json!(import);
-    if let Some(report) = &outcome.built {
-        done.text = format!("{}{}", summary(&manifest, report), done.text);
+    let outcome = scene::compile_cached(&manifest, place, &context.options, &cache, keep, monitor)?;
+    let mut report = deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
+    report.json["scene"] = outcome.report;
+    report.json["import"] = json!(import);
+    if let Some(built) = &outcome.built {
+        report.text = format!("{}{}", summary(&manifest, built), report.text);
     }
-    Ok(done)
+    Ok(report)
 }
 
-/// What is said of part of a scene's objects.
-fn shard_done(job: &Job, cache: &Cache<'_>, built: u64) -> Done {
+/// The report of a shard of a scene's objects.
+fn shard_report(job: &Job, cache: &Cache<'_>, built: u64) -> JobReport {
     let line = format!("{}  {} objects  compiled into the cache", job.model.display(), count(built));
     let log = cache.log();
-    Done {
+    JobReport {
         json: json!({
             "model": job.model.to_string_lossy(),
             "objects": built,
@@ -91,14 +96,14 @@ fn shard_done(job: &Job, cache: &Cache<'_>, built: u64) -> Done {
 
 /// What a compilation of a scene would do.
 pub(super) fn foresee(
-    setting: &Setting<'_>,
+    context: &JobContext<'_>,
     job: &Job,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Foreseen, Failure> {
-    let (manifest, _) = read(&job.model, &setting.args.gltf, monitor)?;
+    let (manifest, _) = read(&job.model, &context.args.gltf, monitor)?;
     let place = Place { folder: folder(&job.model), name: &job.model };
-    Ok(scene::foresee(&manifest, place, &setting.options, cache, job.target.path(), monitor)?)
+    Ok(scene::foresee(&manifest, place, &context.options, cache, job.target.path(), monitor)?)
 }
 
 /// All files that a scene is made from.
@@ -115,9 +120,9 @@ fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>>
     paths.sort_unstable();
     paths.dedup();
     for path in paths {
-        // Without a `./` before it: build systems compare names.
+        // Without a leading `./`, since build systems compare names.
         let path = model.parent().unwrap_or(Path::new("")).join(path);
-        // An object that nobody sees may lack its file.
+        // The file of an object without visible instances may be missing.
         if path != *model && path.exists() {
             files.extend(cached::files(&path)?);
         }
@@ -125,7 +130,7 @@ fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>>
     Ok(files)
 }
 
-/// The report for people.
+/// The report of a compiled scene for people.
 fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     let mut stages = Table::default();
     for stage in &report.seconds {
@@ -138,19 +143,23 @@ fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     facts.row(["instances", &count(report.instances)]);
     facts.row(["objects", &count(report.objects.len() as u64)]);
     let used = (manifest.objects.len() - report.unused.len()) as u64;
-    nonzero(&mut facts, "objects of equal geometry, stored once", used - report.objects.len() as u64);
-    nonzero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
-    nonzero(&mut facts, "tracks", report.tracks);
-    nonzero(&mut facts, "cameras", report.cameras);
-    nonzero(&mut facts, "lights", report.lights);
+    row_unless_zero(&mut facts, "objects of equal geometry, stored once", used - report.objects.len() as u64);
+    row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
+    row_unless_zero(&mut facts, "tracks", report.tracks);
+    row_unless_zero(&mut facts, "cameras", report.cameras);
+    row_unless_zero(&mut facts, "lights", report.lights);
     facts.row(["frames", &format!("{} to {} at {}/s", report.first_frame, report.last_frame, report.rate)]);
     facts.row(["triangles", &count(report.triangles)]);
     facts.row(["triangles of all instances", &count(report.instanced_triangles)]);
-    nonzero(&mut facts, "degenerate (never hit)", report.objects.iter().map(|o| o.degenerate).sum());
-    nonzero(&mut facts, "tet leaves", report.objects.iter().map(|o| o.tet_leaves).sum());
-    nonzero(&mut facts, "triangles in tet leaves", report.objects.iter().map(|o| o.tet_triangles).sum());
+    row_unless_zero(&mut facts, "degenerate (never hit)", report.objects.iter().map(|o| o.degenerate).sum());
+    row_unless_zero(&mut facts, "tet leaves", report.objects.iter().map(|o| o.tet_leaves).sum());
+    row_unless_zero(
+        &mut facts,
+        "triangles in tet leaves",
+        report.objects.iter().map(|o| o.tet_triangles).sum(),
+    );
     facts.row(["file", &bytes(report.bytes)]);
     facts.row(["traversal reads", &bytes(report.resident_bytes)]);
-    let note = note(report.worker.as_ref());
+    let note = worker_note(report.worker.as_ref());
     format!("{}\n{}{note}\n", stages.render(), facts.render())
 }

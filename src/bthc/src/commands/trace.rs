@@ -1,6 +1,6 @@
-//! `bthc trace`: the rays of a file, traced, or with `--exact` compared with every triangle.
+//! `bthc trace`: traces the rays of a file, or with `--exact` tests them against every triangle.
 
-use super::with_threads;
+use super::threads::with_threads;
 use crate::args::Trace;
 use crate::failure::Failure;
 use crate::progress::{self, Progress};
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use serde_json::json;
 use std::time::Instant;
 
-/// Rays per task: enough to pay for starting one.
+/// Rays per task: enough to make the cost of starting a task negligible.
 const CHUNK: usize = 4096;
 
 pub(crate) fn run(args: &Trace) -> Result<(), Failure> {

@@ -1,4 +1,4 @@
-//! `bthc verify`: a compiled file, checked completely.
+//! `bthc verify`: checks a compiled file completely.
 
 use crate::args::Verify;
 use crate::failure::{Failure, runtime_json};

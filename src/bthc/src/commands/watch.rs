@@ -1,8 +1,9 @@
-//! Compiles again whenever a file changes.
+//! Watching: compiles again whenever a file changes.
 
-use super::compile::{Job, Setting, one};
+use super::compile_one::compile_one;
 use super::depfile::inputs;
-use super::with_threads;
+use super::job::{Job, JobContext};
+use super::threads::with_threads;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
@@ -10,33 +11,34 @@ use bth_compile::Monitor;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
-/// Between two looks at the files. Looking works on every file system, network ones included.
+/// Time between two polls of the files. Polling works on every file system, including network ones.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// What a file looks like from outside.
-type Look = Vec<(PathBuf, Option<(SystemTime, u64)>)>;
+/// Modification time and size of each file of a job; `None` for a missing file.
+type Fingerprint = Vec<(PathBuf, Option<(SystemTime, u64)>)>;
 
-/// Compiles the jobs, then again those whose files change, until it is cancelled. Errors are shown and waited out.
+/// Compiles the jobs, then again those whose files change, until it is cancelled. Errors are printed, and the job is compiled
+/// again when its files change.
 ///
 /// # Errors
 /// Cancelled, or standard output closed.
-pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
-    let mut seen: Vec<Option<Look>> = jobs.iter().map(|_| None).collect();
+pub(super) fn run(context: &JobContext<'_>, jobs: &[Job], progress: &Progress) -> Result<(), Failure> {
+    let mut seen: Vec<Option<Fingerprint>> = jobs.iter().map(|_| None).collect();
     loop {
         for (job, seen) in jobs.iter().zip(&mut seen) {
-            let files = look(setting, job);
+            let files = fingerprint(context, job);
             if seen.as_ref() == Some(&files) {
                 continue;
             }
-            // A program that is still writing is given the time to finish.
+            // A program that is still writing the file gets time to finish.
             if seen.is_some() {
                 std::thread::sleep(PAUSE / 4);
             }
-            *seen = Some(look(setting, job));
-            match with_threads(setting.args.threads, || one(setting, job, progress))? {
+            *seen = Some(fingerprint(context, job));
+            match with_threads(context.args.threads, || compile_one(context, job, progress))? {
                 Ok(done) => output::text(&format!("{}\n", done.line))?,
                 Err(Failure::Compile(bth_compile::Error::Cancelled)) => break,
-                Err(failure) => failure.say(),
+                Err(failure) => failure.print(),
             }
         }
         if progress.cancelled() {
@@ -46,9 +48,9 @@ pub(super) fn run(setting: &Setting<'_>, jobs: &[Job], progress: &Progress) -> R
     }
 }
 
-fn look(setting: &Setting<'_>, job: &Job) -> Look {
-    // A scene that cannot be read is looked at until it can.
-    let files = inputs(setting, job).unwrap_or_else(|_| vec![job.model.clone()]);
+fn fingerprint(context: &JobContext<'_>, job: &Job) -> Fingerprint {
+    // Of a scene that cannot be read only the file itself is watched, until it can be read.
+    let files = inputs(context, job).unwrap_or_else(|_| vec![job.model.clone()]);
     let state = |path: &PathBuf| {
         let m = std::fs::metadata(path).ok()?;
         Some((m.modified().ok()?, m.len()))

@@ -1,7 +1,7 @@
-//! Predicted beside measured costs of the nodes that became tet leaves.
+//! Predicted and measured costs of the nodes that became tet leaves.
 
 use super::Explained;
-use crate::measure::{Rays, Run, Way, nanoseconds};
+use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth_compile::costs::{SampleRay, TetWalker, from_surface};
 use serde::Serialize;
 
@@ -10,14 +10,14 @@ const RAYS: usize = 8192;
 /// Rounds of which the fastest counts.
 const ROUNDS: usize = 7;
 
-/// A tet leaf; nanoseconds are of a ray that starts on it, half of them short.
+/// A tet leaf. Costs are nanoseconds per ray that starts on it; half of the rays are short.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct MeasuredNode {
     /// Index in the binary BVH.
     pub(crate) node: u32,
     /// Its triangles.
     pub(crate) triangles: u32,
-    /// Mean steps of bounces: estimated before the tetrahedra were there, and counted.
+    /// Mean steps of bounced rays: estimated before tetrahedralization, and counted.
     pub(crate) steps: [f64; 2],
     /// With the tetrahedra: predicted and measured.
     pub(crate) cost_tet: [f64; 2],
@@ -25,7 +25,7 @@ pub(crate) struct MeasuredNode {
     pub(crate) cost_bvh: [f64; 2],
 }
 
-/// Measures so many of the tet leaves, in their order; `None` when it was stopped.
+/// Measures the first `most` tet leaves; `None` if it was stopped.
 pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) -> Option<Vec<MeasuredNode>> {
     let mut nodes = Vec::new();
     for (node, tets) in of.built.iter().take(most) {
@@ -38,14 +38,14 @@ pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) 
         let walked: Vec<f64> =
             long.iter().filter_map(|ray| walker.walk(ray)).map(|w| f64::from(w.steps)).collect();
         let [long, short] = [long, short].map(|samples| Rays::new(&samples));
-        let runs: [Run<'_>; 4] = [
-            (of.compiled, &long, Way::Nearest),
-            (of.compiled, &short, Way::Any),
-            (of.plain, &long, Way::Nearest),
-            (of.plain, &short, Way::Any),
+        let runs: [TimedRun<'_>; 4] = [
+            (of.compiled, &long, QueryKind::Nearest),
+            (of.compiled, &short, QueryKind::Any),
+            (of.plain, &long, QueryKind::Nearest),
+            (of.plain, &short, QueryKind::Any),
         ];
         let times = nanoseconds(&runs, ROUNDS, &stop)?;
-        // Cells of a node that failed have no prediction of their own.
+        // Descendants that replaced a failed node have no prediction of their own.
         let verdict = of.choice.verdicts.iter().find(|v| v.node == *node);
         let predicted = |value: fn(&bth_compile::costs::Verdict) -> f64| verdict.map_or(f64::NAN, value);
         nodes.push(MeasuredNode {

@@ -11,7 +11,7 @@ use bth_compile::costs::{Choice, Options};
 use bth_compile::tets::TetMesh;
 use bth_import::Mesh;
 
-/// A model and what was decided on it.
+/// A model and the decisions on its nodes.
 pub(crate) struct Explained<'a> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) tree: &'a BinaryBvh,
@@ -19,7 +19,7 @@ pub(crate) struct Explained<'a> {
     pub(crate) costs: &'a Options,
     /// Tetrahedralizations of the chosen nodes; a node that failed may be replaced by some below it.
     pub(crate) built: &'a [(u32, TetMesh)],
-    /// The compiled model, and with a BVH only.
+    /// The model compiled with tetrahedra, and with a BVH only.
     pub(crate) compiled: &'a bth::Scene,
     pub(crate) plain: &'a bth::Scene,
 }

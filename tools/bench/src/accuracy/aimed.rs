@@ -97,7 +97,7 @@ mod tests {
             assert_eq!(set.rays.len(), 100);
             for ray in &set.rays {
                 let at_one = |t| {
-                    let at = bth_oracle::crossing(ray, model.mesh.corners(t));
+                    let at = bth_oracle::intersection(ray, model.mesh.corners(t));
                     at.is_some_and(|at| bth_oracle::to_f64(&at.t) == 1.0)
                 };
                 assert!((0..model.triangles() as u32).any(at_one), "{ray:?}");

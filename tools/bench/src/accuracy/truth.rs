@@ -5,7 +5,7 @@ use crate::tracer::{Batch, Tracer};
 use anyhow::{Result, ensure};
 use bth::Scene;
 use bth::rays::{Hit, Ray};
-use bth_oracle::Crossing;
+use bth_oracle::Intersection;
 use rayon::prelude::*;
 
 /// Triangles as they are stored in a compiled file, and what finds the nearest.
@@ -39,9 +39,9 @@ impl Geometry {
     }
 
     /// Where the line of a ray meets a triangle.
-    pub fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Crossing> {
+    pub fn crossing(&self, ray: &Ray, triangle: u32) -> Option<Intersection> {
         let row = self.ids.binary_search(&triangle).ok()?;
-        bth_oracle::crossing(ray, self.corners[row])
+        bth_oracle::intersection(ray, self.corners[row])
     }
 
     /// The exact answers to a set. Our BVH finds them, as every triangle against every ray would take days; one in

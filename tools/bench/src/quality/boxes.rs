@@ -105,11 +105,11 @@ fn round_up(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bth_tests::rng::Rng;
+    use bth_random::Rng;
 
     #[test]
     fn crossings_are_rounded_outwards() {
-        let mut rng = Rng(4);
+        let mut rng = Rng::new(4);
         let mut inexact = 0;
         for _ in 0..20_000 {
             let mut whole = || rng.below(8192) as f32 - 4096.0;
@@ -135,17 +135,17 @@ mod tests {
 
     #[test]
     fn every_point_of_a_triangle_lies_in_one_of_its_parts() {
-        let mut rng = Rng(5);
+        let mut rng = Rng::new(5);
         for case in 0..3000 {
             let scale = [1.0f32, 1e-30, 1e30, 7.3][case % 4];
             let corners: [[f32; 3]; 3] =
-                std::array::from_fn(|_| std::array::from_fn(|_| scale * (rng.unit() - 0.5)));
+                std::array::from_fn(|_| std::array::from_fn(|_| scale * (rng.unit_f32() - 0.5)));
             let mut boxes = vec![Box3::of_points(&corners)];
             for _ in 0..6 {
                 let at = rng.below(boxes.len() as u64) as usize;
                 let axis = rng.below(3) as usize;
                 let within = boxes.swap_remove(at);
-                let share = rng.unit();
+                let share = rng.unit_f32();
                 let plane = within.lower[axis] + share * (within.upper[axis] - within.lower[axis]);
                 boxes.extend(parts(&corners, &within, axis, plane).into_iter().filter(|b| !b.is_empty()));
             }

@@ -2,7 +2,7 @@
 
 use bth_compile::bvh::Wide;
 use bth_format::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES, WideNode};
-use bth_tests::rng::Rng;
+use bth_random::Rng;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -26,7 +26,7 @@ pub(super) fn reordered(wide: &Wide, order: Order) -> Wide {
         Order::LeavesBesideNodes => beside(wide),
         Order::BreadthFirst => frontier(wide, |_| 0),
         Order::Random => {
-            let mut rng = Rng(1);
+            let mut rng = Rng::new(1);
             let mut blocks = frontier(wide, |len| rng.below(len as u64) as usize);
             let nodes =
                 blocks.partition_point(|code| matches!(Child::from_code(*code), Some(Child::Node(_))));

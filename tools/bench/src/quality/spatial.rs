@@ -173,16 +173,16 @@ impl Builder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bth_tests::rng::Rng;
+    use bth_random::Rng;
     use std::collections::BTreeSet;
 
     /// Long thin triangles across each other.
     fn needles(count: usize) -> Mesh {
-        let mut rng = Rng(3);
+        let mut rng = Rng::new(3);
         let mut mesh = Mesh::default();
         for t in 0..count as u32 {
             for _ in 0..3 {
-                mesh.positions.push(std::array::from_fn(|_| rng.unit()));
+                mesh.positions.push(std::array::from_fn(|_| rng.unit_f32()));
             }
             mesh.triangles.push([3 * t, 3 * t + 1, 3 * t + 2]);
         }

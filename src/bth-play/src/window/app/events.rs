@@ -1,6 +1,6 @@
-//! What the window tells: keys, the pointer, and when there is time to draw.
+//! The events of the window: keys, the pointer, and when there is time to render.
 
-use super::{App, Drag};
+use super::state::{App, Drag};
 use crate::failure::Failure;
 use crate::window::keys;
 use crate::window::screen::{GRIP, Screen};
@@ -13,40 +13,40 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
-/// Pixels of a notch, for devices that scroll by pixels.
+/// Pixels that count as a notch of the wheel, for devices that scroll by pixels.
 const NOTCH: f64 = 40.0;
 
 impl App<'_> {
     fn key(&mut self, event: &KeyEvent, events: &ActiveEventLoop) {
         let PhysicalKey::Code(code) = event.physical_key else { return };
         let pressed = event.state == ElementState::Pressed;
-        if keys::flight(code).is_some() {
-            self.down.retain(|key| *key != code);
+        if keys::fly_direction(code).is_some() {
+            self.keys_down.retain(|key| *key != code);
             if pressed {
-                if self.down.is_empty() {
-                    self.flown = self.start.elapsed();
+                if self.keys_down.is_empty() {
+                    self.last_flight = self.start.elapsed();
                 }
-                self.down.push(code);
+                self.keys_down.push(code);
             }
         } else if let (true, Some(action)) = (pressed, keys::action(code, self.shift)) {
             self.act(action, events);
         }
     }
 
-    /// The pointer is at a point of the window, pixels from the upper left.
-    fn point(&mut self, at: DVec2) {
-        let by = (at - self.pointer) / f64::from(self.canvas.size().1);
+    /// Handles a movement of the pointer to a point, pixels from the upper left.
+    fn move_pointer(&mut self, at: DVec2) {
+        let by = (at - self.pointer) / f64::from(self.renderer.size().1);
         self.pointer = at;
         match self.drag {
             None => return,
-            Some(Drag::Orbit) => self.pilot().orbit(by),
-            Some(Drag::Pan) => self.pilot().pan(by),
+            Some(Drag::Orbit) => self.controller().orbit(by),
+            Some(Drag::Pan) => self.controller().pan(by),
             Some(Drag::Scrub) => {
-                let part = at.x / f64::from(self.canvas.size().0);
+                let part = at.x / f64::from(self.renderer.size().0);
                 return self.seek(|playback| playback.scrub(part));
             }
         }
-        self.canvas.restart(true);
+        self.renderer.restart(true);
     }
 
     fn press(&mut self, button: MouseButton, pressed: bool) {
@@ -54,24 +54,24 @@ impl App<'_> {
             self.drag = None;
             return;
         }
-        let low = self.pointer.y > f64::from(self.canvas.size().1) - GRIP;
+        let low = self.pointer.y > f64::from(self.renderer.size().1) - GRIP;
         self.drag = match button {
-            MouseButton::Left if low && self.playback.moves() => Some(Drag::Scrub),
+            MouseButton::Left if low && self.playback.is_animated() => Some(Drag::Scrub),
             MouseButton::Left if !self.shift => Some(Drag::Orbit),
             MouseButton::Left | MouseButton::Right | MouseButton::Middle => Some(Drag::Pan),
             _ => None,
         };
         if self.drag == Some(Drag::Scrub) {
-            self.point(self.pointer);
+            self.move_pointer(self.pointer);
         }
     }
 }
 
 impl ApplicationHandler for App<'_> {
     fn resumed(&mut self, events: &ActiveEventLoop) {
-        let (width, height) = self.canvas.size();
+        let (width, height) = self.renderer.size();
         let wanted = Window::default_attributes()
-            .with_title(format!("{} - bth-play", self.file.display()))
+            .with_title(format!("{} - bth-play", self.content.file.display()))
             .with_inner_size(PhysicalSize::new(width, height));
         let screen = events
             .create_window(wanted)
@@ -79,7 +79,7 @@ impl ApplicationHandler for App<'_> {
             .and_then(Screen::new);
         let result = screen.map(|screen| {
             let size = screen.window.inner_size();
-            self.canvas.resize((size.width.max(1), size.height.max(1)));
+            self.renderer.resize((size.width.max(1), size.height.max(1)));
             self.screen = Some(screen);
         });
         self.check(events, result);
@@ -89,16 +89,18 @@ impl ApplicationHandler for App<'_> {
         match event {
             WindowEvent::CloseRequested => events.exit(),
             WindowEvent::Resized(size) => {
-                self.canvas.resize((size.width.max(1), size.height.max(1)));
+                self.renderer.resize((size.width.max(1), size.height.max(1)));
             }
             WindowEvent::RedrawRequested => {
                 let shown = self.show();
                 self.check(events, shown);
             }
-            WindowEvent::Focused(false) => self.down.clear(),
+            WindowEvent::Focused(false) => self.keys_down.clear(),
             WindowEvent::ModifiersChanged(modifiers) => self.shift = modifiers.state().shift_key(),
             WindowEvent::KeyboardInput { event, .. } => self.key(&event, events),
-            WindowEvent::CursorMoved { position, .. } => self.point(DVec2::new(position.x, position.y)),
+            WindowEvent::CursorMoved { position, .. } => {
+                self.move_pointer(DVec2::new(position.x, position.y))
+            }
             WindowEvent::MouseInput { state, button, .. } => {
                 self.press(button, state == ElementState::Pressed);
             }
@@ -107,8 +109,8 @@ impl ApplicationHandler for App<'_> {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(y),
                     MouseScrollDelta::PixelDelta(by) => by.y / NOTCH,
                 };
-                self.pilot().approach(notches);
-                self.canvas.restart(true);
+                self.controller().dolly(notches);
+                self.renderer.restart(true);
             }
             _ => {}
         }
@@ -119,14 +121,15 @@ impl ApplicationHandler for App<'_> {
             return;
         }
         self.advance(self.start.elapsed());
-        if !self.canvas.is_done(self.samples) {
+        if !self.renderer.is_done(self.samples) {
             let drawn = self.draw(events);
             self.check(events, drawn);
         }
-        let busy = !self.canvas.is_done(self.samples) || self.playback.is_playing() || !self.down.is_empty();
-        // A scene that plays slower than the display shows needs no more than a look now and then.
+        let busy =
+            !self.renderer.is_done(self.samples) || self.playback.is_playing() || !self.keys_down.is_empty();
+        // While a refined scene plays, only the time of its next frame has to be awaited.
         events.set_control_flow(match busy {
-            true if self.canvas.is_done(self.samples) => {
+            true if self.renderer.is_done(self.samples) => {
                 ControlFlow::WaitUntil(Instant::now() + Duration::from_millis(4))
             }
             true => ControlFlow::Poll,

@@ -1,0 +1,57 @@
+//! A camera outside the model, placed so that the model fills the picture.
+
+use super::bounds::SceneBounds;
+use super::projection::{Camera, half_extent, up_vector};
+use crate::args::{Args, Axis, View};
+use glam::{DVec2, DVec3};
+
+/// Vertical field of view, degrees: narrow enough to keep proportions natural.
+const FOV: f64 = 32.0;
+/// Degrees around the model, from its front.
+const YAW: f64 = 35.0;
+/// Degrees above the horizon.
+const PITCH: f64 = 20.0;
+/// Share of the width or height of the picture that the model fills.
+const FILL: f64 = 0.86;
+
+/// The camera of `--camera` with eye and target, or else of `--yaw` and `--pitch` around the whole model.
+pub(super) fn exterior_camera(args: &Args, bounds: &SceneBounds) -> Camera {
+    let vertical = up_vector(args.up);
+    let half_extent = half_extent(args, FOV);
+    if let Some(View::Points([ex, ey, ez, tx, ty, tz])) = args.camera {
+        let eye = DVec3::new(ex, ey, ez);
+        return Camera::look_along(eye, DVec3::new(tx, ty, tz) - eye, vertical, half_extent / args.zoom);
+    }
+    let (yaw, pitch) = (args.yaw.unwrap_or(YAW).to_radians(), args.pitch.unwrap_or(PITCH).to_radians());
+    let (side, front) = match args.up {
+        Axis::Y => (DVec3::X, DVec3::Z),
+        Axis::Z => (DVec3::X, DVec3::NEG_Y),
+    };
+    let towards = (side * yaw.sin() + front * yaw.cos()) * pitch.cos() + vertical * pitch.sin();
+    let mut camera = Camera::look_along(bounds.center(), -towards, vertical, half_extent);
+    camera.eye = fitted_eye(&camera, bounds, half_extent * FILL);
+    camera.half_extent /= args.zoom;
+    camera
+}
+
+/// The eye nearest to the model from which all its points lie within the frustum of half extent `t`.
+///
+/// In camera axes around the centre, with the eye at (a, b, -d), a point (x, y, z) is inside
+/// when |x - a| <= (z + d) tx. The two extremes of x ∓ z tx give a and the least d; y likewise.
+fn fitted_eye(camera: &Camera, bounds: &SceneBounds, t: DVec2) -> DVec3 {
+    let mut high = DVec2::NEG_INFINITY;
+    let mut low = DVec2::NEG_INFINITY;
+    let center = bounds.center();
+    for point in bounds.points() {
+        let q = *point - center;
+        let (xy, z) = (DVec2::new(q.dot(camera.right), q.dot(camera.up)), q.dot(camera.forward));
+        high = high.max(xy - t * z);
+        low = low.max(-xy - t * z);
+    }
+    if !high.is_finite() || !low.is_finite() {
+        return center - camera.forward;
+    }
+    let distance = ((high + low) / (2.0 * t)).max_element();
+    let shift = (high - low) / 2.0;
+    center + camera.right * shift.x + camera.up * shift.y - camera.forward * distance
+}

@@ -1,0 +1,124 @@
+//! What all frames of a sequence share: the bounds of the scene and the choice of the camera.
+
+use super::bounds::SceneBounds;
+use super::exterior::exterior_camera;
+use super::interior::interior_camera;
+use super::projection::Camera;
+use super::scene_camera::scene_camera;
+use crate::args::{Args, View};
+use crate::failure::Failure;
+use crate::sampling::fibonacci_sphere;
+use bth::Scene;
+use bth::rays::Ray;
+use bth_format::layout::NONE;
+use glam::DVec3;
+use std::path::Path;
+
+/// Where the camera of a frame comes from.
+#[derive(Clone, Copy, Debug)]
+enum CameraSource {
+    /// The same camera in all frames.
+    Fixed(Camera),
+    /// The camera in this row of the scene's table, which may move.
+    Scene(u32),
+}
+
+/// Bounds and camera, the same for all frames of a sequence.
+#[derive(Clone, Debug)]
+pub(crate) struct SceneSetup {
+    pub(crate) bounds: SceneBounds,
+    source: CameraSource,
+    /// Whether the camera is inside a room.
+    pub(crate) interior: bool,
+}
+
+impl SceneSetup {
+    /// Chooses bounds and camera for the frames of `range`; the scene is left at the first of them.
+    ///
+    /// # Errors
+    /// If the file has nothing to show, has no camera of the wanted name, or its first frame cannot be set.
+    pub(crate) fn new(
+        scene: &mut Scene,
+        file: &Path,
+        args: &Args,
+        range: (i32, i32),
+    ) -> Result<Self, Failure> {
+        let is_scene = scene.description().is_some();
+        if scene.object_count() == 0 && !is_scene {
+            let what = "the file has no objects";
+            return Err(Failure::Lacks { file: file.into(), what, hint: "compile a model" });
+        }
+        let bounds =
+            if is_scene { SceneBounds::of_scene(scene, range) } else { SceneBounds::of_object(scene) };
+        scene.set_frame(range.0)?;
+        let source = match chosen_scene_camera(scene, file, args)? {
+            Some(row) => CameraSource::Scene(row),
+            None if args.inside => CameraSource::Fixed(interior_camera(scene, &bounds, args)),
+            None => CameraSource::Fixed(exterior_camera(args, &bounds)),
+        };
+        let mut setup = SceneSetup { bounds, source, interior: false };
+        let eye = setup.camera(scene, args).eye;
+        // The floor of a scene may extend far beyond its objects, so being within the bounds does not make a room.
+        setup.interior = args.inside || setup.bounds.contains(eye) && (!is_scene || is_enclosed(scene, eye));
+        Ok(setup)
+    }
+
+    /// The row of the scene's camera that is used, if one is.
+    pub(crate) fn scene_camera_row(&self) -> Option<u32> {
+        match self.source {
+            CameraSource::Fixed(_) => None,
+            CameraSource::Scene(row) => Some(row),
+        }
+    }
+
+    /// The camera at the time to which the scene is set.
+    pub(crate) fn camera(&self, scene: &Scene, args: &Args) -> Camera {
+        match self.source {
+            CameraSource::Fixed(camera) => camera,
+            CameraSource::Scene(row) => scene_camera(scene, row, args),
+        }
+    }
+}
+
+/// The row of the scene's camera that the options name, or else of the scene's default camera.
+fn chosen_scene_camera(scene: &Scene, file: &Path, args: &Args) -> Result<Option<u32>, Failure> {
+    let view = scene.description();
+    match (&args.camera, view) {
+        (Some(View::Points(_)), _) => Ok(None),
+        (Some(View::Named(name)), None) => Err(Failure::Usage(format!(
+            "{} has no cameras; expected eye and target (six numbers), found {name:?}",
+            file.display()
+        ))),
+        (Some(View::Named(name)), Some(view)) => {
+            let rows = 0..view.cameras.len() as u32;
+            let found = rows.clone().find(|row| view.camera_name(*row) == name);
+            found.map(Some).ok_or_else(|| {
+                let names: Vec<_> = rows.map(|row| format!("{:?}", view.camera_name(row))).collect();
+                Failure::Usage(format!(
+                    "{} has no camera {name:?}; its cameras are {}",
+                    file.display(),
+                    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+                ))
+            })
+        }
+        (None, Some(view)) if !args.inside && args.yaw.is_none() && args.pitch.is_none() => {
+            Ok(Some(view.scene[0].camera).filter(|row| *row != NONE))
+        }
+        (None, _) => Ok(None),
+    }
+}
+
+/// Whether rays in more than nine tenths of all directions hit something, as between walls and a ceiling.
+fn is_enclosed(scene: &Scene, eye: DVec3) -> bool {
+    const DIRECTIONS: u32 = 256;
+    let ray = |d: DVec3| Ray {
+        origin: eye.as_vec3().to_array(),
+        tmin: 0.0,
+        direction: d.as_vec3().to_array(),
+        tmax: f32::INFINITY,
+    };
+    let rays: Vec<Ray> = fibonacci_sphere(DIRECTIONS).map(ray).collect();
+    let mut blocked = vec![false; rays.len()];
+    scene.any_batch(&rays, None, &mut blocked);
+    blocked.iter().filter(|b| **b).count() as u32 > DIRECTIONS * 9 / 10
+}

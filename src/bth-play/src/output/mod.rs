@@ -1,0 +1,14 @@
+//! Pictures and where they go: tone mapping, the color bar, PNG files, animations and streams.
+
+mod animation;
+mod color_bar;
+mod color_map;
+mod numbered;
+mod picture;
+mod sink;
+mod tone_mapping;
+mod y4m;
+
+pub(crate) use picture::Picture;
+pub(crate) use sink::Sink;
+pub(crate) use tone_mapping::{reinhard, shoulder, to_picture};

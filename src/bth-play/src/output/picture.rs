@@ -1,0 +1,105 @@
+//! The finished picture and its PNG file.
+
+use crate::failure::Failure;
+use std::io::Write;
+use std::path::Path;
+
+/// A picture, sRGB, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Picture {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) pixels: Vec<[u8; 3]>,
+}
+
+/// A linear component in sRGB (IEC 61966-2-1); values above 1 are clipped.
+pub(super) fn srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 {
+        linear.max(0.0) * 12.92
+    } else {
+        1.055 * linear.min(1.0).powf(1.0 / 2.4) - 0.055
+    }
+}
+
+/// Rounds components from 0 to 1 to 8 bits.
+pub(super) fn quantized(color: [f32; 3]) -> [u8; 3] {
+    color.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
+impl Picture {
+    /// Sets a pixel, if it lies within the picture.
+    pub(super) fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
+        if x < self.width && y < self.height {
+            self.pixels[y as usize * self.width as usize + x as usize] = color;
+        }
+    }
+
+    /// The bytes of a PNG file.
+    fn encoded(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        set_format(&mut encoder);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(self.pixels.as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
+    /// Writes a PNG file, atomically.
+    ///
+    /// # Errors
+    /// `BTH-P002` if it cannot be written.
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
+        let bytes =
+            self.encoded().map_err(|e| Failure::File { path: path.into(), message: e.to_string() })?;
+        write_atomically(path, &bytes)
+    }
+}
+
+/// Sets the pixel format and color space of a PNG file or animation.
+pub(super) fn set_format<W: Write>(encoder: &mut png::Encoder<'_, W>) {
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+}
+
+/// Whether a file is a complete PNG file of this size.
+pub(super) fn is_complete(path: &Path, (width, height): (u32, u32)) -> bool {
+    let Ok(bytes) = std::fs::read(path) else { return false };
+    let end = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xae, 0x42, 0x60, 0x82];
+    let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
+    bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(16..24) == Some(&size) && bytes.ends_with(&end)
+}
+
+/// The text of an error number of the system.
+fn system_message(number: i32) -> String {
+    std::io::Error::from_raw_os_error(number).to_string()
+}
+
+/// Writes a file by renaming a finished temporary one, so that it is never seen in part.
+///
+/// # Errors
+/// `BTH-P002` if it cannot be written.
+pub(super) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    // The message of the system alone: errors of temporary files also name these.
+    let failed = |e: &std::io::Error| {
+        let reason = e.raw_os_error().map_or_else(|| e.to_string(), system_message);
+        Failure::File { path: path.into(), message: format!("cannot write: {reason}") }
+    };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".bth-play-").suffix(".tmp");
+    #[cfg(unix)]
+    {
+        // The permissions of any new file, which the umask reduces; temporary files get fewer by default.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(|e| failed(&e))?;
+    file.write_all(bytes).map_err(|e| failed(&e))?;
+    file.persist(path).map_err(|e| failed(&e.error))?;
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! Progress on a terminal.
+
+use super::tile::tile_count;
+use crate::args::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+
+/// A bar that counts tiles, shown only where standard error is a terminal.
+pub(super) struct Progress(ProgressBar);
+
+impl Progress {
+    /// A bar for the tiles of all these frames.
+    pub(super) fn new(frames: &[i32], args: &Args) -> Self {
+        let tiles = u64::from(tile_count(args.size)) * frames.len() as u64;
+        let visible = std::io::stderr().is_terminal();
+        let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(tiles), target);
+        let style = ProgressStyle::with_template(
+            "rendering {bar:30} {human_pos}/{human_len} tiles  {msg}  {eta} left",
+        );
+        let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
+        if frames.len() > 1 {
+            bar.set_message(format!("{} frames", frames.len()));
+        }
+        Self(bar)
+    }
+
+    /// Counts a finished tile.
+    pub(super) fn tile_done(&self) {
+        self.0.inc(1);
+    }
+
+    /// Redraws the bar after a frame.
+    pub(super) fn frame_done(&self) {
+        self.0.tick();
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

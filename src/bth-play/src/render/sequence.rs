@@ -1,0 +1,136 @@
+//! A sequence of frames: which ones are rendered, one after another, and the time that each took.
+
+use super::frame::{Summary, render_frame};
+use super::progress::Progress;
+use crate::args::Args;
+use crate::camera::SceneSetup;
+use crate::failure::Failure;
+use crate::output::Sink;
+use crate::shading::FrameContext;
+use bth::Scene;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// Time and work of a frame.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct FrameReport {
+    /// Number of the frame.
+    pub(crate) frame: i32,
+    /// Time to evaluate tracks, hierarchy and instances, without the top level.
+    pub(crate) update_seconds: f64,
+    /// Time to build or refit the top level.
+    pub(crate) top_level_seconds: f64,
+    /// Nodes that moved.
+    pub(crate) nodes_moved: usize,
+    /// Instances whose transforms changed.
+    pub(crate) instances_placed: usize,
+    /// Instances that are visible.
+    pub(crate) instances_visible: usize,
+    /// Time and rays of the rendering.
+    #[serde(flatten)]
+    pub(crate) summary: Summary,
+}
+
+/// Time and work of all frames.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Report {
+    pub(crate) frames: Vec<FrameReport>,
+    /// Frames that were not rendered because their pictures existed already.
+    pub(crate) skipped: usize,
+}
+
+/// The first and last frame of a file and its frames per second; frame 0 alone for files without a scene.
+pub(crate) fn frame_range(scene: &Scene) -> ((i32, i32), f64) {
+    scene.description().map_or(((0, 0), 24.0), |view| {
+        let scene = &view.scene[0];
+        ((scene.first_frame, scene.last_frame), scene.rate)
+    })
+}
+
+/// The first and last frame that the options choose; without an output those for a window.
+///
+/// # Errors
+/// If the options name frames that the file does not have.
+pub(crate) fn frames_to_show(
+    scene: &Scene,
+    file: &Path,
+    args: &Args,
+    output: Option<&Path>,
+) -> Result<(i32, i32), Failure> {
+    let ((first, last), _) = frame_range(scene);
+    match args.frames {
+        Some((a, b)) if a < first || b > last => Err(Failure::Usage(format!(
+            "{} has frames {first} to {last}; expected some of these, found {a} to {b}",
+            file.display()
+        ))),
+        Some(frames) => Ok(frames),
+        None if output.is_some_and(is_one_picture) => Ok((first, first)),
+        None => Ok((first, last)),
+    }
+}
+
+fn is_one_picture(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+        && !output.to_string_lossy().contains('#')
+}
+
+/// Renders the frames that the options choose. The second value tells whether the pictures went to standard output, so that
+/// the report must not.
+///
+/// # Errors
+/// If the options do not fit the file or the output, the file lacks what the mode needs, or a picture cannot be written.
+pub(crate) fn render_sequence(
+    scene: &mut Scene,
+    file: &Path,
+    output: &Path,
+    args: &Args,
+) -> Result<(Report, bool), Failure> {
+    let (whole, rate) = frame_range(scene);
+    let (first, last) = frames_to_show(scene, file, args, Some(output))?;
+    let mut frames: Vec<i32> = (first..=last).collect();
+    let mut sink = Sink::new(output, args.size, frames.len(), rate)?;
+    if let Some((part, parts)) = args.shard {
+        if !sink.is_numbered() {
+            let message = "--shard needs numbered pictures, such as -o frames/####.png";
+            return Err(Failure::Usage(message.to_owned()));
+        }
+        let mut row = 0;
+        frames.retain(|_| {
+            row += 1;
+            (row - 1) % parts == part - 1
+        });
+    }
+    let quiet = sink.takes_stdout();
+    let mut report = Report::default();
+    let before = frames.len();
+    if !args.force {
+        frames.retain(|frame| !sink.has(*frame, args.size));
+    }
+    report.skipped = before - frames.len();
+    if !frames.is_empty() {
+        let setup = SceneSetup::new(scene, file, args, whole)?;
+        let progress = Progress::new(&frames, args);
+        for number in frames {
+            let start = Instant::now();
+            let update = scene.set_frame(number)?;
+            let update_time = start.elapsed().saturating_sub(update.top_level);
+            let camera = setup.camera(scene, args);
+            let frame = FrameContext::new(scene, file, &setup, camera, args)?;
+            let (picture, summary) = render_frame(&frame, &progress);
+            sink.write(number, &picture)?;
+            progress.frame_done();
+            report.frames.push(FrameReport {
+                frame: number,
+                update_seconds: update_time.as_secs_f64(),
+                top_level_seconds: update.top_level.as_secs_f64(),
+                nodes_moved: update.nodes,
+                instances_placed: update.placed,
+                instances_visible: update.visible,
+                summary,
+            });
+        }
+    }
+    sink.finish()?;
+    Ok((report, quiet))
+}

@@ -1,0 +1,107 @@
+//! What all samples of a frame share, and what is counted while they are shaded.
+
+use super::geometry::ShadingGeometry;
+use crate::args::{Args, Mode};
+use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
+use crate::failure::Failure;
+use crate::sampling::Sampler;
+use bth::Scene;
+use bth::rays::Hit;
+use glam::{DVec2, DVec3};
+use serde::Serialize;
+use std::path::Path;
+
+/// A scene at one time, seen by a camera.
+pub(crate) struct FrameContext<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) geometry: ShadingGeometry<'a>,
+    /// Bounds of all frames of the sequence.
+    pub(crate) bounds: &'a SceneBounds,
+    pub(crate) camera: Camera,
+    /// Whether the camera is inside a room.
+    pub(crate) interior: bool,
+    /// Length of ambient-occlusion rays, in world units.
+    pub(crate) occlusion_distance: f64,
+    pub(crate) args: &'a Args,
+}
+
+/// One sample of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    pub(crate) sampler: Sampler,
+    /// Number of the sample within its pixel, from 0.
+    pub(crate) index: u32,
+    /// Point of the picture, from (-1, -1) lower left to (1, 1) upper right.
+    pub(crate) at: DVec2,
+    pub(crate) ray: CameraRay,
+}
+
+/// Rays and traversal steps, summed over the samples of a tile or frame.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Counters {
+    /// Nearest-hit rays beyond those of the camera.
+    pub(crate) nearest_rays: u64,
+    /// Any-hit rays: shadow and occlusion rays.
+    pub(crate) any_rays: u64,
+    /// Steps of camera rays, in mode steps only.
+    pub(crate) steps: Steps,
+}
+
+/// Traversal steps of camera rays.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct Steps {
+    pub(crate) nodes: f64,
+    pub(crate) leaves: f64,
+    pub(crate) triangles: f64,
+    pub(crate) tets: f64,
+}
+
+impl<'a> FrameContext<'a> {
+    /// A scene at the time to which it is set, seen by a camera.
+    ///
+    /// # Errors
+    /// If the file lacks what the mode needs.
+    pub(crate) fn new(
+        scene: &'a Scene,
+        file: &Path,
+        setup: &'a SceneSetup,
+        camera: Camera,
+        args: &'a Args,
+    ) -> Result<Self, Failure> {
+        let geometry = ShadingGeometry::new(scene);
+        if !matches!(args.mode, Mode::Steps) {
+            geometry.require_triangles(file)?;
+        }
+        let interior = setup.interior;
+        let occlusion_distance = setup.bounds.diagonal() * if interior { 0.08 } else { 0.5 };
+        Ok(Self { scene, geometry, bounds: &setup.bounds, camera, interior, occlusion_distance, args })
+    }
+
+    /// The sample of a pixel; the ray goes through the middle of the pixel, or through a random point of it.
+    pub(crate) fn sample(&self, (x, y): (u32, u32), index: u32, centered: bool) -> Sample {
+        let sampler = Sampler::new(x, y);
+        let within = if centered { DVec2::splat(0.5) } else { sampler.point(0, index) };
+        let (width, height) = self.args.size;
+        let part = (DVec2::new(f64::from(x), f64::from(y)) + within)
+            / DVec2::new(f64::from(width), f64::from(height));
+        let at = DVec2::new(2.0 * part.x - 1.0, 1.0 - 2.0 * part.y);
+        Sample { sampler, index, at, ray: self.camera.ray(at) }
+    }
+
+    /// The point of a camera ray's hit and the geometric normal there, on the side of the camera.
+    pub(crate) fn point_and_normal(&self, sample: &Sample, hit: &Hit) -> (DVec3, DVec3) {
+        let point = sample.ray.origin + sample.ray.direction * f64::from(hit.t);
+        (point, self.geometry.geometric_normal(hit.surface, -sample.ray.direction))
+    }
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.nearest_rays += other.nearest_rays;
+        self.any_rays += other.any_rays;
+        self.steps.nodes += other.steps.nodes;
+        self.steps.leaves += other.steps.leaves;
+        self.steps.triangles += other.steps.triangles;
+        self.steps.tets += other.steps.tets;
+    }
+}

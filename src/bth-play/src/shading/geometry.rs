@@ -1,0 +1,82 @@
+//! Normals at hits, computed from the source geometry that the file keeps, in world space.
+
+use crate::failure::Failure;
+use bth::Scene;
+use bth::rays::{Hit, Surface};
+use bth_format::object::ObjectView;
+use glam::{DVec3, Vec3};
+use std::path::Path;
+
+/// The geometry of a scene at the time to which it is set. Normals are computed in f64, so that no product of two f32
+/// lengths overflows or underflows.
+pub(crate) struct ShadingGeometry<'a> {
+    scene: &'a Scene,
+    objects: Vec<ObjectView<'a>>,
+    /// The object of each instance.
+    object_of: Vec<u32>,
+}
+
+fn to_f64(p: [f32; 3]) -> DVec3 {
+    Vec3::from_array(p).as_dvec3()
+}
+
+impl<'a> ShadingGeometry<'a> {
+    pub(crate) fn new(scene: &'a Scene) -> Self {
+        Self {
+            scene,
+            objects: (0..scene.object_count()).map(|i| scene.object(i)).collect(),
+            object_of: (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
+        }
+    }
+
+    /// Fails when the file was compiled without the source's positions and triangles, which normals need.
+    pub(crate) fn require_triangles(&self, file: &Path) -> Result<(), Failure> {
+        if self.objects.iter().all(|view| view.triangles.len() == view.header.triangles as usize) {
+            return Ok(());
+        }
+        Err(Failure::Lacks {
+            file: file.into(),
+            what: "the file has no positions and triangles, which this mode needs for normals",
+            hint: "compile the model without --no-geometry, or use --mode steps",
+        })
+    }
+
+    fn object(&self, surface: Surface) -> &ObjectView<'a> {
+        &self.objects[self.object_of[surface.instance as usize] as usize]
+    }
+
+    fn to_world(&self, surface: Surface, normal: DVec3) -> Option<DVec3> {
+        let normal = DVec3::from_array(self.scene.normal_to_world(surface.instance, normal.to_array()));
+        // Scaled first, since the square of a tiny length underflows.
+        (normal / normal.abs().max_element()).try_normalize()
+    }
+
+    /// The geometric normal of a hit triangle in the world: unit, on the side that `towards` points to.
+    pub(crate) fn geometric_normal(&self, surface: Surface, towards: DVec3) -> DVec3 {
+        let object = self.object(surface);
+        let [a, b, c] =
+            object.triangles[surface.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
+        let (e, f) = (b - a, c - a);
+        // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
+        let scale = e.abs().max_element().max(f.abs().max_element());
+        let normal = self.to_world(surface, (e / scale).cross(f / scale)).unwrap_or(towards);
+        if normal.dot(towards) < 0.0 { -normal } else { normal }
+    }
+
+    /// The interpolated normal of the source on the side of the geometric one, or the geometric
+    /// one when the source has none.
+    pub(crate) fn shading_normal(&self, hit: &Hit, geometric: DVec3) -> DVec3 {
+        let object = self.object(hit.surface);
+        let Some(corners) = object.corners.get(hit.surface.triangle as usize) else { return geometric };
+        if object.normals.is_empty() {
+            return geometric;
+        }
+        let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        match self.to_world(hit.surface, a * (1.0 - u - v) + b * u + c * v) {
+            Some(normal) if normal.dot(geometric) < 0.0 => -normal,
+            Some(normal) => normal,
+            None => geometric,
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! The light of mode path: the scene's lights, or else a sun, and a sky. Brightness is relative to the brightest light and to
+//! the size of the scene, so that no exposure is needed and frames do not flicker.
+
+use crate::camera::SceneBounds;
+use crate::sampling::uniform_disc;
+use bth::Scene;
+use bth_format::layout;
+use glam::{DVec2, DVec3, Vec3};
+
+/// Tangent of half the angle under which the sun is seen: larger than the real one, for softer shadows.
+const SUN_RADIUS: f64 = 0.02;
+/// Irradiance of the sun, or of the brightest directional light.
+const SUN: Vec3 = Vec3::new(2.1, 1.95, 1.7);
+/// Irradiance of the brightest point or spot light at a quarter of the scene's diagonal.
+const LAMP: f64 = 2.0;
+/// Radiance of the sky at the zenith, at the horizon and below it.
+const ZENITH: Vec3 = Vec3::new(0.42, 0.58, 0.86);
+const HORIZON: Vec3 = Vec3::new(0.86, 0.90, 0.94);
+const BELOW: Vec3 = Vec3::new(0.34, 0.32, 0.30);
+
+/// A sample of a light as seen from a point.
+pub(crate) struct LightSample {
+    /// Unit, towards the light.
+    pub(crate) direction: DVec3,
+    pub(crate) distance: f64,
+    /// Irradiance at normal incidence if nothing blocks the light.
+    pub(crate) light: Vec3,
+}
+
+enum Light {
+    /// `towards` is the unit direction to the light.
+    Directional { towards: DVec3, light: Vec3 },
+    /// A point light, or with a cone a spot light; `light` is its irradiance at distance 1.
+    Point { position: DVec3, light: Vec3, range: f64, cone: Option<Cone> },
+}
+
+struct Cone {
+    axis: DVec3,
+    /// Cosines of the angles to the axis at which the light begins to fade and at which it ends.
+    inner: f64,
+    outer: f64,
+}
+
+/// All light of a frame.
+pub(crate) struct Lights {
+    lights: Vec<Light>,
+    vertical: DVec3,
+    /// Length of shadow rays to directional lights: beyond the bounds of the scene.
+    far_distance: f64,
+}
+
+impl Lights {
+    /// The lights of a scene at the time to which it is set. A scene without lights gets a sun, or in a room a lamp, given by
+    /// its position and the distance at which it is as bright as [`LAMP`].
+    pub(crate) fn new(
+        scene: &Scene,
+        bounds: &SceneBounds,
+        vertical: DVec3,
+        lamp: Option<(DVec3, f64)>,
+    ) -> Self {
+        let mut lights = of_scene(scene, bounds);
+        if let Some((position, distance)) = lamp.filter(|_| lights.is_empty()) {
+            let light = Vec3::splat((LAMP * distance * distance) as f32);
+            lights.push(Light::Point { position, light, range: f64::INFINITY, cone: None });
+        }
+        if lights.is_empty() {
+            // Fixed in the world, so that it does not turn with a moving camera.
+            let (side, front) = vertical.any_orthonormal_pair();
+            let towards = (vertical * 0.9 + side * 0.45 + front * 0.35).normalize();
+            lights.push(Light::Directional { towards, light: SUN });
+        }
+        Self { lights, vertical, far_distance: 4.0 * bounds.diagonal() }
+    }
+
+    /// Radiance of the sky in a unit direction.
+    pub(crate) fn sky(&self, direction: DVec3) -> Vec3 {
+        let height = direction.dot(self.vertical) as f32;
+        if height < 0.0 {
+            HORIZON.lerp(BELOW, (-height * 4.0).min(1.0))
+        } else {
+            HORIZON.lerp(ZENITH, height.sqrt())
+        }
+    }
+
+    /// Samples of the lights as seen from a point: one of each directional light, and one of a point light that is chosen
+    /// uniformly at random. `spread` and `choice` are points of the unit square.
+    pub(crate) fn samples(
+        &self,
+        point: DVec3,
+        spread: DVec2,
+        choice: DVec2,
+    ) -> impl Iterator<Item = LightSample> {
+        let count = self.lights.iter().filter(|l| matches!(l, Light::Point { .. })).count();
+        let chosen = (choice.x * count as f64) as usize;
+        let directional = self.lights.iter().filter_map(move |l| match l {
+            Light::Directional { towards, light } => {
+                let (tangent, bitangent) = towards.any_orthonormal_pair();
+                let at = uniform_disc(spread) * SUN_RADIUS;
+                let direction = (*towards + tangent * at.x + bitangent * at.y).normalize();
+                Some(LightSample { direction, distance: self.far_distance, light: *light })
+            }
+            Light::Point { .. } => None,
+        });
+        let mut points = self.lights.iter().filter(|l| matches!(l, Light::Point { .. }));
+        let point_light = points.nth(chosen.min(count.max(1) - 1));
+        directional.chain(point_light.and_then(move |l| l.seen_from(point, count as f64)))
+    }
+}
+
+/// The visible lights of a scene at the time to which it is set.
+fn of_scene(scene: &Scene, bounds: &SceneBounds) -> Vec<Light> {
+    let Some(view) = scene.description() else { return Vec::new() };
+    let strength = |l: &layout::Light| l.intensity * l.color.iter().fold(0.0f64, |m, c| m.max(*c));
+    let brightest = |directional: bool| {
+        let same = view.lights.iter().filter(|l| (l.kind == 0) == directional);
+        same.map(strength).fold(0.0f64, f64::max)
+    };
+    let (brightest_directional, brightest_point) = (brightest(true), brightest(false));
+    let mut lights = Vec::new();
+    for light in view.lights {
+        let (rows, visible) = scene.node(light.node);
+        let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
+        let axis = (-column(2)).normalize_or(DVec3::NEG_Z);
+        if !visible || strength(light) <= 0.0 {
+            continue;
+        }
+        let color = DVec3::from_array(light.color) * light.intensity;
+        if light.kind == 0 {
+            let light = SUN * (color / brightest_directional).as_vec3();
+            lights.push(Light::Directional { towards: -axis, light });
+            continue;
+        }
+        let distance = 0.25 * bounds.diagonal();
+        let cosine = |degrees: f64| degrees.to_radians().cos();
+        lights.push(Light::Point {
+            position: column(3),
+            light: (color / brightest_point * LAMP * distance * distance).as_vec3(),
+            range: if light.range > 0.0 { light.range } else { f64::INFINITY },
+            cone: (light.kind == 2).then(|| Cone {
+                axis,
+                inner: cosine(light.inner),
+                outer: cosine(light.outer),
+            }),
+        });
+    }
+    lights
+}
+
+impl Light {
+    /// The sample of a point light as seen from a point, weighted with the number of lights among which it was chosen. `None`
+    /// beyond its range or cone.
+    fn seen_from(&self, point: DVec3, lights: f64) -> Option<LightSample> {
+        let Light::Point { position, light, range, cone } = self else { return None };
+        let (direction, distance) = (*position - point).normalize_and_length();
+        if distance == 0.0 || distance > *range {
+            return None;
+        }
+        let spot = cone.as_ref().map_or(1.0, |cone| {
+            let part = (-direction.dot(cone.axis) - cone.outer) / (cone.inner - cone.outer);
+            part.clamp(0.0, 1.0).powi(2)
+        });
+        let window = (1.0 - (distance / range).powi(4)).max(0.0);
+        let scale = lights * spot * window / (distance * distance);
+        (scale > 0.0).then(|| LightSample {
+            direction,
+            distance: distance * 0.999,
+            light: *light * scale as f32,
+        })
+    }
+}

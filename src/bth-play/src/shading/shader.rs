@@ -1,0 +1,72 @@
+//! The shader of each mode.
+
+use super::context::{Counters, FrameContext, Sample};
+use super::lights::Lights;
+use super::room_lamp::room_lamp;
+use super::studio::Studio;
+use super::{ambient_occlusion, path_tracer, step_counts, surface_colors};
+use crate::args::Mode;
+use crate::camera::up_vector;
+use bth::rays::{Hit, Ray};
+use glam::Vec3;
+
+/// Shades batches of samples; what it needs besides the frame is computed once a frame.
+pub(crate) enum Shader {
+    Studio(Studio),
+    Path(Lights),
+    Normals,
+    AmbientOcclusion,
+    Instances,
+    Steps,
+}
+
+impl Shader {
+    /// The shader of the frame's mode.
+    pub(crate) fn new(frame: &FrameContext<'_>) -> Self {
+        let vertical = up_vector(frame.args.up);
+        match frame.args.mode {
+            Mode::Shaded => {
+                let ground = !frame.args.no_ground && frame.scene.description().is_none();
+                Shader::Studio(Studio::new(frame, vertical, ground))
+            }
+            Mode::Path => {
+                let lamp = frame.interior.then(|| {
+                    let position = room_lamp(frame, vertical);
+                    (position, 1.5 * (position - frame.camera.eye).length())
+                });
+                Shader::Path(Lights::new(frame.scene, frame.bounds, vertical, lamp))
+            }
+            Mode::Normals => Shader::Normals,
+            Mode::Ao => Shader::AmbientOcclusion,
+            Mode::Steps => Shader::Steps,
+            Mode::Instances => Shader::Instances,
+        }
+    }
+
+    /// Traces the camera rays of a batch of samples and shades their hits. The colours are linear, but for
+    /// [`Shader::Normals`], whose components are shown as they are, and [`Shader::Steps`], whose first component is the
+    /// number of steps.
+    pub(crate) fn shade(
+        &self,
+        frame: &FrameContext<'_>,
+        samples: &[Sample],
+        counters: &mut Counters,
+    ) -> Vec<Vec3> {
+        let rays: Vec<Ray> = samples.iter().map(|sample| sample.ray.to_ray()).collect();
+        if let Shader::Steps = self {
+            return step_counts::shade(frame.scene, &rays, &mut counters.steps);
+        }
+        let mut hits = vec![Hit::MISS; rays.len()];
+        frame.scene.nearest_batch(&rays, None, &mut hits);
+        match self {
+            Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
+            Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),
+            Shader::Normals => surface_colors::normals(frame, samples, &hits),
+            Shader::AmbientOcclusion => {
+                ambient_occlusion::shade(frame, samples, &hits, &mut counters.any_rays)
+            }
+            Shader::Instances => surface_colors::instances(frame, samples, &hits),
+            Shader::Steps => unreachable!("handled above"),
+        }
+    }
+}

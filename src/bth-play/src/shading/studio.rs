@@ -1,0 +1,177 @@
+//! The studio shader of mode shaded: a matte material under a soft key light and a fill light, with ambient occlusion, on a
+//! ground that only catches shadows.
+
+use super::context::{FrameContext, Sample};
+use super::occlusion_rays::{OcclusionRays, Origin};
+use super::room_lamp::room_lamp;
+use crate::output::shoulder;
+use crate::sampling::{cosine_hemisphere, uniform_disc};
+use bth::rays::{Hit, Surface};
+use glam::{DVec3, Vec3};
+
+/// Ambient-occlusion rays per sample.
+const AMBIENT_RAYS: u32 = 2;
+/// Radius of the key light at distance 1, which decides how soft its shadows are.
+const KEY_RADIUS: f64 = 0.16;
+/// Albedo of the material.
+const ALBEDO: Vec3 = Vec3::new(0.57, 0.515, 0.465);
+/// Irradiance of the key light, of the fill light, and of the ambient light from above and from below.
+const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
+const FILL: Vec3 = Vec3::new(0.12, 0.145, 0.19);
+const SKY: Vec3 = Vec3::new(0.33, 0.37, 0.43);
+const BOUNCE: Vec3 = Vec3::new(0.22, 0.20, 0.18);
+const BACKGROUND_TOP: Vec3 = Vec3::new(0.52, 0.56, 0.62);
+const BACKGROUND_BOTTOM: Vec3 = Vec3::new(0.80, 0.81, 0.82);
+
+/// The lights and the ground.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Studio {
+    vertical: DVec3,
+    key: Key,
+    /// Unit, towards the fill light.
+    fill: DVec3,
+    /// Height of the ground along the vertical, if there is one.
+    ground: Option<f64>,
+    /// Diagonal of the scene's bounds.
+    diagonal: f64,
+}
+
+/// The key light.
+#[derive(Clone, Copy, Debug)]
+enum Key {
+    /// Infinitely far away in this unit direction.
+    Directional(DVec3),
+    /// At this point, for rooms.
+    Point(DVec3),
+}
+
+/// A point to be lit. Its occlusion rays are one to the key light and then [`AMBIENT_RAYS`].
+struct ShadingPoint {
+    /// Index of its sample.
+    sample: usize,
+    normal: DVec3,
+    to_key: DVec3,
+    /// How strongly a shadow shows, for points of the ground; `None` for those of the model.
+    ground: Option<f64>,
+}
+
+impl Studio {
+    pub(crate) fn new(frame: &FrameContext<'_>, vertical: DVec3, ground: bool) -> Self {
+        let camera = &frame.camera;
+        let diagonal = frame.bounds.diagonal();
+        let key = if frame.interior {
+            Key::Point(room_lamp(frame, vertical))
+        } else {
+            Key::Directional((-camera.forward * 0.45 - camera.right * 0.55 + vertical * 0.85).normalize())
+        };
+        let fill = (camera.right * 0.85 - camera.forward * 0.5 + vertical * 0.1).normalize();
+        let ground = (ground && !frame.interior).then(|| frame.bounds.lower.dot(vertical));
+        Self { vertical, key, fill, ground, diagonal }
+    }
+
+    /// The colours (linear) of a batch of samples.
+    pub(crate) fn shade(
+        &self,
+        frame: &FrameContext<'_>,
+        samples: &[Sample],
+        hits: &[Hit],
+        any_rays: &mut u64,
+    ) -> Vec<Vec3> {
+        let mut colors: Vec<Vec3> = samples.iter().map(|s| background(s.at.y, s.at.length())).collect();
+        let mut rays = OcclusionRays::default();
+        let mut points = Vec::new();
+        for (index, (sample, hit)) in samples.iter().zip(hits).enumerate() {
+            if hit.is_hit() {
+                let (point, geometric) = frame.point_and_normal(sample, hit);
+                let origin = Origin::above(point, geometric, hit.surface, self.diagonal);
+                let to_key = self.push(&mut rays, origin, geometric, sample, frame.occlusion_distance);
+                let normal = frame.geometry.shading_normal(hit, geometric);
+                points.push(ShadingPoint { sample: index, normal, to_key, ground: None });
+            } else if let Some((point, share)) = self.on_ground(frame, sample) {
+                let origin = Origin::above(point, self.vertical, Surface::NONE, self.diagonal);
+                let distance = frame.occlusion_distance;
+                let to_key = self.push(&mut rays, origin, self.vertical, sample, distance);
+                points.push(ShadingPoint {
+                    sample: index,
+                    normal: self.vertical,
+                    to_key,
+                    ground: Some(share),
+                });
+            }
+        }
+        *any_rays += rays.len() as u64;
+        let blocked = rays.trace(frame.scene);
+        for (point, blocked) in points.iter().zip(blocked.chunks(1 + AMBIENT_RAYS as usize)) {
+            let open = blocked[1..].iter().filter(|b| !**b).count() as f32 / AMBIENT_RAYS as f32;
+            let key = if blocked[0] { 0.0 } else { 1.0 };
+            let color = &mut colors[point.sample];
+            *color = match point.ground {
+                Some(share) => *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key))),
+                None => self.reflected(point, samples[point.sample].ray.direction, key, open),
+            };
+        }
+        colors
+    }
+
+    /// Adds the key ray and the ambient rays, of length `distance`, of a point; returns the direction to the key light.
+    fn push(
+        &self,
+        rays: &mut OcclusionRays,
+        origin: Origin,
+        normal: DVec3,
+        sample: &Sample,
+        distance: f64,
+    ) -> DVec3 {
+        let (to_key, length) = match self.key {
+            Key::Directional(direction) => (direction, 4.0 * self.diagonal),
+            Key::Point(lamp) => {
+                let to_lamp = lamp - origin.point;
+                (to_lamp.normalize_or(normal), to_lamp.length())
+            }
+        };
+        let (tangent, bitangent) = to_key.any_orthonormal_pair();
+        let spread = uniform_disc(sample.sampler.point(1, sample.index)) * KEY_RADIUS;
+        rays.push(origin, (to_key + tangent * spread.x + bitangent * spread.y).normalize(), length * 0.999);
+        for ray in 0..AMBIENT_RAYS {
+            let at = sample.sampler.point(2, sample.index * AMBIENT_RAYS + ray);
+            rays.push(origin, cosine_hemisphere(normal, at), distance);
+        }
+        to_key
+    }
+
+    /// The light that a point of the model reflects towards the camera; `direction` is that of the camera ray, `key` the
+    /// visible share of the key light, `open` that of the hemisphere.
+    fn reflected(&self, point: &ShadingPoint, direction: DVec3, key: f32, open: f32) -> Vec3 {
+        let facing = |towards: DVec3| point.normal.dot(towards).max(0.0) as f32;
+        let height = (point.normal.dot(self.vertical) * 0.5 + 0.5) as f32;
+        let ambient = BOUNCE.lerp(SKY, height) * open;
+        // A weak specular term (Blinn), which shows curvature in the lit parts.
+        let half = (point.to_key - direction).normalize_or(point.normal);
+        let gloss = 0.06 * facing(half).powi(24) * key;
+        let light =
+            KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient;
+        shoulder(ALBEDO * light + KEY * gloss)
+    }
+
+    /// Where the camera ray meets the ground, and how much of the shadow there shows.
+    fn on_ground(&self, frame: &FrameContext<'_>, sample: &Sample) -> Option<(DVec3, f64)> {
+        let height = self.ground?;
+        let eye = sample.ray.origin;
+        let (above, descent) = (eye.dot(self.vertical) - height, -sample.ray.direction.dot(self.vertical));
+        if above <= 0.0 || descent <= 1e-6 {
+            return None;
+        }
+        let point = eye + sample.ray.direction * (above / descent);
+        let away =
+            (point - frame.bounds.center()).reject_from_normalized(self.vertical).length() / self.diagonal;
+        // Beyond a few diagonals the shadow is too faint to be seen.
+        (away < 3.0).then(|| (point, (-(away / 1.1).powi(2)).exp()))
+    }
+}
+
+/// A vertical gradient with a slight vignette.
+fn background(height: f64, from_center: f64) -> Vec3 {
+    let part = (height * 0.5 + 0.5) as f32;
+    let smooth = part * part * (3.0 - 2.0 * part);
+    BACKGROUND_BOTTOM.lerp(BACKGROUND_TOP, smooth) * (1.0 - 0.10 * (from_center * from_center) as f32)
+}

@@ -1,0 +1,186 @@
+//! The state of the window.
+
+use crate::args::{Args, Mode};
+use crate::camera::{Camera, SceneSetup, scene_camera, up_vector};
+use crate::failure::Failure;
+use crate::output::Picture;
+use crate::window::camera_controller::CameraController;
+use crate::window::playback::Playback;
+use crate::window::progressive::ProgressiveRenderer;
+use crate::window::screen::Screen;
+use crate::window::summary::WindowSummary;
+use bth::Scene;
+use bth::rays::Hit;
+use glam::DVec2;
+use rayon::ThreadPool;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use winit::event_loop::ActiveEventLoop;
+use winit::keyboard::KeyCode;
+
+/// What dragging the pointer does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Drag {
+    Orbit,
+    Pan,
+    Scrub,
+}
+
+/// The camera in use.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum ViewCamera {
+    /// The camera that the options chose, which may move with the scene.
+    Initial,
+    /// The camera in this row of the scene's table.
+    Scene(u32),
+    /// The camera that the user moves.
+    Free(CameraController),
+}
+
+/// What the window shows.
+pub(crate) struct Content<'a> {
+    pub(crate) scene: &'a mut Scene,
+    pub(crate) file: &'a Path,
+    pub(crate) setup: SceneSetup,
+}
+
+/// The state of the window.
+pub(crate) struct App<'a> {
+    pub(super) content: Content<'a>,
+    pub(super) pool: &'a ThreadPool,
+    pub(super) renderer: ProgressiveRenderer,
+    pub(super) playback: Playback,
+    pub(super) view: ViewCamera,
+    pub(super) mode: Mode,
+    /// The window, once the event loop has created it.
+    pub(super) screen: Option<Screen>,
+    /// The last finished picture.
+    pub(super) picture: Option<Picture>,
+    /// Samples per pixel to which the picture is refined.
+    pub(super) samples: u32,
+    /// Pictures after which the window closes.
+    pub(super) picture_limit: Option<u64>,
+    pub(super) screenshot: Option<PathBuf>,
+    /// Whether the next finished picture is to be saved.
+    pub(super) save_requested: bool,
+    /// Keys that are down and move the camera.
+    pub(super) keys_down: Vec<KeyCode>,
+    pub(super) shift: bool,
+    /// Pixels from the upper left.
+    pub(super) pointer: DVec2,
+    pub(super) drag: Option<Drag>,
+    /// When the window was created. Other times are relative to it.
+    pub(super) start: Instant,
+    /// When keys last moved the camera.
+    pub(super) last_flight: Duration,
+    /// When the pictures of the last second were shown.
+    pub(super) shown_at: Vec<Duration>,
+    /// Pictures shown.
+    pub(super) pictures: u64,
+    /// Why the current frame cannot be set; shown in the title.
+    pub(super) frame_error: Option<String>,
+    /// Why the window closes, if it is an error.
+    pub(super) failure: Option<Failure>,
+}
+
+impl<'a> App<'a> {
+    /// A window that plays the frames of `range` at `rate` frames per second.
+    pub(crate) fn new(
+        content: Content<'a>,
+        args: &Args,
+        pool: &'a ThreadPool,
+        range: (i32, i32),
+        rate: f64,
+    ) -> Self {
+        Self {
+            content,
+            pool,
+            renderer: ProgressiveRenderer::new(args),
+            playback: Playback::new(range, rate),
+            view: ViewCamera::Initial,
+            mode: args.mode,
+            screen: None,
+            picture: None,
+            samples: args.spp.max(args.window_frames.unwrap_or(0)),
+            picture_limit: args.window_frames.map(u64::from),
+            screenshot: args.screenshot.clone(),
+            save_requested: false,
+            keys_down: Vec::new(),
+            shift: false,
+            pointer: DVec2::ZERO,
+            drag: None,
+            start: Instant::now(),
+            last_flight: Duration::ZERO,
+            shown_at: Vec::new(),
+            pictures: 0,
+            frame_error: None,
+            failure: None,
+        }
+    }
+
+    /// A summary of what was shown.
+    ///
+    /// # Errors
+    /// The error that closed the window, if one did.
+    pub(crate) fn finish(self) -> Result<WindowSummary, Failure> {
+        let (width, height) = self.renderer.size();
+        match self.failure {
+            Some(failure) => Err(failure),
+            None => Ok(WindowSummary {
+                pictures: self.pictures,
+                seconds: self.start.elapsed().as_secs_f64(),
+                frame: self.playback.frame(),
+                mode: self.mode.name(),
+                width,
+                height,
+            }),
+        }
+    }
+
+    /// Closes the window if an operation failed.
+    pub(super) fn check(&mut self, events: &ActiveEventLoop, result: Result<(), Failure>) {
+        if let Err(failure) = result {
+            self.failure.get_or_insert(failure);
+            events.exit();
+        }
+    }
+
+    /// The camera at the time to which the scene is set.
+    pub(super) fn camera(&self) -> Camera {
+        let args = self.renderer.args();
+        match self.view {
+            ViewCamera::Initial => {
+                self.content.setup.camera(self.content.scene, &args).with_aspect_of(args.size)
+            }
+            ViewCamera::Scene(row) => scene_camera(self.content.scene, row, &args),
+            ViewCamera::Free(controller) => controller.camera(args.size),
+        }
+    }
+
+    /// The controller of the camera; the user takes over the current camera if another one was in use.
+    pub(super) fn controller(&mut self) -> &mut CameraController {
+        if !matches!(self.view, ViewCamera::Free(_)) {
+            let camera = self.camera();
+            let vertical = up_vector(self.renderer.args().up);
+            self.view = ViewCamera::Free(CameraController::new(camera, vertical, self.distance(&camera)));
+        }
+        match &mut self.view {
+            ViewCamera::Free(controller) => controller,
+            ViewCamera::Initial | ViewCamera::Scene(_) => unreachable!("assigned above"),
+        }
+    }
+
+    /// Distance to the hit in the middle of the picture, or else to the middle of the scene.
+    fn distance(&self, camera: &Camera) -> f64 {
+        let ray = camera.ray(DVec2::ZERO).to_ray();
+        let mut hit = [Hit::MISS];
+        self.content.scene.nearest_batch(&[ray], None, &mut hit);
+        let bounds = &self.content.setup.bounds;
+        let diagonal = bounds.diagonal();
+        if hit[0].is_hit() {
+            f64::from(hit[0].t).max(1e-6 * diagonal)
+        } else {
+            (bounds.center() - camera.eye).length().max(0.1 * diagonal)
+        }
+    }
+}

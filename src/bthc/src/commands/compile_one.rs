@@ -1,0 +1,32 @@
+//! The compilation of one job.
+
+use super::job::{Job, JobContext, JobReport, cache};
+use super::summary::summary;
+use super::{deliver, scene};
+use crate::failure::Failure;
+use bth_compile::Monitor;
+use bth_compile::pipeline;
+
+/// Compiles a model or scene, or takes it from the cache, and brings it to its target.
+///
+/// # Errors
+/// If it cannot be compiled or written.
+pub(super) fn compile_one(
+    context: &JobContext<'_>,
+    job: &Job,
+    monitor: &dyn Monitor,
+) -> Result<JobReport, Failure> {
+    if scene::is_scene(&job.model, context.args) {
+        return scene::compile(context, job, monitor);
+    }
+    let cache = cache(context, &job.model);
+    let needed = |record: &_| job.target.needs(record, context.store.as_ref());
+    let outcome = pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
+    let mut report =
+        deliver::deliver(context, job, &outcome, &cache, &|| bth_compile::cached::files(&job.model))?;
+    report.json["report"] = outcome.report;
+    if let Some(built) = &outcome.built {
+        report.text = format!("{}{}", summary(built), report.text);
+    }
+    Ok(report)
+}

@@ -1,0 +1,98 @@
+//! A compilation job: a model, where its compiled file goes, and what is reported about it.
+
+use crate::args::Compile;
+use bth_cache::{Digest, Record, Store};
+use bth_compile::cached::Cache;
+use bth_compile::pipeline::Options;
+use bth_compile::write;
+use serde_json::Value;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// A model and where its compiled file goes.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) model: PathBuf,
+    pub(super) target: Target,
+}
+
+/// Options and cache, which all jobs share.
+pub(super) struct JobContext<'a> {
+    pub(super) args: &'a Compile,
+    pub(super) options: Options,
+    pub(super) store: Option<Store>,
+}
+
+/// Where a compiled file goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    File(PathBuf),
+    Stdout,
+    Cache,
+}
+
+/// What is reported about a finished job.
+pub(super) struct JobReport {
+    pub(super) json: Value,
+    /// The report of a single job, several lines.
+    pub(super) text: String,
+    /// The report of one of many jobs, one line.
+    pub(super) line: String,
+}
+
+impl Target {
+    /// Whether the bytes of a compiled file that the cache holds must be written to the target.
+    pub(super) fn needs(&self, record: &Record, store: Option<&Store>) -> bool {
+        match self {
+            Self::File(path) => !contains(path, record, store),
+            Self::Stdout => true,
+            // The record may exist without its content, which must then be compiled again.
+            Self::Cache => !store.is_some_and(|store| store.holds(record)),
+        }
+    }
+
+    /// The file, if it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Stdout | Self::Cache => None,
+        }
+    }
+
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::File(path) => path.display().to_string(),
+            Self::Stdout => "standard output".to_owned(),
+            Self::Cache => "the cache".to_owned(),
+        }
+    }
+}
+
+/// Whether a file has the content of a record, by its fingerprint in the store, or else by reading it.
+fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
+    if store.and_then(|store| store.stamped(path)) == Some(record.blob) {
+        return true;
+    }
+    let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
+    let same = || {
+        let found = match record.whole {
+            true => File::open(path).and_then(Digest::of_reader).ok().map(|(digest, _)| digest),
+            false => write::name_if_whole(path),
+        };
+        found == Some(record.blob)
+    };
+    let same = same_size && same();
+    if let (true, Some(store)) = (same, store) {
+        store.stamp(path, record.blob);
+    }
+    same
+}
+
+/// The cache of a job; without a store one that keeps nothing.
+pub(super) fn cache<'a>(context: &'a JobContext<'_>, model: &Path) -> Cache<'a> {
+    let subject = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
+    match &context.store {
+        Some(store) => Cache::new(store, subject.to_string_lossy()),
+        None => Cache::none(),
+    }
+}

@@ -1,12 +1,13 @@
 //! Reads a model: finds its format, reads, welds and reports.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::mesh::{Keep, Mesh, Report};
 use crate::monitor::Monitor;
-use crate::raw::{Raw, Row, check_rows, check_triangles};
-use crate::source::{NON_FINITE, Source, input_error};
+use crate::raw::{Raw, RowKind, check_rows, check_triangles};
+use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::{attributes, gltf, obj, off, ply, stl, topology, weld};
 
 /// Formats that can be read.
@@ -40,7 +41,7 @@ pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor)
     let source = Source::new(name, data, monitor);
     let raw = match format(&source)? {
         Format::Obj => obj::read(&source, keep)?,
-        Format::Gltf => gltf::read(&source, keep)?,
+        Format::Gltf => gltf::flatten::read(&source, keep)?,
         Format::Ply => ply::read(&source, keep)?,
         Format::Stl => stl::read(&source)?,
         Format::Off => off::read(&source)?,
@@ -66,23 +67,25 @@ pub fn import_gltf_meshes(
         let message = "expected a glTF or GLB file, of which single meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
     }
-    let supported = [gltf::SUPPORTED.as_slice(), &gltf::SCENE_EXTENSIONS].concat();
-    let (root, binary) = gltf::document(&source, &supported)?;
+    let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
+    let (document, binary) = gltf::document::read(&source, &supported)?;
     let one =
-        |mesh: &u32| finish(gltf::read_mesh(&source, &root, binary, *mesh as usize, keep)?, keep, monitor);
+        |mesh: &u32| finish(gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, keep)?, keep, monitor);
     meshes.iter().map(one).collect()
 }
 
-/// All bytes of a source.
+/// The files that a model consists of: itself, then those that a glTF document refers to, in order. What is no glTF
+/// document refers to none.
 ///
 /// # Errors
-/// `BTH-O001` when it cannot be read.
-pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    })
+/// `BTH-O001` when the model cannot be read.
+pub fn source_files(path: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = vec![path.to_owned()];
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
+        files.extend(gltf::external_files(path, &read_file(path)?));
+    }
+    Ok(files)
 }
 
 /// Welds what was read and counts.
@@ -94,7 +97,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     let welded = weld::weld(&raw.positions, &mut triangles).map_err(|row| {
         input_error(
             NON_FINITE,
-            (raw.locate)(Row::Position, row),
+            (raw.locate)(RowKind::Position, row),
             format!("expected finite coordinates, found {:?} (as 32-bit numbers)", raw.positions[row]),
             "remove the vertex and the faces that use it, or export the model again",
         )

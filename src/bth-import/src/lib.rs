@@ -23,7 +23,8 @@ mod weld;
 mod zero_area;
 
 pub use error::{Error, Place, Result};
-pub use import::{import, import_bytes, import_gltf_meshes, read_file};
+pub use import::{import, import_bytes, import_gltf_meshes, source_files};
 pub use mesh::{Attributes, Keep, Mesh, Report};
 pub use monitor::{Monitor, Silent};
+pub use source::read_file;
 pub use zero_area::is_zero_area;

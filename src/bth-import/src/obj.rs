@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::error::Result;
 use crate::mesh::Keep;
 use crate::number::{Lines, float, integer, shown, words};
-use crate::raw::{NONE, Raw, Row, check_rows};
+use crate::raw::{NONE, Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
@@ -53,7 +53,7 @@ pub(super) fn looks_like_obj(data: &[u8]) -> bool {
 
 /// A use of a row that was not there yet; allowed if it comes later.
 struct Forward {
-    kind: Row,
+    kind: RowKind,
     index: u32,
     line: u64,
 }
@@ -162,16 +162,16 @@ impl Reader<'_, '_> {
         for word in words {
             // v, v/vt, v//vn or v/vt/vn; a part may be empty.
             let mut parts = word.split(|&c| c == b'/');
-            let position = self.index(line, Row::Position, word, parts.next().unwrap_or_default())?;
+            let position = self.index(line, RowKind::Position, word, parts.next().unwrap_or_default())?;
             self.face.push(position);
             let (uv, normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
             if self.uvs {
-                let uv = if uv.is_empty() { NONE } else { self.index(line, Row::Uv, word, uv)? };
+                let uv = if uv.is_empty() { NONE } else { self.index(line, RowKind::Uv, word, uv)? };
                 self.face_uvs.push(uv);
             }
             if self.normals {
                 let normal =
-                    if normal.is_empty() { NONE } else { self.index(line, Row::Normal, word, normal)? };
+                    if normal.is_empty() { NONE } else { self.index(line, RowKind::Normal, word, normal)? };
                 self.face_normals.push(normal);
             }
         }
@@ -182,7 +182,7 @@ impl Reader<'_, '_> {
 
     /// The row that an index names: from 1, or negative to count back from the last row so far.
     #[inline]
-    fn index(&mut self, line: u64, kind: Row, word: &[u8], index: &[u8]) -> Result<u32> {
+    fn index(&mut self, line: u64, kind: RowKind, word: &[u8], index: &[u8]) -> Result<u32> {
         let rows = self.rows(kind);
         let Some(number) = integer(index) else {
             let message = format!("expected a face corner such as 1/2/3, found \"{}\"", shown(word));
@@ -198,20 +198,20 @@ impl Reader<'_, '_> {
         Ok(row as u32)
     }
 
-    fn rows(&self, kind: Row) -> usize {
+    fn rows(&self, kind: RowKind) -> usize {
         match kind {
-            Row::Position => self.raw.positions.len(),
-            Row::Normal => self.raw.normals.len(),
-            Row::Uv => self.raw.uvs.len(),
+            RowKind::Position => self.raw.positions.len(),
+            RowKind::Normal => self.raw.normals.len(),
+            RowKind::Uv => self.raw.uvs.len(),
         }
     }
 
     #[cold]
-    fn out_of_range(&self, line: u64, kind: Row, number: i64) -> crate::Error {
+    fn out_of_range(&self, line: u64, kind: RowKind, number: i64) -> crate::Error {
         let name = match kind {
-            Row::Position => "v",
-            Row::Normal => "vn",
-            Row::Uv => "vt",
+            RowKind::Position => "v",
+            RowKind::Normal => "vn",
+            RowKind::Uv => "vt",
         };
         let rows = self.rows(kind);
         let message = if number < 0 {
@@ -219,7 +219,7 @@ impl Reader<'_, '_> {
         } else {
             format!("expected an index of a {name} line, from 1 to {rows}, found {number}")
         };
-        let hint = if kind == Row::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
+        let hint = if kind == RowKind::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
         self.source.error_at_line(INDEX, line, message, hint)
     }
 
@@ -248,11 +248,11 @@ fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
     Some((number, Cow::Owned(joined)))
 }
 
-fn line_of_row(data: &[u8], kind: Row, row: usize) -> u64 {
+fn line_of_row(data: &[u8], kind: RowKind, row: usize) -> u64 {
     let keyword = match kind {
-        Row::Position => &b"v"[..],
-        Row::Normal => b"vn",
-        Row::Uv => b"vt",
+        RowKind::Position => &b"v"[..],
+        RowKind::Normal => b"vn",
+        RowKind::Uv => b"vt",
     };
     let mut lines = Lines::new(data);
     let statements = std::iter::from_fn(|| next_statement(&mut lines));

@@ -8,7 +8,7 @@ pub(super) const NONE: u32 = u32::MAX;
 
 /// Which rows a place is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Row {
+pub(super) enum RowKind {
     /// Of `positions`.
     Position,
     /// Of `normals`.
@@ -18,7 +18,7 @@ pub(super) enum Row {
 }
 
 /// Tells where in the source a row stands; slow, for messages.
-pub(super) type Locate<'a> = Box<dyn Fn(Row, usize) -> Place + 'a>;
+pub(super) type Locate<'a> = Box<dyn Fn(RowKind, usize) -> Place + 'a>;
 
 /// A mesh as in the source. Readers have checked that all indices are in range.
 pub(super) struct Raw<'a> {

@@ -102,6 +102,18 @@ pub(crate) fn input_error(code: &'static str, place: Place, message: impl Into<S
     Error::Input { code, place, message: message.into(), hint: hint.to_owned() }
 }
 
+/// All bytes of a source.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read.
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    })
+}
+
 /// The file is cut off: use with [`TRUNCATED_HINT`].
 pub(crate) const TRUNCATED: &str = "BTH-I003";
 /// What to do about a file that is cut off.

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::number::{Lines, float, shown, words};
-use crate::raw::{Raw, Row, check_triangles};
+use crate::raw::{Raw, RowKind, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Bytes before the first facet: a free header and the count.
@@ -47,7 +47,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     if extra > 0 {
         source.monitor.warn(&format!("{extra} bytes after the last facet are ignored"));
     }
-    let locate = |_: Row, row: usize| source.byte(HEADER + row / 3 * FACET + 12 + row % 3 * 12);
+    let locate = |_: RowKind, row: usize| source.byte(HEADER + row / 3 * FACET + 12 + row % 3 * 12);
     let mut raw = Raw::new("stl", Box::new(locate));
     raw.positions.reserve_exact(3 * count as usize);
     for (row, facet) in body.chunks_exact(FACET).take(count as usize).enumerate() {

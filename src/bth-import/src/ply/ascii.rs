@@ -2,8 +2,8 @@
 
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
-use crate::ply::header::{Element, Header, Kind, Meaning, Scalar};
-use crate::ply::{BadIndex, Refused, Sink, slot};
+use crate::ply::header::{Element, Header, ElementKind, Meaning, Scalar};
+use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Reads all elements.
@@ -88,7 +88,7 @@ fn read_row(
             })?;
         }
     }
-    if element.kind == Kind::Vertices {
+    if element.kind == ElementKind::Vertices {
         sink.vertex(vertex);
     }
     Ok(words.next().is_none())
@@ -97,7 +97,7 @@ fn read_row(
 /// The line of a vertex's row.
 pub(super) fn line_of_vertex(source: &Source<'_>, header: &Header, row: usize) -> u64 {
     let with_rows = header.elements.iter().filter(|element| !element.properties.is_empty());
-    let before: u64 = with_rows.take_while(|e| e.kind != Kind::Vertices).map(|e| e.count).sum();
+    let before: u64 = with_rows.take_while(|e| e.kind != ElementKind::Vertices).map(|e| e.count).sum();
     let lines = Lines::after(source.data, header.body, header.lines);
     let mut rows = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
     rows.nth(before as usize + row).map_or(0, |(number, _)| number)

@@ -1,8 +1,8 @@
 //! The body of a binary PLY.
 
 use crate::error::Result;
-use crate::ply::header::{Element, Header, Kind, Meaning, Scalar};
-use crate::ply::{BadIndex, Refused, Sink, slot};
+use crate::ply::header::{Element, Header, ElementKind, Meaning, Scalar};
+use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Reads all elements; `BIG` is the byte order.
@@ -10,9 +10,9 @@ pub(super) fn read<const BIG: bool>(source: &Source<'_>, header: &Header, sink: 
     let mut cursor = Cursor::<BIG> { source, at: header.body };
     for element in &header.elements {
         match element.kind {
-            Kind::Vertices => cursor.vertices(element, sink)?,
-            Kind::Faces | Kind::Strips => cursor.lists(element, sink)?,
-            Kind::Edges | Kind::Other => cursor.pass(element, element.count)?,
+            ElementKind::Vertices => cursor.vertices(element, sink)?,
+            ElementKind::Faces | ElementKind::Strips => cursor.lists(element, sink)?,
+            ElementKind::Edges | ElementKind::Other => cursor.pass(element, element.count)?,
         }
     }
     let extra = source.data.len() - cursor.at;
@@ -26,9 +26,9 @@ pub(super) fn read<const BIG: bool>(source: &Source<'_>, header: &Header, sink: 
 pub(super) fn byte_of_vertex<const BIG: bool>(source: &Source<'_>, header: &Header, row: usize) -> usize {
     let mut cursor = Cursor::<BIG> { source, at: header.body };
     for element in &header.elements {
-        let rows = if element.kind == Kind::Vertices { row as u64 } else { element.count };
+        let rows = if element.kind == ElementKind::Vertices { row as u64 } else { element.count };
         // The body has been read to its end before: this cannot fail.
-        if cursor.pass(element, rows).is_err() || element.kind == Kind::Vertices {
+        if cursor.pass(element, rows).is_err() || element.kind == ElementKind::Vertices {
             break;
         }
     }
@@ -80,7 +80,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
     }
 
     fn lists(&mut self, element: &Element, sink: &mut Sink<'_>) -> Result<()> {
-        if element.kind == Kind::Faces {
+        if element.kind == ElementKind::Faces {
             // Most faces are triangles of 13 bytes; a list of fewer bytes than 3 holds no triangle.
             let room = (self.source.data.len() - self.at) / (smallest_row(element) + 3);
             sink.raw.triangles.reserve(room.min(element.count as usize));

@@ -84,7 +84,7 @@ pub(super) struct Property {
 
 /// What an element is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ElementKind {
     Vertices,
     Faces,
     Strips,
@@ -97,7 +97,7 @@ pub(super) enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
     pub(super) name: String,
-    pub(super) kind: Kind,
+    pub(super) kind: ElementKind,
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
 }
@@ -116,7 +116,7 @@ pub(super) struct Header {
 impl Header {
     /// The vertices, if the file has some.
     pub(super) fn vertices(&self) -> Option<&Element> {
-        self.elements.iter().find(|element| element.kind == Kind::Vertices)
+        self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
     /// Whether vertices have all of `N` properties of a meaning.
@@ -126,17 +126,17 @@ impl Header {
     }
 }
 
-fn meaning(kind: Kind, name: &[u8], list: bool) -> Meaning {
+fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
     match (kind, name, list) {
-        (Kind::Vertices, b"x", false) => Meaning::Position(0),
-        (Kind::Vertices, b"y", false) => Meaning::Position(1),
-        (Kind::Vertices, b"z", false) => Meaning::Position(2),
-        (Kind::Vertices, b"nx", false) => Meaning::Normal(0),
-        (Kind::Vertices, b"ny", false) => Meaning::Normal(1),
-        (Kind::Vertices, b"nz", false) => Meaning::Normal(2),
-        (Kind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
-        (Kind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
-        (Kind::Faces | Kind::Strips, b"vertex_indices" | b"vertex_index", true) => Meaning::Indices,
+        (ElementKind::Vertices, b"x", false) => Meaning::Position(0),
+        (ElementKind::Vertices, b"y", false) => Meaning::Position(1),
+        (ElementKind::Vertices, b"z", false) => Meaning::Position(2),
+        (ElementKind::Vertices, b"nx", false) => Meaning::Normal(0),
+        (ElementKind::Vertices, b"ny", false) => Meaning::Normal(1),
+        (ElementKind::Vertices, b"nz", false) => Meaning::Normal(2),
+        (ElementKind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
+        (ElementKind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
+        (ElementKind::Faces | ElementKind::Strips, b"vertex_indices" | b"vertex_index", true) => Meaning::Indices,
         _ => Meaning::Other,
     }
 }
@@ -180,13 +180,13 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
             }
             [b"element", name, count] => {
                 let kind = match name {
-                    b"vertex" => Kind::Vertices,
-                    b"face" => Kind::Faces,
-                    b"tristrips" => Kind::Strips,
-                    b"edge" => Kind::Edges,
-                    _ => Kind::Other,
+                    b"vertex" => ElementKind::Vertices,
+                    b"face" => ElementKind::Faces,
+                    b"tristrips" => ElementKind::Strips,
+                    b"edge" => ElementKind::Edges,
+                    _ => ElementKind::Other,
                 };
-                if kind == Kind::Vertices && elements.iter().any(|e| e.kind == kind) {
+                if kind == ElementKind::Vertices && elements.iter().any(|e| e.kind == kind) {
                     return Err(malformed("one element vertex"));
                 }
                 let count = integer(count).and_then(|n| u64::try_from(n).ok());
@@ -227,7 +227,7 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
         let message = "expected properties x, y and z of element vertex, found not all of them";
         return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));
     }
-    for element in header.elements.iter().filter(|e| matches!(e.kind, Kind::Faces | Kind::Strips)) {
+    for element in header.elements.iter().filter(|e| matches!(e.kind, ElementKind::Faces | ElementKind::Strips)) {
         if element.count > 0 && element.properties.iter().all(|p| p.meaning != Meaning::Indices) {
             let message = format!("expected a list vertex_indices of element {}, found none", element.name);
             return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));

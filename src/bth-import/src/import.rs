@@ -69,8 +69,9 @@ pub fn import_gltf_meshes(
     }
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = gltf::document::read(&source, &supported)?;
-    let one =
-        |mesh: &u32| finish(gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, keep)?, keep, monitor);
+    let one = |mesh: &u32| {
+        finish(gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, keep)?, keep, monitor)
+    };
     meshes.iter().map(one).collect()
 }
 

@@ -11,10 +11,7 @@ pub(crate) const GRAPH: &str = "BTH-I012";
 
 /// Reads the document of a glTF or GLB file and refuses required extensions that are not among `supported`
 /// (see [`is_supported`]). The second value is the binary chunk of a GLB.
-pub(crate) fn read<'a>(
-    source: &Source<'a>,
-    supported: &[&str],
-) -> Result<(GltfDocument, Option<&'a [u8]>)> {
+pub(crate) fn read<'a>(source: &Source<'a>, supported: &[&str]) -> Result<(GltfDocument, Option<&'a [u8]>)> {
     source.fetched()?;
     let (json, binary) = split(source)?;
     let document: GltfDocument = serde_json::from_slice(json).map_err(|e| {

@@ -70,7 +70,8 @@ impl DracoPrimitive {
         let Some(attribute) =
             self.mesh.attribute_by_unique_id(id).filter(|a| usize::from(a.num_components()) == N)
         else {
-            let message = format!("expected an attribute {id} of {N} components for {name} in the Draco stream");
+            let message =
+                format!("expected an attribute {id} of {N} components for {name} in the Draco stream");
             return Err(error(accessors.source, part, message));
         };
         let numbers = attribute.read_f32s(self.mesh.num_points(), N);

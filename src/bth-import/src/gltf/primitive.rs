@@ -102,7 +102,12 @@ impl PrimitiveReader<'_, '_> {
         self.check_indices(&indices, rows)?;
         let corners = corners(mode, &indices).ok_or_else(|| {
             let message = format!("expected a mode from 0 to 6, found {mode}");
-            self.accessors.source.error_in_part(MALFORMED, self.part.as_str(), message, "export the model again")
+            self.accessors.source.error_in_part(
+                MALFORMED,
+                self.part.as_str(),
+                message,
+                "export the model again",
+            )
         })?;
         let normals = kept.normals.map(|a| self.attribute(draco.as_ref(), "NORMAL", a, rows)).transpose()?;
         let mut uvs = None;
@@ -132,7 +137,9 @@ impl PrimitiveReader<'_, '_> {
         }
         let found = self.accessors.count(accessor)?;
         if found != rows {
-            return Err(self.index_error(accessor, format!("expected {rows} rows as in POSITION, found {found}")));
+            return Err(
+                self.index_error(accessor, format!("expected {rows} rows as in POSITION, found {found}"))
+            );
         }
         self.accessors.vectors(accessor)
     }

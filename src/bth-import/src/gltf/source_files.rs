@@ -15,7 +15,8 @@ use crate::source::Source;
 /// reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not read.
 pub fn external_files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
     let source = Source::new(path, data, &Silent);
-    let document = split(&source).ok().and_then(|(json, _)| serde_json::from_slice::<GltfDocument>(json).ok());
+    let document =
+        split(&source).ok().and_then(|(json, _)| serde_json::from_slice::<GltfDocument>(json).ok());
     let buffers = document.into_iter().flat_map(|document| document.buffers);
     let file = |buffer: Buffer| {
         let uri = buffer.uri.as_deref().filter(|uri| !uri.starts_with("data:"))?;

@@ -30,7 +30,8 @@ impl TextureCoordinates {
         let Some(value) = document.materials.get(index) else {
             return Err(error(source, &part, "it does not exist".to_owned()));
         };
-        let parsed = |e: serde_json::Error| error(source, &part, format!("expected a glTF material, found: {e}"));
+        let parsed =
+            |e: serde_json::Error| error(source, &part, format!("expected a glTF material, found: {e}"));
         let material = Material::deserialize(value).map_err(parsed)?;
         let Some(texture) = deciding_texture(&material) else { return Ok(plain) };
         let transform = match texture.extensions.get(TEXTURE_TRANSFORM) {
@@ -38,7 +39,10 @@ impl TextureCoordinates {
             None => TextureTransform::default(),
         };
         let set = transform.tex_coord.unwrap_or(texture.tex_coord);
-        Ok(TextureCoordinates { attribute: format!("TEXCOORD_{set}"), transform: UvTransform::new(&transform) })
+        Ok(TextureCoordinates {
+            attribute: format!("TEXCOORD_{set}"),
+            transform: UvTransform::new(&transform),
+        })
     }
 
     /// Transforms the kept coordinates in place.

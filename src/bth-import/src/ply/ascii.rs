@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
-use crate::ply::header::{Element, Header, ElementKind, Meaning, Scalar};
+use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
 use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 

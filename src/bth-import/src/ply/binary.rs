@@ -1,7 +1,7 @@
 //! The body of a binary PLY.
 
 use crate::error::Result;
-use crate::ply::header::{Element, Header, ElementKind, Meaning, Scalar};
+use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
 use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 

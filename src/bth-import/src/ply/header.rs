@@ -136,7 +136,9 @@ fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
         (ElementKind::Vertices, b"nz", false) => Meaning::Normal(2),
         (ElementKind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
         (ElementKind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
-        (ElementKind::Faces | ElementKind::Strips, b"vertex_indices" | b"vertex_index", true) => Meaning::Indices,
+        (ElementKind::Faces | ElementKind::Strips, b"vertex_indices" | b"vertex_index", true) => {
+            Meaning::Indices
+        }
         _ => Meaning::Other,
     }
 }
@@ -227,7 +229,9 @@ pub(super) fn read(source: &Source<'_>) -> Result<Header> {
         let message = "expected properties x, y and z of element vertex, found not all of them";
         return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));
     }
-    for element in header.elements.iter().filter(|e| matches!(e.kind, ElementKind::Faces | ElementKind::Strips)) {
+    for element in
+        header.elements.iter().filter(|e| matches!(e.kind, ElementKind::Faces | ElementKind::Strips))
+    {
         if element.count > 0 && element.properties.iter().all(|p| p.meaning != Meaning::Indices) {
             let message = format!("expected a list vertex_indices of element {}, found none", element.name);
             return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));

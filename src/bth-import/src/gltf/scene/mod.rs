@@ -43,7 +43,8 @@ pub fn import(
     let known = SUPPORTED.iter().filter(|s| **s != "KHR_animation_pointer");
     let known: Vec<&str> = known.chain(&SCENE_EXTENSIONS).copied().collect();
     let (document, binary) = document::read(&source, &known)?;
-    let accessors = Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
+    let accessors =
+        Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
     let mut importer = Importer {
         source: &source,
         document: &document,
@@ -67,15 +68,15 @@ pub fn import(
 
 /// Adds the totals to the report.
 fn finish(importer: Importer<'_>) -> (Manifest, ImportReport) {
-        let manifest = importer.manifest;
-        let report = ImportReport {
-            nodes: manifest.nodes.len() as u64,
-            instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
-            objects: manifest.objects.len() as u64,
-            tracks: manifest.tracks.len() as u64,
-            cameras: manifest.cameras.len() as u64,
-            lights: manifest.lights.len() as u64,
-            ..importer.report
-        };
-        (manifest, report)
-    }
+    let manifest = importer.manifest;
+    let report = ImportReport {
+        nodes: manifest.nodes.len() as u64,
+        instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
+        objects: manifest.objects.len() as u64,
+        tracks: manifest.tracks.len() as u64,
+        cameras: manifest.cameras.len() as u64,
+        lights: manifest.lights.len() as u64,
+        ..importer.report
+    };
+    (manifest, report)
+}

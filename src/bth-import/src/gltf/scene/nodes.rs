@@ -50,7 +50,8 @@ impl Importer<'_> {
         let mut stack: Vec<(usize, Option<usize>)> = roots.into_iter().rev().map(|n| (n, None)).collect();
         while let Some((index, parent)) = stack.pop() {
             let part = || format!("node {index}");
-            let node = self.document.nodes.get(index).ok_or_else(|| self.error(part(), "it does not exist"))?;
+            let node =
+                self.document.nodes.get(index).ok_or_else(|| self.error(part(), "it does not exist"))?;
             if self.report.node_rows[index].is_some() {
                 let message = "expected a node with one parent, found it twice in the scene";
                 return Err(self.error(part(), message));

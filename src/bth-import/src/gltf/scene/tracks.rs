@@ -127,9 +127,8 @@ impl Importer<'_> {
         }
         // A cubic key has its value between two tangents.
         let main = rows / 2 * width;
-        let zero = |key: &[f64]| {
-            property == Property::Rotation && key[main..main + width].iter().all(|x| *x == 0.0)
-        };
+        let zero =
+            |key: &[f64]| property == Property::Rotation && key[main..main + width].iter().all(|x| *x == 0.0);
         if !values.iter().all(|x| x.is_finite()) || values.chunks(width * rows).any(zero) {
             return Err(self.error(part, "expected finite values, and rotations that are not zero"));
         }

@@ -1,4 +1,4 @@
-//! Brings a source's normals and texture coordinates to common rows.
+//! Merges a source's normals and texture coordinates into rows that both share.
 
 use std::collections::HashMap;
 
@@ -7,9 +7,9 @@ use crate::mesh::{Attributes, Keep};
 use crate::raw::{NONE, Raw, RowKind};
 use crate::source::input_error;
 
-/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of
-/// first use. A corner that has none gets zeros (a zero normal asks for the geometric one).
-/// `None` when the source has none of what `keep` asks for.
+/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of first use. A corner
+/// without one gets zeros; a zero normal means that the geometric normal is to be used. `None` when the source has
+/// nothing of what `keep` names.
 ///
 /// # Errors
 /// `BTH-I008` for a used value that is not finite.

@@ -1,4 +1,4 @@
-//! Reads a model: finds its format, reads, welds and reports.
+//! The pipeline of importing a model: find the format, read, collect attributes, weld, count.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::{attributes, gltf, obj, off, ply, stl, topology, weld};
 
-/// Formats that can be read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Obj,
@@ -20,7 +20,7 @@ enum Format {
     Off,
 }
 
-/// Reads an OBJ, glTF, GLB, PLY, STL or OFF file, by its extension or else by its content. Triangle
+/// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else the content. Triangle
 /// ids are the source's face order after fan triangulation. A model without faces is an empty mesh.
 ///
 /// # Errors
@@ -31,8 +31,8 @@ pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, R
     import_bytes(path, &read_file(path)?, keep, monitor)
 }
 
-/// As [`import`], from the bytes of a file; `name` tells the format by its extension, stands in messages, and says
-/// beside what a glTF file's external buffers lie.
+/// As [`import`], from the bytes of a file. The extension of `name` decides about the format, messages contain it, and
+/// the external buffers of a glTF file are in its folder.
 ///
 /// # Errors
 /// As [`import`].
@@ -50,7 +50,7 @@ pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor)
     finish(raw, keep, monitor)
 }
 
-/// Reads meshes of a glTF or GLB file, by number, each in its own space and without the nodes that use it.
+/// Reads meshes of a glTF or GLB file by their numbers, each in its own space, without the transforms of nodes.
 ///
 /// # Errors
 /// As [`import`]; also when the file is no glTF or a mesh does not exist.
@@ -89,7 +89,7 @@ pub fn source_files(path: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Welds what was read and counts.
+/// Collects attributes, welds and counts.
 fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
@@ -128,7 +128,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     Ok((mesh, report))
 }
 
-/// The format by extension, else by content.
+/// The format of a source by its extension, or else by its content.
 fn format(source: &Source<'_>) -> Result<Format> {
     source.fetched()?;
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -149,7 +149,7 @@ fn format(source: &Source<'_>) -> Result<Format> {
     })
 }
 
-/// The format by content, if it is plain.
+/// The format that the first bytes suggest, if they suggest one.
 fn sniff(data: &[u8]) -> Option<Format> {
     let text = data.trim_ascii_start();
     let first_word = text.split(|c| c.is_ascii_whitespace()).next().unwrap_or_default();

@@ -1,8 +1,9 @@
 //! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
 //!
-//! A reader for each format turns a file into a [`raw`](self) mesh with the source's own rows; `weld` merges its positions,
-//! `attributes` its shading rows, and `topology` counts what the report tells. [`import()`] is the way in;
-//! [`gltf::scene`] reads nodes, animations, cameras and lights.
+//! [`import()`] is the entry point. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
+//! turns the file into a `raw` mesh with the source's own rows. Then `weld` merges bit-equal positions, `attributes`
+//! merges shading rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations, cameras
+//! and lights into a manifest instead.
 #![warn(missing_docs)]
 
 mod attributes;

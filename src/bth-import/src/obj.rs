@@ -1,4 +1,6 @@
-//! Wavefront OBJ: polygons only; materials, groups and smoothing are left out.
+//! Reads Wavefront OBJ: polygons with normals and texture coordinates. Materials, groups and smoothing are ignored.
+//!
+//! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
 use std::borrow::Cow;
 
@@ -10,7 +12,7 @@ use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPP
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
-/// Keywords that do not change the polygons.
+/// Keywords of OBJ that do not change the polygons.
 const KNOWN: [&[u8]; 30] = [
     b"g",
     b"s",
@@ -44,14 +46,14 @@ const KNOWN: [&[u8]; 30] = [
     b"vt",
 ];
 
-/// Whether the first statement of a text is one of OBJ.
+/// Whether the first statement of a text has a keyword of OBJ.
 pub(super) fn looks_like_obj(data: &[u8]) -> bool {
     let mut keywords = Lines::new(data).filter_map(|(_, line)| words(line).next());
     let first = keywords.find(|word| !word.starts_with(b"#"));
     first.is_some_and(|word| [&b"v"[..], b"f"].contains(&word) || KNOWN.contains(&word))
 }
 
-/// A use of a row that was not there yet; allowed if it comes later.
+/// A use of a row before its definition, which is allowed if the definition follows.
 struct Forward {
     kind: RowKind,
     index: u32,
@@ -69,8 +71,8 @@ struct Reader<'a, 's> {
     face_uvs: Vec<u32>,
 }
 
-/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or
-/// surface; points count each.
+/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or surface; each point of a
+/// point statement counts as one.
 pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
     if let Some(byte) = source.data.iter().take(4096).position(|&c| c == 0) {
         let hint = "save it as UTF-8 or ASCII text, or give it the extension of its format";
@@ -134,7 +136,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
 }
 
 impl Reader<'_, '_> {
-    /// Up to three numbers, of which the first `needed` must be there; the others default to 0.
+    /// Parses up to three numbers, of which the first `needed` are mandatory; the others default to 0.
     fn numbers<'w>(
         &self,
         line: u64,
@@ -180,7 +182,7 @@ impl Reader<'_, '_> {
         self.raw.push_face(&self.face)
     }
 
-    /// The row that an index names: from 1, or negative to count back from the last row so far.
+    /// The row that an index means. Indices count from 1; negative ones count back from the last row so far.
     #[inline]
     fn index(&mut self, line: u64, kind: RowKind, word: &[u8], index: &[u8]) -> Result<u32> {
         let rows = self.rows(kind);
@@ -223,7 +225,7 @@ impl Reader<'_, '_> {
         self.source.error_at_line(INDEX, line, message, hint)
     }
 
-    /// Fails for the first use of a row that never came.
+    /// Fails for the first use of a row that the whole file does not define.
     fn check_forward(&self) -> Result<()> {
         match self.forward.iter().find(|f| f.index as usize >= self.rows(f.kind)) {
             Some(f) => Err(self.out_of_range(f.line, f.kind, i64::from(f.index) + 1)),
@@ -232,7 +234,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// The next line, joined with those after it while it ends in a backslash; the number is the first line's.
+/// The next line and its number. While a line ends in a backslash, the following line is joined to it.
 #[inline]
 fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
     let (number, line) = lines.next()?;

@@ -1,4 +1,4 @@
-//! The body of a text PLY: one row a line.
+//! Reads the body of a text PLY, which has one row a line.
 
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
@@ -10,7 +10,7 @@ use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCA
 pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
     let mut lines = Lines::after(source.data, header.body, header.lines);
     let mut indices = Vec::new();
-    // Rows with more values than the header tells: how many, and the line of the first.
+    // The number of rows with more values than the header announces, and the line of the first.
     let (mut longer, mut first_longer) = (0u64, 0);
     for element in header.elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
@@ -40,7 +40,7 @@ pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) ->
     Ok(())
 }
 
-/// Reads a row; returns whether it ends where the header tells.
+/// Reads a row. The result is whether it has as many values as the header announces.
 fn read_row(
     source: &Source<'_>,
     element: &Element,

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::number::{Lines, integer, shown, words};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
 
-/// How the body is written.
+/// How the body is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -56,7 +56,7 @@ impl Scalar {
     }
 }
 
-/// What a property means to the reader.
+/// What the reader uses a property for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meaning {
     /// A coordinate of a position.
@@ -65,9 +65,9 @@ pub(super) enum Meaning {
     Normal(usize),
     /// A texture coordinate.
     Uv(usize),
-    /// Corners of a face, or a strip.
+    /// Vertex indices of a face or of strips.
     Indices,
-    /// Passed over.
+    /// Skipped.
     Other,
 }
 
@@ -78,11 +78,11 @@ pub(super) struct Property {
     pub(super) list: Option<Scalar>,
     /// Type of the value or of a list's items.
     pub(super) scalar: Scalar,
-    /// What it is for.
+    /// What it is used for.
     pub(super) meaning: Meaning,
 }
 
-/// What an element is for.
+/// What an element is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ElementKind {
     Vertices,
@@ -102,7 +102,7 @@ pub(super) struct Element {
     pub(super) properties: Vec<Property>,
 }
 
-/// A header.
+/// The header of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -114,12 +114,12 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// The vertices, if the file has some.
+    /// The element of vertices, if the file has one.
     pub(super) fn vertices(&self) -> Option<&Element> {
         self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
-    /// Whether vertices have all of `N` properties of a meaning.
+    /// Whether vertices have all of the `N` properties of a meaning.
     pub(super) fn has<const N: usize>(&self, meaning: impl Fn(usize) -> Meaning) -> bool {
         let properties = self.vertices().map_or(&[][..], |vertices| &vertices.properties);
         (0..N).all(|k| properties.iter().any(|p| p.meaning == meaning(k)))

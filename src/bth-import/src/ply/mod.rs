@@ -1,4 +1,7 @@
-//! PLY: vertices with faces or triangle strips, in text or binary of either byte order.
+//! Reads PLY: vertices with faces or triangle strips, in text or binary of either byte order.
+//!
+//! `header` reads the elements and their properties, `ascii` or `binary` the body, and `sink` collects the rows. Readers of
+//! our own rather than `ply-rs-bw`: docs/decisions.md says why.
 
 mod ascii;
 mod binary;
@@ -12,7 +15,7 @@ use crate::mesh::Keep;
 use crate::raw::{Raw, check_rows};
 use crate::source::Source;
 
-/// Reads a PLY file. Edges count as skipped.
+/// Reads a PLY file. Edges count as skipped elements.
 pub(crate) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
     let header = header::read(source)?;
     check_rows(header.vertices().map_or(0, |v| v.count))?;

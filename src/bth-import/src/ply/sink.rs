@@ -1,4 +1,4 @@
-//! Where the text and the binary reader of PLY bodies put their rows.
+//! Collects the rows that the text and the binary reader of PLY bodies read.
 
 use crate::error::Error;
 use crate::mesh::Keep;
@@ -8,7 +8,7 @@ use crate::raw::{Raw, check_triangles, strip};
 /// Values of a vertex that are kept: position, normal, texture coordinate.
 pub(super) type Vertex = [f32; 8];
 
-/// Where a property goes in a [`Vertex`].
+/// The index of a property in a [`Vertex`].
 pub(super) fn slot(meaning: Meaning) -> Option<usize> {
     match meaning {
         Meaning::Position(k) => Some(k),
@@ -18,7 +18,7 @@ pub(super) fn slot(meaning: Meaning) -> Option<usize> {
     }
 }
 
-/// Collects the rows that the text and the binary reader find.
+/// A raw mesh that grows by vertices and faces.
 pub(super) struct Sink<'a> {
     pub(super) raw: Raw<'a>,
     normals: bool,
@@ -27,7 +27,7 @@ pub(super) struct Sink<'a> {
     face: Vec<u32>,
 }
 
-/// An index that names no vertex.
+/// An index of no vertex.
 pub(super) struct BadIndex {
     pub(super) found: i64,
     pub(super) vertices: u64,

@@ -26,7 +26,7 @@ enum Format {
 /// # Errors
 /// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
-/// [`Error::Cancelled`].
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     import_bytes(path, &read_file(path)?, keep, monitor)
 }

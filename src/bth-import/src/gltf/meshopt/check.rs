@@ -108,7 +108,7 @@ fn stride(compression: &MeshoptCompression, mode: Mode, filter: Filter) -> Resul
 /// at least the control bits of its byte columns, and the tail with the first row.
 fn smallest_attributes(stream: &[u8], count: u64, stride: u64) -> u64 {
     let version = stream.first().map_or(0, |header| header & 0x0f);
-    let block = (8192 / stride & !15).min(256);
+    let block = ((8192 / stride) & !15).min(256);
     let of_block = |rows: u64| match version {
         _ if rows == 0 => 0,
         // Two bits for each group of 16 rows of a byte column, in whole bytes.

@@ -31,6 +31,7 @@ mod decoder {
 
     /// Not reached: `buffer` refuses compressed views first in a build without the decoder.
     pub(super) fn decode(_: &[u8], sizes: CheckedSizes) -> Result<Vec<u8>, String> {
-        Err(format!("{sizes:?}, which this build does not decode"))
+        let CheckedSizes { mode, filter, count, stride } = sizes;
+        Err(format!("{mode:?} {filter:?}, {count} by {stride} bytes, which this build does not decode"))
     }
 }

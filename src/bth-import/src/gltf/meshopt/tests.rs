@@ -23,8 +23,9 @@ fn decoded(stream: &[u8], mode: &str, filter: &str, stride: u64, count: u64) -> 
 /// Rows of smooth and of random bytes.
 fn rows<const N: usize>(count: usize) -> Vec<[u8; N]> {
     let mut random = Rng::new(N as u64);
-    let byte =
-        |row: usize, k: usize, noise: u64| if k % 3 == 0 { noise as u8 } else { (row / (k + 1)) as u8 };
+    let byte = |row: usize, k: usize, noise: u64| {
+        if k.is_multiple_of(3) { noise as u8 } else { (row / (k + 1)) as u8 }
+    };
     (0..count).map(|row| std::array::from_fn(|k| byte(row, k, random.below(256)))).collect()
 }
 

@@ -4,7 +4,7 @@
 
 use std::borrow::Cow;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::Keep;
 use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{NONE, Raw, RowKind, check_rows};
@@ -209,7 +209,7 @@ impl Reader<'_, '_> {
     }
 
     #[cold]
-    fn out_of_range(&self, line: u64, kind: RowKind, number: i64) -> crate::Error {
+    fn out_of_range(&self, line: u64, kind: RowKind, number: i64) -> Error {
         let name = match kind {
             RowKind::Position => "v",
             RowKind::Normal => "vn",

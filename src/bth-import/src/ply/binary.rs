@@ -1,6 +1,6 @@
 //! Reads the body of a binary PLY.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
 use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
@@ -166,7 +166,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
     }
 
     #[cold]
-    fn truncated(&self, element: &Element) -> crate::Error {
+    fn truncated(&self, element: &Element) -> Error {
         let message =
             format!("expected {} rows of element {}, found the end of the file", element.count, element.name);
         self.source.error_at_byte(TRUNCATED, self.source.data.len(), message, TRUNCATED_HINT)

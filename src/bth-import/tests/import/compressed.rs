@@ -104,6 +104,36 @@ fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// The file of compressed views with a fallback buffer of this URI.
+fn with_fallback(uri: &str) -> Vec<u8> {
+    let bytes = seed("meshopt.glb");
+    let json = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    let mut document: serde_json::Value = serde_json::from_slice(&bytes[20..20 + json]).unwrap();
+    document["buffers"][1]["uri"] = uri.into();
+    super::gltf::glb(&document, &bytes[28 + json..])
+}
+
+#[test]
+fn a_fallback_buffer_is_a_source_file_only_if_it_exists() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, with_fallback("fallback.bin")).unwrap();
+    assert_eq!(bth_import::source_files(&path).unwrap(), [path.as_path()]);
+    #[cfg(feature = "meshopt")]
+    assert_eq!(import(&path, Keep::None, &Silent).unwrap().0.triangles.len(), 24);
+    let fallback = folder.path().join("fallback.bin");
+    std::fs::write(&fallback, [0; 624]).unwrap();
+    assert_eq!(bth_import::source_files(&path).unwrap(), [path, fallback]);
+}
+
+#[cfg(not(feature = "meshopt"))]
+#[test]
+fn a_build_without_the_decoder_reads_the_fallback_buffer() {
+    let zeros = format!("data:application/octet-stream;base64,{}", "AAAA".repeat(624 / 3));
+    let mesh = import_bytes("a.glb", &with_fallback(&zeros), Keep::None).unwrap().0;
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1, 24));
+}
+
 #[track_caller]
 fn assert_edit_refused(name: &str, [from, to]: [&str; 2], place: &str, message: &str) {
     let bytes = replaced(&seed(name), from.as_bytes(), to.as_bytes());

@@ -54,7 +54,7 @@ impl Importer<'_> {
     /// Parses a part of the document that is kept as a value.
     pub(super) fn typed<T: DeserializeOwned>(&self, value: &serde_json::Value, part: &str) -> Result<T> {
         T::deserialize(value).map_err(|e| {
-            let message = format!("expected what glTF says, found: {e}");
+            let message = format!("expected the properties that glTF defines, found: {e}");
             self.source.error_in_part(MALFORMED, part, message, "export the model again")
         })
     }

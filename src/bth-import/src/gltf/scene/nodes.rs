@@ -9,11 +9,12 @@ use crate::gltf::schema::{GltfNode, Instancing, LightReference, Visibility};
 use crate::source::UNSUPPORTED;
 
 impl Importer<'_> {
-    /// A name that no node has yet.
+    /// A name that no other node has.
     fn node_name(&mut self, given: &str, fallback: String) -> String {
         unique(&mut self.node_names, given, fallback)
     }
 
+    /// The root nodes and the name or number of the wanted scene, or else of the default one.
     fn scene(&self, wanted: Option<&str>) -> Result<(Vec<usize>, String)> {
         let scenes = &self.document.scenes;
         let index = match wanted {
@@ -43,7 +44,7 @@ impl Importer<'_> {
         Ok((scene.nodes.clone(), name))
     }
 
-    /// The scene's nodes, parents before children, in depth-first order.
+    /// Adds the scene's nodes, parents before children, in depth-first order.
     pub(super) fn nodes(&mut self, options: &ImportOptions) -> Result<()> {
         let (roots, name) = self.scene(options.scene.as_deref())?;
         self.report.scene = name;
@@ -64,6 +65,7 @@ impl Importer<'_> {
         Ok(())
     }
 
+    /// Adds a node with its object, instances, camera and light.
     fn node(&mut self, index: usize, node: &GltfNode, parent: Option<usize>) -> Result<()> {
         let part = format!("node {index}");
         let row = self.manifest.nodes.len();
@@ -94,6 +96,7 @@ impl Importer<'_> {
         Ok(())
     }
 
+    /// A node's transform, checked to be finite.
     fn transform(&self, node: &GltfNode, part: &str) -> Result<Transform> {
         let transform = match node.matrix {
             Some(m) => Transform::Matrix([0, 1, 2].map(|row| [m[row], m[row + 4], m[row + 8], m[row + 12]])),
@@ -118,7 +121,7 @@ impl Importer<'_> {
         Ok(transform)
     }
 
-    /// The object of a mesh.
+    /// The row of the object of a mesh, which is added at its first use.
     fn object(&mut self, mesh: usize, part: &str) -> Result<usize> {
         if let Some(row) = self.objects.get(&mesh) {
             return Ok(*row);
@@ -139,7 +142,7 @@ impl Importer<'_> {
         Ok(row)
     }
 
-    /// A child node for each instance of EXT_mesh_gpu_instancing.
+    /// Adds a child node for each instance of EXT_mesh_gpu_instancing.
     fn instancing(
         &mut self,
         instancing: &Instancing,

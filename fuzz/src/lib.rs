@@ -4,37 +4,20 @@ use bth::rays::{Hit, Ray, Surface};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
 use bth_import::{Keep, import_bytes};
+use bth_random::Rng;
 use std::path::Path;
 
-/// Small generator of pseudo-random numbers (SplitMix64), so that an input always does the same.
-struct Rng(u64);
-
-impl Rng {
-    /// Seeded by the input (FNV-1a).
-    fn of(bytes: &[u8]) -> Self {
-        Rng(bytes
-            .iter()
-            .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x100_0000_01b3)))
-    }
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-    fn below(&mut self, n: u64) -> u64 {
-        self.bits() % n
-    }
-    fn unit(&mut self) -> f32 {
-        (self.bits() >> 40) as f32 / (1u64 << 24) as f32
-    }
+/// A generator seeded by the input (FNV-1a), so that an input always does the same.
+fn seeded_by(bytes: &[u8]) -> Rng {
+    let fold = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+    Rng::new(bytes.iter().fold(0xcbf2_9ce4_8422_2325, fold))
 }
 
 /// Opens a file; what passes the checks is traced with 64 rays, at some times, with the instruction set that the
 /// input's bytes choose. Whatever the answers: no panic, no end beyond the time limit, nothing read out of bounds.
 pub fn open_and_trace(bytes: &[u8]) {
     let Ok(mut scene) = bth::from_bytes(bytes) else { return };
-    let mut rng = Rng::of(bytes);
+    let mut rng = seeded_by(bytes);
     let available: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
     available[rng.below(available.len() as u64) as usize].choose().expect("it is available");
     trace(&scene, &mut rng);
@@ -76,7 +59,7 @@ fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
         let s = [(); 3].map(|()| match rng.below(4) {
             0 => rng.below(2) as f32,
             1 => 0.5,
-            _ => 0.5 + (rng.unit() - 0.5) * spread,
+            _ => 0.5 + ((rng.next() >> 40) as f32 / (1u64 << 24) as f32 - 0.5) * spread,
         });
         [0, 1, 2].map(|k| lower[k] * (1.0 - s[k]) + upper[k] * s[k])
     };

@@ -62,6 +62,21 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
     }
 }
 
+#[test]
+fn every_compressed_model_compiles() {
+    let Some((data, bthc)) = data_and_compiler() else { return };
+    let folder = data.join("compressed");
+    if !folder.is_dir() {
+        println!("SKIPPED: no folder compressed among the test models");
+        return;
+    }
+    let out = tempfile::tempdir().unwrap();
+    for model in models(&folder) {
+        let (compiled, _) = check(&bthc, &data, &model, &out.path().join("x.bth")).unwrap();
+        assert!(compiled, "{}", model.display());
+    }
+}
+
 /// The compiler, ended by the system when it takes more than it may.
 fn limited(bthc: &Path) -> Command {
     if !cfg!(unix) {

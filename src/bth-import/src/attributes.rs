@@ -1,15 +1,15 @@
-//! Brings a source's normals and texture coordinates to common rows.
+//! Merges a source's normals and texture coordinates into rows that both share.
 
 use std::collections::HashMap;
 
 use crate::error::Result;
 use crate::mesh::{Attributes, Keep};
-use crate::raw::{NONE, Raw, Row};
+use crate::raw::{NONE, Raw, RowKind};
 use crate::source::input_error;
 
-/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of
-/// first use. A corner that has none gets zeros (a zero normal asks for the geometric one).
-/// `None` when the source has none of what `keep` asks for.
+/// Shading attributes with one row for each used pair of normal and texture coordinate, in order of first use. A corner
+/// without one gets zeros; a zero normal means that the geometric normal is to be used. `None` when the source has
+/// nothing of what `keep` names.
 ///
 /// # Errors
 /// `BTH-I008` for a used value that is not finite.
@@ -32,10 +32,10 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
             *corner = *rows.entry(pair).or_insert(next);
             if *corner == next {
                 if has_normals {
-                    attributes.normals.push(value(raw, Row::Normal, &raw.normals, pair.0)?);
+                    attributes.normals.push(value(raw, RowKind::Normal, &raw.normals, pair.0)?);
                 }
                 if has_uvs {
-                    attributes.uvs.push(value(raw, Row::Uv, &raw.uvs, pair.1)?);
+                    attributes.uvs.push(value(raw, RowKind::Uv, &raw.uvs, pair.1)?);
                 }
             }
         }
@@ -44,7 +44,7 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
     Ok(Some(attributes))
 }
 
-fn value<const N: usize>(raw: &Raw<'_>, kind: Row, values: &[[f32; N]], row: u32) -> Result<[f32; N]> {
+fn value<const N: usize>(raw: &Raw<'_>, kind: RowKind, values: &[[f32; N]], row: u32) -> Result<[f32; N]> {
     if row == NONE {
         return Ok([0.0; N]);
     }
@@ -52,7 +52,7 @@ fn value<const N: usize>(raw: &Raw<'_>, kind: Row, values: &[[f32; N]], row: u32
     if value.iter().all(|x| x.is_finite()) {
         return Ok(value);
     }
-    let name = if kind == Row::Normal { "normal" } else { "texture coordinate" };
+    let name = if kind == RowKind::Normal { "normal" } else { "texture coordinate" };
     Err(input_error(
         "BTH-I008",
         (raw.locate)(kind, row as usize),

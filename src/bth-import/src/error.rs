@@ -1,11 +1,11 @@
-//! What can go wrong in a compilation, each with a stable code, a place and a hint.
+//! Errors of importing and compiling, each with a stable code, a place and a hint.
 
 use std::path::PathBuf;
 
-/// Result of the compiler's functions.
+/// Result of functions that import or compile.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Where in its source something is.
+/// A place in a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
@@ -29,32 +29,32 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// An error of the compiler.
+/// An error of importing or compiling.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The source cannot be used (exit code 3).
+    /// The source cannot be used; programs exit with code 3.
     #[error("{place}: {code}: {message}{}", hint_text(hint))]
     Input {
         /// Stable code, `BTH-I…`.
         code: &'static str,
-        /// Where.
+        /// Where the fault is.
         place: Place,
         /// What was expected and what was found.
         message: String,
-        /// What to do, or empty.
+        /// What the user can do, or empty.
         hint: String,
     },
-    /// A file could not be read or written (exit code 4).
+    /// A file could not be read or written; programs exit with code 4.
     #[error("{}: {code}: {message}", path.display())]
     File {
         /// Stable code, `BTH-O…`.
         code: &'static str,
         /// Which file.
         path: PathBuf,
-        /// What the system said.
+        /// The error that the system reported.
         message: String,
     },
-    /// The model exceeds a limit of the format (exit code 5).
+    /// The model exceeds a limit of the file format; programs exit with code 5.
     #[error("{code}: {message}")]
     Limit {
         /// Stable code, `BTH-L…`.
@@ -62,7 +62,7 @@ pub enum Error {
         /// Which limit, and the model's figure.
         message: String,
     },
-    /// The result failed our own checks: a defect of the compiler (exit code 70).
+    /// The result failed the compiler's own checks, which is a defect of the compiler; programs exit with code 70.
     #[error("{code}: internal error: {message} (please report this)")]
     Internal {
         /// Stable code, `BTH-X…`.
@@ -70,7 +70,7 @@ pub enum Error {
         /// What does not hold.
         message: String,
     },
-    /// The user asked to stop (exit code 130).
+    /// The user cancelled; programs exit with code 130.
     #[error("cancelled")]
     Cancelled,
 }

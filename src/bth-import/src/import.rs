@@ -1,15 +1,16 @@
-//! Reads a model: finds its format, reads, welds and reports.
+//! The pipeline of importing a model: find the format, read, collect attributes, weld, count.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::mesh::{Keep, Mesh, Report};
 use crate::monitor::Monitor;
-use crate::raw::{Raw, Row, check_rows, check_triangles};
-use crate::source::{NON_FINITE, Source, input_error};
+use crate::raw::{Raw, RowKind, check_rows, check_triangles};
+use crate::source::{NON_FINITE, Source, input_error, read_file};
 use crate::{attributes, gltf, obj, off, ply, stl, topology, weld};
 
-/// Formats that can be read.
+/// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Obj,
@@ -19,19 +20,19 @@ enum Format {
     Off,
 }
 
-/// Reads an OBJ, glTF, GLB, PLY, STL or OFF file, by its extension or else by its content. Triangle
+/// Reads an OBJ, glTF, GLB, PLY, STL or OFF file. The extension decides about the format, or else the content. Triangle
 /// ids are the source's face order after fan triangulation. A model without faces is an empty mesh.
 ///
 /// # Errors
 /// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
-/// [`Error::Cancelled`].
+/// [`Error::Cancelled`](crate::Error::Cancelled).
 pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     import_bytes(path, &read_file(path)?, keep, monitor)
 }
 
-/// As [`import`], from the bytes of a file; `name` tells the format by its extension, stands in messages, and says
-/// beside what a glTF file's external buffers lie.
+/// As [`import`], from the bytes of a file. The extension of `name` decides about the format, messages contain it, and
+/// the external buffers of a glTF file are in its folder.
 ///
 /// # Errors
 /// As [`import`].
@@ -40,7 +41,7 @@ pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor)
     let source = Source::new(name, data, monitor);
     let raw = match format(&source)? {
         Format::Obj => obj::read(&source, keep)?,
-        Format::Gltf => gltf::read(&source, keep)?,
+        Format::Gltf => gltf::flatten::read(&source, keep)?,
         Format::Ply => ply::read(&source, keep)?,
         Format::Stl => stl::read(&source)?,
         Format::Off => off::read(&source)?,
@@ -49,7 +50,7 @@ pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor)
     finish(raw, keep, monitor)
 }
 
-/// Reads meshes of a glTF or GLB file, by number, each in its own space and without the nodes that use it.
+/// Reads meshes of a glTF or GLB file by their numbers, each in its own space, without the transforms of nodes.
 ///
 /// # Errors
 /// As [`import`]; also when the file is no glTF or a mesh does not exist.
@@ -66,26 +67,29 @@ pub fn import_gltf_meshes(
         let message = "expected a glTF or GLB file, of which single meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
     }
-    let supported = [gltf::SUPPORTED.as_slice(), &gltf::SCENE_EXTENSIONS].concat();
-    let (root, binary) = gltf::document(&source, &supported)?;
-    let one =
-        |mesh: &u32| finish(gltf::read_mesh(&source, &root, binary, *mesh as usize, keep)?, keep, monitor);
+    let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
+    let (document, binary) = gltf::document::read(&source, &supported)?;
+    let one = |mesh: &u32| {
+        finish(gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, keep)?, keep, monitor)
+    };
     meshes.iter().map(one).collect()
 }
 
-/// All bytes of a source.
+/// The files that a model consists of: itself, then those that a glTF document refers to, in order. What is no glTF
+/// document refers to none.
 ///
 /// # Errors
-/// `BTH-O001` when it cannot be read.
-pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| Error::File {
-        code: "BTH-O001",
-        path: path.to_owned(),
-        message: format!("cannot read: {e}"),
-    })
+/// `BTH-O001` when the model cannot be read.
+pub fn source_files(path: &Path) -> Result<Vec<PathBuf>> {
+    let mut files = vec![path.to_owned()];
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
+        files.extend(gltf::external_files(path, &read_file(path)?));
+    }
+    Ok(files)
 }
 
-/// Welds what was read and counts.
+/// Collects attributes, welds and counts.
 fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
@@ -94,7 +98,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     let welded = weld::weld(&raw.positions, &mut triangles).map_err(|row| {
         input_error(
             NON_FINITE,
-            (raw.locate)(Row::Position, row),
+            (raw.locate)(RowKind::Position, row),
             format!("expected finite coordinates, found {:?} (as 32-bit numbers)", raw.positions[row]),
             "remove the vertex and the faces that use it, or export the model again",
         )
@@ -124,7 +128,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     Ok((mesh, report))
 }
 
-/// The format by extension, else by content.
+/// The format of a source by its extension, or else by its content.
 fn format(source: &Source<'_>) -> Result<Format> {
     source.fetched()?;
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -145,7 +149,7 @@ fn format(source: &Source<'_>) -> Result<Format> {
     })
 }
 
-/// The format by content, if it is plain.
+/// The format that the first bytes suggest, if they suggest one.
 fn sniff(data: &[u8]) -> Option<Format> {
     let text = data.trim_ascii_start();
     let first_word = text.split(|c| c.is_ascii_whitespace()).next().unwrap_or_default();

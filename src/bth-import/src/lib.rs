@@ -1,8 +1,9 @@
 //! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
 //!
-//! A reader for each format turns a file into a [`raw`](self) mesh with the source's own rows; `weld` merges its positions,
-//! `attributes` its shading rows, and `topology` counts what the report tells. [`import()`] is the way in;
-//! [`gltf::scene`] reads nodes, animations, cameras and lights.
+//! [`import()`] is the entry point. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
+//! turns the file into a `raw` mesh with the source's own rows. Then `weld` merges bit-equal positions, `attributes`
+//! merges shading rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations, cameras
+//! and lights into a manifest instead.
 #![warn(missing_docs)]
 
 mod attributes;
@@ -23,7 +24,8 @@ mod weld;
 mod zero_area;
 
 pub use error::{Error, Place, Result};
-pub use import::{import, import_bytes, import_gltf_meshes, read_file};
+pub use import::{import, import_bytes, import_gltf_meshes, source_files};
 pub use mesh::{Attributes, Keep, Mesh, Report};
 pub use monitor::{Monitor, Silent};
+pub use source::read_file;
 pub use zero_area::is_zero_area;

@@ -1,4 +1,4 @@
-//! A triangle mesh as the importers hand it on, and what they say of it.
+//! The triangle mesh that importers make, and their report about it.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 pub struct Mesh {
     /// Distinct finite positions, in order of first use by the faces.
     pub positions: Vec<[f32; 3]>,
-    /// Rows of `positions`, in the source's face order after fan triangulation: the index is the
-    /// triangle id everywhere in the product. Degenerate triangles are kept here.
+    /// Rows of `positions`, in the source's face order after fan triangulation. The index of a triangle here is its id
+    /// in the compiled file and in hits. Degenerate triangles are kept.
     pub triangles: Vec<[u32; 3]>,
-    /// Shading attributes, if the source has some and they were asked for.
+    /// Shading attributes, if the source has some and the caller keeps them.
     pub attributes: Option<Attributes>,
 }
 
@@ -21,7 +21,7 @@ pub struct Attributes {
     pub corners: Vec<[u32; 3]>,
     /// Normals as in the source, or empty.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates, or empty. When both are present they have the same number of rows.
+    /// Texture coordinates, or empty. When there are normals too, both have the same number of rows.
     pub uvs: Vec<[f32; 2]>,
 }
 
@@ -38,32 +38,32 @@ pub enum Keep {
     All,
 }
 
-/// What was found in a source; counts of triangles unless said otherwise.
+/// What was found in a source. Counts are of triangles unless the field names another unit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the format that was read.
     pub format: String,
     /// Triangles after fan triangulation.
     pub triangles: u64,
-    /// Positions before and after welding.
+    /// Positions in the source, before welding.
     pub positions_read: u64,
-    /// Distinct positions.
+    /// Distinct positions that faces use, after welding.
     pub positions: u64,
     /// Faces of more than three corners that were fan-triangulated.
     pub polygons: u64,
-    /// Faces of fewer than three corners, points and lines, which were left out (elements).
+    /// Elements that were left out: faces of fewer than three corners, points and lines.
     pub skipped: u64,
-    /// Triangles of exactly zero area (decided exactly): kept for their ids, hit by no ray.
+    /// Triangles of exactly zero area, decided by exact arithmetic. They keep their ids, and no ray hits them.
     pub degenerate: u64,
     /// Triangles with the same three positions as an earlier one.
     pub duplicate: u64,
-    /// Edges with one triangle.
+    /// Edges of one triangle.
     pub boundary_edges: u64,
-    /// Edges with more than two triangles.
+    /// Edges of more than two triangles.
     pub non_manifold_edges: u64,
-    /// Connected components (by shared positions).
+    /// Components that are connected by shared positions.
     pub components: u64,
-    /// Positions that are not finite and that no face uses (positions); used ones are an error.
+    /// Positions that are not finite and that no face uses. Used ones are an error.
     pub non_finite_unused: u64,
 }
 

@@ -1,29 +1,29 @@
-//! How stages report progress and learn that they should stop.
+//! How stages report progress and are cancelled.
 
 use crate::error::{Error, Result};
 
-/// Watches a compilation; called from any thread.
+/// Receives progress and warnings, and cancels. All methods may be called from any thread.
 pub trait Monitor: Sync {
-    /// A stage begins; `total` units of work if that is known.
+    /// A stage begins that consists of `total` units of work, if that is known.
     fn stage(&self, _name: &'static str, _total: Option<u64>) {}
-    /// `units` more are done.
+    /// `units` more units of the stage are done.
     fn advance(&self, _units: u64) {}
-    /// Whether the user asked to stop; stages look a few times a second.
+    /// Whether the user cancelled. Stages call this a few times a second.
     fn cancelled(&self) -> bool {
         false
     }
-    /// Something that the user should know but that stops nothing.
+    /// A message for the user about something that is not an error.
     fn warn(&self, _message: &str) {}
 }
 
 impl dyn Monitor + '_ {
-    /// Fails with [`Error::Cancelled`] once the user asked to stop.
+    /// Fails with [`Error::Cancelled`] once the user cancelled.
     pub fn check(&self) -> Result<()> {
         if self.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     }
 }
 
-/// Watches nothing.
+/// A monitor that ignores everything and never cancels.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 impl Monitor for Silent {}

@@ -1,7 +1,7 @@
-//! Numbers and lines in text sources.
+//! Numbers, words and lines of text sources.
 
-/// A number as text, `None` if it is none. Also the way that some C libraries write what is not
-/// finite (`-nan(ind)`, `1.#INF`): all of it reads as NaN, so that only its use is an error.
+/// Parses a number; `None` if the word is none. What some C libraries write for numbers that are not finite, such as
+/// `-nan(ind)` and `1.#INF`, becomes NaN, so that it is an error only where a face uses it.
 #[inline]
 pub(super) fn float<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     let text = std::str::from_utf8(word).ok()?;
@@ -14,7 +14,7 @@ fn foreign_nan(text: &str) -> Option<&'static str> {
     (text.starts_with("1.#") || text.starts_with("nan(")).then_some("nan")
 }
 
-/// A decimal integer, `None` if it is none or too large for an `i64`.
+/// Parses a decimal integer; `None` if the word is none or has more than 18 digits.
 #[inline]
 pub(super) fn integer(word: &[u8]) -> Option<i64> {
     let (negative, digits) = match word {
@@ -35,19 +35,19 @@ pub(super) fn integer(word: &[u8]) -> Option<i64> {
     Some(if negative { -value } else { value })
 }
 
-/// The words of a line.
+/// The words of a line, which white space separates.
 #[inline]
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(|c| c.is_ascii_whitespace()).filter(|word| !word.is_empty())
 }
 
-/// A word for a message: lossy and cut short.
+/// A word as it is shown in a message: valid UTF-8, escaped, and at most 40 bytes of it.
 pub(super) fn shown(word: &[u8]) -> String {
     let cut = &word[..word.len().min(40)];
     String::from_utf8_lossy(cut).escape_debug().to_string()
 }
 
-/// Lines of a text with their numbers; ends at LF, CR LF or CR.
+/// Lines of a text with their numbers. LF, CR LF and CR end a line.
 pub(super) struct Lines<'a> {
     data: &'a [u8],
     at: usize,
@@ -60,17 +60,17 @@ impl<'a> Lines<'a> {
         Lines::after(data, 0, 0)
     }
 
-    /// Lines from a byte on, when `number` lines end before it.
+    /// Lines from byte `at` on, which `number` lines precede.
     pub(super) fn after(data: &'a [u8], at: usize, number: u64) -> Self {
         Lines { data, at, number }
     }
 
-    /// Byte after the last line given.
+    /// The byte after the last line that the iterator returned.
     pub(super) fn position(&self) -> usize {
         self.at
     }
 
-    /// Number of the last line given.
+    /// The number of the last line that the iterator returned.
     pub(super) fn number(&self) -> u64 {
         self.number
     }

@@ -1,16 +1,18 @@
-//! Wavefront OBJ: polygons only; materials, groups and smoothing are left out.
+//! Reads Wavefront OBJ: polygons with normals and texture coordinates. Materials, groups and smoothing are ignored.
+//!
+//! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
 use std::borrow::Cow;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::Keep;
 use crate::number::{Lines, float, integer, shown, words};
-use crate::raw::{NONE, Raw, Row, check_rows};
+use crate::raw::{NONE, Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
 
 const ATTRIBUTE_HINT: &str = "correct the file, or compile without attributes (--attributes none)";
 
-/// Keywords that do not change the polygons.
+/// Keywords of OBJ that do not change the polygons.
 const KNOWN: [&[u8]; 30] = [
     b"g",
     b"s",
@@ -44,16 +46,16 @@ const KNOWN: [&[u8]; 30] = [
     b"vt",
 ];
 
-/// Whether the first statement of a text is one of OBJ.
+/// Whether the first statement of a text has a keyword of OBJ.
 pub(super) fn looks_like_obj(data: &[u8]) -> bool {
     let mut keywords = Lines::new(data).filter_map(|(_, line)| words(line).next());
     let first = keywords.find(|word| !word.starts_with(b"#"));
     first.is_some_and(|word| [&b"v"[..], b"f"].contains(&word) || KNOWN.contains(&word))
 }
 
-/// A use of a row that was not there yet; allowed if it comes later.
+/// A use of a row before its definition, which is allowed if the definition follows.
 struct Forward {
-    kind: Row,
+    kind: RowKind,
     index: u32,
     line: u64,
 }
@@ -69,8 +71,8 @@ struct Reader<'a, 's> {
     face_uvs: Vec<u32>,
 }
 
-/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or
-/// surface; points count each.
+/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or surface; each point of a
+/// point statement counts as one.
 pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
     if let Some(byte) = source.data.iter().take(4096).position(|&c| c == 0) {
         let hint = "save it as UTF-8 or ASCII text, or give it the extension of its format";
@@ -134,7 +136,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
 }
 
 impl Reader<'_, '_> {
-    /// Up to three numbers, of which the first `needed` must be there; the others default to 0.
+    /// Parses up to three numbers, of which the first `needed` are mandatory; the others default to 0.
     fn numbers<'w>(
         &self,
         line: u64,
@@ -162,16 +164,16 @@ impl Reader<'_, '_> {
         for word in words {
             // v, v/vt, v//vn or v/vt/vn; a part may be empty.
             let mut parts = word.split(|&c| c == b'/');
-            let position = self.index(line, Row::Position, word, parts.next().unwrap_or_default())?;
+            let position = self.index(line, RowKind::Position, word, parts.next().unwrap_or_default())?;
             self.face.push(position);
             let (uv, normal) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
             if self.uvs {
-                let uv = if uv.is_empty() { NONE } else { self.index(line, Row::Uv, word, uv)? };
+                let uv = if uv.is_empty() { NONE } else { self.index(line, RowKind::Uv, word, uv)? };
                 self.face_uvs.push(uv);
             }
             if self.normals {
                 let normal =
-                    if normal.is_empty() { NONE } else { self.index(line, Row::Normal, word, normal)? };
+                    if normal.is_empty() { NONE } else { self.index(line, RowKind::Normal, word, normal)? };
                 self.face_normals.push(normal);
             }
         }
@@ -180,9 +182,9 @@ impl Reader<'_, '_> {
         self.raw.push_face(&self.face)
     }
 
-    /// The row that an index names: from 1, or negative to count back from the last row so far.
+    /// The row that an index means. Indices count from 1; negative ones count back from the last row so far.
     #[inline]
-    fn index(&mut self, line: u64, kind: Row, word: &[u8], index: &[u8]) -> Result<u32> {
+    fn index(&mut self, line: u64, kind: RowKind, word: &[u8], index: &[u8]) -> Result<u32> {
         let rows = self.rows(kind);
         let Some(number) = integer(index) else {
             let message = format!("expected a face corner such as 1/2/3, found \"{}\"", shown(word));
@@ -198,20 +200,20 @@ impl Reader<'_, '_> {
         Ok(row as u32)
     }
 
-    fn rows(&self, kind: Row) -> usize {
+    fn rows(&self, kind: RowKind) -> usize {
         match kind {
-            Row::Position => self.raw.positions.len(),
-            Row::Normal => self.raw.normals.len(),
-            Row::Uv => self.raw.uvs.len(),
+            RowKind::Position => self.raw.positions.len(),
+            RowKind::Normal => self.raw.normals.len(),
+            RowKind::Uv => self.raw.uvs.len(),
         }
     }
 
     #[cold]
-    fn out_of_range(&self, line: u64, kind: Row, number: i64) -> crate::Error {
+    fn out_of_range(&self, line: u64, kind: RowKind, number: i64) -> Error {
         let name = match kind {
-            Row::Position => "v",
-            Row::Normal => "vn",
-            Row::Uv => "vt",
+            RowKind::Position => "v",
+            RowKind::Normal => "vn",
+            RowKind::Uv => "vt",
         };
         let rows = self.rows(kind);
         let message = if number < 0 {
@@ -219,11 +221,11 @@ impl Reader<'_, '_> {
         } else {
             format!("expected an index of a {name} line, from 1 to {rows}, found {number}")
         };
-        let hint = if kind == Row::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
+        let hint = if kind == RowKind::Position { INDEX_HINT } else { ATTRIBUTE_HINT };
         self.source.error_at_line(INDEX, line, message, hint)
     }
 
-    /// Fails for the first use of a row that never came.
+    /// Fails for the first use of a row that the whole file does not define.
     fn check_forward(&self) -> Result<()> {
         match self.forward.iter().find(|f| f.index as usize >= self.rows(f.kind)) {
             Some(f) => Err(self.out_of_range(f.line, f.kind, i64::from(f.index) + 1)),
@@ -232,7 +234,7 @@ impl Reader<'_, '_> {
     }
 }
 
-/// The next line, joined with those after it while it ends in a backslash; the number is the first line's.
+/// The next line and its number. While a line ends in a backslash, the following line is joined to it.
 #[inline]
 fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
     let (number, line) = lines.next()?;
@@ -248,11 +250,11 @@ fn next_statement<'a>(lines: &mut Lines<'a>) -> Option<(u64, Cow<'a, [u8]>)> {
     Some((number, Cow::Owned(joined)))
 }
 
-fn line_of_row(data: &[u8], kind: Row, row: usize) -> u64 {
+fn line_of_row(data: &[u8], kind: RowKind, row: usize) -> u64 {
     let keyword = match kind {
-        Row::Position => &b"v"[..],
-        Row::Normal => b"vn",
-        Row::Uv => b"vt",
+        RowKind::Position => &b"v"[..],
+        RowKind::Normal => b"vn",
+        RowKind::Uv => b"vt",
     };
     let mut lines = Lines::new(data);
     let statements = std::iter::from_fn(|| next_statement(&mut lines));

@@ -1,4 +1,4 @@
-//! OFF (Geomview's object file format), text.
+//! Reads OFF (the object file format of Geomview) as text.
 
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
@@ -7,12 +7,12 @@ use crate::source::{
     INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED,
 };
 
-/// Whether a word is the keyword of some OFF variant: `[ST][C][N][4][n]OFF`.
+/// Whether a word is the keyword of a variant of OFF: `[ST][C][N][4][n]OFF`.
 pub(super) fn is_keyword(word: &[u8]) -> bool {
     variant(word).is_some()
 }
 
-/// The prefix of the keyword.
+/// The prefix of a keyword; `None` for other words.
 fn variant(word: &[u8]) -> Option<&[u8]> {
     let prefix = word.strip_suffix(b"OFF")?;
     let mut rest = prefix;
@@ -22,7 +22,7 @@ fn variant(word: &[u8]) -> Option<&[u8]> {
     rest.is_empty().then_some(prefix)
 }
 
-/// Lines that say something: comments cut off, blank ones left out.
+/// Lines without comments; blank ones are omitted.
 struct Statements<'a, 'b> {
     source: &'b Source<'a>,
     lines: Lines<'a>,
@@ -47,13 +47,13 @@ impl<'a> Statements<'a, '_> {
     }
 }
 
-/// Reads an OFF file; colours, normals and texture coordinates at the ends of lines are left out.
+/// Reads an OFF file. Colours, normals and texture coordinates at the ends of lines are ignored.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let mut statements = Statements { source, lines: Lines::new(source.data) };
     let malformed =
         |number, message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
 
-    // The keyword may be missing, and the counts may follow it on its line.
+    // The keyword is optional, and the counts may be on its line.
     let (mut number, mut line) = statements.expect("OFF or the counts")?;
     let first = words(line).next().unwrap_or_default();
     if let Some(prefix) = variant(first) {

@@ -1,4 +1,4 @@
-//! A mesh as a reader found it: the source's own rows, not welded.
+//! The mesh that a format's reader makes: the source's own rows, not welded.
 
 use crate::error::{Error, Place, Result};
 use bth_format::limits::MAX_TRIANGLES;
@@ -6,33 +6,33 @@ use bth_format::limits::MAX_TRIANGLES;
 /// Row of an attribute that a corner does not have.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Which rows a place is asked for.
+/// The three kinds of rows of a [`Raw`] mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Row {
-    /// Of `positions`.
+pub(super) enum RowKind {
+    /// A row of `positions`.
     Position,
-    /// Of `normals`.
+    /// A row of `normals`.
     Normal,
-    /// Of `uvs`.
+    /// A row of `uvs`.
     Uv,
 }
 
-/// Tells where in the source a row stands; slow, for messages.
-pub(super) type Locate<'a> = Box<dyn Fn(Row, usize) -> Place + 'a>;
+/// Finds the place of a row in the source. It may read the source again, so it is for error messages only.
+pub(super) type Locate<'a> = Box<dyn Fn(RowKind, usize) -> Place + 'a>;
 
-/// A mesh as in the source. Readers have checked that all indices are in range.
+/// A mesh with the rows of its source. Its reader has checked that all indices are in range.
 pub(super) struct Raw<'a> {
     /// Name of the format.
     pub(super) format: &'static str,
     /// All positions, finite or not.
     pub(super) positions: Vec<[f32; 3]>,
-    /// All faces, fan-triangulated: rows of `positions`.
+    /// Rows of `positions` of all faces after fan triangulation.
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Normals, if there are some and they were asked for.
+    /// Normals, if there are some and the caller keeps them.
     pub(super) normals: Vec<[f32; 3]>,
     /// Per triangle rows of `normals` or [`NONE`]; empty without normals.
     pub(super) normal_rows: Vec<[u32; 3]>,
-    /// Texture coordinates, if there are some and they were asked for.
+    /// Texture coordinates, if there are some and the caller keeps them.
     pub(super) uvs: Vec<[f32; 2]>,
     /// Per triangle rows of `uvs` or [`NONE`]; empty without texture coordinates.
     pub(super) uv_rows: Vec<[u32; 3]>,
@@ -40,7 +40,7 @@ pub(super) struct Raw<'a> {
     pub(super) polygons: u64,
     /// Points, lines and faces of fewer than three corners.
     pub(super) skipped: u64,
-    /// Where rows stand.
+    /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Raw<'a> {
         check_triangles(self.triangles.len() as u64)
     }
 
-    /// Counts polygons and faces that are too short.
+    /// Counts faces of more than three corners as polygons and of fewer as skipped.
     #[inline]
     pub(super) fn count_face(&mut self, corners: usize) {
         self.polygons += u64::from(corners > 3);
@@ -77,7 +77,7 @@ impl<'a> Raw<'a> {
     }
 }
 
-/// Appends a polygon's fan: (0, k-1, k) for k from 2.
+/// Appends the fan of a polygon around its first corner: the triangles (0, k-1, k) for k from 2.
 #[inline]
 pub(super) fn fan(triangles: &mut Vec<[u32; 3]>, face: &[u32]) {
     if let [first, rest @ ..] = face {
@@ -85,7 +85,7 @@ pub(super) fn fan(triangles: &mut Vec<[u32; 3]>, face: &[u32]) {
     }
 }
 
-/// Refuses more triangles than a file can hold.
+/// Refuses more triangles than a compiled file can hold (`BTH-L001`).
 #[inline]
 pub(super) fn check_triangles(count: u64) -> Result<()> {
     if count <= u64::from(MAX_TRIANGLES) {
@@ -97,7 +97,7 @@ pub(super) fn check_triangles(count: u64) -> Result<()> {
     })
 }
 
-/// Refuses more rows than 32-bit indices reach.
+/// Refuses more rows than 32-bit indices can address (`BTH-L002`).
 pub(super) fn check_rows(count: u64) -> Result<()> {
     if count < u64::from(NONE) {
         return Ok(());
@@ -108,8 +108,8 @@ pub(super) fn check_rows(count: u64) -> Result<()> {
     })
 }
 
-/// Triangles of a strip in the order of OpenGL and glTF: every second one turned around. Those that
-/// repeat a corner are kept, so that an id is the triangle's place in the strip.
+/// Triangles of a strip as OpenGL and glTF order them, every second one with its last two corners exchanged. Triangles
+/// that repeat a corner are kept, so that a triangle's id is its position in the strip.
 pub(super) fn strip(indices: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     indices
         .windows(3)

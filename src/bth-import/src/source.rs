@@ -1,4 +1,4 @@
-//! The bytes of a source, its place for messages, and the progress of its reader.
+//! The bytes of a source file, the progress of its reader, and errors at places in it.
 
 use std::cell::Cell;
 use std::path::Path;
@@ -6,40 +6,41 @@ use std::path::Path;
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
 
-/// Rows that a reader takes between two looks at the monitor (a few milliseconds).
+/// Rows that a reader reads between two calls of the monitor: a few milliseconds.
 const ROWS_BETWEEN_CHECKS: u64 = 1 << 16;
 
 /// A source file in memory.
 pub(crate) struct Source<'a> {
-    /// Where it was read from.
+    /// Where it was read from, for messages.
     pub(crate) path: &'a Path,
     /// All its bytes.
     pub(crate) data: &'a [u8],
-    /// Who watches.
+    /// Receives progress and warnings.
     pub(crate) monitor: &'a dyn Monitor,
     reported: Cell<u64>,
 }
 
 impl<'a> Source<'a> {
-    /// A source whose reader starts at byte 0.
+    /// A source of which nothing is read yet.
     pub(crate) fn new(path: &'a Path, data: &'a [u8], monitor: &'a dyn Monitor) -> Self {
         Source { path, data, monitor, reported: Cell::new(0) }
     }
 
-    /// Now and then (by the row's number) reports how many bytes are read, and fails once cancelled.
+    /// As [`Self::progress`], but only for one row in [`ROWS_BETWEEN_CHECKS`].
     #[inline]
     pub(crate) fn tick(&self, row: u64, bytes: usize) -> Result<()> {
         if row.is_multiple_of(ROWS_BETWEEN_CHECKS) { self.progress(bytes) } else { Ok(()) }
     }
 
-    /// Reports how many bytes are read, and fails once cancelled.
+    /// Reports how many bytes are read so far, and fails once the user cancelled.
     pub(crate) fn progress(&self, bytes: usize) -> Result<()> {
         let bytes = (bytes as u64).max(self.reported.get());
         self.monitor.advance(bytes - self.reported.replace(bytes));
         self.monitor.check()
     }
 
-    /// Fails for what Git LFS leaves in the place of a file that was not fetched: as OBJ it would be a model without faces.
+    /// Refuses the pointer that Git LFS puts in the place of a file that was not fetched. Its text would be a valid OBJ
+    /// without faces.
     pub(crate) fn fetched(&self) -> Result<()> {
         if !self.data.starts_with(b"version https://git-lfs.github.com/") {
             return Ok(());
@@ -48,7 +49,7 @@ impl<'a> Source<'a> {
         Err(self.error("BTH-I001", message, "run `git lfs pull`"))
     }
 
-    /// An error of the whole file.
+    /// An error of the file as a whole.
     pub(crate) fn error(&self, code: &'static str, message: impl Into<String>, hint: &str) -> Error {
         input_error(code, Place::File(self.path.to_owned()), message, hint)
     }
@@ -97,24 +98,36 @@ impl<'a> Source<'a> {
     }
 }
 
-/// An error of the source.
+/// An error of a source.
 pub(crate) fn input_error(code: &'static str, place: Place, message: impl Into<String>, hint: &str) -> Error {
     Error::Input { code, place, message: message.into(), hint: hint.to_owned() }
 }
 
-/// The file is cut off: use with [`TRUNCATED_HINT`].
+/// All bytes of a source.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read.
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    })
+}
+
+/// Code: the file is cut off. Use it with [`TRUNCATED_HINT`].
 pub(crate) const TRUNCATED: &str = "BTH-I003";
-/// What to do about a file that is cut off.
+/// Hint for a file that is cut off.
 pub(crate) const TRUNCATED_HINT: &str = "the file is cut off; copy or export it again";
-/// The text or structure does not follow the format.
+/// Code: the text or structure does not follow the format.
 pub(crate) const MALFORMED: &str = "BTH-I002";
-/// A coordinate of a used position is not finite.
+/// Code: a coordinate of a used position is not finite.
 pub(crate) const NON_FINITE: &str = "BTH-I004";
-/// An index names a row that does not exist.
+/// Code: an index refers to a row that does not exist.
 pub(crate) const INDEX: &str = "BTH-I005";
-/// A variant of the format that this program does not read.
+/// Code: a variant of the format that is not supported.
 pub(crate) const UNSUPPORTED: &str = "BTH-I006";
-/// What to do about a text file that does not follow its format.
+/// Hint for a text file that does not follow its format.
 pub(crate) const MALFORMED_HINT: &str = "correct the file there, or export it again";
-/// What to do about an index out of range.
+/// Hint for an index out of range.
 pub(crate) const INDEX_HINT: &str = "export the model again; its faces do not belong to its vertices";

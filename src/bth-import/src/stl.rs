@@ -1,27 +1,29 @@
-//! STL, text and binary.
+//! Reads STL, text and binary.
+//!
+//! A reader of our own rather than `stl_io`: docs/decisions.md says why.
 
 use crate::error::Result;
 use crate::number::{Lines, float, shown, words};
-use crate::raw::{Raw, Row, check_triangles};
+use crate::raw::{Raw, RowKind, check_triangles};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
-/// Bytes before the first facet: a free header and the count.
+/// Bytes before the first facet: 80 of any content and the count of facets.
 const HEADER: usize = 84;
-/// Bytes of a facet: normal, three corners, two bytes that some programs use for colour.
+/// Bytes of a facet: a normal, three corners, and two bytes that some programs use for colour.
 const FACET: usize = 50;
 
-/// The count in a binary header, if the file is long enough to have one.
+/// The count of facets in a binary header; `None` if the file is too short for a header.
 fn binary_count(data: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(data.get(80..HEADER)?.try_into().ok()?))
 }
 
-/// Whether the file has exactly the length that its binary header implies. This tells binary files
-/// from text ones also when their free header begins with "solid".
+/// Whether the file has exactly the length that its binary header implies. This distinguishes binary files whose header
+/// begins with "solid" from text files.
 pub(super) fn is_binary_size(data: &[u8]) -> bool {
     binary_count(data).is_some_and(|n| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(n))
 }
 
-/// Reads an STL file. Facet normals are not shading attributes and are left out.
+/// Reads an STL file. Facet normals are not shading attributes and are ignored.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let data = source.data;
     let text = !is_binary_size(data)
@@ -47,7 +49,7 @@ fn read_binary<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     if extra > 0 {
         source.monitor.warn(&format!("{extra} bytes after the last facet are ignored"));
     }
-    let locate = |_: Row, row: usize| source.byte(HEADER + row / 3 * FACET + 12 + row % 3 * 12);
+    let locate = |_: RowKind, row: usize| source.byte(HEADER + row / 3 * FACET + 12 + row % 3 * 12);
     let mut raw = Raw::new("stl", Box::new(locate));
     raw.positions.reserve_exact(3 * count as usize);
     for (row, facet) in body.chunks_exact(FACET).take(count as usize).enumerate() {
@@ -64,7 +66,7 @@ fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let mut raw = Raw::new("stl", Box::new(|_, row| source.line(line_of_vertex(source.data, row))));
     let mut lines = Lines::new(source.data);
     let mut in_solid = false;
-    // Rows of the loop that is open.
+    // Rows of the loop between `outer loop` and `endloop`.
     let mut open: Option<Vec<u32>> = None;
     while let Some((number, line)) = lines.next() {
         source.tick(number, lines.position())?;

@@ -1,27 +1,27 @@
-//! Counts what a model's user wants to know of its topology.
+//! Counts degenerate and duplicate triangles, boundary and non-manifold edges, and components.
 
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
 use crate::zero_area::is_zero_area;
 
-/// Figures of a welded mesh.
+/// Counts of a welded mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Topology {
     /// Triangles of exactly zero area.
     pub(super) degenerate: u64,
     /// Triangles with the same three positions as an earlier one.
     pub(super) duplicate: u64,
-    /// Edges with one triangle.
+    /// Edges of one triangle.
     pub(super) boundary_edges: u64,
-    /// Edges with more than two triangles.
+    /// Edges of more than two triangles.
     pub(super) non_manifold_edges: u64,
     /// Components connected by shared positions.
     pub(super) components: u64,
 }
 
-/// Counts in time and memory proportional to the mesh. A triangle that repeats a position is no
-/// triangle to its neighbours: it has no sides and duplicates nothing.
+/// Counts in time and memory proportional to the mesh. A triangle that repeats a position counts as degenerate only: it
+/// has no edges and is no duplicate.
 pub(super) fn topology(mesh: &Mesh) -> Topology {
     let ((degenerate, components), ((boundary_edges, non_manifold_edges), duplicate)) = rayon::join(
         || (degenerate(mesh), components(mesh)),
@@ -38,7 +38,7 @@ fn degenerate(mesh: &Mesh) -> u64 {
     mesh.triangles.par_chunks(1 << 14).map(count).sum()
 }
 
-/// Triangles of three different positions.
+/// Triangles of three distinct positions.
 fn proper(mesh: &Mesh) -> impl Iterator<Item = [u32; 3]> + Clone + '_ {
     mesh.triangles.iter().copied().filter(|[a, b, c]| a != b && b != c && c != a)
 }
@@ -65,8 +65,8 @@ fn duplicates(mesh: &Mesh) -> u64 {
     duplicate
 }
 
-/// Calls `run` with the number of times that each distinct pair occurs: a counting sort by the
-/// first value (below `buckets`), then a sort inside each of the short buckets.
+/// Calls `run` with the number of occurrences of each distinct pair, by a counting sort of the first values (which are
+/// below `buckets`) and a sort inside each bucket.
 fn for_each_run<T: Ord + Copy + Default>(
     buckets: usize,
     pairs: impl Iterator<Item = (u32, T)> + Clone,
@@ -95,8 +95,8 @@ fn for_each_run<T: Ord + Copy + Default>(
     }
 }
 
-/// Union-find with path halving; the smaller row is the root, so the forest stays shallow on
-/// meshes whose rows are in order of first use.
+/// Counts components by union-find with path halving. The smaller row becomes the root, which keeps the forest shallow
+/// on meshes whose rows are in order of first use.
 fn components(mesh: &Mesh) -> u64 {
     let mut parents: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     fn root(parents: &mut [u32], mut row: u32) -> u32 {

@@ -2,17 +2,17 @@
 
 use crate::raw::NONE;
 
-/// What [`weld`] made of a mesh.
+/// The result of [`weld`].
 #[derive(Debug, PartialEq)]
 pub(super) struct Welded {
-    /// Distinct positions in order of first use; -0 is written as +0.
+    /// Distinct positions in order of first use, with +0 in the place of -0.
     pub(super) positions: Vec<[f32; 3]>,
     /// Positions that are not finite and that no face uses.
     pub(super) non_finite_unused: u64,
 }
 
-/// Replaces the rows of `triangles` by rows of distinct positions, in order of first use (so the
-/// result does not depend on unused positions). -0 and +0 are equal.
+/// Replaces the rows of `triangles` by rows of distinct positions. These are in order of first use, so the result does
+/// not depend on unused positions. -0 equals +0.
 ///
 /// # Errors
 /// The row of the first used position that is not finite.
@@ -37,15 +37,15 @@ pub(super) fn weld(positions: &[[f32; 3]], triangles: &mut [[u32; 3]]) -> Result
     Ok(Welded { positions: distinct, non_finite_unused })
 }
 
-/// Open addressing over rows of the distinct positions: a quarter of the memory of a map that
-/// holds the keys, and no dependence on a random seed.
+/// A hash table with open addressing whose slots are rows of the distinct positions. It needs a quarter of the memory of
+/// a map that holds the keys, and its order does not depend on a random seed.
 struct Table {
     slots: Vec<u32>,
     shift: u32,
 }
 
 impl Table {
-    /// Room for `count` entries at a load of at most one half.
+    /// A table for `count` entries at a load of at most one half.
     fn with_capacity(count: usize) -> Table {
         let size = (count.max(4) * 2).next_power_of_two();
         Table { slots: vec![NONE; size], shift: 64 - size.trailing_zeros() }

@@ -98,6 +98,22 @@ fn liars() -> Vec<(&'static str, Vec<u8>)> {
             {{"componentType":5125,"count":{count},"type":"SCALAR"}}]}}"#
         ))
     };
+    // A compressed view, a view of zeros and a Draco stream of eight bytes.
+    let compressed = |count: &str, view: &str, primitive: &str| {
+        text(&format!(
+            r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"extensions":{{{primitive}}}}}]}}],
+            "buffers":[{{"byteLength":8,"uri":"data:application/octet-stream;base64,oQAAAAAAAAA="}},{{"byteLength":{count}}}],
+            "bufferViews":[{{"buffer":1,"byteLength":{count},"extensions":{{{view}}}}},{{"buffer":0,"byteLength":8}}],
+            "accessors":[{{"componentType":5126,"count":{count},"type":"VEC3"{}}}]}}"#,
+            if view.is_empty() { "" } else { r#","bufferView":0"# }
+        ))
+    };
+    let meshopt = |count: &str, mode: &str, stride: u32| {
+        let properties =
+            format!(r#""buffer":0,"byteLength":8,"byteStride":{stride},"count":{count},"mode":"{mode}""#);
+        compressed(count, &format!(r#""EXT_meshopt_compression":{{{properties}}}"#), "")
+    };
     let mut liars = vec![
         ("a.off", text("OFF\n4000000000 4000000000 0\n0 0 0\n")),
         ("b.off", text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n")),
@@ -112,6 +128,19 @@ fn liars() -> Vec<(&'static str, Vec<u8>)> {
         }
         liars.push(("a.gltf", gltf(count, "8")));
         liars.push(("b.gltf", gltf(count, count)));
+        liars.push(("c.gltf", compressed(count, "", "")));
+        liars.push((
+            "d.gltf",
+            compressed(
+                count,
+                "",
+                r#""KHR_draco_mesh_compression":{"bufferView":1,"attributes":{"POSITION":0}}"#,
+            ),
+        ));
+        liars.push(("e.gltf", meshopt(count, "ATTRIBUTES", 12)));
+        liars.push(("f.gltf", meshopt(count, "ATTRIBUTES", 256)));
+        liars.push(("g.gltf", meshopt(count, "TRIANGLES", 4)));
+        liars.push(("h.gltf", meshopt(count, "INDICES", 2)));
     }
     liars
 }

@@ -187,8 +187,7 @@ fn what_is_ignored_is_said_and_refused_when_strict() {
 
 #[test]
 fn required_extensions_that_are_not_read_are_refused_by_name() {
-    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_animation_pointer", "ACME_rig"]
-    {
+    for name in ["ACME_mesh_compression", "KHR_animation_pointer", "ACME_rig"] {
         let error = import(&edited(|d| d["extensionsRequired"] = json!([name])), &ImportOptions::default());
         let error = error.unwrap_err().to_string();
         assert!(error.contains("BTH-I011") && error.contains(name), "{error}");

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::gltf::buffer::Buffers;
-use crate::gltf::json::{Accessor, Root};
+use crate::gltf::schema::{Accessor, GltfDocument};
 use crate::source::Source;
 
 const ACCESSOR: &str = "BTH-I013";
@@ -10,13 +10,13 @@ const ACCESSOR: &str = "BTH-I013";
 /// Reads accessors of a document.
 pub(crate) struct Accessors<'a> {
     pub(crate) source: &'a Source<'a>,
-    pub(crate) root: &'a Root,
+    pub(crate) document: &'a GltfDocument,
     pub(crate) buffers: Buffers<'a>,
 }
 
 /// Component types.
 #[derive(Clone, Copy, PartialEq)]
-enum Component {
+enum ComponentType {
     I8,
     U8,
     I16,
@@ -25,44 +25,55 @@ enum Component {
     F32,
 }
 
-impl Component {
-    fn new(code: u64) -> Option<Component> {
+impl ComponentType {
+    fn from_code(code: u64) -> Option<ComponentType> {
         Some(match code {
-            5120 => Component::I8,
-            5121 => Component::U8,
-            5122 => Component::I16,
-            5123 => Component::U16,
-            5125 => Component::U32,
-            5126 => Component::F32,
+            5120 => ComponentType::I8,
+            5121 => ComponentType::U8,
+            5122 => ComponentType::I16,
+            5123 => ComponentType::U16,
+            5125 => ComponentType::U32,
+            5126 => ComponentType::F32,
             _ => return None,
         })
     }
 
     fn size(self) -> usize {
         match self {
-            Component::I8 | Component::U8 => 1,
-            Component::I16 | Component::U16 => 2,
-            Component::U32 | Component::F32 => 4,
+            ComponentType::I8 | ComponentType::U8 => 1,
+            ComponentType::I16 | ComponentType::U16 => 2,
+            ComponentType::U32 | ComponentType::F32 => 4,
         }
     }
 
-    /// The value of a component's bytes; normalized integers by the specification's §3.6.2.2.
+    /// The value of a component's bytes.
     #[inline]
     fn float(self, bytes: &[u8], normalized: bool) -> f32 {
-        let (value, most) = match self {
-            Component::F32 => {
+        let value = match self {
+            ComponentType::F32 => {
                 let mut word = [0; 4];
                 word.copy_from_slice(bytes);
                 return f32::from_le_bytes(word);
             }
-            Component::I8 => (f64::from(bytes[0] as i8), 127.0),
-            Component::I16 => (f64::from(i16::from_le_bytes([bytes[0], bytes[1]])), 32767.0),
-            Component::U8 => (f64::from(bytes[0]), 255.0),
-            Component::U16 | Component::U32 => {
-                (f64::from(self.integer(bytes)), if self == Component::U16 { 65535.0 } else { 4294967295.0 })
-            }
+            ComponentType::I8 => f64::from(bytes[0] as i8),
+            ComponentType::I16 => f64::from(i16::from_le_bytes([bytes[0], bytes[1]])),
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32 => f64::from(self.integer(bytes)),
         };
-        if normalized { (value / most).max(-1.0) as f32 } else { value as f32 }
+        if normalized { self.normalized(value) } else { value as f32 }
+    }
+
+    /// The fraction that a normalized integer stands for (§3.6.2.2).
+    #[inline]
+    fn normalized(self, value: f64) -> f32 {
+        let most = match self {
+            ComponentType::I8 => 127.0,
+            ComponentType::U8 => 255.0,
+            ComponentType::I16 => 32767.0,
+            ComponentType::U16 => 65535.0,
+            ComponentType::U32 => 4294967295.0,
+            ComponentType::F32 => 1.0,
+        };
+        (value / most).max(-1.0) as f32
     }
 
     #[inline]
@@ -100,6 +111,16 @@ impl Accessors<'_> {
         self.rows(index, accessor, N * size, [0.0; N], convert)
     }
 
+    /// Rows that a decoder gave for an accessor as plain numbers, brought to what the accessor means by them.
+    pub(crate) fn decoded<const N: usize>(&self, index: usize, numbers: &[f32]) -> Result<Vec<[f32; N]>> {
+        let (accessor, component) = self.accessor(index, &format!("VEC{N}"))?;
+        let rows = numbers.as_chunks::<N>().0;
+        if !accessor.normalized || component == ComponentType::F32 {
+            return Ok(rows.to_vec());
+        }
+        Ok(rows.iter().map(|row| row.map(|x| component.normalized(f64::from(x)))).collect())
+    }
+
     /// Rows of one number.
     pub(crate) fn scalars(&self, index: usize) -> Result<Vec<f32>> {
         let (accessor, component) = self.accessor(index, "SCALAR")?;
@@ -110,25 +131,30 @@ impl Accessors<'_> {
     /// Rows of one unsigned integer.
     pub(crate) fn indices(&self, index: usize) -> Result<Vec<u32>> {
         let (accessor, component) = self.accessor(index, "SCALAR")?;
-        if !matches!(component, Component::U8 | Component::U16 | Component::U32) {
+        if !matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) {
             return Err(self.error(index, "expected unsigned integers as indices"));
         }
         self.rows(index, accessor, component.size(), 0, |bytes| component.integer(bytes))
     }
 
+    /// Whether an accessor has bytes of its own: a compressed primitive's accessors have none.
+    pub(crate) fn has_data(&self, index: usize) -> bool {
+        self.document.accessors.get(index).is_none_or(|a| a.buffer_view.is_some() || a.sparse.is_some())
+    }
+
     /// Number of rows that an accessor claims, not checked against its bytes.
     pub(crate) fn count(&self, index: usize) -> Result<u64> {
-        let accessor = self.root.accessors.get(index);
+        let accessor = self.document.accessors.get(index);
         accessor.map(|a| a.count).ok_or_else(|| self.error(index, "it does not exist"))
     }
 
-    fn accessor(&self, index: usize, shape: &str) -> Result<(&Accessor, Component)> {
+    fn accessor(&self, index: usize, shape: &str) -> Result<(&Accessor, ComponentType)> {
         let accessor =
-            self.root.accessors.get(index).ok_or_else(|| self.error(index, "it does not exist"))?;
+            self.document.accessors.get(index).ok_or_else(|| self.error(index, "it does not exist"))?;
         if accessor.shape != shape {
             return Err(self.error(index, format!("expected {shape}, found {}", accessor.shape)));
         }
-        let component = Component::new(accessor.component_type).ok_or_else(|| {
+        let component = ComponentType::from_code(accessor.component_type).ok_or_else(|| {
             self.error(index, format!("unknown component type {}", accessor.component_type))
         })?;
         Ok((accessor, component))
@@ -147,18 +173,22 @@ impl Accessors<'_> {
                 let rows = self.slice(index, view, accessor.byte_offset, accessor.count, size)?;
                 (0..accessor.count as usize).map(|row| convert(rows.get(row))).collect()
             }
-            None if accessor.sparse.is_none() => {
-                return Err(self.error(index, "it has no data (no buffer view and no sparse values)"));
+            // Without a view all is zero (§5.1), which takes no bytes of the file: the bytes that were read bound it.
+            None => {
+                let most = self.source.data.len() as u64 + self.buffers.bytes_read();
+                if accessor.count > most {
+                    let message = format!(
+                        "{} rows without data are too many: the model may have up to {most}, one for each byte read",
+                        accessor.count
+                    );
+                    return Err(self.error(index, message));
+                }
+                vec![zero; accessor.count as usize]
             }
-            // Zeros need no bytes in the file: bound them by something that does.
-            None if accessor.count > self.document_bytes() => {
-                return Err(self.error(index, format!("{} rows without data are too many", accessor.count)));
-            }
-            None => vec![zero; accessor.count as usize],
         };
         if let Some(sparse) = &accessor.sparse {
-            let component = Component::new(sparse.indices.component_type)
-                .filter(|c| matches!(c, Component::U8 | Component::U16 | Component::U32))
+            let component = ComponentType::from_code(sparse.indices.component_type)
+                .filter(|c| matches!(c, ComponentType::U8 | ComponentType::U16 | ComponentType::U32))
                 .ok_or_else(|| self.error(index, "expected unsigned integers as sparse indices"))?;
             let (at, count) = (&sparse.indices, sparse.count);
             let places = self.slice(index, at.buffer_view, at.byte_offset, count, component.size())?;
@@ -180,7 +210,7 @@ impl Accessors<'_> {
 
     /// `count` rows of `size` bytes, checked to lie inside the view.
     fn slice(&self, index: usize, view: usize, offset: u64, count: u64, size: usize) -> Result<Rows<'_>> {
-        let (bytes, stride) = self.buffers.view(self.root, view)?;
+        let (bytes, stride) = self.buffers.view(view)?;
         let stride = stride.unwrap_or(size as u64);
         if stride < size as u64 {
             return Err(self.error(index, format!("a stride of {stride} bytes is less than a row of {size}")));
@@ -198,10 +228,6 @@ impl Accessors<'_> {
                 Err(self.error(index, message))
             }
         }
-    }
-
-    fn document_bytes(&self) -> u64 {
-        self.source.data.len() as u64
     }
 
     fn error(&self, index: usize, message: impl Into<String>) -> Error {

@@ -1,16 +1,16 @@
-//! The body of a text PLY: one row a line.
+//! Reads the body of a text PLY, which has one row a line.
 
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
-use crate::ply::header::{Element, Header, Kind, Meaning, Scalar};
-use crate::ply::{BadIndex, Refused, Sink, slot};
+use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
+use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Reads all elements.
 pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
     let mut lines = Lines::after(source.data, header.body, header.lines);
     let mut indices = Vec::new();
-    // Rows with more values than the header tells: how many, and the line of the first.
+    // The number of rows with more values than the header announces, and the line of the first.
     let (mut longer, mut first_longer) = (0u64, 0);
     for element in header.elements.iter().filter(|element| !element.properties.is_empty()) {
         for row in 0..element.count {
@@ -40,7 +40,7 @@ pub(super) fn read(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) ->
     Ok(())
 }
 
-/// Reads a row; returns whether it ends where the header tells.
+/// Reads a row. The result is whether it has as many values as the header announces.
 fn read_row(
     source: &Source<'_>,
     element: &Element,
@@ -88,7 +88,7 @@ fn read_row(
             })?;
         }
     }
-    if element.kind == Kind::Vertices {
+    if element.kind == ElementKind::Vertices {
         sink.vertex(vertex);
     }
     Ok(words.next().is_none())
@@ -97,7 +97,7 @@ fn read_row(
 /// The line of a vertex's row.
 pub(super) fn line_of_vertex(source: &Source<'_>, header: &Header, row: usize) -> u64 {
     let with_rows = header.elements.iter().filter(|element| !element.properties.is_empty());
-    let before: u64 = with_rows.take_while(|e| e.kind != Kind::Vertices).map(|e| e.count).sum();
+    let before: u64 = with_rows.take_while(|e| e.kind != ElementKind::Vertices).map(|e| e.count).sum();
     let lines = Lines::after(source.data, header.body, header.lines);
     let mut rows = lines.filter(|(_, line)| !line.trim_ascii().is_empty());
     rows.nth(before as usize + row).map_or(0, |(number, _)| number)

@@ -1,18 +1,18 @@
-//! The body of a binary PLY.
+//! Reads the body of a binary PLY.
 
-use crate::error::Result;
-use crate::ply::header::{Element, Header, Kind, Meaning, Scalar};
-use crate::ply::{BadIndex, Refused, Sink, slot};
+use crate::error::{Error, Result};
+use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
+use crate::ply::sink::{BadIndex, Refused, Sink, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
-/// Reads all elements; `BIG` is the byte order.
+/// Reads all elements; `BIG` is whether the byte order is big-endian.
 pub(super) fn read<const BIG: bool>(source: &Source<'_>, header: &Header, sink: &mut Sink<'_>) -> Result<()> {
     let mut cursor = Cursor::<BIG> { source, at: header.body };
     for element in &header.elements {
         match element.kind {
-            Kind::Vertices => cursor.vertices(element, sink)?,
-            Kind::Faces | Kind::Strips => cursor.lists(element, sink)?,
-            Kind::Edges | Kind::Other => cursor.pass(element, element.count)?,
+            ElementKind::Vertices => cursor.vertices(element, sink)?,
+            ElementKind::Faces | ElementKind::Strips => cursor.lists(element, sink)?,
+            ElementKind::Edges | ElementKind::Other => cursor.skip(element, element.count)?,
         }
     }
     let extra = source.data.len() - cursor.at;
@@ -26,9 +26,9 @@ pub(super) fn read<const BIG: bool>(source: &Source<'_>, header: &Header, sink: 
 pub(super) fn byte_of_vertex<const BIG: bool>(source: &Source<'_>, header: &Header, row: usize) -> usize {
     let mut cursor = Cursor::<BIG> { source, at: header.body };
     for element in &header.elements {
-        let rows = if element.kind == Kind::Vertices { row as u64 } else { element.count };
-        // The body has been read to its end before: this cannot fail.
-        if cursor.pass(element, rows).is_err() || element.kind == Kind::Vertices {
+        let rows = if element.kind == ElementKind::Vertices { row as u64 } else { element.count };
+        // The body was read to its end before, so this cannot fail.
+        if cursor.skip(element, rows).is_err() || element.kind == ElementKind::Vertices {
             break;
         }
     }
@@ -59,7 +59,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
             }
             return Ok(());
         }
-        // Rows of one size: find the kept values in them once.
+        // All rows have the same size, so the offsets of the kept values are found once.
         let mut fields = Vec::new();
         let mut offset = 0;
         for property in &element.properties {
@@ -80,13 +80,13 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
     }
 
     fn lists(&mut self, element: &Element, sink: &mut Sink<'_>) -> Result<()> {
-        if element.kind == Kind::Faces {
-            // Most faces are triangles of 13 bytes; a list of fewer bytes than 3 holds no triangle.
+        if element.kind == ElementKind::Faces {
+            // Reserve for triangles, whose rows have at least three bytes of indices.
             let room = (self.source.data.len() - self.at) / (smallest_row(element) + 3);
             sink.raw.triangles.reserve(room.min(element.count as usize));
         }
         let mut indices = Vec::new();
-        // Elements without properties have no bytes, whatever their count.
+        // Elements without properties take no bytes, so their count is not bounded by the file.
         let rows = if element.properties.is_empty() { 0 } else { element.count };
         for row in 0..rows {
             self.source.tick(row, self.at)?;
@@ -98,8 +98,8 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
                 }
                 indices.clear();
                 match property.scalar {
-                    Scalar::I32 => indices.extend(words::<BIG>(bytes).map(|word| i64::from(word as i32))),
-                    Scalar::U32 => indices.extend(words::<BIG>(bytes).map(i64::from)),
+                    Scalar::I32 => indices.extend(u32_words::<BIG>(bytes).map(|word| i64::from(word as i32))),
+                    Scalar::U32 => indices.extend(u32_words::<BIG>(bytes).map(i64::from)),
                     scalar => {
                         let items = bytes.chunks_exact(scalar.size());
                         indices.extend(items.map(|item| integer::<BIG>(scalar, item)));
@@ -120,8 +120,8 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
         Ok(())
     }
 
-    /// Passes over rows.
-    fn pass(&mut self, element: &Element, rows: u64) -> Result<()> {
+    /// Skips rows.
+    fn skip(&mut self, element: &Element, rows: u64) -> Result<()> {
         if element.properties.is_empty() {
             return Ok(());
         }
@@ -166,7 +166,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
     }
 
     #[cold]
-    fn truncated(&self, element: &Element) -> crate::Error {
+    fn truncated(&self, element: &Element) -> Error {
         let message =
             format!("expected {} rows of element {}, found the end of the file", element.count, element.name);
         self.source.error_at_byte(TRUNCATED, self.source.data.len(), message, TRUNCATED_HINT)
@@ -179,7 +179,7 @@ fn smallest_row(element: &Element) -> usize {
 }
 
 #[inline]
-fn words<const BIG: bool>(bytes: &[u8]) -> impl Iterator<Item = u32> {
+fn u32_words<const BIG: bool>(bytes: &[u8]) -> impl Iterator<Item = u32> {
     let (words, _) = bytes.as_chunks::<4>();
     words.iter().map(|word| if BIG { u32::from_be_bytes(*word) } else { u32::from_le_bytes(*word) })
 }

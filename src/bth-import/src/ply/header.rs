@@ -1,10 +1,10 @@
 //! The header of a PLY file: elements and their properties.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::number::{Lines, integer, shown, words};
 use crate::source::{MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT, UNSUPPORTED};
 
-/// How the body is written.
+/// How the body is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
     Ascii,
@@ -56,7 +56,7 @@ impl Scalar {
     }
 }
 
-/// What a property means to the reader.
+/// What the reader uses a property for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meaning {
     /// A coordinate of a position.
@@ -65,9 +65,9 @@ pub(super) enum Meaning {
     Normal(usize),
     /// A texture coordinate.
     Uv(usize),
-    /// Corners of a face, or a strip.
+    /// Vertex indices of a face or of strips.
     Indices,
-    /// Passed over.
+    /// Skipped.
     Other,
 }
 
@@ -78,13 +78,13 @@ pub(super) struct Property {
     pub(super) list: Option<Scalar>,
     /// Type of the value or of a list's items.
     pub(super) scalar: Scalar,
-    /// What it is for.
+    /// What it is used for.
     pub(super) meaning: Meaning,
 }
 
-/// What an element is for.
+/// What an element is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ElementKind {
     Vertices,
     Faces,
     Strips,
@@ -97,12 +97,12 @@ pub(super) enum Kind {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
     pub(super) name: String,
-    pub(super) kind: Kind,
+    pub(super) kind: ElementKind,
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
 }
 
-/// A header.
+/// The header of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -114,124 +114,155 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// The vertices, if the file has some.
+    /// The element of vertices, if the file has one.
     pub(super) fn vertices(&self) -> Option<&Element> {
-        self.elements.iter().find(|element| element.kind == Kind::Vertices)
+        self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
-    /// Whether vertices have all of `N` properties of a meaning.
+    /// Whether vertices have all of the `N` properties of a meaning.
     pub(super) fn has<const N: usize>(&self, meaning: impl Fn(usize) -> Meaning) -> bool {
         let properties = self.vertices().map_or(&[][..], |vertices| &vertices.properties);
         (0..N).all(|k| properties.iter().any(|p| p.meaning == meaning(k)))
     }
 }
 
-fn meaning(kind: Kind, name: &[u8], list: bool) -> Meaning {
+fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
     match (kind, name, list) {
-        (Kind::Vertices, b"x", false) => Meaning::Position(0),
-        (Kind::Vertices, b"y", false) => Meaning::Position(1),
-        (Kind::Vertices, b"z", false) => Meaning::Position(2),
-        (Kind::Vertices, b"nx", false) => Meaning::Normal(0),
-        (Kind::Vertices, b"ny", false) => Meaning::Normal(1),
-        (Kind::Vertices, b"nz", false) => Meaning::Normal(2),
-        (Kind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
-        (Kind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
-        (Kind::Faces | Kind::Strips, b"vertex_indices" | b"vertex_index", true) => Meaning::Indices,
+        (ElementKind::Vertices, b"x", false) => Meaning::Position(0),
+        (ElementKind::Vertices, b"y", false) => Meaning::Position(1),
+        (ElementKind::Vertices, b"z", false) => Meaning::Position(2),
+        (ElementKind::Vertices, b"nx", false) => Meaning::Normal(0),
+        (ElementKind::Vertices, b"ny", false) => Meaning::Normal(1),
+        (ElementKind::Vertices, b"nz", false) => Meaning::Normal(2),
+        (ElementKind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
+        (ElementKind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
+        (ElementKind::Faces | ElementKind::Strips, b"vertex_indices" | b"vertex_index", true) => {
+            Meaning::Indices
+        }
         _ => Meaning::Other,
     }
 }
 
+/// A header in the making, and the line that is being read.
+struct HeaderReader<'s, 'd> {
+    source: &'s Source<'d>,
+    number: u64,
+    line: &'d [u8],
+    encoding: Option<Encoding>,
+    elements: Vec<Element>,
+}
+
 /// Reads the header.
+///
+/// # Errors
+/// `BTH-I002`, `BTH-I003` or `BTH-I006` with the line that does not follow the format, is missing, or is not supported.
 pub(super) fn read(source: &Source<'_>) -> Result<Header> {
     let mut lines = Lines::new(source.data);
-    let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
-    let mut first = true;
+    let mut reader = HeaderReader { source, number: 0, line: b"", encoding: None, elements: Vec::new() };
     loop {
         let Some((number, line)) = lines.next() else {
             let message = "expected end_header, found the end of the file";
             return Err(source.error_at_line(TRUNCATED, lines.number(), message, TRUNCATED_HINT));
         };
-        let malformed = |expected: &str| {
-            let message = format!("expected {expected}, found \"{}\"", shown(line));
-            source.error_at_line(MALFORMED, number, message, MALFORMED_HINT)
-        };
+        (reader.number, reader.line) = (number, line);
         let words: Vec<&[u8]> = words(line).collect();
-        if std::mem::take(&mut first) {
-            if words != [b"ply"] {
-                return Err(malformed("ply"));
-            }
-            continue;
-        }
         match words[..] {
+            [b"ply"] if number == 1 => {}
+            _ if number == 1 => return Err(reader.malformed("ply")),
             [] | [b"comment" | b"obj_info", ..] => {}
-            [b"format", name, version] if encoding.is_none() => {
-                encoding = Some(match name {
-                    b"ascii" => Encoding::Ascii,
-                    b"binary_little_endian" => Encoding::Little,
-                    b"binary_big_endian" => Encoding::Big,
-                    _ => return Err(malformed("ascii, binary_little_endian or binary_big_endian")),
-                });
-                if version != b"1.0" {
-                    let message = format!("expected PLY version 1.0, found \"{}\"", shown(version));
-                    let hint = "convert the model to PLY 1.0";
-                    return Err(source.error_at_line(UNSUPPORTED, number, message, hint));
-                }
-            }
-            [b"element", name, count] => {
-                let kind = match name {
-                    b"vertex" => Kind::Vertices,
-                    b"face" => Kind::Faces,
-                    b"tristrips" => Kind::Strips,
-                    b"edge" => Kind::Edges,
-                    _ => Kind::Other,
-                };
-                if kind == Kind::Vertices && elements.iter().any(|e| e.kind == kind) {
-                    return Err(malformed("one element vertex"));
-                }
-                let count = integer(count).and_then(|n| u64::try_from(n).ok());
-                let count = count.ok_or_else(|| malformed("a number of rows"))?;
-                elements.push(Element { name: shown(name), kind, count, properties: Vec::new() });
-            }
-            [b"property", ref rest @ ..] => {
-                let element = elements.last_mut().ok_or_else(|| malformed("element before property"))?;
-                let scalar = |name| Scalar::new(name).ok_or_else(|| malformed("a PLY type"));
-                let (list, item, name) = match *rest {
-                    [b"list", count, item, name] => (Some(scalar(count)?), scalar(item)?, name),
-                    [item, name] => (None, scalar(item)?, name),
-                    _ => return Err(malformed("property type name or property list type type name")),
-                };
-                if list.is_some_and(|count| !count.is_integer()) {
-                    return Err(malformed("an integer type for the count of a list"));
-                }
-                let meaning = meaning(element.kind, name, list.is_some());
-                if meaning == Meaning::Indices && !item.is_integer() {
-                    return Err(malformed("an integer type for indices"));
-                }
-                if meaning != Meaning::Other && element.properties.iter().any(|p| p.meaning == meaning) {
-                    return Err(malformed("each property once"));
-                }
-                element.properties.push(Property { list, scalar: item, meaning });
-            }
-            [b"end_header"] => break,
-            _ => return Err(malformed("format, element, property, comment or end_header")),
+            [b"format", name, version] if reader.encoding.is_none() => reader.format(name, version)?,
+            [b"element", name, count] => reader.element(name, count)?,
+            [b"property", ref rest @ ..] => reader.property(rest)?,
+            [b"end_header"] => return reader.finish(lines.position()),
+            _ => return Err(reader.malformed("format, element, property, comment or end_header")),
         }
     }
-    let (body, lines) = (lines.position(), lines.number());
-    let Some(encoding) = encoding else {
-        let message = "expected a line \"format ...\" before end_header, found none";
-        return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));
-    };
-    let header = Header { encoding, elements, body, lines };
-    if header.vertices().is_some_and(|v| v.count > 0) && !header.has::<3>(Meaning::Position) {
-        let message = "expected properties x, y and z of element vertex, found not all of them";
-        return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));
+}
+
+impl HeaderReader<'_, '_> {
+    fn malformed(&self, expected: &str) -> Error {
+        let message = format!("expected {expected}, found \"{}\"", shown(self.line));
+        self.source.error_at_line(MALFORMED, self.number, message, MALFORMED_HINT)
     }
-    for element in header.elements.iter().filter(|e| matches!(e.kind, Kind::Faces | Kind::Strips)) {
-        if element.count > 0 && element.properties.iter().all(|p| p.meaning != Meaning::Indices) {
-            let message = format!("expected a list vertex_indices of element {}, found none", element.name);
-            return Err(source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT));
+
+    fn format(&mut self, name: &[u8], version: &[u8]) -> Result<()> {
+        self.encoding = Some(match name {
+            b"ascii" => Encoding::Ascii,
+            b"binary_little_endian" => Encoding::Little,
+            b"binary_big_endian" => Encoding::Big,
+            _ => return Err(self.malformed("ascii, binary_little_endian or binary_big_endian")),
+        });
+        if version == b"1.0" {
+            return Ok(());
         }
+        let message = format!("expected PLY version 1.0, found \"{}\"", shown(version));
+        Err(self.source.error_at_line(UNSUPPORTED, self.number, message, "convert the model to PLY 1.0"))
     }
-    Ok(header)
+
+    fn element(&mut self, name: &[u8], count: &[u8]) -> Result<()> {
+        let kind = match name {
+            b"vertex" => ElementKind::Vertices,
+            b"face" => ElementKind::Faces,
+            b"tristrips" => ElementKind::Strips,
+            b"edge" => ElementKind::Edges,
+            _ => ElementKind::Other,
+        };
+        if kind == ElementKind::Vertices && self.elements.iter().any(|e| e.kind == kind) {
+            return Err(self.malformed("one element vertex"));
+        }
+        let count = integer(count).and_then(|n| u64::try_from(n).ok());
+        let count = count.ok_or_else(|| self.malformed("a number of rows"))?;
+        self.elements.push(Element { name: shown(name), kind, count, properties: Vec::new() });
+        Ok(())
+    }
+
+    fn property(&mut self, words: &[&[u8]]) -> Result<()> {
+        let Some(element) = self.elements.last() else {
+            return Err(self.malformed("element before property"));
+        };
+        let scalar = |name| Scalar::new(name).ok_or_else(|| self.malformed("a PLY type"));
+        let (list, item, name) = match *words {
+            [b"list", count, item, name] => (Some(scalar(count)?), scalar(item)?, name),
+            [item, name] => (None, scalar(item)?, name),
+            _ => return Err(self.malformed("property type name or property list type type name")),
+        };
+        if list.is_some_and(|count| !count.is_integer()) {
+            return Err(self.malformed("an integer type for the count of a list"));
+        }
+        let meaning = meaning(element.kind, name, list.is_some());
+        if meaning == Meaning::Indices && !item.is_integer() {
+            return Err(self.malformed("an integer type for indices"));
+        }
+        if meaning != Meaning::Other && element.properties.iter().any(|p| p.meaning == meaning) {
+            return Err(self.malformed("each property once"));
+        }
+        if let Some(element) = self.elements.last_mut() {
+            element.properties.push(Property { list, scalar: item, meaning });
+        }
+        Ok(())
+    }
+
+    /// Checks that the header has what the body needs, which begins at byte `body`.
+    fn finish(self, body: usize) -> Result<Header> {
+        let (source, lines) = (self.source, self.number);
+        let incomplete = |message: String| source.error_at_line(MALFORMED, lines, message, MALFORMED_HINT);
+        let Some(encoding) = self.encoding else {
+            let message = "expected a line \"format ...\" before end_header, found none";
+            return Err(incomplete(message.to_owned()));
+        };
+        let header = Header { encoding, elements: self.elements, body, lines };
+        if header.vertices().is_some_and(|v| v.count > 0) && !header.has::<3>(Meaning::Position) {
+            let message = "expected properties x, y and z of element vertex, found not all of them";
+            return Err(incomplete(message.to_owned()));
+        }
+        let has_corners = |e: &&Element| matches!(e.kind, ElementKind::Faces | ElementKind::Strips);
+        for element in header.elements.iter().filter(has_corners) {
+            if element.count > 0 && element.properties.iter().all(|p| p.meaning != Meaning::Indices) {
+                let name = &element.name;
+                let message = format!("expected a list vertex_indices of element {name}, found none");
+                return Err(incomplete(message));
+            }
+        }
+        Ok(header)
+    }
 }

@@ -159,14 +159,67 @@ fn messy_models_are_read_or_refused_with_their_place() {
     );
 }
 
+/// Triangles, and the smallest and the largest corner in world space, as gltf-transform 4.5.1 (Node.js, with the
+/// meshoptimizer of its authors) reads them.
+#[cfg(feature = "meshopt")]
+const COMPRESSED: [(&str, u64, [[f64; 3]; 2]); 2] = [
+    (
+        "pirate.glb",
+        5010,
+        [[-0.76058197, -0.00108800002, -0.229468003], [0.760505213499, 1.903962938537, 0.225776727785]],
+    ),
+    (
+        "ingenuity.glb",
+        9060,
+        [
+            [-0.4949973523616791, -0.0060527026653289795, -0.5528796911239624],
+            [0.49137577414512634, 0.5560029149055481, 0.5535024404525757],
+        ],
+    ),
+];
+
+#[cfg(feature = "meshopt")]
+#[test]
+fn compressed_models_have_the_bounds_that_another_reader_finds() {
+    let Some(folder) = folder() else { return };
+    for (name, triangles, bounds) in COMPRESSED {
+        let path = folder.join("compressed").join(name);
+        #[allow(clippy::print_stderr, reason = "a skipped test says so")]
+        if !path.is_file() {
+            eprintln!("skipped: no {}", path.display());
+            continue;
+        }
+        let (mesh, report) = import(&path, Keep::All, &Silent).unwrap();
+        assert_eq!(report.triangles, triangles, "{name}");
+        let extreme = |k: usize, pick: fn(f32, f32) -> f32| {
+            mesh.positions.iter().map(|p| p[k]).reduce(pick).map_or(f64::NAN, f64::from)
+        };
+        for k in 0..3 {
+            let found = [extreme(k, f32::min), extreme(k, f32::max)];
+            for (found, expected) in found.into_iter().zip(bounds.map(|b| b[k])) {
+                let half_ulp = f64::from(f32::EPSILON) / 2.0 * expected.abs();
+                assert!((found - expected).abs() <= half_ulp, "{name}: {found} instead of {expected}");
+            }
+        }
+        // Whatever bits of the streams change, no decoder panics or reads outside.
+        let bytes = std::fs::read(&path).unwrap();
+        let mut random = bth_random::Rng::new(2);
+        for _ in 0..20 {
+            let mut damaged = bytes.clone();
+            for _ in 0..=random.below(8) {
+                let at = random.below(bytes.len() as u64) as usize;
+                damaged[at] ^= 1 << random.below(8);
+            }
+            let _ = bth_import::import_bytes(&path, &damaged, Keep::All, &Silent);
+        }
+    }
+}
+
 #[test]
 fn cuts_and_flipped_bits_of_models_never_panic() {
     let Some(folder) = folder() else { return };
-    let mut state = 1u64;
-    let mut random = move |below: usize| {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 33) as usize % below
-    };
+    let mut generator = bth_random::Rng::new(1);
+    let mut random = move |below: usize| generator.below(below as u64) as usize;
     for path in models(&folder) {
         let bytes = std::fs::read(&path).unwrap();
         if bytes.is_empty() || bytes.len() > 40_000 {

@@ -1,11 +1,14 @@
 //! Import of models: what each format yields, what is refused and where, and the collected test models.
 
+mod compressed;
 mod data;
 mod gltf;
 mod obj;
 mod off;
 mod ply;
+mod quantized;
 mod stl;
+mod textures;
 
 use std::sync::Mutex;
 

@@ -1,0 +1,207 @@
+//! Flat models: the default scene's meshes in world space, in node traversal order, or single meshes in their own space.
+
+use glam::DAffine3;
+
+use crate::error::{Place, Result};
+use crate::gltf::accessor::Accessors;
+use crate::gltf::buffer::Buffers;
+use crate::gltf::document::{self, GRAPH};
+use crate::gltf::extensions::SUPPORTED;
+use crate::gltf::primitive::{PrimitiveReader, Triangles};
+use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
+use crate::gltf::transform;
+use crate::mesh::Keep;
+use crate::raw::{NONE, Raw, RowKind, check_triangles};
+use crate::source::Source;
+
+/// A mesh at a place of the flat model.
+struct PlacedMesh {
+    /// `None` when the mesh is read in its own space.
+    node: Option<usize>,
+    mesh: usize,
+    world: DAffine3,
+}
+
+/// Where the rows of one primitive of one node begin.
+struct Span {
+    first: [usize; 3],
+    accessors: [Option<usize>; 3],
+    node: Option<usize>,
+    mesh: usize,
+    primitive: usize,
+}
+
+/// Appends primitives to a raw mesh.
+struct Flattener<'r, 'a> {
+    accessors: Accessors<'r>,
+    raw: Raw<'a>,
+    spans: Vec<Span>,
+    keep: Keep,
+}
+
+/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes. Skins and morph
+/// targets stay in the mesh's own pose. Lines count each segment, points each point as skipped.
+pub(crate) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
+    let (document, binary) = document::read(source, &SUPPORTED)?;
+    if document.extensions_used.iter().any(|name| name == "EXT_mesh_gpu_instancing") {
+        source.monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
+    }
+    let placed = placed_meshes(source, &document)?;
+    if placed.iter().filter_map(|placed| placed.node).any(|node| document.nodes[node].skin.is_some()) {
+        source.monitor.warn("skins are ignored: skinned meshes are read in their bind pose");
+    }
+    if placed.iter().any(|placed| document.has_targets(placed.mesh)) {
+        source.monitor.warn("morph targets are ignored: meshes are read without them");
+    }
+    read_placed(source, &document, binary, keep, &placed)
+}
+
+/// Reads one mesh of a document in its own space.
+pub(crate) fn read_mesh<'a>(
+    source: &'a Source<'a>,
+    document: &GltfDocument,
+    binary: Option<&[u8]>,
+    mesh: usize,
+    keep: Keep,
+) -> Result<Raw<'a>> {
+    let placed = PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY };
+    read_placed(source, document, binary, keep, &[placed])
+}
+
+fn read_placed<'a>(
+    source: &'a Source<'a>,
+    document: &GltfDocument,
+    binary: Option<&[u8]>,
+    keep: Keep,
+    placed: &[PlacedMesh],
+) -> Result<Raw<'a>> {
+    let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
+    let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
+    let mut flattener = Flattener { accessors, raw: Raw::new("gltf", no_place), spans: Vec::new(), keep };
+    for (done, mesh) in placed.iter().enumerate() {
+        source.progress(source.data.len() / placed.len() * done)?;
+        flattener.mesh(mesh)?;
+    }
+    let Flattener { mut raw, spans, .. } = flattener;
+    if raw.normals.is_empty() {
+        raw.normal_rows.clear();
+    }
+    if raw.uvs.is_empty() {
+        raw.uv_rows.clear();
+    }
+    Ok(Raw { locate: Box::new(move |kind, row| locate(source, &spans, kind, row)), ..raw })
+}
+
+fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Place {
+    let kind = kind as usize;
+    let span = &spans[spans.partition_point(|span| span.first[kind] <= row).saturating_sub(1)];
+    let accessor = span.accessors[kind]
+        .map_or(String::new(), |a| format!(" accessor {a} row {}", row - span.first[kind]));
+    let node = span.node.map_or(String::new(), |node| format!("node {node} "));
+    let part = format!("{node}mesh {} primitive {}{accessor}", span.mesh, span.primitive);
+    Place::Part(source.path.to_owned(), part)
+}
+
+/// The scene's nodes that have a mesh, in depth-first order, with their world transforms.
+fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
+    let error =
+        |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
+    let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
+        Some(scene) => scene.nodes.clone(),
+        None if document.scene.is_some() => {
+            return Err(error(format!("scene {}", document.scene.unwrap_or(0)), "it does not exist"));
+        }
+        None => document.parentless_nodes(),
+    };
+    let mut placed = Vec::new();
+    let mut visited = vec![false; document.nodes.len()];
+    let mut stack: Vec<_> = roots.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
+    while let Some((index, parent)) = stack.pop() {
+        let part = || format!("node {index}");
+        let node = document.nodes.get(index).ok_or_else(|| error(part(), "it does not exist"))?;
+        if std::mem::replace(&mut visited[index], true) {
+            return Err(error(part(), "expected a node with one parent, found it twice in the scene"));
+        }
+        let world = parent * transform::local(node);
+        if let Some(mesh) = node.mesh {
+            placed.push(PlacedMesh { node: Some(index), mesh, world });
+        }
+        stack.extend(node.children.iter().rev().map(|&child| (child, world)));
+    }
+    Ok(placed)
+}
+
+impl Flattener<'_, '_> {
+    fn mesh(&mut self, placed: &PlacedMesh) -> Result<()> {
+        let (document, source) = (self.accessors.document, self.accessors.source);
+        let Some(GltfMesh { primitives, .. }) = document.meshes.get(placed.mesh) else {
+            let message = format!("expected a mesh below {}, found {}", document.meshes.len(), placed.mesh);
+            let part =
+                placed.node.map_or_else(|| format!("mesh {}", placed.mesh), |node| format!("node {node}"));
+            return Err(source.error_in_part(GRAPH, part, message, "export the model again"));
+        };
+        for (index, primitive) in primitives.iter().enumerate() {
+            source.monitor.check()?;
+            self.primitive(placed, index, primitive)?;
+        }
+        Ok(())
+    }
+
+    fn primitive(&mut self, placed: &PlacedMesh, index: usize, primitive: &Primitive) -> Result<()> {
+        let part = format!("mesh {} primitive {index}", placed.mesh);
+        let reader = PrimitiveReader { accessors: &self.accessors, primitive, part };
+        let Some(kept) = reader.kept(self.keep)? else {
+            let warning = format!("{} has no positions and is left out", reader.part);
+            self.accessors.source.monitor.warn(&warning);
+            self.raw.skipped += 1;
+            return Ok(());
+        };
+        if let Some(skipped) = reader.points_or_lines(&kept)? {
+            self.raw.skipped += skipped;
+            return Ok(());
+        }
+        self.spans.push(Span {
+            first: [self.raw.positions.len(), self.raw.normals.len(), self.raw.uvs.len()],
+            accessors: [Some(kept.positions), kept.normals, kept.uvs],
+            node: placed.node,
+            mesh: placed.mesh,
+            primitive: index,
+        });
+        let triangles = reader.read(&kept, self.raw.positions.len())?;
+        self.append(&triangles, &placed.world)
+    }
+
+    /// Appends a primitive's rows in world space. A mirrored mesh keeps its front sides (specification, §3.7.4).
+    fn append(&mut self, triangles: &Triangles, world: &DAffine3) -> Result<()> {
+        let (raw, corners) = (&mut self.raw, &triangles.corners);
+        raw.skipped += triangles.skipped;
+        check_triangles((raw.triangles.len() + corners.len()) as u64)?;
+        let mirrored = transform::is_mirrored(world);
+        let rows_from = |first: usize| {
+            let row = move |i: u32| first as u32 + i;
+            let turned = move |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+            corners.iter().map(move |triangle| turned(triangle).map(row))
+        };
+        let absent = std::iter::repeat_n([NONE; 3], corners.len());
+        let first = [raw.positions.len(), raw.normals.len(), raw.uvs.len()];
+        raw.positions.extend(triangles.positions.iter().map(|p| transform::point(world, *p)));
+        raw.triangles.extend(rows_from(first[0]));
+        match &triangles.normals {
+            Some(normals) => {
+                raw.normals.extend(normals.iter().map(|n| transform::normal(world, *n)));
+                raw.normal_rows.extend(rows_from(first[1]));
+            }
+            None if self.keep != Keep::None => raw.normal_rows.extend(absent.clone()),
+            None => {}
+        }
+        match &triangles.uvs {
+            Some(uvs) => {
+                raw.uvs.extend(uvs);
+                raw.uv_rows.extend(rows_from(first[2]));
+            }
+            None if self.keep == Keep::All => raw.uv_rows.extend(absent),
+            None => {}
+        }
+        Ok(())
+    }
+}

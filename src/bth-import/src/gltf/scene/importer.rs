@@ -1,0 +1,75 @@
+//! What the steps of a scene's import share: the document, the manifest so far, and the names that are taken.
+
+use std::collections::{HashMap, HashSet};
+
+use bth_scene::Manifest;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+use crate::gltf::accessor::Accessors;
+use crate::gltf::document::GRAPH;
+use crate::gltf::scene::options::ImportReport;
+use crate::gltf::schema::GltfDocument;
+use crate::source::{MALFORMED, Source};
+
+/// A manifest in the making.
+pub(super) struct Importer<'a> {
+    pub(super) source: &'a Source<'a>,
+    pub(super) document: &'a GltfDocument,
+    pub(super) accessors: Accessors<'a>,
+    /// Whether what would be ignored is an error.
+    pub(super) strict: bool,
+    /// The path of the document as it stands in the manifest.
+    pub(super) file: &'a str,
+    pub(super) manifest: Manifest,
+    pub(super) report: ImportReport,
+    /// Names of the nodes so far.
+    pub(super) node_names: HashSet<String>,
+    /// Names of the objects so far.
+    pub(super) object_names: HashSet<String>,
+    /// Row of the object of each mesh.
+    pub(super) objects: HashMap<usize, usize>,
+}
+
+impl Importer<'_> {
+    /// Reports something that is not read: an error when strict, else a warning.
+    pub(super) fn ignore(&mut self, part: &str, what: String) -> Result<()> {
+        if self.strict {
+            let hint = "leave out --strict to go on without it";
+            return Err(self.source.error_in_part("BTH-I015", part, what, hint));
+        }
+        let message = format!("{part}: {what}");
+        if !self.report.ignored.contains(&message) {
+            self.source.monitor.warn(&message);
+            self.report.ignored.push(message);
+        }
+        Ok(())
+    }
+
+    /// An error of the scene's graph.
+    pub(super) fn error(&self, part: impl Into<String>, message: impl Into<String>) -> Error {
+        self.source.error_in_part(GRAPH, part, message, "export the model again")
+    }
+
+    /// Parses a part of the document that is kept as a value.
+    pub(super) fn typed<T: DeserializeOwned>(&self, value: &serde_json::Value, part: &str) -> Result<T> {
+        T::deserialize(value).map_err(|e| {
+            let message = format!("expected the properties that glTF defines, found: {e}");
+            self.source.error_in_part(MALFORMED, part, message, "export the model again")
+        })
+    }
+}
+
+/// The given name or else the fallback, without control characters and with a number if it is among `names` already;
+/// added to them.
+pub(super) fn unique(names: &mut HashSet<String>, given: &str, fallback: String) -> String {
+    let base: String = given.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let base = if base.is_empty() { fallback } else { base };
+    let mut name = base.clone();
+    let mut number = 2;
+    while !names.insert(name.clone()) {
+        name = format!("{base} {number}");
+        number += 1;
+    }
+    name
+}

@@ -1,0 +1,46 @@
+//! Lights of a glTF scene (KHR_lights_punctual).
+
+use bth_scene::{Light, LightKind};
+
+use crate::error::Result;
+use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::schema::Lights;
+
+impl Importer<'_> {
+    /// Adds a light at a row of the manifest's nodes.
+    pub(super) fn light(&mut self, index: usize, node: usize, part: &str) -> Result<()> {
+        let lights: Lights = match self.document.extensions.get("KHR_lights_punctual") {
+            Some(value) => self.typed(value, "KHR_lights_punctual")?,
+            None => Lights::default(),
+        };
+        let light = lights.lights.into_iter().nth(index);
+        let light = light.ok_or_else(|| self.error(part, format!("its light {index} does not exist")))?;
+        let light_part = format!("light {index}");
+        let kind = match light.kind.as_str() {
+            "directional" => LightKind::Directional,
+            "point" => LightKind::Point,
+            "spot" => LightKind::Spot {
+                inner: light.spot.inner_cone_angle.unwrap_or(0.0).to_degrees(),
+                outer: light.spot.outer_cone_angle.unwrap_or(std::f64::consts::FRAC_PI_4).to_degrees(),
+            },
+            other => {
+                return self.ignore(&light_part, format!("lights of kind \"{other}\" are ignored"));
+            }
+        };
+        let (color, intensity) = (light.color.unwrap_or([1.0; 3]), light.intensity.unwrap_or(1.0));
+        let from_zero = |x: f64| x.is_finite() && x >= 0.0;
+        let cone = match kind {
+            LightKind::Spot { inner, outer } => from_zero(inner) && inner < outer && outer <= 90.0,
+            _ => true,
+        };
+        let range = light.range.is_none_or(|r| from_zero(r) && r > 0.0);
+        if !(cone && range && color.iter().chain([&intensity]).all(|x| from_zero(*x))) {
+            let message = "expected a color, intensity, range and cone that glTF allows";
+            return Err(self.error(light_part, message));
+        }
+        let mut names = self.manifest.lights.iter().map(|l| l.name.clone()).collect();
+        let name = unique(&mut names, &light.name, light_part);
+        self.manifest.lights.push(Light { name, node, kind, color, intensity, range: light.range });
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+//! A manifest from a glTF scene: nodes, animations, cameras, lights, instancing.
+
+mod cameras;
+mod importer;
+mod lights;
+mod nodes;
+pub(crate) mod options;
+mod tracks;
+
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+use bth_scene::{Frames, Manifest};
+
+use self::importer::Importer;
+pub use self::options::{ImportOptions, ImportReport};
+use crate::error::Result;
+use crate::gltf::accessor::Accessors;
+use crate::gltf::buffer::Buffers;
+use crate::gltf::document;
+use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
+use crate::monitor::Monitor;
+use crate::source::{Source, read_file};
+
+/// The longest animation in frames.
+const MAX_FRAMES: u32 = 1 << 24;
+
+/// Reads the scene of a glTF or GLB file. `name` is the file's path as it is to stand in the manifest.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read, `BTH-I…` with the place when it cannot be used; with `strict` `BTH-I015` for
+/// what would be ignored.
+pub fn import(
+    path: &Path,
+    name: &str,
+    options: &ImportOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Manifest, ImportReport)> {
+    let data = read_file(path)?;
+    monitor.stage("import", Some(data.len() as u64));
+    let source = Source::new(path, &data, monitor);
+    // Animation pointers move what tracks cannot, so a document that requires them cannot be read.
+    let known = SUPPORTED.iter().filter(|s| **s != "KHR_animation_pointer");
+    let known: Vec<&str> = known.chain(&SCENE_EXTENSIONS).copied().collect();
+    let (document, binary) = document::read(&source, &known)?;
+    let accessors =
+        Accessors { source: &source, document: &document, buffers: Buffers::new(&source, &document, binary) };
+    let mut importer = Importer {
+        source: &source,
+        document: &document,
+        accessors,
+        strict: options.strict,
+        file: name,
+        manifest: Manifest::default(),
+        report: ImportReport { node_rows: vec![None; document.nodes.len()], ..ImportReport::default() },
+        node_names: HashSet::new(),
+        object_names: HashSet::new(),
+        objects: HashMap::new(),
+    };
+    importer.nodes(options)?;
+    let (tracks, last) = importer.tracks(&options.animation)?;
+    importer.manifest.tracks = tracks;
+    let last = (last * options.rate).ceil().clamp(0.0, f64::from(MAX_FRAMES)) as i32;
+    importer.manifest.frames = Frames { first: 0, last, rate: options.rate };
+    source.progress(data.len())?;
+    Ok(finish(importer))
+}
+
+/// Adds the totals to the report.
+fn finish(importer: Importer<'_>) -> (Manifest, ImportReport) {
+    let manifest = importer.manifest;
+    let report = ImportReport {
+        nodes: manifest.nodes.len() as u64,
+        instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
+        objects: manifest.objects.len() as u64,
+        tracks: manifest.tracks.len() as u64,
+        cameras: manifest.cameras.len() as u64,
+        lights: manifest.lights.len() as u64,
+        ..importer.report
+    };
+    (manifest, report)
+}

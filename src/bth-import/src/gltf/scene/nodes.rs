@@ -1,0 +1,190 @@
+//! Nodes of a glTF scene with their transforms, objects and instances.
+
+use bth_scene::{Node, Object, Transform};
+
+use crate::error::Result;
+use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::scene::options::ImportOptions;
+use crate::gltf::schema::{GltfNode, Instancing, LightReference, Visibility};
+use crate::source::UNSUPPORTED;
+
+impl Importer<'_> {
+    /// A name that no other node has.
+    fn node_name(&mut self, given: &str, fallback: String) -> String {
+        unique(&mut self.node_names, given, fallback)
+    }
+
+    /// The root nodes and the name or number of the wanted scene, or else of the default one.
+    fn scene(&self, wanted: Option<&str>) -> Result<(Vec<usize>, String)> {
+        let scenes = &self.document.scenes;
+        let index = match wanted {
+            Some(name) => {
+                let found = scenes.iter().position(|s| s.name == name);
+                let number = || name.parse().ok().filter(|n: &usize| *n < scenes.len());
+                Some(found.or_else(number).ok_or_else(|| {
+                    let names: Vec<_> =
+                        scenes.iter().enumerate().map(|(i, s)| format!("{i} \"{}\"", s.name)).collect();
+                    let message = format!("expected one of its scenes ({}), found {name}", names.join(", "));
+                    self.source.error_in_part(
+                        UNSUPPORTED,
+                        "scenes",
+                        message,
+                        "name one of these, or its number",
+                    )
+                })?)
+            }
+            None => self.document.scene.or((!scenes.is_empty()).then_some(0)),
+        };
+        let Some(index) = index else {
+            return Ok((self.document.parentless_nodes(), "all nodes".to_owned()));
+        };
+        let scene =
+            scenes.get(index).ok_or_else(|| self.error(format!("scene {index}"), "it does not exist"))?;
+        let name = if scene.name.is_empty() { index.to_string() } else { scene.name.clone() };
+        Ok((scene.nodes.clone(), name))
+    }
+
+    /// Adds the scene's nodes, parents before children, in depth-first order.
+    pub(super) fn nodes(&mut self, options: &ImportOptions) -> Result<()> {
+        let (roots, name) = self.scene(options.scene.as_deref())?;
+        self.report.scene = name;
+        let mut stack: Vec<(usize, Option<usize>)> = roots.into_iter().rev().map(|n| (n, None)).collect();
+        while let Some((index, parent)) = stack.pop() {
+            let part = || format!("node {index}");
+            let node =
+                self.document.nodes.get(index).ok_or_else(|| self.error(part(), "it does not exist"))?;
+            if self.report.node_rows[index].is_some() {
+                let message = "expected a node with one parent, found it twice in the scene";
+                return Err(self.error(part(), message));
+            }
+            let row = self.manifest.nodes.len();
+            self.report.node_rows[index] = Some(row);
+            self.node(index, node, parent)?;
+            stack.extend(node.children.iter().rev().map(|&child| (child, Some(row))));
+        }
+        Ok(())
+    }
+
+    /// Adds a node with its object, instances, camera and light.
+    fn node(&mut self, index: usize, node: &GltfNode, parent: Option<usize>) -> Result<()> {
+        let part = format!("node {index}");
+        let row = self.manifest.nodes.len();
+        let visible = match node.extensions.get("KHR_node_visibility") {
+            Some(value) => self.typed::<Visibility>(value, &part)?.visible.unwrap_or(true),
+            None => true,
+        };
+        let name = self.node_name(&node.name, part.clone());
+        let transform = self.transform(node, &part)?;
+        self.manifest.nodes.push(Node { name: name.clone(), parent, transform, object: None, visible });
+        if let Some(mesh) = node.mesh {
+            let object = self.object(mesh, &part)?;
+            if node.skin.is_some() {
+                self.ignore(&part, "its skin is ignored: the mesh stays in its bind pose".to_owned())?;
+            }
+            match node.extensions.get("EXT_mesh_gpu_instancing") {
+                Some(value) => self.instancing(&self.typed(value, &part)?, row, object, &name, &part)?,
+                None => self.manifest.nodes[row].object = Some(object),
+            }
+        }
+        if let Some(camera) = node.camera {
+            self.camera(camera, row, &part)?;
+        }
+        if let Some(value) = node.extensions.get("KHR_lights_punctual") {
+            let reference: LightReference = self.typed(value, &part)?;
+            self.light(reference.light, row, &part)?;
+        }
+        Ok(())
+    }
+
+    /// A node's transform, checked to be finite.
+    fn transform(&self, node: &GltfNode, part: &str) -> Result<Transform> {
+        let transform = match node.matrix {
+            Some(m) => Transform::Matrix([0, 1, 2].map(|row| [m[row], m[row + 4], m[row + 8], m[row + 12]])),
+            None => Transform::Parts {
+                translation: node.translation.unwrap_or([0.0; 3]),
+                rotation: node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]),
+                scale: node.scale.unwrap_or([1.0; 3]),
+            },
+        };
+        let numbers: Vec<f64> = match transform {
+            Transform::Matrix(rows) => rows.as_flattened().to_vec(),
+            Transform::Parts { translation, rotation, scale } => {
+                if rotation == [0.0; 4] {
+                    return Err(self.error(part, "expected a rotation that is not zero"));
+                }
+                [translation.as_slice(), &rotation, &scale].concat()
+            }
+        };
+        if !numbers.iter().all(|x| x.is_finite()) {
+            return Err(self.error(part, format!("expected a finite transform, found {numbers:?}")));
+        }
+        Ok(transform)
+    }
+
+    /// The row of the object of a mesh, which is added at its first use.
+    fn object(&mut self, mesh: usize, part: &str) -> Result<usize> {
+        if let Some(row) = self.objects.get(&mesh) {
+            return Ok(*row);
+        }
+        let Some(found) = self.document.meshes.get(mesh) else {
+            let message = format!("expected a mesh below {}, found {mesh}", self.document.meshes.len());
+            return Err(self.error(part, message));
+        };
+        if self.document.has_targets(mesh) {
+            let part = format!("mesh {mesh}");
+            self.ignore(&part, "its morph targets are ignored: it stays in its base shape".to_owned())?;
+        }
+        let row = self.manifest.objects.len();
+        let name = unique(&mut self.object_names, &found.name, format!("mesh {mesh}"));
+        let source = bth_scene::Source::Model { path: self.file.to_owned(), mesh: Some(mesh as u32) };
+        self.manifest.objects.push(Object { name, source });
+        self.objects.insert(mesh, row);
+        Ok(row)
+    }
+
+    /// Adds a child node for each instance of EXT_mesh_gpu_instancing.
+    fn instancing(
+        &mut self,
+        instancing: &Instancing,
+        parent: usize,
+        object: usize,
+        name: &str,
+        part: &str,
+    ) -> Result<()> {
+        let attribute = |name: &str| instancing.attributes.get(name).copied();
+        let vectors = |name: &str| attribute(name).map(|a| self.accessors.vectors::<3>(a)).transpose();
+        let (translations, scales) = (vectors("TRANSLATION")?, vectors("SCALE")?);
+        let rotations = attribute("ROTATION").map(|a| self.accessors.vectors::<4>(a)).transpose()?;
+        let lengths = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ];
+        let mut counts = lengths.into_iter().flatten();
+        let count = counts.next().unwrap_or(0);
+        if counts.any(|n| n != count) {
+            let message =
+                format!("expected equally many rows of each attribute of instances, found {lengths:?}");
+            return Err(self.error(part, message));
+        }
+        for i in 0..count {
+            let wide = |v: [f32; 3]| v.map(f64::from);
+            let transform = Transform::Parts {
+                translation: translations.as_ref().map_or([0.0; 3], |t| wide(t[i])),
+                rotation: rotations.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |r| r[i].map(f64::from)),
+                scale: scales.as_ref().map_or([1.0; 3], |s| wide(s[i])),
+            };
+            if let Transform::Parts { translation, rotation, scale } = transform {
+                let finite = [&translation[..], &rotation, &scale].concat().iter().all(|x| x.is_finite());
+                if !finite || rotation == [0.0; 4] {
+                    let message = format!("instance {i}: expected a finite transform with a rotation");
+                    return Err(self.error(part, message));
+                }
+            }
+            let name = self.node_name(&format!("{name}/{i}"), String::new());
+            let parent = Some(parent);
+            self.manifest.nodes.push(Node { name, parent, transform, object: Some(object), visible: true });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,141 @@
+//! Tracks of a manifest from the animations of a glTF document.
+
+use std::collections::HashSet;
+
+use bth_scene::{Interpolation, Property, Track, Transform};
+
+use crate::error::Result;
+use crate::gltf::scene::importer::Importer;
+use crate::gltf::scene::options::Chosen;
+use crate::gltf::schema::{Animation, Channel, Sampler};
+use crate::source::UNSUPPORTED;
+
+impl Importer<'_> {
+    /// The tracks of the chosen animations, by node and property, and the last time of any in seconds.
+    pub(super) fn tracks(&mut self, chosen: &Chosen) -> Result<(Vec<Track>, f64)> {
+        let mut tracks: Vec<Track> = Vec::new();
+        let mut taken = HashSet::new();
+        let mut last = 0.0f64;
+        for (index, animation) in &self.animations(chosen)? {
+            let name = if animation.name.is_empty() { index.to_string() } else { animation.name.clone() };
+            self.report.animations.push(name);
+            for (number, channel) in animation.channels.iter().enumerate() {
+                let part = format!("animation {index} channel {number}");
+                let Some(track) = self.track(animation, channel, &part)? else { continue };
+                if !taken.insert((track.node, track.property)) {
+                    let name = &self.manifest.nodes[track.node].name;
+                    let what = format!("the {} of \"{name}\" is animated already", track.property.name());
+                    self.ignore(&part, what)?;
+                    continue;
+                }
+                last = last.max(track.times.last().copied().unwrap_or(0.0));
+                tracks.push(track);
+            }
+        }
+        tracks.sort_by_key(|t| (t.node, t.property));
+        Ok((tracks, last))
+    }
+
+    /// The chosen animations with their numbers.
+    fn animations(&self, chosen: &Chosen) -> Result<Vec<(usize, Animation)>> {
+        let mut animations = Vec::new();
+        for (index, value) in self.document.animations.iter().enumerate() {
+            let animation: Animation = self.typed(value, &format!("animation {index}"))?;
+            animations.push((index, animation));
+        }
+        match chosen {
+            Chosen::All => Ok(animations),
+            Chosen::None => Ok(Vec::new()),
+            Chosen::One(wanted) => {
+                let by_name = animations.iter().position(|(_, a)| a.name == *wanted);
+                let by_number = || wanted.parse().ok().filter(|n: &usize| *n < animations.len());
+                let Some(found) = by_name.or_else(by_number) else {
+                    let names: Vec<_> =
+                        animations.iter().map(|(i, a)| format!("{i} \"{}\"", a.name)).collect();
+                    let message =
+                        format!("expected one of its animations ({}), found {wanted}", names.join(", "));
+                    let hint = "name one of these, or its number";
+                    return Err(self.source.error_in_part(UNSUPPORTED, "animations", message, hint));
+                };
+                Ok(vec![animations.swap_remove(found)])
+            }
+        }
+    }
+
+    /// A channel's track; `None` where it moves nothing of the scene.
+    fn track(&mut self, animation: &Animation, channel: &Channel, part: &str) -> Result<Option<Track>> {
+        let property = match channel.target.path.as_str() {
+            "translation" => Property::Translation,
+            "rotation" => Property::Rotation,
+            "scale" => Property::Scale,
+            other => {
+                self.ignore(part, format!("animations of {other} are ignored"))?;
+                return Ok(None);
+            }
+        };
+        // Without a node the channel moves nothing.
+        let Some(target) = channel.target.node else { return Ok(None) };
+        let Some(row) = self.report.node_rows.get(target) else {
+            return Err(self.error(part, format!("its node {target} does not exist")));
+        };
+        // Nodes of other scenes have no row.
+        let Some(node) = *row else { return Ok(None) };
+        if matches!(self.manifest.nodes[node].transform, Transform::Matrix(_)) {
+            let message = format!("its node {target} has a matrix, which cannot be animated");
+            return Err(self.error(part, message));
+        }
+        let Some(sampler) = animation.samplers.get(channel.sampler) else {
+            return Err(self.error(part, format!("its sampler {} does not exist", channel.sampler)));
+        };
+        let interpolation = match sampler.interpolation.as_deref() {
+            None | Some("LINEAR") => Interpolation::Linear,
+            Some("STEP") => Interpolation::Step,
+            Some("CUBICSPLINE") => Interpolation::Cubic,
+            Some(other) => return Err(self.error(part, format!("unknown interpolation \"{other}\""))),
+        };
+        let (times, values) = self.keys(sampler, property, interpolation, part)?;
+        Ok(Some(Track { node, property, interpolation, times, values }))
+    }
+
+    /// The times and values of a sampler's keys, checked.
+    fn keys(
+        &self,
+        sampler: &Sampler,
+        property: Property,
+        interpolation: Interpolation,
+        part: &str,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        let times: Vec<f64> = self.accessors.scalars(sampler.input)?.into_iter().map(f64::from).collect();
+        let values = if property == Property::Rotation {
+            widened(self.accessors.vectors::<4>(sampler.output)?)
+        } else {
+            widened(self.accessors.vectors::<3>(sampler.output)?)
+        };
+        let ascending = times.iter().all(|t| t.is_finite()) && times.windows(2).all(|w| w[0] < w[1]);
+        if times.is_empty() || !ascending {
+            return Err(self.error(part, "expected finite times that ascend, at least one"));
+        }
+        let (width, rows) = (property.width(), interpolation.values_per_key());
+        if values.len() != times.len() * width * rows {
+            let message = format!(
+                "expected {} rows of values for {} times, found {}",
+                times.len() * rows,
+                times.len(),
+                values.len() / width
+            );
+            return Err(self.error(part, message));
+        }
+        // A cubic key has its value between two tangents.
+        let main = rows / 2 * width;
+        let zero =
+            |key: &[f64]| property == Property::Rotation && key[main..main + width].iter().all(|x| *x == 0.0);
+        if !values.iter().all(|x| x.is_finite()) || values.chunks(width * rows).any(zero) {
+            return Err(self.error(part, "expected finite values, and rotations that are not zero"));
+        }
+        Ok((times, values))
+    }
+}
+
+fn widened<const N: usize>(rows: Vec<[f32; N]>) -> Vec<f64> {
+    rows.as_flattened().iter().map(|x| f64::from(*x)).collect()
+}

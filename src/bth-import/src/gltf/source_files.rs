@@ -1,0 +1,31 @@
+//! The files that a glTF document refers to.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::gltf::container::split;
+use crate::gltf::extensions::MESHOPT;
+use crate::gltf::schema::{Buffer, GltfDocument, MeshoptFallback};
+use crate::gltf::uri::beside;
+use crate::monitor::Silent;
+use crate::source::Source;
+
+/// The files beside a glTF document that hold its buffers, in order; none for what is no document, which reading it
+/// reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not read.
+pub fn external_files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
+    let source = Source::new(path, data, &Silent);
+    let document =
+        split(&source).ok().and_then(|(json, _)| serde_json::from_slice::<GltfDocument>(json).ok());
+    let buffers = document.into_iter().flat_map(|document| document.buffers);
+    let file = |buffer: Buffer| {
+        let uri = buffer.uri.as_deref().filter(|uri| !uri.starts_with("data:"))?;
+        beside(path, uri).filter(|file| !is_fallback(&buffer) || file.exists())
+    };
+    buffers.filter_map(file).collect()
+}
+
+fn is_fallback(buffer: &Buffer) -> bool {
+    let mut values = MESHOPT.into_iter().filter_map(|name| buffer.extensions.get(name));
+    values.any(|value| MeshoptFallback::deserialize(value).is_ok_and(|extension| extension.fallback))
+}

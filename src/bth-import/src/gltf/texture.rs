@@ -1,0 +1,100 @@
+//! Which texture coordinates of a primitive are kept, and how a texture changes them (KHR_texture_transform).
+//!
+//! A mesh keeps one set. The base colour texture decides, since it is what most renderers show; where a material has none,
+//! the next of its textures in the order of the specification does. Without any texture it is `TEXCOORD_0`, unchanged.
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+use crate::gltf::extensions::TEXTURE_TRANSFORM;
+use crate::gltf::schema::{GltfDocument, Material, Primitive, TextureReference, TextureTransform};
+use crate::source::{MALFORMED, Source};
+
+/// A set of texture coordinates and its transform.
+pub(super) struct TextureCoordinates {
+    /// Name of the attribute, such as `TEXCOORD_0`.
+    pub(super) attribute: String,
+    /// `None` where coordinates stay as they are.
+    transform: Option<UvTransform>,
+}
+
+impl TextureCoordinates {
+    /// Those that a primitive's material samples its deciding texture with.
+    ///
+    /// # Errors
+    /// `BTH-I002` where the material is malformed or does not exist.
+    pub(super) fn of(source: &Source<'_>, document: &GltfDocument, primitive: &Primitive) -> Result<Self> {
+        let plain = TextureCoordinates { attribute: "TEXCOORD_0".to_owned(), transform: None };
+        let Some(index) = primitive.material else { return Ok(plain) };
+        let part = format!("material {index}");
+        let Some(value) = document.materials.get(index) else {
+            return Err(error(source, &part, "it does not exist".to_owned()));
+        };
+        let parsed =
+            |e: serde_json::Error| error(source, &part, format!("expected a glTF material, found: {e}"));
+        let material = Material::deserialize(value).map_err(parsed)?;
+        let Some(texture) = deciding_texture(&material) else { return Ok(plain) };
+        let transform = match texture.extensions.get(TEXTURE_TRANSFORM) {
+            Some(value) => TextureTransform::deserialize(value).map_err(parsed)?,
+            None => TextureTransform::default(),
+        };
+        let set = transform.tex_coord.unwrap_or(texture.tex_coord);
+        Ok(TextureCoordinates {
+            attribute: format!("TEXCOORD_{set}"),
+            transform: UvTransform::new(&transform),
+        })
+    }
+
+    /// Transforms the kept coordinates in place.
+    pub(super) fn apply(&self, uvs: &mut [[f32; 2]]) {
+        if let Some(transform) = &self.transform {
+            uvs.iter_mut().for_each(|uv| *uv = transform.apply(*uv));
+        }
+    }
+}
+
+fn deciding_texture(material: &Material) -> Option<&TextureReference> {
+    let pbr = &material.pbr_metallic_roughness;
+    [
+        &pbr.base_color_texture,
+        &pbr.metallic_roughness_texture,
+        &material.normal_texture,
+        &material.occlusion_texture,
+        &material.emissive_texture,
+    ]
+    .into_iter()
+    .find_map(Option::as_ref)
+}
+
+/// Scale, then rotation, then offset, in f64.
+struct UvTransform {
+    /// Rows of the linear part.
+    linear: [[f64; 2]; 2],
+    offset: [f64; 2],
+}
+
+impl UvTransform {
+    /// `None` for the identity, which leaves the coordinates' bits alone.
+    ///
+    /// A positive angle turns coordinates counter-clockwise in the image, that is from +u to -v, because v grows downwards.
+    /// So do three.js, Babylon.js and cesium-native; the shader in the extension's text has the other sign
+    /// (KhronosGroup/glTF issue 1563).
+    fn new(transform: &TextureTransform) -> Option<Self> {
+        let TextureTransform { offset, rotation, scale: [su, sv], .. } = *transform;
+        if offset == [0.0; 2] && rotation == 0.0 && [su, sv] == [1.0; 2] {
+            return None;
+        }
+        let (sin, cos) = rotation.sin_cos();
+        Some(UvTransform { linear: [[cos * su, sin * sv], [-sin * su, cos * sv]], offset })
+    }
+
+    fn apply(&self, uv: [f32; 2]) -> [f32; 2] {
+        let [u, v] = uv.map(f64::from);
+        [0, 1].map(|k| (self.linear[k][0] * u + self.linear[k][1] * v + self.offset[k]) as f32)
+    }
+}
+
+fn error(source: &Source<'_>, part: &str, message: String) -> Error {
+    let hint = "export the model again, or compile without texture coordinates (--attributes normals)";
+    source.error_in_part(MALFORMED, part, message, hint)
+}

@@ -61,6 +61,7 @@ install_missing() {
         note "Missing and not installable from here (no apt-get, or not root): ${packages[*]}"
     fi
     command -v cc >/dev/null || note "No C compiler: Rust needs one to link. Install gcc or clang."
+    have_cxx || note "No C++ compiler: meshopt-compressed glTF files cannot be read. Install g++ or clang."
     have_tetgen || note "No TetGen: the worker is not built, and compiled files hold BVHs only."
     [ "$1" = plain ] || have_display || note "No Xvfb or no xdotool: the test of the window is skipped."
     [ "$1" = plain ] || have_venv || note "No python3 with venv: the Python cross-checks are skipped."

@@ -2,10 +2,10 @@
 
 use crate::intersect::boxes::ChildBoxes;
 use crate::simd::Simd;
-use bth_format::object::Unpacked;
 use bth_format::layout::{
     Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode,
 };
+use bth_format::object::Unpacked;
 use bth_format::object::{NodeBase, ObjectView};
 
 /// A kind of nodes.

@@ -135,7 +135,7 @@ const PLAIN_EXPONENTS: i32 = 64;
 const LEAST_PLAIN: f64 = 1.0 / (1u128 << PLAIN_EXPONENTS) as f64;
 const MOST_PLAIN: f64 = (1u128 << (PLAIN_EXPONENTS + 1)) as f64;
 
-/// AnswerLanes rays, a lane each.
+/// Sixteen rays, a lane each.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayLanes {
     pub(super) origin: [[f32; LANES]; 3],

@@ -2,10 +2,10 @@
 //! rays at once.
 
 use super::World;
-use super::affine::ObjectRay;
 use super::enter_object::ObjectRays;
 use super::packets::Packets;
 use super::placement::Placed;
+use super::round::Round;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::object::{self, Scratch};
@@ -14,7 +14,6 @@ use crate::query::{self, Steps, better};
 use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::file::File;
-use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use std::cell::RefCell;
 
@@ -30,26 +29,6 @@ trait SceneQuery {
     fn tmax(&self, ray: usize) -> Option<f32>;
     /// Traces the visits of one object.
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]);
-}
-
-/// What the visits of a round share.
-pub(super) struct Round<'a> {
-    pub(super) world: &'a World,
-    file: &'a File,
-    pub(super) rays: &'a [Ray],
-    pub(super) from: Option<&'a [Surface]>,
-}
-
-impl Round<'_> {
-    /// The ray of a visit in the object's space.
-    pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
-        self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
-    }
-
-    pub(super) fn hint(&self, ray: usize, instance: u32) -> u32 {
-        let from = self.from.map_or(Surface::NONE, |f| f[ray]);
-        if from.instance == instance { from.triangle } else { NONE }
-    }
 }
 
 /// Rays under way, whose memory a thread keeps.

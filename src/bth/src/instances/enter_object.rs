@@ -1,7 +1,7 @@
 //! Rays that enter an object together, in its space.
 
 use super::affine::{ObjectRay, RayLanes};
-use super::batch::Round;
+use super::round::Round;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};

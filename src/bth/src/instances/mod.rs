@@ -10,6 +10,7 @@ mod enter_object;
 mod packets;
 mod placement;
 mod pose;
+mod round;
 mod top_level;
 mod tracks;
 mod traverse;

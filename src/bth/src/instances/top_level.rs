@@ -1,6 +1,6 @@
 //! The BVH over the instances of a frame: 16 children a node, midpoint splits, rebuilt for each frame.
 //!
-//! AnswerLanes instances or fewer are the children of one node: splitting them further would make nodes of two
+//! Sixteen instances or fewer are the children of one node: splitting them further would make nodes of two
 //! or three, whose empty slots cost memory and time.
 
 use super::placement::Placed;

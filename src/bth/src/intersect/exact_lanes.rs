@@ -4,10 +4,10 @@ use super::exact::reported;
 use crate::intersect::exact::{OriginTerms, Weighed, reported_share, size, wide};
 use crate::simd::{LANES, Simd};
 
-/// AnswerLanes of a number.
+/// Sixteen of a number.
 pub(crate) type Many = [f32; LANES];
 
-/// AnswerLanes rays and a triangle of each.
+/// Sixteen rays and a triangle of each.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Pairs {

@@ -1,4 +1,4 @@
-//! AnswerLanes lanes of f32 or u32, whatever the machine: the small vector trait over which kernels are written once.
+//! Sixteen lanes of f32 or u32, whatever the machine: the small vector trait over which kernels are written once.
 //!
 //! An implementation is a token that exists only on machines that have its instructions, so its methods are
 //! safe to call, and every `unsafe` of the kernels lies in the files beside this one. All methods, and
@@ -30,7 +30,7 @@ pub(crate) trait Kernel {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// AnswerLanes lanes. Lane i of a mask is bit i.
+/// Sixteen lanes. Lane i of a mask is bit i.
 pub(crate) trait Simd: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
@@ -75,7 +75,7 @@ pub(crate) trait Simd: Copy + 'static {
     fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
     /// As [`Self::rows4`], rows of eight words.
     fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
-    /// AnswerLanes rows of eight words by their columns.
+    /// Sixteen rows of eight words by their columns.
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [Self::U; 8];
     /// Columns of five words as rows: element k of row i is lane i of the k-th.
     #[inline(always)]

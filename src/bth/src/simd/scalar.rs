@@ -1,4 +1,4 @@
-//! AnswerLanes lanes in plain arrays: for machines without vector code, and what the other instruction sets are tested against.
+//! Sixteen lanes in plain arrays: for machines without vector code, and what the other instruction sets are tested against.
 //!
 //! Each operation is a loop over the lanes, which compilers turn into what vectors the target has at least. Kernels that only
 //! pay with vectors are left out ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part of the library.

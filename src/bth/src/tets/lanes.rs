@@ -1,4 +1,4 @@
-//! AnswerLanes tet walks side by side: the step from one tetrahedron to the next, in f32.
+//! Sixteen tet walks side by side: the step from one tetrahedron to the next, in f32.
 //!
 //! As [`super::walk`], but a sign counts only where f32 makes it certain. With u = 2^-24, the computed projection
 //! (x, y, z) of a point, z its depth, and W = |x| + |y| + |z|: the differences from the origin are off by a factor of

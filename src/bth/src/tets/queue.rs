@@ -32,7 +32,7 @@ pub(super) struct ReadyQueue {
     end: usize,
 }
 
-/// AnswerLanes elements of a row.
+/// Sixteen elements of a row.
 #[inline(always)]
 fn sixteen<T>(row: &[T; CAPACITY + LANES], at: usize) -> &[T; LANES] {
     row[at..].first_chunk().expect("rows have sixteen elements to spare")

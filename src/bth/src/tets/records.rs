@@ -119,7 +119,7 @@ impl ReadRecords for Records<'_> {
     }
 }
 
-/// AnswerLanes tetrahedra as entered through faces, one a lane.
+/// Sixteen tetrahedra as entered through faces, one a lane.
 #[derive(Clone, Copy)]
 pub(crate) struct EnteredLanes<S: Simd> {
     pub(crate) tet: S::U,

@@ -15,6 +15,7 @@ pub(crate) mod leaf;
 pub(crate) mod leaf_mesh;
 pub(crate) mod packet;
 pub(crate) mod points;
+pub(crate) mod projection;
 pub(crate) mod ray_group;
 pub(crate) mod runs;
 pub(crate) mod segment_box;

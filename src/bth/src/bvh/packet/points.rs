@@ -1,7 +1,7 @@
 //! Points of a leaf as sixteen rays of a packet see them.
 
 use super::bounds::FrustumView;
-use super::ray_group::Projection;
+use super::projection::Projection;
 use crate::intersect::exact_lanes::Many;
 use crate::simd::{LANES, Simd};
 use bth_format::layout::WIDTH;
@@ -39,7 +39,7 @@ pub(crate) struct Relative([[Many; 3]; 3]);
 impl Relative {
     pub(crate) const NONE: Relative = Relative([[[0.0; LANES]; 3]; 3]);
 
-    /// AnswerLanes of them.
+    /// Sixteen of them.
     #[inline(always)]
     pub(crate) fn put<S: Simd>(&mut self, s: S, part: usize, rows: [S::F; 3], from: [f32; 3]) {
         for k in 0..3 {

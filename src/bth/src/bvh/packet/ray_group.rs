@@ -1,4 +1,4 @@
-//! AnswerLanes rays of a packet, a lane each.
+//! Sixteen rays of a packet, a lane each.
 //!
 //! What [`crate::intersect::boxes`] and [`crate::intersect::filter`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
 //! one box or triangle: the same operations on the same prepared floats ([`crate::intersect::prepare`]), so the same bounds hold.
@@ -6,6 +6,7 @@
 use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::Leaf;
+use super::projection::Projection;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::{self, Axes, Common, Mixed};
@@ -14,40 +15,7 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 
-/// How sixteen rays see points.
-#[derive(Clone, Copy)]
-pub(crate) struct Projection<S: Simd> {
-    pub(crate) origin: [S::F; 2],
-    /// Slopes of the rays: how far they go along the plane's axes while they go 1 along the third, whichever way.
-    pub(crate) shear: [S::F; 2],
-    pub(crate) forward: S::F,
-    pub(crate) start: S::F,
-}
-
-impl<S: Simd> Projection<S> {
-    /// A point, given along the axes of the projection: its place in the plane, negated (which shows in no weight), and its depth.
-    #[inline(always)]
-    pub(crate) fn of(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        let depth = s.fma(z, self.forward, self.start);
-        let (x, y) = (s.sub(self.origin[0], x), s.sub(self.origin[1], y));
-        [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
-    }
-
-    /// For points relative to the one at which the rays start: with slopes that count on coordinates as they are.
-    #[inline(always)]
-    pub(crate) fn relative(mut self, s: S) -> Self {
-        self.shear = [s.mul(self.shear[0], self.forward), s.mul(self.shear[1], self.forward)];
-        self
-    }
-
-    /// As [`Self::of`], of such a point. (The depth apart: for most triangles nobody asks.)
-    #[inline(always)]
-    pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        [s.fnma(self.shear[0], z, x), s.fnma(self.shear[1], z, y), s.mul(z, self.forward)]
-    }
-}
-
-/// AnswerLanes rays, and what they have found.
+/// Sixteen rays, and what they have found.
 #[derive(Clone, Copy)]
 pub(crate) struct RayGroup<S: Simd> {
     pub(crate) origin: [S::F; 3],

@@ -1,4 +1,4 @@
-//! AnswerLanes rays prepared in lanes: what [`PreparedRay`]s say of them, before they are turned into those.
+//! Sixteen rays prepared in lanes: what [`PreparedRay`]s say of them, before they are turned into those.
 
 use super::axes::Axes;
 use super::{HitProgress, LARGEST, PreparedRay, SMALLEST, UP};

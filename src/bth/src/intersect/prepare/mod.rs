@@ -1,4 +1,4 @@
-//! AnswerLanes rays prepared for the BVH at once, in f32 lanes.
+//! Sixteen rays prepared for the BVH at once, in f32 lanes.
 //!
 //! To the bounds that [`RaySlabs`] and [`TriangleFilter`] demand, though not to the same bits as their own constructors, which
 //! compute in f64. Rays that f32 can't prepare so are left to those.
@@ -166,7 +166,7 @@ impl PreparedRay {
     }
 }
 
-/// AnswerLanes rays, prepared; on cache lines, because whole vectors are stored.
+/// Sixteen rays, prepared; on cache lines, because whole vectors are stored.
 #[derive(Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Prepared {

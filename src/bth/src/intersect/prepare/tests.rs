@@ -67,7 +67,7 @@ impl Kernel for Look<'_> {
     }
 }
 
-/// AnswerLanes rays prepared together, as a kernel.
+/// Sixteen rays prepared together, as a kernel.
 struct PacketKernel<'a>(&'a [Ray; LANES], &'a Object);
 
 impl Kernel for PacketKernel<'_> {

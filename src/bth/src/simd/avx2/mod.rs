@@ -1,4 +1,4 @@
-//! AnswerLanes lanes in two AVX2 registers.
+//! Sixteen lanes in two AVX2 registers.
 //!
 //! Every block below is sound for one reason: an [`Avx2`] exists only where [`Avx2::detect`] found the features that
 //! the intrinsics need, so each may be executed. Blocks that go through pointers say more.

@@ -1,4 +1,4 @@
-//! AnswerLanes lanes in one AVX-512 register.
+//! Sixteen lanes in one AVX-512 register.
 //!
 //! Every block below is sound for one reason: an [`Avx512`] exists only where [`Avx512::detect`] found the features
 //! that the intrinsics need, so each may be executed. Blocks that go through pointers say more.

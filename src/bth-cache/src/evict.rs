@@ -1,8 +1,8 @@
 //! Eviction: what was used longest ago goes first, and never what a process has mapped.
 
-use crate::atomic::SUFFIX;
 use crate::files::{Files, named, remove};
 use crate::record::Record;
+use bth_files::SUFFIX;
 use serde::Serialize;
 use std::fs::{DirEntry, File, TryLockError};
 use std::path::Path;

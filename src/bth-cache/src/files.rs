@@ -57,7 +57,7 @@ impl Files {
     }
 
     /// Counters.
-    pub(crate) fn tally(&self) -> PathBuf {
+    pub(crate) fn statistics(&self) -> PathBuf {
         self.root.join("tally")
     }
 

@@ -45,7 +45,7 @@ impl Remote for Folder {
             // Gone already or not ours to remove: the next line tells.
             let _ = std::fs::remove_file(&path);
         }
-        crate::atomic::write_once(&path, bytes).map(|_| ())
+        bth_files::write_once(&path, bytes).map(|_| ())
     }
 
     fn name(&self) -> String {

@@ -1,10 +1,10 @@
 //! The store: find, read, pin and put.
 
-use crate::atomic::write_once;
 use crate::evict::{Evicted, evict};
 use crate::files::{Files, named, remove, touch};
 use crate::lock::{WorkLock, same_file};
-use crate::{Digest, Key, Record, Remote, Tally, last};
+use crate::{Digest, Key, Record, Remote, Statistics, last_keys};
+use bth_files::write_once;
 use serde_json::Value;
 use std::fs::File;
 use std::io::{ErrorKind, Result};
@@ -25,7 +25,7 @@ pub struct Store {
     pub(crate) cap: u64,
     remote: Mutex<Option<Box<dyn Remote>>>,
     notes: Mutex<Vec<String>>,
-    tally: Mutex<Tally>,
+    statistics: Mutex<Statistics>,
     written: AtomicU64,
 }
 
@@ -49,7 +49,7 @@ impl Store {
             cap,
             remote: Mutex::new(None),
             notes: Mutex::default(),
-            tally: Mutex::default(),
+            statistics: Mutex::default(),
             written: AtomicU64::new(0),
         })
     }
@@ -113,7 +113,7 @@ impl Store {
             );
             return None;
         }
-        lock(&self.tally).shared_hits += 1;
+        lock(&self.statistics).shared_hits += 1;
         // What cannot be kept can be used all the same.
         let _ = self.write(&path, &bytes);
         Some(bytes)
@@ -227,9 +227,9 @@ impl Store {
         }
         touch(&blob);
         if new {
-            let mut tally = lock(&self.tally);
-            tally.stored += 1;
-            tally.stored_bytes += record.bytes;
+            let mut statistics = lock(&self.statistics);
+            statistics.stored += 1;
+            statistics.stored_bytes += record.bytes;
         }
         self.written(record.bytes);
         Ok(())
@@ -269,25 +269,25 @@ impl Store {
 
     /// Counts hits of a stage.
     pub fn count_hits(&self, stage: &str, hits: u64) {
-        lock(&self.tally).hit(stage, hits);
+        lock(&self.statistics).hit(stage, hits);
     }
 
     /// Why a key is not there: what differs from the last key of the same source. `source` may be a path: only a
     /// hash of it is kept.
     pub fn reasons(&self, key: &Key, source: &str) -> Vec<String> {
-        last::reasons(&self.files, key, source)
+        last_keys::reasons(&self.files, key, source)
     }
 
     /// Counts a miss and says why.
     pub fn count_miss(&self, key: &Key, source: &str) -> Vec<String> {
         let reasons = self.reasons(key, source);
-        lock(&self.tally).miss(key.stage(), &reasons);
+        lock(&self.statistics).miss(key.stage(), &reasons);
         reasons
     }
 
     /// Notes the key that a source has now.
     pub fn note_last(&self, key: &Key, source: &str) {
-        last::note(&self.files, key, source);
+        last_keys::note(&self.files, key, source);
     }
 
     /// What a person should know: damaged entries, a shared store that cannot be reached.
@@ -299,23 +299,23 @@ impl Store {
     pub fn evict(&self, cap: u64) -> Evicted {
         self.written.store(0, Ordering::Relaxed);
         let evicted = evict(&self.files, cap);
-        let mut tally = lock(&self.tally);
-        tally.evictions += evicted.entries;
-        tally.evicted_bytes += evicted.bytes;
-        let _ = File::create(self.files.tally().with_extension("checked"));
+        let mut statistics = lock(&self.statistics);
+        statistics.evictions += evicted.entries;
+        statistics.evicted_bytes += evicted.bytes;
+        let _ = File::create(self.files.statistics().with_extension("checked"));
         evicted
     }
 
     /// The counters, those of this process included.
-    pub fn tally(&self) -> Tally {
+    pub fn statistics(&self) -> Statistics {
         self.flush();
-        Tally::read(&self.files)
+        Statistics::read(&self.files)
     }
 
     pub(crate) fn flush(&self) {
-        let tally = std::mem::take(&mut *lock(&self.tally));
+        let statistics = std::mem::take(&mut *lock(&self.statistics));
         // Counters are the least of what a full disk costs.
-        let _ = tally.append(&self.files);
+        let _ = statistics.append(&self.files);
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
@@ -335,7 +335,7 @@ impl Store {
     }
 
     pub(crate) fn damaged(&self, what: &str, why: &str) {
-        lock(&self.tally).damaged += 1;
+        lock(&self.statistics).damaged += 1;
         lock(&self.notes).push(format!("cache: {what} is damaged ({why}); it is not used"));
     }
 
@@ -367,7 +367,7 @@ impl Store {
 impl Drop for Store {
     fn drop(&mut self) {
         let unchecked = || {
-            let checked = std::fs::metadata(self.files.tally().with_extension("checked"));
+            let checked = std::fs::metadata(self.files.statistics().with_extension("checked"));
             let age = checked.and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
             age.is_none_or(|age| age > LONG_UNCHECKED)
         };

@@ -6,7 +6,7 @@
 
 use std::collections::HashSet;
 
-use super::gather::Input;
+use super::gather::NodeInput;
 
 /// Deepest level of the octree: cells of 1/2048 of the box.
 const DEPTH: u32 = 11;
@@ -18,7 +18,7 @@ const MARGIN: f64 = 0.02;
 
 /// The points, inside the box and different from every vertex and from each other. The same for
 /// the same input and seed. `most` vertices may share a cell; 0 gives no points.
-pub(super) fn points(input: &Input, most: u32, seed: u64) -> Vec<[f32; 3]> {
+pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
     if most == 0 {
         return Vec::new();
     }
@@ -103,8 +103,8 @@ fn splitmix(state: u64) -> u64 {
 mod tests {
     use super::*;
 
-    fn input(vertices: Vec<[f32; 3]>) -> Input {
-        Input { lower: [-1.0; 3], upper: [1.0; 3], vertices, triangles: Vec::new(), ids: Vec::new() }
+    fn input(vertices: Vec<[f32; 3]>) -> NodeInput {
+        NodeInput { lower: [-1.0; 3], upper: [1.0; 3], vertices, triangles: Vec::new(), ids: Vec::new() }
     }
 
     #[test]
@@ -132,8 +132,13 @@ mod tests {
         let far = 1e6f32;
         let vertices: Vec<_> =
             (0..200).map(|i| [far + (i % 7) as f32 * 0.25, far + (i % 5) as f32, far]).collect();
-        let input =
-            Input { lower: [far - 1.0; 3], upper: [far + 5.0; 3], vertices, triangles: vec![], ids: vec![] };
+        let input = NodeInput {
+            lower: [far - 1.0; 3],
+            upper: [far + 5.0; 3],
+            vertices,
+            triangles: vec![],
+            ids: vec![],
+        };
         let points = points(&input, 4, 1);
         let distinct: HashSet<_> = points.iter().chain(&input.vertices).map(bits).collect();
         assert_eq!(distinct.len(), points.len() + 35);

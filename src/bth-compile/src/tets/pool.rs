@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 
 use super::Options;
-use super::report::Trouble;
+use super::failure::AttemptError;
 use super::worker::{Setup, Worker};
 
 /// File name of the worker program.
@@ -50,19 +50,19 @@ pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
 pub(crate) fn version(options: &Options, monitor: &dyn Monitor) -> Result<Option<String>> {
     let Ok(program) = find(options) else { return Ok(Some("none".to_owned())) };
     let setup = Setup { program, memory: options.memory };
-    let version = Slot::new(&setup).tetgen(monitor)?.map(str::to_owned);
+    let version = WorkerSlot::new(&setup).tetgen(monitor)?.map(str::to_owned);
     Ok(version.ok())
 }
 
 /// A place for one worker.
-pub(super) struct Slot<'a> {
+pub(super) struct WorkerSlot<'a> {
     setup: &'a Setup,
     worker: Option<Worker>,
     /// Workers started in this place.
     pub(super) started: u64,
 }
 
-impl<'a> Slot<'a> {
+impl<'a> WorkerSlot<'a> {
     /// An empty place.
     pub(super) fn new(setup: &'a Setup) -> Self {
         Self { setup, worker: None, started: 0 }
@@ -72,14 +72,17 @@ impl<'a> Slot<'a> {
     ///
     /// # Errors
     /// As [`Worker::start`].
-    pub(super) fn tetgen(&mut self, monitor: &dyn Monitor) -> Result<std::result::Result<&str, Trouble>> {
+    pub(super) fn tetgen(
+        &mut self,
+        monitor: &dyn Monitor,
+    ) -> Result<std::result::Result<&str, AttemptError>> {
         if self.worker.is_none() {
             match Worker::start(self.setup, monitor)? {
                 Ok(worker) => {
                     self.started += 1;
                     self.worker = Some(worker);
                 }
-                Err(trouble) => return Ok(Err(trouble)),
+                Err(error) => return Ok(Err(error)),
             }
         }
         Ok(Ok(self.worker.as_ref().map_or("", |w| w.tetgen.as_str())))
@@ -94,12 +97,12 @@ impl<'a> Slot<'a> {
         request: &Request,
         deadline: Duration,
         monitor: &dyn Monitor,
-    ) -> Result<std::result::Result<Tetrahedra, Trouble>> {
-        if let Err(trouble) = self.tetgen(monitor)? {
-            return Ok(Err(trouble));
+    ) -> Result<std::result::Result<Tetrahedra, AttemptError>> {
+        if let Err(error) = self.tetgen(monitor)? {
+            return Ok(Err(error));
         }
         let Some(mut worker) = self.worker.take() else {
-            return Ok(Err(Trouble::Start("no worker".into())));
+            return Ok(Err(AttemptError::Start("no worker".into())));
         };
         let answer = worker.ask(request, deadline, monitor)?;
         if answer.is_ok() {

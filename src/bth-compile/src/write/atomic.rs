@@ -1,4 +1,4 @@
-//! Files that are whole or absent; how is `bth_cache`'s affair.
+//! Files that are whole or absent; how is `bth_files`'s affair.
 
 use super::Content;
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {
-    bth_cache::replace(path, write).map_err(|e| cannot(path, &e))
+    bth_files::replace(path, write).map_err(|e| cannot(path, &e))
 }
 
 /// As [`write_atomically`]. What is in other files is copied by the system.
@@ -29,7 +29,7 @@ pub fn write_atomically_with(
 /// # Errors
 /// As [`write_atomically`]; also when such a file cannot be read or has changed.
 pub fn write_content(path: &Path, content: &Content) -> Result<()> {
-    bth_cache::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
+    bth_files::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
 }
 
 fn cannot(path: &Path, error: &std::io::Error) -> Error {

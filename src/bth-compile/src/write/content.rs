@@ -1,7 +1,7 @@
 //! A file that is ready to be written, in pieces that need not be in one place, nor in memory.
 
 use super::whole::{are_zeros, name};
-use bth_cache::{Digest, Opened};
+use bth_files::{Digest, OpenFile};
 use std::borrow::Cow;
 use std::io::{Error, Result, Write};
 use std::ops::Range;
@@ -15,7 +15,7 @@ pub(crate) enum Bytes<'a> {
     /// In a file that was read.
     In(Arc<bth_format::File>, Range<usize>),
     /// In a file that was opened.
-    Old(Arc<Opened>, Range<u64>),
+    Old(Arc<OpenFile>, Range<u64>),
 }
 
 impl Bytes<'_> {
@@ -131,7 +131,7 @@ impl Content {
     /// Those of the writer, and when an old file that it takes sections from cannot be read or has changed.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
         let mut at = 0;
-        let mut used: Option<&Arc<Opened>> = None;
+        let mut used: Option<&Arc<OpenFile>> = None;
         for piece in &self.pieces {
             match piece {
                 Bytes::Old(file, range) => {

@@ -1,6 +1,6 @@
 //! What names a file without reading all of it, and whether all of it is what the name says.
 
-use bth_cache::Digest;
+use bth_files::Digest;
 use bth_format::file::hash128;
 use std::path::Path;
 

@@ -9,8 +9,8 @@ use crate::progress::{Progress, Quiet};
 use crate::table::{Table, bytes, count, seconds};
 use bth_cache::Store;
 use bth_compile::Monitor;
-use bth_compile::cached::Cache;
-use bth_compile::pipeline::{self, Options, Report};
+use bth_compile::cached::{self, Cache};
+use bth_compile::pipeline::{Options, Report};
 use bth_compile::tets::WorkerStatus;
 use serde_json::json;
 use std::collections::HashMap;
@@ -112,9 +112,9 @@ pub(super) fn one(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -> Re
     }
     let cache = cache(setting, &job.model);
     let needed = |record: &_| job.target.needs(record, setting.store.as_ref());
-    let outcome = pipeline::compile_cached(&job.model, &setting.options, &cache, &needed, monitor)?;
+    let outcome = cached::compile(&job.model, &setting.options, &cache, &needed, monitor)?;
     let mut done =
-        deliver::deliver(setting, job, &outcome, &cache, &|| bth_compile::cached::files(&job.model))?;
+        deliver::deliver(setting, job, &outcome, &cache, &|| bth_compile::source::files(&job.model))?;
     done.json["report"] = outcome.report;
     if let Some(report) = &outcome.built {
         done.text = format!("{}{}", summary(report), done.text);

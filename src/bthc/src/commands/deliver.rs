@@ -4,8 +4,7 @@ use super::compile::{Job, Setting};
 use crate::failure::Failure;
 use crate::table::{bytes, seconds};
 use bth_cache::{Digest, Record, Store};
-use bth_compile::cached::Cache;
-use bth_compile::pipeline::Outcome;
+use bth_compile::cached::{Cache, Outcome};
 use bth_compile::write::{self, Content};
 use serde_json::{Value, json};
 use std::fs::File;
@@ -58,9 +57,9 @@ impl Target {
     }
 }
 
-/// Whether a file has the content of a record: by its stamp, else by reading it.
+/// Whether a file has the content of a record: by its fingerprint, else by reading it.
 fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
-    if store.and_then(|store| store.stamped(path)) == Some(record.blob) {
+    if store.and_then(|store| store.content_of(path)) == Some(record.blob) {
         return true;
     }
     let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
@@ -73,7 +72,7 @@ fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
     };
     let same = same_size && same();
     if let (true, Some(store)) = (same, store) {
-        store.stamp(path, record.blob);
+        store.store_fingerprint(path, record.blob);
     }
     same
 }
@@ -94,7 +93,7 @@ pub(super) fn deliver<R>(
         (Target::File(path), Some(content)) => {
             write::write_content(path, content)?;
             if let (Some(store), Some(record)) = (&setting.store, &outcome.record) {
-                store.stamp(path, record.blob);
+                store.store_fingerprint(path, record.blob);
             }
         }
         (Target::File(path), None) => {
@@ -160,7 +159,7 @@ fn touch(path: &Path, record: Option<&Record>, store: Option<&Store>) -> Result<
     let file = File::options().append(true).open(path).map_err(failed)?;
     file.set_modified(SystemTime::now()).map_err(failed)?;
     if let (Some(record), Some(store)) = (record, store) {
-        store.stamp(path, record.blob);
+        store.store_fingerprint(path, record.blob);
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use super::compile::{Job, Setting};
 use super::deliver::Target;
 use super::scene;
 use crate::failure::Failure;
-use bth_compile::{cached, write};
+use bth_compile::{source, write};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ pub(super) fn write(path: &Path, setting: &Setting<'_>, jobs: &[Job]) -> Result<
 pub(super) fn inputs(setting: &Setting<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
     match scene::is_scene(&job.model, setting.args) {
         true => scene::inputs(&job.model),
-        false => Ok(cached::files(&job.model)?),
+        false => Ok(source::files(&job.model)?),
     }
 }
 

@@ -6,7 +6,7 @@ use super::scene;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
-use bth_compile::pipeline::{self, Foreseen};
+use bth_compile::cached::{self, DryRun};
 use serde_json::json;
 
 /// Says for each job what would be done.
@@ -18,24 +18,24 @@ pub(super) fn show(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> R
     let mut text = String::new();
     for job in jobs {
         let cache = cache(setting, &job.model);
-        let foreseen = match scene::is_scene(&job.model, setting.args) {
-            true => scene::foresee(setting, job, &cache, &progress)?,
-            false => pipeline::foresee(&job.model, &setting.options, &cache, &progress)?,
+        let found = match scene::is_scene(&job.model, setting.args) {
+            true => scene::dry_run(setting, job, &cache, &progress)?,
+            false => cached::dry_run(&job.model, &setting.options, &cache, &progress)?,
         };
-        let (what, why) = action(setting, job, &foreseen);
+        let (what, why) = action(setting, job, &found);
         let why = why.join(", ");
         let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };
         text.push_str(&format!("{}: {what}{behind}\n", job.target.name()));
-        for part in &foreseen.parts {
+        for part in &found.parts {
             text.push_str(&format!("  {}: compile ({})\n", part.part, part.because.join(", ")));
         }
         reports.push(json!({
             "model": job.model.to_string_lossy(),
             "output": job.target.name(),
             "action": what,
-            "because": foreseen.because,
-            "objects": foreseen.parts,
-            "objects_kept": foreseen.kept,
+            "because": found.because,
+            "objects": found.parts,
+            "objects_kept": found.reused,
         }));
     }
     drop(progress);
@@ -45,11 +45,11 @@ pub(super) fn show(setting: &Setting<'_>, jobs: &[Job], progress: Progress) -> R
     Ok(output::text(&text)?)
 }
 
-fn action<'a>(setting: &Setting<'_>, job: &Job, foreseen: &'a Foreseen) -> (&'static str, &'a [String]) {
-    match &foreseen.record {
+fn action<'a>(setting: &Setting<'_>, job: &Job, found: &'a DryRun) -> (&'static str, &'a [String]) {
+    match &found.record {
         Some(record) if !job.target.needs(record, setting.store.as_ref()) => ("nothing to do", &[]),
-        Some(_) if job.target == Target::Cache => ("make again", &foreseen.because),
+        Some(_) if job.target == Target::Cache => ("make again", &found.because),
         Some(_) => ("take from the cache", &[]),
-        None => ("compile", &foreseen.because),
+        None => ("compile", &found.because),
     }
 }

@@ -6,9 +6,10 @@ use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
 use crate::table::{Table, bytes, count, seconds};
 use bth_compile::Monitor;
-use bth_compile::cached::{self, Cache};
-use bth_compile::pipeline::Foreseen;
-use bth_compile::scene::{self, ImportReport, Keep, Place, SceneReport};
+use bth_compile::cached::{Cache, DryRun};
+use bth_compile::scene::{self, Keep, Place, SceneReport};
+use bth_compile::source;
+use bth_import::gltf::scene::{ImportReport, import};
 use bth_scene::Manifest;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -46,13 +47,13 @@ fn read(
         return Ok((bth_scene::read(model)?, None));
     }
     let name = model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let (manifest, report) = scene::import(model, &name, &gltf.options(), monitor)?;
+    let (manifest, report) = import(model, &name, &gltf.options(), monitor)?;
     Ok((manifest, Some(report)))
 }
 
 /// Compiles a scene.
 pub(super) fn compile(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -> Result<Done, Failure> {
-    let (manifest, import) = read(&job.model, &setting.args.gltf, monitor)?;
+    let (manifest, imported) = read(&job.model, &setting.args.gltf, monitor)?;
     let cache = super::compile::cache(setting, &job.model);
     let place = Place { folder: folder(&job.model), name: &job.model };
     if let Some(shard) = setting.args.jobs.shard {
@@ -67,7 +68,7 @@ pub(super) fn compile(setting: &Setting<'_>, job: &Job, monitor: &dyn Monitor) -
     let outcome = scene::compile_cached(&manifest, place, &setting.options, &cache, keep, monitor)?;
     let mut done = deliver(setting, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
     done.json["scene"] = outcome.report;
-    done.json["import"] = json!(import);
+    done.json["import"] = json!(imported);
     if let Some(report) = &outcome.built {
         done.text = format!("{}{}", summary(&manifest, report), done.text);
     }
@@ -90,21 +91,21 @@ fn shard_done(job: &Job, cache: &Cache<'_>, built: u64) -> Done {
 }
 
 /// What a compilation of a scene would do.
-pub(super) fn foresee(
+pub(super) fn dry_run(
     setting: &Setting<'_>,
     job: &Job,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
-) -> Result<Foreseen, Failure> {
+) -> Result<DryRun, Failure> {
     let (manifest, _) = read(&job.model, &setting.args.gltf, monitor)?;
     let place = Place { folder: folder(&job.model), name: &job.model };
-    Ok(scene::foresee(&manifest, place, &setting.options, cache, job.target.path(), monitor)?)
+    Ok(scene::dry_run(&manifest, place, &setting.options, cache, job.target.path(), monitor)?)
 }
 
 /// All files that a scene is made from.
 pub(super) fn inputs(model: &Path) -> Result<Vec<PathBuf>, Failure> {
     if is_gltf(model) {
-        return Ok(cached::files(model)?);
+        return Ok(source::files(model)?);
     }
     Ok(files(&bth_scene::read(model)?, model)?)
 }
@@ -119,7 +120,7 @@ fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>>
         let path = model.parent().unwrap_or(Path::new("")).join(path);
         // An object that nobody sees may lack its file.
         if path != *model && path.exists() {
-            files.extend(cached::files(&path)?);
+            files.extend(source::files(&path)?);
         }
     }
     Ok(files)

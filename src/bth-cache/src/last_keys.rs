@@ -27,7 +27,7 @@ pub(crate) fn note(files: &Files, key: &Key, source: &str) {
     }
     if let Ok(line) = serde_json::to_string(key) {
         let _ = std::fs::remove_file(&path);
-        let _ = crate::atomic::write_once(&path, seal(line).as_bytes());
+        let _ = bth_files::write_once(&path, seal(line).as_bytes());
     }
 }
 

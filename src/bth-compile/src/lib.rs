@@ -13,6 +13,7 @@
 
 pub mod bvh;
 pub mod cached;
+pub mod comparison;
 pub mod coordinates;
 pub mod costs;
 pub mod jobs;

@@ -1,7 +1,7 @@
 //! Binned SAH: "On fast Construction of SAH-based Bounding Volume Hierarchies" (Wald 2007).
 
 use super::bounds::Bounds;
-use super::build::{Reference, Split};
+use super::split::{Reference, Split};
 use rayon::prelude::*;
 
 /// Most bins that can be asked for.

@@ -1,6 +1,6 @@
 use super::super::samples::{Random, clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
-use super::super::{Options, Plan, Quality, Rule, build};
+use super::super::{Options, Plan, Quality, build};
 use super::*;
 use crate::monitor::Silent;
 use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
@@ -146,24 +146,20 @@ fn largest(wide: &Wide) -> (usize, u32) {
 }
 
 #[test]
-fn plans_keep_their_limits_and_the_greedy_one_costs_more() {
+fn plans_keep_their_limits() {
     for (mesh, seed) in
         [(grid(40, 9.0, 6), 1), (soup(2000, 7), 2), (clutter(1500, &[0.0, 1.0, 2.0, 5.0], 8), 3)]
     {
         let bvh = built(&mesh, Quality::Fast);
         let cut = random_cut(&bvh, 150, &mut Random(seed));
         for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
-            let cost = [Rule::Least, Rule::Largest].map(|rule| {
-                let plan = Plan { rule, children, triangles };
-                for keep in [false, true] {
-                    collapsed_by(&mesh, &bvh, &cut, keep, plan);
-                }
-                let (wide, report) = collapsed_by(&mesh, &bvh, &[], false, plan);
-                let most = largest(&wide);
-                assert!(most.0 <= children && most.1 as usize <= triangles, "{plan:?}: {most:?}");
-                report.cost
-            });
-            assert!(cost[0] <= cost[1] * (1.0 + 1e-5), "{children} {triangles}: {cost:?}");
+            let plan = Plan { children, triangles };
+            for keep in [false, true] {
+                collapsed_by(&mesh, &bvh, &cut, keep, plan);
+            }
+            let (wide, _) = collapsed_by(&mesh, &bvh, &[], false, plan);
+            let most = largest(&wide);
+            assert!(most.0 <= children && most.1 as usize <= triangles, "{plan:?}: {most:?}");
         }
     }
     let (children, triangles) =

@@ -111,7 +111,7 @@ fn chains_collapse_within_the_depth_limit() {
 fn the_lines_are_the_same_at_any_number_of_threads() {
     let mesh = grid(120, 10.0, 4);
     let bvh = built(&mesh, Quality::Fast);
-    let cut = random_cut(&bvh, 200, &mut Random(9));
+    let cut = random_cut(&bvh, 200, &mut Random::new(9));
     let at = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| collapsed(&mesh, &bvh, &cut, true).0)
@@ -151,7 +151,7 @@ fn plans_keep_their_limits() {
         [(grid(40, 9.0, 6), 1), (soup(2000, 7), 2), (clutter(1500, &[0.0, 1.0, 2.0, 5.0], 8), 3)]
     {
         let bvh = built(&mesh, Quality::Fast);
-        let cut = random_cut(&bvh, 150, &mut Random(seed));
+        let cut = random_cut(&bvh, 150, &mut Random::new(seed));
         for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
             let plan = Plan { children, triangles };
             for keep in [false, true] {
@@ -276,7 +276,7 @@ proptest! {
     fn random_meshes_and_cuts_collapse_to_valid_trees(
         count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60, keep: bool,
     ) {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mesh = match kind {
             0 => soup(count, seed),
             1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),

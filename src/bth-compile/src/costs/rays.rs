@@ -1,6 +1,6 @@
 //! Rays that stand for those of a renderer: uniform lines from outside, and rays from surfaces.
 
-use super::random::Random;
+use super::random::RayRng;
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
 
@@ -58,7 +58,7 @@ pub(super) fn diagonal(node: &Node) -> f64 {
 /// Lines that are uniform in space (chords of the ball around the box), which start outside of it and
 /// meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
 pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
-    let mut random = Random(seed);
+    let mut random = RayRng::new(seed);
     let middle: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(lower[k]) + f64::from(upper[k])));
     let half: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(upper[k]) - f64::from(lower[k])));
     let radius = dot(half, half).sqrt();
@@ -90,7 +90,7 @@ pub fn from_surface(
     seed: u64,
 ) -> Vec<SampleRay> {
     let Some(root) = bvh.nodes.first() else { return Vec::new() };
-    let (mut random, diagonal) = (Random(seed), diagonal(root));
+    let (mut random, diagonal) = (RayRng::new(seed), diagonal(root));
     let triangles = &bvh.order[rows];
     let normal = |triangle: u32| {
         let [a, b, c] = corners(mesh, triangle);

@@ -1,7 +1,7 @@
 //! Which objects and triangles the rays of a scene meet (`--for-scene`): rays from its cameras at some of its frames,
 //! bounces from what they hit, and rays from there to its lights.
 
-use crate::costs::{Random, SampleRay, Weighting};
+use crate::costs::{RayRng, SampleRay, Weighting};
 use crate::error::{Error, Place, Result};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
@@ -29,7 +29,7 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
     let (first, last) = (view.scene[0].first_frame, view.scene[0].last_frame);
     let (cameras, lights) = (view.cameras.to_vec(), view.lights.to_vec());
     let count = (i64::from(last) - i64::from(first)).clamp(0, FRAMES - 1);
-    let mut random = Random(51);
+    let mut random = RayRng::new(51);
     for k in 0..=count {
         let frame = i64::from(first) + (i64::from(last) - i64::from(first)) * k / count.max(1);
         // A frame at which something cannot be placed shows nothing.
@@ -81,7 +81,7 @@ fn inverse(rows: &Rows) -> Option<[Vector; 3]> {
 }
 
 /// Jittered rays of a camera, in the world.
-fn sights(scene: &Scene, camera: &Camera, random: &mut Random) -> Vec<Ray> {
+fn sights(scene: &Scene, camera: &Camera, random: &mut RayRng) -> Vec<Ray> {
     let (rows, visible) = scene.node(camera.node);
     if !visible {
         return Vec::new();
@@ -116,7 +116,7 @@ fn ray(origin: Vector, direction: Vector, tmax: f64) -> Option<Ray> {
 }
 
 /// Traces rays and what follows from them, and notes what they meet.
-fn follow(scene: &Scene, sights: Vec<Ray>, lights: &[Light], random: &mut Random, weights: &mut [Weighting]) {
+fn follow(scene: &Scene, sights: Vec<Ray>, lights: &[Light], random: &mut RayRng, weights: &mut [Weighting]) {
     let mut rays: Vec<(Ray, Surface)> = sights.into_iter().map(|ray| (ray, Surface::NONE)).collect();
     for bounce in 0..=BOUNCES {
         let only: Vec<Ray> = rays.iter().map(|r| r.0).collect();

@@ -23,6 +23,7 @@ pub mod pipeline;
 pub mod scene;
 pub mod source;
 pub mod tets;
+mod vectors;
 pub mod write;
 
 pub use bth_import::{Error, Monitor, Place, Result, Silent, error, monitor};

@@ -4,7 +4,7 @@
 //! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is
 //! kept they walk, too. So the saving of a node is a sum over rays, and savings of disjoint nodes add up.
 
-use super::bvh_walk::{Met, walk};
+use super::bvh_walk::{Traced, walk};
 use super::options::Options;
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::rays::{self, SampleRay, along};
@@ -34,7 +34,7 @@ pub(super) struct Gain {
 /// The model's rays, traced through its BVH.
 pub(super) struct Sampled {
     /// Rays from surfaces, where they start and what they met.
-    surface: Vec<(SampleRay, u32, Met)>,
+    surface: Vec<(SampleRay, u32, Traced)>,
     /// How many rays from outside there were, and for each node how many entered it and how many visits its
     /// subtree had of them.
     outside: usize,
@@ -159,13 +159,13 @@ impl Sampled {
 }
 
 /// 1 for a ray that ends at one of the node's triangles, else 0.
-fn hits(met: &Met, node: &crate::bvh::Node) -> f64 {
+fn hits(met: &Traced, node: &crate::bvh::Node) -> f64 {
     let here = |(row, _)| (node.first..node.first + node.count).contains(&row);
     if met.hit.is_some_and(here) { 1.0 } else { 0.0 }
 }
 
 /// Whether a ray leaves a node's box without having met one of its triangles.
-pub(super) fn leaves(ray: &SampleRay, met: &Met, node: &crate::bvh::Node) -> bool {
+pub(super) fn leaves(ray: &SampleRay, met: &Traced, node: &crate::bvh::Node) -> bool {
     match met.hit {
         Some((row, _)) if (node.first..node.first + node.count).contains(&row) => false,
         Some(_) => true,

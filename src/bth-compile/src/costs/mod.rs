@@ -29,7 +29,7 @@ mod testing;
 mod tests;
 
 pub use area::area_steps;
-pub use bvh_walk::{Met, walk};
+pub use bvh_walk::{Traced, walk};
 pub use choose::{Storage, choose};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;

@@ -16,6 +16,7 @@ use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::tets::TetMesh;
+use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
 use serde::Serialize;
 
@@ -114,15 +115,12 @@ fn rows(bvh: &BinaryBvh, node: u32) -> std::ops::Range<usize> {
     node.first as usize..(node.first + node.count) as usize
 }
 
-/// Sums of the triangles' areas up to each row of the order.
+/// Sums of the triangles' double areas up to each row of the order.
 fn surface_areas(mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
-    use super::rays::{corners, cross, dot, sub};
     let mut sums = Vec::with_capacity(bvh.order.len() + 1);
     sums.push(0.0);
     for &triangle in &bvh.order {
-        let [a, b, c] = corners(mesh, triangle);
-        let n = cross(sub(b, a), sub(c, a));
-        sums.push(sums[sums.len() - 1] + dot(n, n).sqrt());
+        sums.push(sums[sums.len() - 1] + double_area(corners(mesh, triangle)).length());
     }
     sums
 }

@@ -96,8 +96,8 @@ mod tests {
     use super::super::coplanar::Projection;
     use super::super::oracle::oracle;
     use super::super::testing::planted;
-    use bth_random::Rng;
     use super::*;
+    use bth_random::Rng;
 
     /// Two random triangles of non-zero area on a grid of `side`³ points that share the given
     /// number of vertices; `flat` puts them into one plane.

@@ -1,4 +1,4 @@
-//! What is in a store: listed, summed, verified, cleared.
+//! The contents of a store: list, sums, verification, removal.
 
 use crate::evict::{is_locked, sweep};
 use crate::files::{named, remove};
@@ -7,12 +7,12 @@ use serde::Serialize;
 use std::collections::{BTreeMap, HashSet};
 use std::time::SystemTime;
 
-/// A record, and its content's state.
+/// A record and the state of its content.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
     /// Hash of the key.
     pub id: Digest,
-    /// The record, without the report.
+    /// Stage of the key.
     pub stage: String,
     /// Names and values of the key.
     pub components: Vec<(String, String)>,
@@ -37,12 +37,12 @@ pub struct Inventory {
     pub bytes: u64,
     /// Bytes that are kept.
     pub cap: u64,
-    /// What happened so far.
+    /// Hits, misses and evictions so far.
     #[serde(rename = "tally")]
     pub statistics: Statistics,
 }
 
-/// What a verification found.
+/// Findings of a verification.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Verification {
     /// Records that were checked.
@@ -53,7 +53,7 @@ pub struct Verification {
     pub bytes: u64,
     /// Damaged records and contents, which were removed.
     pub damaged: Vec<String>,
-    /// What killed processes left, which was removed.
+    /// Files left by killed processes, which were removed.
     pub leftovers: u64,
 }
 
@@ -80,7 +80,7 @@ impl Store {
         entries
     }
 
-    /// Sums.
+    /// Sums over the store.
     pub fn inventory(&self) -> Inventory {
         let mut inventory = Inventory {
             folder: self.folder().display().to_string(),
@@ -97,7 +97,8 @@ impl Store {
         inventory
     }
 
-    /// Reads everything; what is damaged or was left by killed processes is removed. Stops early when `go_on` says so.
+    /// Reads everything, and removes damaged entries and files left by killed processes. Stops early when `go_on`, which gets
+    /// the bytes read, returns false.
     pub fn verify(&self, go_on: &dyn Fn(u64) -> bool) -> Verification {
         let mut found = Verification { leftovers: sweep(&self.files), ..Verification::default() };
         for entry in self.files.below("keys") {

@@ -6,16 +6,16 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, Write};
 
-/// Bytes of lines beyond which they are summed into one.
+/// A longer file is summed into one line, in bytes.
 const LONG: u64 = 64 << 10;
 
-/// What happened in a store. Counts are only counts: a process that is killed takes its own with it.
+/// Counts of events in a store. A killed process loses its own counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Statistics {
-    /// Results that were there, by stage.
+    /// Results that the store had, by stage.
     pub hits: BTreeMap<String, u64>,
-    /// Results that were not, by stage and by the component of the key that differed from the source's last
+    /// Results that the store did not have, by stage and by the component of the key that differed from the source's last
     /// key; `new` for sources never seen, `evicted` for keys that had been there.
     pub misses: BTreeMap<String, BTreeMap<String, u64>>,
     /// Hits that the shared store answered.

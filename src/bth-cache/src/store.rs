@@ -13,9 +13,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Share of the cap that a process writes before it looks whether something must go.
+/// A process evicts after it has written this share of the cap, as the divisor.
 const SHARE: u64 = 64;
-/// Longest time for which no process looks.
+/// Longest time between evictions by any process.
 const LONG_UNCHECKED: Duration = Duration::from_secs(600);
 
 /// A store; see the crate's page.
@@ -32,7 +32,7 @@ pub struct Store {
 /// A verified content that is not evicted while this value lives.
 #[derive(Debug)]
 pub struct Pin {
-    /// The file; nobody writes to it, ever.
+    /// The file, which is never written to again.
     pub path: PathBuf,
     _file: File,
 }
@@ -54,8 +54,8 @@ impl Store {
         })
     }
 
-    /// With a shared store behind it: what this one lacks is looked for there, what is put here goes there too. When
-    /// that fails, a note says so and this process goes on without it.
+    /// With a shared store behind it, which is read on a miss and to which every put is copied. When it fails, there is a note,
+    /// and this process goes on without it.
     #[must_use]
     pub fn with_remote(self, remote: Box<dyn Remote>) -> Self {
         *lock(&self.remote) = Some(remote);
@@ -95,7 +95,7 @@ impl Store {
         Record::from_text(&text, id).map_err(|why| self.drop_damaged(&path, why)).ok()
     }
 
-    /// The content of a record, checked. `None` when it was evicted, or damaged: then it is removed and a note says so.
+    /// The content of a record, checked. `None` when it was evicted or is damaged; damaged content is removed, with a note.
     pub fn read(&self, record: &Record) -> Option<Vec<u8>> {
         let path = self.files.blob(&record.blob);
         if let Ok(bytes) = std::fs::read(&path) {
@@ -114,7 +114,7 @@ impl Store {
             return None;
         }
         lock(&self.statistics).shared_hits += 1;
-        // What cannot be kept can be used all the same.
+        // The bytes can be used even if they cannot be kept.
         let _ = self.write(&path, &bytes);
         Some(bytes)
     }
@@ -198,8 +198,8 @@ impl Store {
         self.put_both(key, bytes, report).map(|(record, _)| record)
     }
 
-    /// Keeps only what the content of a key is called and how many bytes it has, for contents that are quickly made from
-    /// others. `blob` is its hash, or what names it as surely.
+    /// Keeps only the name and length of a key's content, for contents that are quickly put together from others. `blob` is a
+    /// hash that determines the content.
     ///
     /// # Errors
     /// As [`Store::put`].
@@ -272,30 +272,30 @@ impl Store {
         lock(&self.statistics).hit(stage, hits);
     }
 
-    /// Why a key is not there: what differs from the last key of the same source. `source` may be a path: only a
-    /// hash of it is kept.
+    /// Why a key is missing: its differences from the last key of the same source. `source` may be a path: only a hash of
+    /// it is kept.
     pub fn reasons(&self, key: &Key, source: &str) -> Vec<String> {
         last_keys::reasons(&self.files, key, source)
     }
 
-    /// Counts a miss and says why.
+    /// Counts a miss and returns its reasons.
     pub fn count_miss(&self, key: &Key, source: &str) -> Vec<String> {
         let reasons = self.reasons(key, source);
         lock(&self.statistics).miss(key.stage(), &reasons);
         reasons
     }
 
-    /// Notes the key that a source has now.
+    /// Stores the key as the last one of a source.
     pub fn note_last(&self, key: &Key, source: &str) {
         last_keys::note(&self.files, key, source);
     }
 
-    /// What a person should know: damaged entries, a shared store that cannot be reached.
+    /// Takes the messages for the user: damaged entries, a shared store that cannot be reached.
     pub fn take_notes(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.notes))
     }
 
-    /// Removes what was used longest ago until `cap` bytes are left, and what killed processes left.
+    /// Removes the least recently used contents until `cap` bytes are left, and files left by killed processes.
     pub fn evict(&self, cap: u64) -> Evicted {
         self.written.store(0, Ordering::Relaxed);
         let evicted = evict(&self.files, cap);
@@ -306,7 +306,7 @@ impl Store {
         evicted
     }
 
-    /// The counters, those of this process included.
+    /// The statistics of all processes, this one included.
     pub fn statistics(&self) -> Statistics {
         self.flush();
         Statistics::read(&self.files)
@@ -314,7 +314,7 @@ impl Store {
 
     pub(crate) fn flush(&self) {
         let statistics = std::mem::take(&mut *lock(&self.statistics));
-        // Counters are the least of what a full disk costs.
+        // Lost counts cost nothing else.
         let _ = statistics.append(&self.files);
     }
 
@@ -348,9 +348,9 @@ impl Store {
         })
     }
 
-    fn share(&self, name: &str, bytes: &[u8], over: bool) {
+    fn share(&self, name: &str, bytes: &[u8], overwrite: bool) {
         let mut remote = lock(&self.remote);
-        let put = remote.as_ref().map_or(Ok(()), |place| place.put(name, bytes, over));
+        let put = remote.as_ref().map_or(Ok(()), |place| place.put(name, bytes, overwrite));
         if let Err(e) = put {
             self.give_up(&mut remote, &e);
         }
@@ -388,7 +388,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// As [`Files`] have it, with slashes on all systems.
+/// The name of an entry, as in the folder but with slashes on all systems.
 fn name(kind: &str, digest: &Digest) -> String {
     let hex = digest.hex();
     format!("{kind}/{}/{hex}", &hex[..2])

@@ -1,4 +1,4 @@
-//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and says where; without it there is nothing to
+//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and sets its address; without it there is nothing to
 //! test.
 #![allow(clippy::print_stdout)]
 

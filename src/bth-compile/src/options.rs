@@ -9,7 +9,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Structure {
-    /// A BVH, some nodes of which are tetrahedralized where the cost model says that it pays.
+    /// A BVH, some nodes of which are tetrahedralized where that saves time according to the cost model.
     #[default]
     Bth,
     /// A BVH only.

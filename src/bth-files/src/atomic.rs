@@ -165,7 +165,7 @@ fn unused_name<T>(
     Err(IoError::new(ErrorKind::AlreadyExists, "no unused name for the unfinished file"))
 }
 
-/// Removes unfinished files of this target that nobody has locked: their programs are gone.
+/// Removes unfinished files of this target that are not locked: the programs that wrote them have ended.
 fn remove_stale(folder: &Path, prefix: &OsString) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

@@ -4,7 +4,7 @@ use super::bounds::Bounds;
 use super::split::{Reference, Split};
 use rayon::prelude::*;
 
-/// Most bins that can be asked for.
+/// Greatest number of bins.
 pub(super) const MAX_BINS: usize = 32;
 /// Nodes of more triangles are binned in parallel, in chunks.
 const PARALLEL_COUNT: usize = 1 << 15;

@@ -15,7 +15,7 @@ use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use std::time::Instant;
 
-/// How the tetrahedra will be stored, and beside what.
+/// How the tetrahedra will be stored, and the size of the BVH beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storage {
     /// Their record.
@@ -91,7 +91,7 @@ struct Limits<'a> {
     prices: &'a Prices<'a>,
     /// Bytes and seconds.
     most: [Option<f64>; 2],
-    /// Bytes of the BVH that a triangle of a node no longer takes.
+    /// Bytes of the BVH saved for each triangle of a tet leaf, where subtrees are not kept.
     pruned: f64,
 }
 

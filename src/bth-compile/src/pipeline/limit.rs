@@ -10,7 +10,7 @@ use crate::{bvh, tets};
 use bth_format::layout::Object as Header;
 use bth_import::Mesh;
 
-/// How the tetrahedra of a mesh will be stored; under a limit on bytes, beside a BVH of how many.
+/// How the tetrahedra of a mesh will be stored; under a limit on bytes, with the size of the BVH beside them.
 ///
 /// # Errors
 /// A limit of the format, cancellation.

@@ -53,7 +53,7 @@ impl<'a> Names<'a> {
 }
 
 /// The sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
-/// instance uses; `visible` says which nodes may be seen: instances at others are left out.
+/// instance uses; `visible` tells for each node whether it may be seen; instances at other nodes are left out.
 ///
 /// # Errors
 /// `BTH-L050` beyond the limits of the format.

@@ -40,7 +40,7 @@ impl SourceMesh {
     /// The mesh itself.
     ///
     /// # Errors
-    /// Those of the import, when the cache does not have it any more.
+    /// Those of the import, when the mesh has been evicted from the cache.
     pub(super) fn take(&mut self, file: &File<'_>, context: &Context<'_>) -> Result<Mesh> {
         if let Some(mesh) = self.mesh.take() {
             return Ok(mesh);

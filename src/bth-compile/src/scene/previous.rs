@@ -68,6 +68,6 @@ impl Previous {
 
     /// Where the bytes of a section are.
     pub(super) fn bytes(&self, section: &SectionRow) -> Bytes<'static> {
-        Bytes::Old(self.file.clone(), section.offset..section.offset + section.length)
+        Bytes::OnDisk(self.file.clone(), section.offset..section.offset + section.length)
     }
 }

@@ -4,7 +4,7 @@ use super::file_index::Hash;
 use super::previous::Previous;
 use crate::error::Result;
 use crate::tets;
-use crate::write::{Bytes, FileBuilder, Known};
+use crate::write::{Bytes, FileBuilder, SectionHead};
 use bth_format::layout::{self, SectionEntry, kind};
 use std::sync::Arc;
 use zerocopy::FromBytes;
@@ -40,15 +40,20 @@ impl ObjectSections {
                 for section in Self::sections(file, *object) {
                     let e = section.entry;
                     let hash = if made.is_some() { e.hash } else { bth_format::file::hash128(section.bytes) };
-                    let known = Known { kind: e.kind, object: number, stride: e.stride, hash };
+                    let head = SectionHead { kind: e.kind, object: number, stride: e.stride, hash };
                     let range = e.offset as usize..(e.offset + e.length) as usize;
-                    builder.known_section(known, self.coordinates(e.kind), Bytes::In(file.clone(), range))?;
+                    builder.hashed_section(
+                        head,
+                        self.coordinates(e.kind),
+                        Bytes::InFile(file.clone(), range),
+                    )?;
                 }
             }
             Self::InPrevious { file, object } => {
                 for row in file.index.sections_of(*object) {
-                    let known = Known { kind: row.kind, object: number, stride: row.stride, hash: row.hash };
-                    builder.known_section(known, self.coordinates(row.kind), file.bytes(row))?;
+                    let head =
+                        SectionHead { kind: row.kind, object: number, stride: row.stride, hash: row.hash };
+                    builder.hashed_section(head, self.coordinates(row.kind), file.bytes(row))?;
                 }
             }
         }

@@ -19,7 +19,7 @@ use super::{Leaf, Options, TetMesh};
 /// built: chosen nodes, or cells below them where they failed; the rest stays in the BVH. It is
 /// the same for any number of workers, as long as no deadline passes.
 ///
-/// Having no worker is no error: nothing is built then, and the report says how to get one.
+/// A missing worker is no error: nothing is built then, and the report has a hint how to get one.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; [`Error::Limit`] when the object exceeds a limit of the format;

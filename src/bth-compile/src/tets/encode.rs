@@ -76,8 +76,8 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
     to
 }
 
-/// Bytes of the sections that a mesh adds to, but for the face_of_triangle of the triangles, which are one for each triangle
-/// of the source.
+/// Bytes that a tetrahedralization adds to the sections, without the map from triangles to faces, which has a row for each
+/// triangle of the source.
 pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
     let hulls = mesh.behind.iter().flatten().filter(|behind| **behind == Behind::Hull).count();
     let bytes = mesh.tets.len() * kind.stride()

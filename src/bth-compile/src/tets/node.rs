@@ -1,4 +1,4 @@
-//! One node: attempts with different points until one passes the checks.
+//! The tetrahedralization of one node: attempts with different points until one passes the checks.
 
 use std::time::{Duration, Instant};
 
@@ -230,7 +230,7 @@ fn switches(version: &str) -> &'static str {
     if version.starts_with("1.5") {
         "pzYMQJT1e-15"
     } else {
-        // 1.6 splits and merges facets by angle unless told otherwise.
+        // By default 1.6 splits and merges facets by angle.
         "pzYMQJT1e-15p179.9/0.1/15/179.9999"
     }
 }

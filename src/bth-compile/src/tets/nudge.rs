@@ -1,5 +1,5 @@
 //! Repairs tetrahedra that rounding made flat or turned inside out, by moving points that are
-//! ours to move by one or two units in the last place.
+//! not part of the input by one or two units in the last place.
 
 use super::orientation::orientation;
 

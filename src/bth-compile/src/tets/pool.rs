@@ -1,4 +1,4 @@
-//! Where the worker program is, and a place for a worker that is replaced after any failure.
+//! The path of the worker program, and a slot for a worker that is replaced after any failure.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -42,8 +42,8 @@ pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
     })
 }
 
-/// The tetrahedralizer that a compilation will use: TetGen and its version, or `none`; nothing when there is a worker
-/// that does not work.
+/// The tetrahedralizer that a compilation will use: the version of TetGen, or `none` without a worker; `None` when the worker
+/// fails.
 ///
 /// # Errors
 /// Cancelled.
@@ -54,16 +54,16 @@ pub(crate) fn version(options: &Options, monitor: &dyn Monitor) -> Result<Option
     Ok(version.ok())
 }
 
-/// A place for one worker.
+/// A slot for one worker.
 pub(super) struct WorkerSlot<'a> {
     setup: &'a Setup,
     worker: Option<Worker>,
-    /// Workers started in this place.
+    /// Workers started in this slot.
     pub(super) started: u64,
 }
 
 impl<'a> WorkerSlot<'a> {
-    /// An empty place.
+    /// An empty slot.
     pub(super) fn new(setup: &'a Setup) -> Self {
         Self { setup, worker: None, started: 0 }
     }
@@ -88,7 +88,7 @@ impl<'a> WorkerSlot<'a> {
         Ok(Ok(self.worker.as_ref().map_or("", |w| w.tetgen.as_str())))
     }
 
-    /// Has the worker do a job. One that fails in any way is gone afterwards.
+    /// Sends a request to the worker, which is dropped after any failure.
     ///
     /// # Errors
     /// As [`Worker::ask`].

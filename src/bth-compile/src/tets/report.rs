@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// What became of the chosen nodes.
+/// Report on the chosen nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     /// The worker that was used, or why there was none.
     pub worker: WorkerStatus,
-    /// Nodes that were asked for.
+    /// Nodes that were to be tetrahedralized.
     pub chosen: u64,
     /// Triangles below them.
     pub chosen_triangles: u64,
@@ -69,7 +69,7 @@ pub enum WorkerStatus {
     },
 }
 
-/// What became of one node.
+/// Report on one node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     /// Index in the binary BVH.

@@ -1,4 +1,4 @@
-//! One worker process: started, asked, and ended when it dies, hangs or is no longer needed.
+//! One worker process: start, requests, and end when it dies, hangs or is not needed.
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -24,9 +24,9 @@ pub(super) struct Setup {
     pub(super) memory: u64,
 }
 
-/// How often cancellation is looked at while a worker works.
+/// Interval between checks for cancellation while a worker is busy.
 const CANCEL_INTERVAL: Duration = Duration::from_millis(100);
-/// Time for a worker to say hello.
+/// Time limit for the greeting of a worker.
 const START: Duration = Duration::from_secs(20);
 
 /// A running worker. It ends with this value, or with this process, however that ends.
@@ -147,7 +147,7 @@ impl Worker {
         }
     }
 
-    /// How the process ended, now that its pipe has.
+    /// The error for a process whose pipe has closed, with its exit status.
     fn exit_error(&mut self) -> AttemptError {
         let _ = self.child.kill();
         AttemptError::Died(match self.child.wait() {
@@ -159,7 +159,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may be in the midst of a job, or hang: there is nothing to save.
+        // It may be busy or hang; it has no state that would be lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.requests = None;

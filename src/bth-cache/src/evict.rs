@@ -1,14 +1,14 @@
-//! Eviction: what was used longest ago goes first, and never what a process has mapped.
+//! Eviction: the least recently used contents first, and none that a process has mapped.
 
-use crate::atomic::SUFFIX;
 use crate::files::{Files, named, remove};
 use crate::record::Record;
+use bth_files::SUFFIX;
 use serde::Serialize;
 use std::fs::{DirEntry, File, TryLockError};
 use std::path::Path;
 use std::time::SystemTime;
 
-/// What an eviction removed and left.
+/// Result of an eviction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Evicted {
     /// Contents that were removed.
@@ -17,7 +17,7 @@ pub struct Evicted {
     pub bytes: u64,
     /// Contents that would have been removed, were they not in use.
     pub in_use: u64,
-    /// What killed processes left: unfinished files and locks.
+    /// Unfinished files and locks of killed processes that were removed.
     pub leftovers: u64,
     /// Bytes that are left.
     pub left_bytes: u64,
@@ -83,7 +83,7 @@ pub(crate) fn is_locked(path: &Path) -> bool {
     file.is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
-/// Removes what killed processes left.
+/// Removes unfinished files and locks of killed processes.
 pub(crate) fn sweep(files: &Files) -> u64 {
     let mut removed = 0;
     for name in ["keys", "blobs", "last", "locks"] {

@@ -1,11 +1,11 @@
-//! Where things lie in the folder of a store.
+//! The layout of a store's folder.
 
 use crate::Digest;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// Least age of a time of use that is renewed.
+/// A time of use younger than this is not renewed.
 const FRESH: Duration = Duration::from_secs(1);
 
 /// The folders of a store.
@@ -14,7 +14,7 @@ pub(crate) struct Files {
     root: PathBuf,
 }
 
-/// What says to backup programs that a folder can be made again (<https://bford.info/cachedir/>).
+/// Tag by which backup programs recognize caches (<https://bford.info/cachedir/>).
 const TAG: &str = "Signature: 8a477f597d28d172789f06886806bc55\n\
     # This folder is a cache of compiled models (bthc); it may be deleted at any time.\n";
 
@@ -30,7 +30,7 @@ impl Files {
         }
         let tag = folder.join("CACHEDIR.TAG");
         if !tag.exists() {
-            // A store without the tag is only backed up for nothing.
+            // Without the tag backups are larger, and nothing else.
             let _ = std::fs::write(tag, TAG);
         }
         Ok(files)
@@ -46,7 +46,7 @@ impl Files {
         self.sharded("blobs", digest)
     }
 
-    /// The lock of who works on a key.
+    /// The lock for building what a key stands for.
     pub(crate) fn lock(&self, id: &Digest) -> PathBuf {
         self.root.join("locks").join(id.hex())
     }
@@ -57,7 +57,7 @@ impl Files {
     }
 
     /// Counters.
-    pub(crate) fn tally(&self) -> PathBuf {
+    pub(crate) fn statistics(&self) -> PathBuf {
         self.root.join("tally")
     }
 
@@ -90,12 +90,12 @@ pub(crate) fn named(path: &Path) -> Option<Digest> {
     Digest::parse(path.file_name()?.to_str()?)
 }
 
-/// Removes a file; whether it is gone by our doing. Read-only files need no more rights than others, but on Windows.
+/// Removes a file; whether this call removed it. Except on Windows, read-only files need no other rights.
 pub(crate) fn remove(path: &Path) -> bool {
     std::fs::remove_file(path).is_ok()
 }
 
-/// Renews the time of use; a store of others, which cannot be written, is read all the same.
+/// Renews the time of use. Ignores failures, so that a store that cannot be written can still be read.
 pub(crate) fn touch(path: &Path) {
     let Ok(file) = File::open(path) else { return };
     let used = file.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());

@@ -1,4 +1,4 @@
-//! What a result depends on.
+//! Keys of results.
 
 use crate::Digest;
 use serde::{Deserialize, Serialize};

@@ -1,12 +1,12 @@
-//! Which folder is the cache, and how large it may be.
+//! The folder of the cache and its size limit.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Bytes that are kept unless told otherwise.
+/// Bytes that are kept by default.
 pub const DEFAULT_CAP: u64 = 20 << 30;
 
-/// The folder that the environment asks for: `BTH_CACHE_DIR`, else `bth` in the folder for caches
+/// The folder that the environment names: `BTH_CACHE_DIR`, else `bth` in the folder for caches
 /// (`XDG_CACHE_HOME`, `~/.cache`, on Windows `LOCALAPPDATA`).
 pub fn folder() -> Option<PathBuf> {
     choose(|name| std::env::var_os(name))

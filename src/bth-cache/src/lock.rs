@@ -24,7 +24,7 @@ impl WorkLock {
         loop {
             let file = File::options().write(true).create(true).truncate(false).open(path).ok()?;
             match file.try_lock() {
-                // Whoever had it may have removed the name meanwhile; then others lock another file.
+                // The previous holder may have removed the name meanwhile; then other processes lock another file.
                 Ok(()) if same_file(&file, path) => {
                     return Some(Self { path: path.to_owned(), waited, _file: file });
                 }
@@ -44,7 +44,7 @@ impl WorkLock {
 
 impl Drop for WorkLock {
     fn drop(&mut self) {
-        // Before the lock goes with the file: nobody can have the new one's lock and this one's.
+        // Before the lock is released with the file: no process can hold the locks of both the old and a new file.
         let _ = std::fs::remove_file(&self.path);
     }
 }

@@ -1,22 +1,22 @@
-//! Which content belongs to a key: a line of JSON and a line with its hash.
+//! The record of a key, which names its content: a line of JSON and a line with its hash.
 
 use crate::{Digest, Key};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Which content belongs to a key, and what was said when it was made.
+/// The content of a key, and the report of the stage that made it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// The key.
     #[serde(flatten)]
     pub key: Key,
-    /// BLAKE3 of the content; of one that is not kept, what names it as surely.
+    /// BLAKE3 of the content; for a content that is not kept, a hash that determines it.
     pub blob: Digest,
     /// Bytes of the content.
     pub bytes: u64,
-    /// Whether the content itself is kept; else it is made from other entries when it is wanted.
+    /// Whether the content itself is kept; else it is put together from other entries when it is needed.
     pub whole: bool,
-    /// What the stage reported.
+    /// The report of the stage.
     pub report: Value,
 }
 
@@ -25,7 +25,7 @@ impl Record {
         Ok(seal(serde_json::to_string(self)?))
     }
 
-    /// The record of a key; `Err` says what is wrong with the text.
+    /// The record of a key; `Err` describes the damage.
     pub(crate) fn from_text(text: &[u8], id: &Digest) -> Result<Self, &'static str> {
         let record: Self =
             serde_json::from_str(unseal(text)?).map_err(|_| "the record is none of this version")?;

@@ -1,22 +1,22 @@
-//! A second store behind the first, shared by machines: looked into on a miss, filled on a build.
+//! A second store behind the first, shared by machines: read on a miss, written on a build.
 
 use std::io::{Error, ErrorKind, Result};
 use std::path::PathBuf;
 
-/// A place that keeps named bytes. Names are such as `keys/ab/abcd…`; what has a name never changes, and who
-/// reads checks what was read.
+/// A store of named bytes. Names are such as `keys/ab/abcd…`; the bytes of a name never change, and readers check what they
+/// read.
 pub trait Remote: Send + Sync {
-    /// The bytes of a name, if it is there.
+    /// The bytes of a name, if the store has it.
     ///
     /// # Errors
-    /// When the place cannot be reached.
+    /// When the store cannot be reached.
     fn get(&self, name: &str) -> Result<Option<Vec<u8>>>;
-    /// Keeps bytes under a name; `over` replaces what is there.
+    /// Keeps bytes under a name; `overwrite` replaces those that are there.
     ///
     /// # Errors
-    /// When the place cannot be reached or is full.
-    fn put(&self, name: &str, bytes: &[u8], over: bool) -> Result<()>;
-    /// What to call it in messages.
+    /// When the store cannot be reached or is full.
+    fn put(&self, name: &str, bytes: &[u8], overwrite: bool) -> Result<()>;
+    /// Its name in messages.
     fn name(&self) -> String;
 }
 
@@ -33,7 +33,7 @@ impl Remote for Folder {
         }
     }
 
-    fn put(&self, name: &str, bytes: &[u8], over: bool) -> Result<()> {
+    fn put(&self, name: &str, bytes: &[u8], overwrite: bool) -> Result<()> {
         let path = self.0.join(name);
         if !self.0.is_dir() {
             return Err(Error::new(ErrorKind::NotFound, "the folder is not there"));
@@ -41,11 +41,11 @@ impl Remote for Folder {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder)?;
         }
-        if over {
-            // Gone already or not ours to remove: the next line tells.
+        if overwrite {
+            // A failure to remove shows in the write below.
             let _ = std::fs::remove_file(&path);
         }
-        crate::atomic::write_once(&path, bytes).map(|_| ())
+        bth_files::write_once(&path, bytes).map(|_| ())
     }
 
     fn name(&self) -> String {

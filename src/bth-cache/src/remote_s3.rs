@@ -8,7 +8,7 @@ use std::io::{Error, Result};
 use std::time::Duration;
 use tokio::runtime::Runtime;
 
-/// Time for one try, and for all tries together: who is offline goes on without soon.
+/// Time limits of one try and of all tries together: a machine that is offline goes on without the store soon.
 const CONNECT: Duration = Duration::from_secs(5);
 const TRIES: usize = 2;
 const ALL_TRIES: Duration = Duration::from_secs(30);
@@ -71,7 +71,7 @@ impl Remote for S3 {
     }
 }
 
-/// Options of the client replace what the environment says of it, so this is asked here.
+/// Options of the client override the environment, so the variable is read here.
 fn allow_http() -> bool {
     std::env::var("AWS_ALLOW_HTTP").is_ok_and(|value| value.eq_ignore_ascii_case("true") || value == "1")
 }

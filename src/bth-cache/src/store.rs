@@ -1,10 +1,10 @@
 //! The store: find, read, pin and put.
 
-use crate::atomic::write_once;
 use crate::evict::{Evicted, evict};
 use crate::files::{Files, named, remove, touch};
 use crate::lock::{WorkLock, same_file};
-use crate::{Digest, Key, Record, Remote, Tally, last};
+use crate::{Digest, Key, Record, Remote, Statistics, last_keys};
+use bth_files::write_once;
 use serde_json::Value;
 use std::fs::File;
 use std::io::{ErrorKind, Result};
@@ -13,9 +13,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Share of the cap that a process writes before it looks whether something must go.
+/// A process evicts after it has written this share of the cap, as the divisor.
 const SHARE: u64 = 64;
-/// Longest time for which no process looks.
+/// Longest time between evictions by any process.
 const LONG_UNCHECKED: Duration = Duration::from_secs(600);
 
 /// A store; see the crate's page.
@@ -25,14 +25,14 @@ pub struct Store {
     pub(crate) cap: u64,
     remote: Mutex<Option<Box<dyn Remote>>>,
     notes: Mutex<Vec<String>>,
-    tally: Mutex<Tally>,
+    statistics: Mutex<Statistics>,
     written: AtomicU64,
 }
 
 /// A verified content that is not evicted while this value lives.
 #[derive(Debug)]
 pub struct Pin {
-    /// The file; nobody writes to it, ever.
+    /// The file, which is never written to again.
     pub path: PathBuf,
     _file: File,
 }
@@ -49,13 +49,13 @@ impl Store {
             cap,
             remote: Mutex::new(None),
             notes: Mutex::default(),
-            tally: Mutex::default(),
+            statistics: Mutex::default(),
             written: AtomicU64::new(0),
         })
     }
 
-    /// With a shared store behind it: what this one lacks is looked for there, what is put here goes there too. When
-    /// that fails, a note says so and this process goes on without it.
+    /// With a shared store behind it, which is read on a miss and to which every put is copied. When it fails, there is a note,
+    /// and this process goes on without it.
     #[must_use]
     pub fn with_remote(self, remote: Box<dyn Remote>) -> Self {
         *lock(&self.remote) = Some(remote);
@@ -95,7 +95,7 @@ impl Store {
         Record::from_text(&text, id).map_err(|why| self.drop_damaged(&path, why)).ok()
     }
 
-    /// The content of a record, checked. `None` when it was evicted, or damaged: then it is removed and a note says so.
+    /// The content of a record, checked. `None` when it was evicted or is damaged; damaged content is removed, with a note.
     pub fn read(&self, record: &Record) -> Option<Vec<u8>> {
         let path = self.files.blob(&record.blob);
         if let Ok(bytes) = std::fs::read(&path) {
@@ -113,8 +113,8 @@ impl Store {
             );
             return None;
         }
-        lock(&self.tally).shared_hits += 1;
-        // What cannot be kept can be used all the same.
+        lock(&self.statistics).shared_hits += 1;
+        // The bytes can be used even if they cannot be kept.
         let _ = self.write(&path, &bytes);
         Some(bytes)
     }
@@ -198,8 +198,8 @@ impl Store {
         self.put_both(key, bytes, report).map(|(record, _)| record)
     }
 
-    /// Keeps only what the content of a key is called and how many bytes it has, for contents that are quickly made from
-    /// others. `blob` is its hash, or what names it as surely.
+    /// Keeps only the name and length of a key's content, for contents that are quickly put together from others. `blob` is a
+    /// hash that determines the content.
     ///
     /// # Errors
     /// As [`Store::put`].
@@ -227,9 +227,9 @@ impl Store {
         }
         touch(&blob);
         if new {
-            let mut tally = lock(&self.tally);
-            tally.stored += 1;
-            tally.stored_bytes += record.bytes;
+            let mut statistics = lock(&self.statistics);
+            statistics.stored += 1;
+            statistics.stored_bytes += record.bytes;
         }
         self.written(record.bytes);
         Ok(())
@@ -269,53 +269,53 @@ impl Store {
 
     /// Counts hits of a stage.
     pub fn count_hits(&self, stage: &str, hits: u64) {
-        lock(&self.tally).hit(stage, hits);
+        lock(&self.statistics).hit(stage, hits);
     }
 
-    /// Why a key is not there: what differs from the last key of the same source. `source` may be a path: only a
-    /// hash of it is kept.
+    /// Why a key is missing: its differences from the last key of the same source. `source` may be a path: only a hash of
+    /// it is kept.
     pub fn reasons(&self, key: &Key, source: &str) -> Vec<String> {
-        last::reasons(&self.files, key, source)
+        last_keys::reasons(&self.files, key, source)
     }
 
-    /// Counts a miss and says why.
+    /// Counts a miss and returns its reasons.
     pub fn count_miss(&self, key: &Key, source: &str) -> Vec<String> {
         let reasons = self.reasons(key, source);
-        lock(&self.tally).miss(key.stage(), &reasons);
+        lock(&self.statistics).miss(key.stage(), &reasons);
         reasons
     }
 
-    /// Notes the key that a source has now.
+    /// Stores the key as the last one of a source.
     pub fn note_last(&self, key: &Key, source: &str) {
-        last::note(&self.files, key, source);
+        last_keys::note(&self.files, key, source);
     }
 
-    /// What a person should know: damaged entries, a shared store that cannot be reached.
+    /// Takes the messages for the user: damaged entries, a shared store that cannot be reached.
     pub fn take_notes(&self) -> Vec<String> {
         std::mem::take(&mut lock(&self.notes))
     }
 
-    /// Removes what was used longest ago until `cap` bytes are left, and what killed processes left.
+    /// Removes the least recently used contents until `cap` bytes are left, and files left by killed processes.
     pub fn evict(&self, cap: u64) -> Evicted {
         self.written.store(0, Ordering::Relaxed);
         let evicted = evict(&self.files, cap);
-        let mut tally = lock(&self.tally);
-        tally.evictions += evicted.entries;
-        tally.evicted_bytes += evicted.bytes;
-        let _ = File::create(self.files.tally().with_extension("checked"));
+        let mut statistics = lock(&self.statistics);
+        statistics.evictions += evicted.entries;
+        statistics.evicted_bytes += evicted.bytes;
+        let _ = File::create(self.files.statistics().with_extension("checked"));
         evicted
     }
 
-    /// The counters, those of this process included.
-    pub fn tally(&self) -> Tally {
+    /// The statistics of all processes, this one included.
+    pub fn statistics(&self) -> Statistics {
         self.flush();
-        Tally::read(&self.files)
+        Statistics::read(&self.files)
     }
 
     pub(crate) fn flush(&self) {
-        let tally = std::mem::take(&mut *lock(&self.tally));
-        // Counters are the least of what a full disk costs.
-        let _ = tally.append(&self.files);
+        let statistics = std::mem::take(&mut *lock(&self.statistics));
+        // Lost counts cost nothing else.
+        let _ = statistics.append(&self.files);
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<bool> {
@@ -335,7 +335,7 @@ impl Store {
     }
 
     pub(crate) fn damaged(&self, what: &str, why: &str) {
-        lock(&self.tally).damaged += 1;
+        lock(&self.statistics).damaged += 1;
         lock(&self.notes).push(format!("cache: {what} is damaged ({why}); it is not used"));
     }
 
@@ -348,9 +348,9 @@ impl Store {
         })
     }
 
-    fn share(&self, name: &str, bytes: &[u8], over: bool) {
+    fn share(&self, name: &str, bytes: &[u8], overwrite: bool) {
         let mut remote = lock(&self.remote);
-        let put = remote.as_ref().map_or(Ok(()), |place| place.put(name, bytes, over));
+        let put = remote.as_ref().map_or(Ok(()), |place| place.put(name, bytes, overwrite));
         if let Err(e) = put {
             self.give_up(&mut remote, &e);
         }
@@ -367,7 +367,7 @@ impl Store {
 impl Drop for Store {
     fn drop(&mut self) {
         let unchecked = || {
-            let checked = std::fs::metadata(self.files.tally().with_extension("checked"));
+            let checked = std::fs::metadata(self.files.statistics().with_extension("checked"));
             let age = checked.and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
             age.is_none_or(|age| age > LONG_UNCHECKED)
         };
@@ -388,7 +388,7 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// As [`Files`] have it, with slashes on all systems.
+/// The name of an entry, as in the folder but with slashes on all systems.
 fn name(kind: &str, digest: &Digest) -> String {
     let hex = digest.hex();
     format!("{kind}/{}/{hex}", &hex[..2])

@@ -1,4 +1,4 @@
-//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and says where; without it there is nothing to
+//! A shared cache in a real S3-compatible server. `tools/s3/run` starts one and sets its address; without it there is nothing to
 //! test.
 #![allow(clippy::print_stdout)]
 
@@ -33,7 +33,7 @@ fn what_one_machine_makes_another_finds() {
     let (two, _) = store(&there).unwrap();
     assert_eq!(two.find(&key("a")), Some(record.clone()));
     assert!(two.read(&record).as_deref() == Some(&content[..]));
-    assert_eq!(two.tally().shared_hits, 1);
+    assert_eq!(two.statistics().shared_hits, 1);
     // The copy serves without the server.
     let alone = Store::open(there.path(), LARGE).unwrap();
     assert!(alone.find(&key("a")).and_then(|r| alone.read(&r)).as_deref() == Some(&content[..]));

@@ -84,7 +84,7 @@ fn every_flipped_byte_of_every_entry_is_noticed_removed_and_reported() {
             flipped += 1;
         }
     }
-    assert_eq!(store.tally().damaged, flipped);
+    assert_eq!(store.statistics().damaged, flipped);
 }
 
 #[test]
@@ -139,8 +139,8 @@ fn what_was_used_longest_ago_goes_first_and_never_what_is_in_use() {
     assert_eq!(store.find(&key("c")), None, "the record goes with its content");
     drop(pin);
     assert_eq!(store.evict(0).entries, 3);
-    let tally = store.tally();
-    assert_eq!((tally.evictions, tally.evicted_bytes), (5, 50_000));
+    let statistics = store.statistics();
+    assert_eq!((statistics.evictions, statistics.evicted_bytes), (5, 50_000));
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn a_miss_names_the_component_that_differs_from_the_last_time() {
     assert_eq!(store.count_miss(&of("fast", "2"), "model.ply"), ["source"]);
     assert_eq!(store.count_miss(&of("fast", "1"), "model.ply"), ["evicted"]);
     assert_eq!(store.count_miss(&of("fast", "1"), "other.ply"), ["new"]);
-    let misses = &store.tally().misses["bvh"];
+    let misses = &store.statistics().misses["bvh"];
     let expected = [("evicted", 1), ("new", 2), ("quality", 1), ("source", 1)];
     assert!(misses.iter().map(|(name, n)| (name.as_str(), *n)).eq(expected), "{misses:?}");
     for path in files(folder.path()) {
@@ -202,7 +202,7 @@ fn a_shared_folder_is_read_through_with_a_local_copy() {
     let store = open(two.path());
     assert_eq!(store.find(&key("a")).as_ref(), Some(&record));
     assert_eq!(store.read(&record), Some(content("a", 2000)));
-    assert_eq!(store.tally().shared_hits, 1);
+    assert_eq!(store.statistics().shared_hits, 1);
     // The copy serves without the shared folder, and a pinned one is fetched as well.
     let alone = Store::open(two.path(), LARGE).unwrap();
     assert_eq!(alone.find(&key("a")).and_then(|r| alone.read(&r)), Some(content("a", 2000)));

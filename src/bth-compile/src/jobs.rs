@@ -1,18 +1,18 @@
 //! A pool of jobs that share threads and memory.
 //!
-//! Every job runs on a thread of its own, not in a pool of rayon: there, a job that waits for another process to finish
-//! the same work could hold up one that it waits for.
+//! Jobs run on threads of their own, not in the shared pool of rayon, where a job that waits for another process could block
+//! the job that this process waits for.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Runs the jobs, `at_once` of them at a time as long as they need no more than `memory` bytes together by the
-/// `estimate`; one is run in any case. Results are in the order of the jobs.
+/// Runs the jobs, at most `parallel` at a time and no more than need `memory` bytes together by the `estimate`; one is run in
+/// any case. Results are in the order of the jobs.
 ///
-/// `within` is given what each thread does and does that, in surroundings of its own, such as a pool.
+/// `within` runs the work of each thread, for example in a pool of its own.
 pub fn run<J: Send, T: Send>(
     jobs: Vec<J>,
-    at_once: usize,
+    parallel: usize,
     memory: u64,
     estimate: impl Fn(&J) -> u64 + Sync,
     within: impl Fn(&(dyn Fn() + Sync)) + Sync,
@@ -20,7 +20,7 @@ pub fn run<J: Send, T: Send>(
 ) -> Vec<T> {
     let memory = Memory::new(memory);
     let next = AtomicUsize::new(0);
-    let at_once = at_once.clamp(1, jobs.len().max(1));
+    let parallel = parallel.clamp(1, jobs.len().max(1));
     let places: Vec<Mutex<(Option<J>, Option<T>)>> =
         jobs.into_iter().map(|job| Mutex::new((Some(job), None))).collect();
     let lock = |place: usize| Some(places.get(place)?.lock().unwrap_or_else(PoisonError::into_inner));
@@ -37,17 +37,17 @@ pub fn run<J: Send, T: Send>(
             }
         }
     };
-    if at_once == 1 {
+    if parallel == 1 {
         within(&worker);
     } else {
-        std::thread::scope(|scope| (0..at_once).for_each(|_| drop(scope.spawn(|| within(&worker)))));
+        std::thread::scope(|scope| (0..parallel).for_each(|_| drop(scope.spawn(|| within(&worker)))));
     }
     let result =
         |place: Mutex<(Option<J>, Option<T>)>| place.into_inner().unwrap_or_else(PoisonError::into_inner).1;
     places.into_iter().map(|place| result(place).expect("every job has run")).collect()
 }
 
-/// Memory that is taken before a job and given back after it.
+/// Memory that jobs reserve before they start and release when they end.
 struct Memory {
     limit: u64,
     taken: Mutex<u64>,
@@ -61,7 +61,7 @@ impl Memory {
         Self { limit, taken: Mutex::new(0), given_back: Condvar::new() }
     }
 
-    /// Waits until there is enough, or nobody else has any.
+    /// Waits until there is enough memory, or no other job has any.
     fn take(&self, bytes: u64) -> Share<'_> {
         let taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let too_much = |taken: &mut u64| *taken > 0 && taken.saturating_add(bytes) > self.limit;
@@ -104,16 +104,16 @@ mod tests {
     }
 
     #[test]
-    fn results_are_in_order_however_many_run_at_once() {
-        for at_once in [0, 1, 3, 100] {
+    fn results_are_in_order_for_every_number_of_threads() {
+        for parallel in [0, 1, 3, 100] {
             let started = AtomicUsize::new(0);
             let within = |worker: &(dyn Fn() + Sync)| {
                 started.fetch_add(1, Ordering::Relaxed);
                 worker();
             };
-            let squares = run((0..20u64).collect(), at_once, u64::MAX, |_| 1, within, |n| n * n);
+            let squares = run((0..20u64).collect(), parallel, u64::MAX, |_| 1, within, |n| n * n);
             assert_eq!(squares, (0..20).map(|n| n * n).collect::<Vec<_>>());
-            assert_eq!(started.into_inner(), at_once.clamp(1, 20));
+            assert_eq!(started.into_inner(), parallel.clamp(1, 20));
         }
         assert!(run(Vec::<u8>::new(), 4, 0, |_| 0, |worker| worker(), |n| n).is_empty());
     }

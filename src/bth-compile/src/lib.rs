@@ -1,18 +1,29 @@
 //! The BTH compiler: mesh → coordinates → bvh → marks → costs → tets → write.
 //!
-//! Each stage is `fn(&Input, &Options, &dyn Monitor) -> Result<(Output, Report)>`,
-//! knows nothing of files or terminals, and gives the same output at any number of threads.
+//! Each stage is `fn(&Input, &Options, &dyn Monitor) -> Result<(Output, Report)>`: it depends on neither files, terminals
+//! nor the cache, and its output is the same at any number of threads. From the bottom up:
+//!
+//! | modules | |
+//! |---|---|
+//! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`write`] | the stages |
+//! | [`pipeline`] | calls the stages in order, from a model to a file |
+//! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
+//! | [`scene`] | many objects, each by the pipeline, into one file |
 #![warn(missing_docs)]
 
 pub mod bvh;
 pub mod cached;
+pub mod comparison;
 pub mod coordinates;
 pub mod costs;
 pub mod jobs;
 pub mod marks;
+mod options;
 pub mod pipeline;
 pub mod scene;
+pub mod source;
 pub mod tets;
+mod vectors;
 pub mod write;
 
 pub use bth_import::{Error, Monitor, Place, Result, Silent, error, monitor};

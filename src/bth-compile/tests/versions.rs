@@ -1,11 +1,10 @@
-//! A stage that makes something else than it did has a new version in `cached/keys.rs`: else caches would serve what
-//! the old one made.
+//! A stage whose results change gets a new version in `cached/keys.rs`: otherwise caches would serve the old results.
 // Tests say what they skip.
 #![allow(clippy::print_stdout)]
 
 use bth_cache::Store;
-use bth_compile::cached::Cache;
-use bth_compile::pipeline::{Options, Structure, compile_cached};
+use bth_compile::cached::{Cache, compile};
+use bth_compile::pipeline::{Options, Structure};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -46,7 +45,7 @@ fn made(folder: &Path) -> String {
         // No node is large enough: whether there is a worker makes no difference.
         options.costs.minimum_triangles = 1 << 20;
         let cache = Cache::new(&store, "model");
-        compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+        compile(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
     }
     let mut text = String::new();
     for entry in store.list() {
@@ -110,7 +109,7 @@ fn tetrahedralizations_that_are_other_ones_have_another_version() {
     let mut options = Options { structure: Structure::Tets, ..Options::default() };
     options.tets.worker = Some(worker);
     let cache = Cache::new(&store, "model");
-    compile_cached(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
+    compile(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();
     let entries = store.list();
     let tets: Vec<_> = entries.iter().filter(|entry| entry.stage == "tets").collect();
     assert_eq!(tets.len(), 1, "the whole model");

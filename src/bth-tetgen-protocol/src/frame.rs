@@ -45,7 +45,7 @@ pub fn read_frame(from: &mut impl Read) -> Result<Vec<u8>, Error> {
     if length > MAX_FRAME {
         return Err(Error::TooLong(u64::from(length)));
     }
-    // A length is only a claim: memory follows the bytes that arrive.
+    // The length is not trusted: memory grows with the bytes that arrive.
     let length = length as usize;
     let mut bytes = Vec::new();
     while bytes.len() < length {

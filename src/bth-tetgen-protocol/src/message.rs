@@ -5,12 +5,12 @@ use crate::Error;
 /// Version of the messages; the worker names its own in [`Reply::Hello`].
 pub const PROTOCOL: u32 = 1;
 
-/// What the compiler asks for.
+/// A request of the compiler.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
     /// Tetrahedralize.
     Job(Job),
-    /// Misbehave, so that the compiler's answer to it can be tested.
+    /// Fail in a given way, for tests of the compiler.
     Fault(Fault),
 }
 
@@ -36,23 +36,23 @@ pub enum Fault {
     Hang,
     /// Take all memory there is.
     Hog,
-    /// Answer what is no reply.
+    /// Send bytes that are no reply.
     Garble,
-    /// Greet again.
+    /// Send a second [`Reply::Hello`].
     Greet,
     /// Answer with tetrahedra of other points than were sent.
     Invent,
-    /// Say that the job failed.
+    /// Reply that the job failed.
     Fail(Failure),
 }
 
-/// Added to a [`Failure`] that is to be told of.
+/// Bit of the code of a fault that stands for a [`Failure`].
 const FAIL: u8 = 0x80;
 
-/// What the worker answers.
+/// A reply of the worker.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Reply {
-    /// Sent once, unasked, when the worker is ready.
+    /// Sent once, before any request, when the worker is ready.
     Hello {
         /// [`PROTOCOL`] of the worker.
         protocol: u32,
@@ -65,7 +65,7 @@ pub enum Reply {
     Failed {
         /// Why.
         failure: Failure,
-        /// For people.
+        /// Message for the user.
         text: String,
     },
 }
@@ -127,7 +127,7 @@ impl Fault {
 }
 
 impl Failure {
-    /// All.
+    /// All failures.
     pub const ALL: [Failure; 7] = [
         Failure::Request,
         Failure::Memory,
@@ -162,7 +162,7 @@ impl Request {
         }
     }
 
-    /// The message that the bytes stand for.
+    /// The message of the bytes.
     ///
     /// # Errors
     /// [`Error::Malformed`] for anything but one whole message; indices are checked against `points`.
@@ -219,7 +219,7 @@ impl Reply {
         to
     }
 
-    /// The message that the bytes stand for.
+    /// The message of the bytes.
     ///
     /// # Errors
     /// [`Error::Malformed`] for anything but one whole message; indices are checked against `points`.
@@ -374,7 +374,7 @@ mod tests {
                 let at = random() % bytes.len();
                 bytes[at] = [0, 1, 0x7f, 0xff, random() as u8][random() % 5];
             }
-            // Whatever is understood must say the same again.
+            // A message that is accepted must encode to the same bytes.
             if let Ok(request) = Request::from_bytes(&bytes) {
                 assert_eq!(request.to_bytes(), bytes);
             }

@@ -1,6 +1,6 @@
 //! The worker that tetrahedralizes for the BTH compiler, with TetGen.
 //!
-//! It speaks `bth-tetgen-protocol` on its standard input and output, one job after the other.
+//! It serves `bth-tetgen-protocol` on its standard input and output, one job after the other.
 //! Usage: `bth-tetgen [--memory BYTES] [--parent PID]`; without a compiler it is of no use.
 
 mod process;

@@ -11,7 +11,7 @@ use std::os::fd::FromRawFd;
 /// The system's.
 pub(crate) fn frames_apart_from_prints() -> io::Result<File> {
     let null = std::fs::OpenOptions::new().write(true).open("/dev/null")?;
-    // SAFETY: `dup` only reads the descriptor table; on success the new descriptor is ours alone.
+    // SAFETY: `dup` only reads the descriptor table; on success nothing else owns the new descriptor.
     let frames = unsafe { libc::dup(1) };
     if frames < 0 {
         return Err(io::Error::last_os_error());
@@ -39,7 +39,7 @@ pub(crate) fn confine(memory: Option<u64>, parent: Option<u64>) -> io::Result<()
     }
     if let Some(parent) = parent {
         #[cfg(target_os = "linux")]
-        // SAFETY: PR_SET_PDEATHSIG takes a signal number and touches no memory of ours.
+        // SAFETY: PR_SET_PDEATHSIG takes a signal number and accesses no memory of this process.
         if unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) } != 0 {
             return Err(io::Error::last_os_error());
         }

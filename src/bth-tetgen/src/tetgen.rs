@@ -1,4 +1,4 @@
-//! TetGen, by way of `shim.cpp`.
+//! TetGen through `shim.cpp`.
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};

@@ -2,7 +2,8 @@
 
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure};
-use bth_compile::scene::{self, ImportOptions, ImportReport, SceneReport};
+use bth_compile::scene::{self, SceneReport};
+use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
 use bth_scene::Manifest;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +29,7 @@ pub(crate) fn animated() -> Vec<PathBuf> {
 /// The scene of a glTF file.
 pub(crate) fn imported(path: &Path) -> (Manifest, ImportReport) {
     let name = path.file_name().unwrap().to_str().unwrap();
-    scene::import(path, name, &ImportOptions::default(), &Silent)
+    import(path, name, &ImportOptions::default(), &Silent)
         .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 

@@ -1,10 +1,10 @@
 //! Binned SAH: "On fast Construction of SAH-based Bounding Volume Hierarchies" (Wald 2007).
 
 use super::bounds::Bounds;
-use super::build::{Reference, Split};
+use super::split::{Reference, Split};
 use rayon::prelude::*;
 
-/// Most bins that can be asked for.
+/// Greatest number of bins.
 pub(super) const MAX_BINS: usize = 32;
 /// Nodes of more triangles are binned in parallel, in chunks.
 const PARALLEL_COUNT: usize = 1 << 15;

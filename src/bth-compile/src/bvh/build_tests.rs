@@ -174,7 +174,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn random_meshes_build_valid_trees(count in 1usize..300, seed: u64, kind in 0..3) {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mesh = match kind {
             0 => soup(count, seed),
             1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),

@@ -18,7 +18,7 @@ pub struct CollapseOptions {
     pub keep_subtrees: bool,
     /// Costs that the tree is chosen by.
     pub costs: Costs,
-    /// Which trees are made.
+    /// Limits on the tree.
     pub plan: Plan,
 }
 
@@ -71,7 +71,7 @@ pub struct CollapseReport {
 }
 
 impl CollapseReport {
-    /// Takes down how many bytes there are.
+    /// Sets the counts of bytes.
     pub(crate) fn measure(&mut self, wide: &Wide) {
         self.bytes = 64 * wide.lines.len() as u64 + 4 * wide.triangle_ids.len() as u64;
         self.bytes_per_triangle = self.bytes as f64 / (wide.triangle_ids.len() as f64).max(1.0);
@@ -91,6 +91,24 @@ pub fn collapse(
     options: &CollapseOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Wide, CollapseReport)> {
+    collapse_by(mesh, bvh, cut, options, &|planner, cut| planner.run(cut), monitor)
+}
+
+/// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree without its tet leaves.
+pub type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
+
+/// As [`collapse`], with the tree chosen by `decide`. For comparisons of ways to choose it.
+///
+/// # Errors
+/// As [`collapse`], and those of `decide`.
+pub fn collapse_by(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    cut: &[u32],
+    options: &CollapseOptions,
+    decide: &Decide<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(Wide, CollapseReport)> {
     let start = Instant::now();
     check_cut(bvh, cut)?;
     monitor.stage("collapse", None);
@@ -100,7 +118,7 @@ pub fn collapse(
         return Ok((wide, report));
     }
     let planner = Planner::new(mesh, bvh, options.costs, options.plan, options.keep_subtrees, monitor);
-    let (decisions, cost) = planner.run(cut)?;
+    let (decisions, cost) = decide(&planner, cut)?;
     report.cost = f64::from(cost);
     let root_area = Bounds::of_node(&bvh.nodes[0]).half_area();
     let mut writer = Writer {

@@ -1,6 +1,6 @@
 use super::super::samples::{Random, clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
-use super::super::{Options, Plan, Quality, Rule, build};
+use super::super::{Options, Plan, Quality, build};
 use super::*;
 use crate::monitor::Silent;
 use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
@@ -111,7 +111,7 @@ fn chains_collapse_within_the_depth_limit() {
 fn the_lines_are_the_same_at_any_number_of_threads() {
     let mesh = grid(120, 10.0, 4);
     let bvh = built(&mesh, Quality::Fast);
-    let cut = random_cut(&bvh, 200, &mut Random(9));
+    let cut = random_cut(&bvh, 200, &mut Random::new(9));
     let at = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| collapsed(&mesh, &bvh, &cut, true).0)
@@ -146,24 +146,20 @@ fn largest(wide: &Wide) -> (usize, u32) {
 }
 
 #[test]
-fn plans_keep_their_limits_and_the_greedy_one_costs_more() {
+fn plans_keep_their_limits() {
     for (mesh, seed) in
         [(grid(40, 9.0, 6), 1), (soup(2000, 7), 2), (clutter(1500, &[0.0, 1.0, 2.0, 5.0], 8), 3)]
     {
         let bvh = built(&mesh, Quality::Fast);
-        let cut = random_cut(&bvh, 150, &mut Random(seed));
+        let cut = random_cut(&bvh, 150, &mut Random::new(seed));
         for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
-            let cost = [Rule::Least, Rule::Largest].map(|rule| {
-                let plan = Plan { rule, children, triangles };
-                for keep in [false, true] {
-                    collapsed_by(&mesh, &bvh, &cut, keep, plan);
-                }
-                let (wide, report) = collapsed_by(&mesh, &bvh, &[], false, plan);
-                let most = largest(&wide);
-                assert!(most.0 <= children && most.1 as usize <= triangles, "{plan:?}: {most:?}");
-                report.cost
-            });
-            assert!(cost[0] <= cost[1] * (1.0 + 1e-5), "{children} {triangles}: {cost:?}");
+            let plan = Plan { children, triangles };
+            for keep in [false, true] {
+                collapsed_by(&mesh, &bvh, &cut, keep, plan);
+            }
+            let (wide, _) = collapsed_by(&mesh, &bvh, &[], false, plan);
+            let most = largest(&wide);
+            assert!(most.0 <= children && most.1 as usize <= triangles, "{plan:?}: {most:?}");
         }
     }
     let (children, triangles) =
@@ -280,7 +276,7 @@ proptest! {
     fn random_meshes_and_cuts_collapse_to_valid_trees(
         count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60, keep: bool,
     ) {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let mesh = match kind {
             0 => soup(count, seed),
             1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),

@@ -3,17 +3,17 @@
 //! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to better places.
 //! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
 //!
-//! What each step is worth, `bth-bench quality` measures. Spatial splits are not made: nodes of 16 children take
-//! the few large triangles that overlap much into one leaf near the root, and splitting them won nothing.
+//! `bth-bench quality` measures the gain of each step. Spatial splits are not made: nodes of 16 children take the few large
+//! triangles that overlap much into one leaf near the root, and splitting them gained nothing.
 
 mod binned_split;
 mod bounds;
 mod build;
 mod collapse;
-mod greedy;
 mod linked_tree;
 mod plan;
 mod reinsertion;
+mod split;
 mod sweep_split;
 mod wide_lines;
 
@@ -23,8 +23,8 @@ mod samples;
 mod validate;
 
 pub use build::{Effort, MAX_LEVELS, Options, Quality, Report, build, build_with, reinsert, visits};
-pub use collapse::{CollapseOptions, CollapseReport, Wide, collapse};
-pub use plan::{Costs, Plan, Rule};
+pub use collapse::{CollapseOptions, CollapseReport, Decide, Wide, collapse, collapse_by};
+pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
 
 /// Node of a [`BinaryBvh`].
 #[derive(Clone, Copy, Debug, PartialEq)]

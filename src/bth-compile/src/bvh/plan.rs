@@ -5,7 +5,7 @@
 //! wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
 
 use super::bounds::Bounds;
-use super::{BinaryBvh, Node, greedy};
+use super::{BinaryBvh, Node};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use bth_format::layout::{INDEXED_LINES, NODE_LINES, RAW_LINES, WIDTH};
@@ -34,11 +34,9 @@ impl Default for Costs {
     }
 }
 
-/// Which wide trees are made. Measurements vary it.
+/// Limits on wide trees below those of the format. Benchmarks vary them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// How the tree is chosen.
-    pub rule: Rule,
     /// Most children of a wide node, 2 to 16.
     pub children: usize,
     /// Most triangles of a leaf, 1 to 16.
@@ -47,31 +45,25 @@ pub struct Plan {
 
 impl Default for Plan {
     fn default() -> Self {
-        Plan { rule: Rule::Least, children: WIDTH, triangles: WIDTH }
+        Plan { children: WIDTH, triangles: WIDTH }
     }
 }
 
-/// How a wide tree is chosen.
+/// The role of a node that takes one slot of a wide node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// Of least cost, by dynamic programming.
-    Least,
-    /// From the top, opening the child of the largest area while there is room; leaves as large as they can be.
-    Largest,
-}
-
-/// What a node is when it takes one slot of a wide node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Role {
+pub enum Role {
+    /// A wide node.
     Node,
+    /// A leaf with shared vertices.
     Indexed,
+    /// A leaf without sharing.
     Raw,
 }
 
 /// A node's decisions in 4 bits each: at 4 k for k in 2..16, how many of k slots its left child
 /// takes, 0 for "as with k - 1"; at 0, how many of 16 when it is itself a wide node; at 4, its role.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Decision(u64);
+pub struct Decision(u64);
 
 impl Decision {
     const CUT: u64 = 8 << 4;
@@ -80,15 +72,18 @@ impl Decision {
         (self.0 >> (4 * (slots % WIDTH)) & 15) as usize
     }
 
-    pub(super) fn set_share(&mut self, slots: usize, left: usize) {
+    /// Sets how many of `slots` slots the left child takes.
+    pub fn set_share(&mut self, slots: usize, left: usize) {
         self.0 |= (left as u64) << (4 * (slots % WIDTH));
     }
 
-    pub(super) fn set_role(&mut self, role: Role) {
+    /// Sets the role of a node whose role has not been set.
+    pub fn set_role(&mut self, role: Role) {
         self.0 |= role as u64 * 16;
     }
 
-    pub(super) fn set_cut(&mut self) {
+    /// Makes the node a tet leaf.
+    pub fn set_cut(&mut self) {
         self.0 |= Self::CUT;
     }
 
@@ -101,12 +96,12 @@ impl Decision {
     }
 
     /// Whether the node is a tet leaf; its role is then that of the subtree kept beside it.
-    pub(super) fn is_cut(self) -> bool {
+    pub fn is_cut(self) -> bool {
         self.0 & Self::CUT != 0
     }
 }
 
-/// What a parent needs to know of a subtree.
+/// Costs and vertices of a subtree, as its parent needs them.
 struct Summary {
     /// Least cost in at most so many slots; rows 1 to 15.
     cost: [f32; WIDTH],
@@ -114,15 +109,16 @@ struct Summary {
     vertices: Option<Vertices>,
 }
 
-/// Ascending vertex indices.
+/// At most 16 ascending vertex indices.
 #[derive(Clone, Copy)]
-pub(super) struct Vertices {
+pub struct Vertices {
     index: [u32; WIDTH],
     count: usize,
 }
 
 impl Vertices {
-    pub(super) fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
+    /// The vertices of a triangle.
+    pub fn of_triangle(mut triangle: [u32; 3]) -> Vertices {
         triangle.sort_unstable();
         let mut vertices = Vertices { index: [0; WIDTH], count: 0 };
         for v in triangle {
@@ -134,8 +130,8 @@ impl Vertices {
         vertices
     }
 
-    /// The union, if it fits.
-    pub(super) fn join(&self, other: &Vertices) -> Option<Vertices> {
+    /// The union, if it has at most 16 vertices.
+    pub fn join(&self, other: &Vertices) -> Option<Vertices> {
         let mut joined = Vertices { index: [0; WIDTH], count: 0 };
         let (a, b) = (&self.index[..self.count], &other.index[..other.count]);
         let (mut i, mut j) = (0, 0);
@@ -154,18 +150,23 @@ impl Vertices {
     }
 }
 
-/// Inputs of the planning.
-pub(super) struct Planner<'a> {
-    pub(super) mesh: &'a Mesh,
-    pub(super) bvh: &'a BinaryBvh,
-    pub(super) costs: Costs,
-    pub(super) plan: Plan,
-    /// Whether what lies below cut nodes is planned, too.
-    pub(super) below_cut: bool,
-    pub(super) monitor: &'a dyn Monitor,
+/// Input of the planning.
+pub struct Planner<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Its binary BVH, of at least one node.
+    pub bvh: &'a BinaryBvh,
+    /// Costs that the tree is chosen by.
+    pub costs: Costs,
+    /// Limits on the tree.
+    pub plan: Plan,
+    /// Whether the subtrees below cut nodes are planned, too.
+    pub below_cut: bool,
+    /// Receives warnings and cancels.
+    pub monitor: &'a dyn Monitor,
     inverse_area: f64,
     /// Price of a line.
-    pub(super) line: f32,
+    pub line: f32,
 }
 
 /// Subtrees of more triangles are planned as separate tasks.
@@ -190,16 +191,12 @@ impl<'a> Planner<'a> {
     /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these, ascending.
     pub(super) fn run(&self, cut: &[u32]) -> Result<(Vec<Decision>, f32)> {
         let mut decisions = vec![Decision::default(); self.bvh.nodes.len()];
-        if self.plan.rule == Rule::Largest {
-            let cost = greedy::decide(self, cut, &mut decisions)?;
-            return Ok((decisions, cost));
-        }
         let summary = self.subtree(0, cut, &mut decisions)?;
         Ok((decisions, summary.cost[1]))
     }
 
-    /// How likely a ray through the root meets the node.
-    pub(super) fn area(&self, node: &Node) -> f32 {
+    /// Probability that a ray through the root meets the node.
+    pub fn area(&self, node: &Node) -> f32 {
         (Bounds::of_node(node).half_area() * self.inverse_area) as f32
     }
 
@@ -212,7 +209,7 @@ impl<'a> Planner<'a> {
             self.plain(at, node, &[], decisions)?;
         }
         decisions[0].set_cut();
-        // Cut or not is not ours to weigh, and the slot's own cost is the same everywhere.
+        // Which nodes are cut is given, and a slot's own cost is the same everywhere.
         Ok(Summary { cost: [0.0; WIDTH], vertices: None })
     }
 

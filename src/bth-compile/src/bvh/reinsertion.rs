@@ -2,7 +2,7 @@
 //!
 //! After "Parallel Reinsertion for Bounding Volume Hierarchy Optimization" (Meister and Bittner
 //! 2018): the best places of a batch of subtrees are searched in parallel in the unchanged tree.
-//! The moves are then made one after the other, each undone if it no longer pays after the ones
+//! The moves are then made one after the other, each undone if it does not pay after the ones
 //! before it, so that the cost never rises and the result is the same at any number of threads.
 
 use super::bounds::Bounds;

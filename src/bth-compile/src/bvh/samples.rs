@@ -1,26 +1,23 @@
 //! Meshes for tests.
 
 use bth_import::Mesh;
+use bth_random::Rng;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// SplitMix64.
-pub(super) struct Random(pub(super) u64);
+/// Numbers for samples.
+pub(super) struct Random(Rng);
 
 impl Random {
-    pub(super) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+    pub(super) fn new(seed: u64) -> Self {
+        Self(Rng::new(seed))
     }
     /// In [0, 1).
     pub(super) fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u32 << 24) as f32
+        (self.0.next() >> 40) as f32 / (1u32 << 24) as f32
     }
     pub(super) fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
+        (self.0.next() % n as u64) as usize
     }
 }
 
@@ -42,7 +39,7 @@ pub(super) fn weld(corners: &[[[f32; 3]; 3]]) -> Mesh {
 
 /// Small separate triangles anywhere in the unit cube.
 pub(super) fn soup(count: usize, seed: u64) -> Mesh {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let size = 0.5 / (count as f32).cbrt();
     let corners: Vec<_> = (0..count)
         .map(|_| {
@@ -55,7 +52,7 @@ pub(super) fn soup(count: usize, seed: u64) -> Mesh {
 
 /// A height field of `2 * side * side` triangles.
 pub(super) fn grid(side: usize, height: f32, seed: u64) -> Mesh {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let row = side as u32 + 1;
     let mut mesh = Mesh::default();
     for y in 0..row {
@@ -75,7 +72,7 @@ pub(super) fn grid(side: usize, height: f32, seed: u64) -> Mesh {
 
 /// Triangles with few distinct coordinates: many repeat, touch, coincide or have no area.
 pub(super) fn clutter(count: usize, values: &[f32], seed: u64) -> Mesh {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let corners: Vec<[[f32; 3]; 3]> = (0..count)
         .map(|_| std::array::from_fn(|_| std::array::from_fn(|_| values[random.below(values.len())])))
         .collect();

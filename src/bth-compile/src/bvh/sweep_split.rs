@@ -1,7 +1,7 @@
 //! Full-sweep SAH: every split between neighbours in the order of the centres, on each axis.
 
 use super::bounds::Bounds;
-use super::build::{Reference, Split};
+use super::split::{Reference, Split};
 
 /// Buffers of [`split`], kept between nodes.
 #[derive(Default)]

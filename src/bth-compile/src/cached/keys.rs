@@ -1,19 +1,20 @@
-//! What each stage depends on. Never paths, times, numbers of threads or the order of arguments.
+//! Keys: everything that each result depends on. Never paths, times, numbers of threads or the order of arguments.
 //!
-//! Whoever changes what a stage makes raises its version here; `tests/versions.rs` notices when that
-//! was forgotten.
+//! A change of a stage's results raises its version here; `tests/versions.rs` fails when that was forgotten.
 
-use super::{MeshFacts, SourceDigest};
+use super::codec::MeshSummary;
+use super::rows::HashedRows;
 use crate::bvh;
-use crate::pipeline::{Options, Structure};
+use crate::options::{Options, Structure};
+use crate::source::SourceDigest;
 use crate::write::SceneParts;
-use bth_cache::{Digest, Key};
-use bth_import::{Keep, Mesh};
+use bth_cache::Key;
+use bth_files::Digest;
+use bth_import::Keep;
 use serde::Serialize;
 use std::path::Path;
-use zerocopy::{Immutable, IntoBytes};
 
-/// Versions of what the stages make.
+/// Versions of the results of the stages.
 const MESH: &str = "1";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
@@ -41,24 +42,6 @@ pub(crate) fn extension(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// Hash of a mesh's positions and triangles, which is what all stages but the last read.
-pub(crate) fn geometry(mesh: &Mesh) -> Digest {
-    let mut hasher = Rows::new("geometry");
-    hasher.add(&mesh.positions);
-    hasher.add(&mesh.triangles);
-    hasher.finish()
-}
-
-/// Hash of a mesh's shading attributes, if it has any.
-pub(super) fn shading(mesh: &Mesh) -> Option<Digest> {
-    let attributes = mesh.attributes.as_ref()?;
-    let mut hasher = Rows::new("shading");
-    hasher.add(&attributes.corners);
-    hasher.add(&attributes.normals);
-    hasher.add(&attributes.uvs);
-    Some(hasher.finish())
-}
-
 /// The binary BVH of a mesh.
 pub(crate) fn bvh(geometry: &Digest, options: &bvh::Options) -> Key {
     Key::new("bvh")
@@ -81,10 +64,10 @@ pub(crate) fn tets_of_node(
     options: &crate::tets::Options,
     tetgen: &str,
 ) -> Key {
-    let mut hasher = Rows::new("node");
+    let mut hasher = HashedRows::new("node");
     hasher.add(vertices);
     hasher.add(triangles);
-    // A node that can be replaced by smaller ones is given up earlier.
+    // A node that can be replaced by smaller ones gets fewer attempts.
     let smaller = options.cells.iter().any(|&size| (size as usize) < triangles.len());
     Key::new("tets")
         .with("geometry", hasher.finish().hex())
@@ -94,7 +77,7 @@ pub(crate) fn tets_of_node(
         .with("tets version", TETS)
 }
 
-/// The keys of the sections of a scene's objects: what they have in common is written once.
+/// The keys of a scene's objects; the components that all of them share are made once.
 pub(crate) struct ObjectKeys(Vec<(String, String)>);
 
 impl ObjectKeys {
@@ -103,7 +86,7 @@ impl ObjectKeys {
     }
 
     /// The key of an object.
-    pub(crate) fn of(&self, mesh: &MeshFacts) -> Key {
+    pub(crate) fn of(&self, mesh: &MeshSummary) -> Key {
         Key::new("object")
             .with("geometry", mesh.geometry.hex())
             .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
@@ -121,9 +104,9 @@ pub(crate) fn file(source: &SourceDigest, path: &Path, options: &Options, tetgen
         .with("bthc", env!("CARGO_PKG_VERSION"))
 }
 
-/// A compiled scene. `parts` has the objects by their place in the manifest, `sources` what each used one is made from.
+/// A compiled scene. `parts` numbers the objects as the manifest does, `sources` identifies the content of each used one.
 pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, tetgen: &str) -> Key {
-    let mut hasher = Rows::new("scene");
+    let mut hasher = HashedRows::new("scene");
     hasher.add(std::slice::from_ref(&parts.scene));
     hasher.add(&parts.nodes);
     hasher.add(&parts.instances);
@@ -133,7 +116,7 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, t
     hasher.add(&parts.cameras);
     hasher.add(&parts.lights);
     hasher.add(&parts.names);
-    let mut objects = Rows::new("objects");
+    let mut objects = HashedRows::new("objects");
     sources.iter().for_each(|source| objects.add(source.as_bytes()));
     Key::new("scene")
         .with("scene", hasher.finish().hex())
@@ -143,8 +126,8 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, t
         .with("bthc", env!("CARGO_PKG_VERSION"))
 }
 
-/// What is in the file of a scene, by what names the file.
-pub(crate) fn outline(named: &Digest, options: &Options, tetgen: &str) -> Key {
+/// The inventory of a scene file, by the name of the file's content.
+pub(crate) fn file_index(named: &Digest, options: &Options, tetgen: &str) -> Key {
     Key::new("outline")
         .with("file", named.hex())
         .with_all(components(options, tetgen))
@@ -153,8 +136,7 @@ pub(crate) fn outline(named: &Digest, options: &Options, tetgen: &str) -> Key {
         .with("bthc", env!("CARGO_PKG_VERSION"))
 }
 
-/// All options that a compiled object depends on, in canonical form, each under the name that a person is told when
-/// it differs. The cost profile is among them by the hash of its content.
+/// All options that a compiled object depends on, in canonical form, under the names that explanations of misses show. The cost profile is among them by the hash of its content.
 fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     let mut all = vec![
         ("structure", text(&options.structure)),
@@ -189,7 +171,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     if options.structure != Structure::Bvh {
-        // One by one, so that a person is told which differs.
+        // One by one, so that an explanation names the option that differs.
         let fields = json(&options.costs);
         let fields = fields.as_object().into_iter().flatten();
         all.extend(fields.map(|(name, value)| (format!("selection {name}"), text(value))));
@@ -197,7 +179,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     all
 }
 
-/// What the attempts at a node depend on. Not where the worker is, nor how many there are.
+/// The options that the attempts at a node depend on: neither the path of the worker nor the number of workers.
 fn attempts(options: &crate::tets::Options) -> String {
     format!(
         "free space {}, inflation {:?}, deadline {:?} + {:?}, memory {}",
@@ -209,7 +191,7 @@ fn attempts(options: &crate::tets::Options) -> String {
     )
 }
 
-/// The canonical text of an option: numbers are written with the fewest digits that give them back.
+/// The canonical text of an option: numbers with the fewest digits that parse to the same value.
 fn text(value: &impl Serialize) -> String {
     match json(value) {
         serde_json::Value::String(text) => text,
@@ -220,24 +202,4 @@ fn text(value: &impl Serialize) -> String {
 fn json(value: &impl Serialize) -> serde_json::Value {
     // Options are numbers, names and structures of them.
     serde_json::to_value(value).unwrap_or_else(|e| unreachable!("an option that is no JSON: {e}"))
-}
-
-/// Hash of slices, each with its length before it.
-struct Rows(blake3::Hasher);
-
-impl Rows {
-    fn new(what: &str) -> Self {
-        let mut rows = Self(blake3::Hasher::new());
-        rows.add(what.as_bytes());
-        rows
-    }
-
-    fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
-        let bytes = rows.as_bytes();
-        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
-    }
-
-    fn finish(self) -> Digest {
-        self.0.finalize().into()
-    }
 }

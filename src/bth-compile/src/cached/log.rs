@@ -1,27 +1,26 @@
-//! What a compilation found in the cache and what not.
+//! The log of hits and misses of one compilation.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What was found and what was not.
+/// Hits and misses of a compilation.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Log {
-    /// Results that were there, by stage.
+    /// Results that came from the cache, by stage.
     pub hits: BTreeMap<String, u64>,
-    /// Results that were not.
+    /// Results that the cache did not have.
     pub misses: Vec<Miss>,
-    /// Whether something could not be kept.
+    /// Whether a result could not be written.
     pub failed: bool,
 }
 
-/// A result that was not there.
+/// A result that the cache did not have.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Miss {
     /// Its stage.
     pub stage: String,
     /// Which object or mesh, where there are several.
     pub part: String,
-    /// What differs from the last key of the same source; `new` for one never seen, `evicted` for one that had
-    /// been there.
+    /// What differs from the last key of the same source; `new` for a source without one, `evicted` for the same key.
     pub because: Vec<String>,
 }

@@ -1,14 +1,15 @@
-//! Rows of numbers as bytes: for each slice its length in bytes, then the bytes, padded to eight.
+//! Slices of numbers as bytes: for each its length in bytes, then the bytes, padded to eight; and their hashes.
 
+use bth_files::Digest;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
 const PAD: usize = 8;
 
-/// Rows that become bytes.
+/// Turns slices into bytes.
 #[derive(Default)]
-pub(crate) struct Rows(Vec<u8>);
+pub(crate) struct RowWriter(Vec<u8>);
 
-impl Rows {
+impl RowWriter {
     /// Adds a slice.
     pub(crate) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
         let bytes = rows.as_bytes();
@@ -22,15 +23,15 @@ impl Rows {
     }
 }
 
-/// Bytes that become rows again.
-pub(crate) struct Parts<'a>(&'a [u8]);
+/// Turns the bytes back into slices.
+pub(crate) struct RowReader<'a>(&'a [u8]);
 
-impl<'a> Parts<'a> {
+impl<'a> RowReader<'a> {
     pub(crate) fn new(bytes: &'a [u8]) -> Self {
         Self(bytes)
     }
 
-    /// The next slice; `None` when there is none of whole rows.
+    /// The next slice; `None` when the bytes end or are not whole rows.
     pub(crate) fn take<T: FromBytes>(&mut self) -> Option<Vec<T>> {
         let (length, rest) = self.0.split_first_chunk::<8>()?;
         let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
@@ -54,26 +55,46 @@ impl<'a> Parts<'a> {
     }
 }
 
+/// Hashes slices, each preceded by its length.
+pub(super) struct HashedRows(blake3::Hasher);
+
+impl HashedRows {
+    pub(super) fn new(kind: &str) -> Self {
+        let mut rows = Self(blake3::Hasher::new());
+        rows.add(kind.as_bytes());
+        rows
+    }
+
+    pub(super) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+        let bytes = rows.as_bytes();
+        self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
+    }
+
+    pub(super) fn finish(self) -> Digest {
+        self.0.finalize().into()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn rows_come_back_and_other_lengths_are_refused() {
-        let mut rows = Rows::default();
+        let mut rows = RowWriter::default();
         rows.add(&[[1.5f32, 2.0, -0.0]]);
         rows.add::<u8>(&[7; 3]);
         rows.add::<u64>(&[]);
         rows.add(&[9u32]);
         let bytes = rows.finish();
-        let mut parts = Parts::new(&bytes);
+        let mut parts = RowReader::new(&bytes);
         assert_eq!(parts.take::<[f32; 3]>().unwrap(), [[1.5, 2.0, -0.0]]);
         assert_eq!(parts.take::<u8>().unwrap(), [7; 3]);
         assert!(parts.take::<u64>().unwrap().is_empty());
         assert_eq!(parts.one::<u32>(), Some(9));
         assert!(parts.is_empty() && parts.take::<u8>().is_none());
-        assert!(Parts::new(&bytes).take::<u64>().is_none(), "twelve bytes are no whole u64");
-        assert!(Parts::new(&bytes[..12]).take::<u32>().is_none());
-        assert!(Parts::new(&[255; 16]).take::<u8>().is_none());
+        assert!(RowReader::new(&bytes).take::<u64>().is_none(), "twelve bytes are no whole u64");
+        assert!(RowReader::new(&bytes[..12]).take::<u32>().is_none());
+        assert!(RowReader::new(&[255; 16]).take::<u8>().is_none());
     }
 }

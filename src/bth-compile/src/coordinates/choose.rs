@@ -110,7 +110,7 @@ impl OnGrid {
     }
 }
 
-/// Moves the positions of a mesh to a grid, if one is asked for.
+/// Moves the positions of a mesh to a grid, if the options have one.
 ///
 /// # Errors
 /// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object has no grid of so many

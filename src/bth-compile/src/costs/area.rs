@@ -19,8 +19,8 @@
 //! is left open is the ratio r = N_out / N_surf, which is measured.
 
 use super::Start;
-use super::rays::{cross, dot, sub};
 use crate::tets::{Behind, TetMesh};
+use crate::vectors::double_area;
 
 /// r: steps of a ray from outside over those of a ray from a surface, fitted by `bth-bench costs`.
 const OUTSIDE_OVER_SURFACE: f64 = 1.3;
@@ -31,9 +31,7 @@ pub fn area_steps(mesh: &TetMesh, start: Start) -> f64 {
     let corner = |v: u32| mesh.vertices[v as usize].map(f64::from);
     for (t, (tet, behind)) in mesh.tets.iter().zip(&mesh.behind).enumerate() {
         for k in 0..4 {
-            let [a, b, c] = [1, 2, 3].map(|i| corner(tet[(k + i) % 4]));
-            let n = cross(sub(b, a), sub(c, a));
-            let area = 0.5 * dot(n, n).sqrt();
+            let area = 0.5 * double_area([1, 2, 3].map(|i| corner(tet[(k + i) % 4]).into())).length();
             match behind[k] {
                 // Each is seen from both of its sides.
                 Behind::Tet(next) if (t as u32) < next => free += area,

@@ -1,22 +1,24 @@
 //! Rays through the binary BVH in double precision: what they hit, and which nodes they enter on the way.
 //! These counts are the same on every machine, whatever its vector instructions.
 
-use super::rays::{SampleRay, corners, cross, dot, enters, sub};
+use super::rays::{SampleRay, enters};
 use crate::bvh::BinaryBvh;
+use crate::vectors::corners;
 use bth_import::Mesh;
+use glam::DVec3;
 
-/// What a ray met.
+/// Result of tracing a ray through the binary BVH.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Met {
+pub struct Traced {
     /// Row of the BVH's order that was hit, and where.
     pub hit: Option<(u32, f64)>,
     /// Nodes whose boxes the ray entered, leaves included.
     pub visits: u32,
 }
 
-/// Walks from the root, the nearer child first, to the nearest hit; `entered` hears of every node.
-pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnMut(u32)) -> Met {
-    let mut met = Met { hit: None, visits: 0 };
+/// Traces a ray from the root, the nearer child first, to the nearest hit; `entered` is called with every node entered.
+pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnMut(u32)) -> Traced {
+    let mut traced = Traced { hit: None, visits: 0 };
     let mut best = ray.tmax;
     let meets = |node: u32, best: f64| {
         let node = &bvh.nodes[node as usize];
@@ -33,12 +35,12 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
             continue;
         }
         entered(at);
-        met.visits += 1;
+        traced.visits += 1;
         let node = &bvh.nodes[at as usize];
         if node.is_leaf() {
             if let Some(t) = crosses(ray, corners(mesh, bvh.order[node.first as usize]), best) {
                 best = t;
-                met.hit = Some((node.first, t));
+                traced.hit = Some((node.first, t));
             }
             continue;
         }
@@ -49,18 +51,19 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
             (one, other) => stack.extend(one.or(other)),
         }
     }
-    met
+    traced
 }
 
 /// Möller and Trumbore 1997, within (0, best].
-pub(super) fn crosses(ray: &SampleRay, [a, b, c]: [[f64; 3]; 3], best: f64) -> Option<f64> {
-    let (e1, e2) = (sub(b, a), sub(c, a));
-    let p = cross(ray.direction, e2);
-    let determinant = dot(e1, p);
-    let from = sub(ray.origin, a);
-    let q = cross(from, e1);
-    let (u, v) = (dot(from, p) / determinant, dot(ray.direction, q) / determinant);
-    let t = dot(e2, q) / determinant;
+pub(super) fn crosses(ray: &SampleRay, [a, b, c]: [DVec3; 3], best: f64) -> Option<f64> {
+    let (e1, e2) = (b - a, c - a);
+    let direction = DVec3::from(ray.direction);
+    let p = direction.cross(e2);
+    let determinant = e1.dot(p);
+    let from = DVec3::from(ray.origin) - a;
+    let q = from.cross(e1);
+    let (u, v) = (from.dot(p) / determinant, direction.dot(q) / determinant);
+    let t = e2.dot(q) / determinant;
     // Comparisons with the NaN of a zero determinant are false.
     (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= best).then_some(t)
 }

@@ -15,7 +15,7 @@ use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 use std::time::Instant;
 
-/// How the tetrahedra will be stored, and beside what.
+/// How the tetrahedra will be stored, and the size of the BVH beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storage {
     /// Their record.
@@ -60,7 +60,7 @@ pub fn choose(
             let lost = refuse_beyond(&mut choice, &limits);
             (choice, cost, with + lost)
         }
-        Select::Best => best(mesh, bvh, marks, options, &prices, &limits, monitor)?,
+        Select::Best => best(mesh, bvh, marks, options, &limits, monitor)?,
         Select::Nodes(nodes) => (Choice { chosen: nodes.clone(), verdicts: Vec::new() }, 0.0, 0.0),
     };
     if !choice.chosen.is_empty() && cost_bvh - cost_with_tets < options.minimum_gain * cost_bvh {
@@ -86,12 +86,12 @@ pub fn choose(
     Ok((choice, report))
 }
 
-/// What tetrahedra may take.
+/// Limits on the bytes of tetrahedra and on the seconds to make them.
 struct Limits<'a> {
     prices: &'a Prices<'a>,
     /// Bytes and seconds.
     most: [Option<f64>; 2],
-    /// Bytes of the BVH that a triangle of a node no longer takes.
+    /// Bytes of the BVH saved for each triangle of a tet leaf, where subtrees are not kept.
     pruned: f64,
 }
 
@@ -99,9 +99,9 @@ impl<'a> Limits<'a> {
     fn new(triangles: usize, options: &Options, prices: &'a Prices<'a>, storage: Storage) -> Self {
         let count = triangles as f64;
         let plain = storage.plain_bytes(triangles);
-        // Triangles have homes as soon as there is any tet leaf.
-        let homes = size_of::<u32>() as f64 * count;
-        let bytes = options.max_bytes_per_triangle.map(|most| (most * count - plain - homes).max(0.0));
+        // The map from triangles to faces is there as soon as there is any tet leaf.
+        let map = size_of::<u32>() as f64 * count;
+        let bytes = options.max_bytes_per_triangle.map(|most| (most * count - plain - map).max(0.0));
         let pruned = if storage.keep_subtrees { 0.0 } else { plain / count.max(1.0) };
         Limits { prices, most: [bytes, options.budget], pruned }
     }
@@ -133,8 +133,8 @@ fn refuse_beyond(choice: &mut Choice, limits: &Limits<'_>) -> f64 {
         let mut chosen: Vec<&mut Verdict> = verdicts.collect();
         let weigh = |v: &&mut Verdict| Weighed { gain: v.gain, takes: limits.takes(v.count)[kind] };
         let items: Vec<Weighed> = chosen.iter().map(weigh).collect();
-        let over = items.iter().map(|item| item.takes).sum::<f64>() - most;
-        for k in least_useful(&items, over) {
+        let excess = items.iter().map(|item| item.takes).sum::<f64>() - most;
+        for k in least_useful(&items, excess) {
             chosen[k].decision = Decision::RefusedLimit;
             lost += chosen[k].gain;
         }
@@ -149,7 +149,6 @@ fn best(
     bvh: &BinaryBvh,
     marks: &Marks,
     options: &Options,
-    prices: &Prices<'_>,
     limits: &Limits<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, f64, f64)> {
@@ -162,7 +161,7 @@ fn best(
     };
     let nodes: Vec<u32> = top.iter().copied().filter(fits).collect();
     if nodes.is_empty() {
-        // Nothing to weigh: tracing rays would be in vain.
+        // No candidate: no rays need to be traced.
         let verdicts = top.iter().map(|&i| verdict(bvh, marks, options, i, None)).collect();
         return Ok((Choice { chosen: Vec::new(), verdicts }, 0.0, 0.0));
     }
@@ -171,7 +170,7 @@ fn best(
     let sampled: Sampled = sample(mesh, bvh, options, scene);
     monitor.check()?;
     let sums = subtree_sums(bvh);
-    let gains = sampled.gains(bvh, &sums, &nodes, options, prices, weights);
+    let gains = sampled.gains(bvh, &sums, &nodes, limits.prices, weights);
     let count = |i: u32| bvh.nodes[i as usize].count;
     let takes: Vec<[f64; 2]> = nodes.iter().map(|&i| limits.takes(count(i))).collect();
     let candidates = Candidates { bvh, nodes: &nodes, gains: &gains, takes: &takes };

@@ -1,6 +1,6 @@
 //! Steps of a ray through a tetrahedralization that does not exist yet: N_avg of the paper's §3.3.
 //!
-//! The paper's appendices with its formulas are not public; the derivations here are ours. Both
+//! The paper's appendices with its formulas are not public; the derivations here are independent of them. Both
 //! hold for a constrained tetrahedralization with free-space points at the centres of the empty
 //! cells of an octree (what the `tets` stage builds), and for rays that end at the first surface.
 //! Once the tetrahedra exist, [`super::mean_steps`] samples them and [`super::area_steps`] adds up

@@ -1,10 +1,10 @@
-//! What tetrahedralizing a node would save, by sampled rays through the binary BVH.
+//! The gain of tetrahedralizing a node, by sample rays through the binary BVH.
 //!
 //! A ray that starts on a triangle of a tet leaf walks there first, and goes through the BVH only if it leaves the
 //! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is
 //! kept they walk, too. So the saving of a node is a sum over rays, and savings of disjoint nodes add up.
 
-use super::bvh_walk::{Met, walk};
+use super::bvh_walk::{Traced, walk};
 use super::options::Options;
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::rays::{self, SampleRay, along};
@@ -19,7 +19,7 @@ const SHORT_STEPS: f64 = 0.6;
 const TRIANGLES_PER_RAY: usize = 16;
 const RAYS: [usize; 2] = [512, 4096];
 
-/// What was found of a node.
+/// Estimated gain of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Gain {
     /// Nanoseconds saved for each ray of the model; below 0 where tetrahedra are the slower.
@@ -31,10 +31,10 @@ pub(super) struct Gain {
     pub(super) steps: f64,
 }
 
-/// The model's rays, traced through its BVH.
+/// The sample rays, traced through the BVH.
 pub(super) struct Sampled {
-    /// Rays from surfaces, where they start and what they met.
-    surface: Vec<(SampleRay, u32, Met)>,
+    /// Rays from surfaces, with the row that each starts on and its result.
+    surface: Vec<(SampleRay, u32, Traced)>,
     /// How many rays from outside there were, and for each node how many entered it and how many visits its
     /// subtree had of them.
     outside: usize,
@@ -80,10 +80,10 @@ pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &Options, scene: Opt
     let row_of = rows(bvh, mesh.triangles.len());
     let mut surface_total = 0;
     for ray in from_surface {
-        let met = walk(mesh, bvh, ray, |_| {});
-        surface_total += met.visits;
+        let traced = walk(mesh, bvh, ray, |_| {});
+        surface_total += traced.visits;
         let row = ray.from.map_or(u32::MAX, |triangle| row_of[triangle as usize]);
-        sampled.surface.push((*ray, row, met));
+        sampled.surface.push((*ray, row, traced));
     }
     let mean = |visits: u32, rays: usize| f64::from(visits) / rays.max(1) as f64;
     sampled.cost_bvh = costs.ray
@@ -102,30 +102,30 @@ fn rows(bvh: &BinaryBvh, triangles: usize) -> Vec<u32> {
 }
 
 impl Sampled {
-    /// The gains of these nodes, which are ascending.
+    /// The gains of these nodes, which are ascending. `weights` are those of rays from outside and from surfaces.
     pub(super) fn gains(
         &self,
         bvh: &BinaryBvh,
         sums: &[Sums],
         nodes: &[u32],
-        options: &Options,
         prices: &Prices<'_>,
         weights: [f64; 2],
     ) -> Vec<Gain> {
-        let costs = options.profile.bvh;
+        let costs = prices.bvh();
         let mut gains: Vec<Gain> = Vec::with_capacity(nodes.len());
         let mut started = vec![0u32; nodes.len()];
         let depth = |i: u32| sums[i as usize].depth as f64 / f64::from(bvh.nodes[i as usize].count);
         let steps = |start: Start, i: u32| prices.steps(start, bvh.nodes[i as usize].count, depth(i));
         gains.resize(nodes.len(), Gain::default());
-        for (ray, row, met) in &self.surface {
-            let bvh_time = costs.ray + costs.surface * f64::from(met.visits);
+        for (ray, row, traced) in &self.surface {
+            let bvh_time = costs.ray + costs.surface * f64::from(traced.visits);
             for at in path(bvh, *row) {
                 let Ok(k) = nodes.binary_search(&at) else { continue };
                 let node = &bvh.nodes[at as usize];
                 let share = if ray.tmax.is_finite() { SHORT_STEPS } else { 1.0 };
-                let mut time = prices.surface(node.count, share * steps(Start::Surface, at), hits(met, node));
-                if at != 0 && leaves(ray, met, node) {
+                let mut time =
+                    prices.surface(node.count, share * steps(Start::Surface, at), hits(traced, node));
+                if at != 0 && leaves(ray, traced, node) {
                     time += bvh_time;
                 }
                 started[k] += 1;
@@ -159,14 +159,14 @@ impl Sampled {
 }
 
 /// 1 for a ray that ends at one of the node's triangles, else 0.
-fn hits(met: &Met, node: &crate::bvh::Node) -> f64 {
+fn hits(traced: &Traced, node: &crate::bvh::Node) -> f64 {
     let here = |(row, _)| (node.first..node.first + node.count).contains(&row);
-    if met.hit.is_some_and(here) { 1.0 } else { 0.0 }
+    if traced.hit.is_some_and(here) { 1.0 } else { 0.0 }
 }
 
-/// Whether a ray leaves a node's box without having met one of its triangles.
-pub(super) fn leaves(ray: &SampleRay, met: &Met, node: &crate::bvh::Node) -> bool {
-    match met.hit {
+/// Whether a ray leaves a node's box without having hit one of its triangles.
+pub(super) fn leaves(ray: &SampleRay, traced: &Traced, node: &crate::bvh::Node) -> bool {
+    match traced.hit {
         Some((row, _)) if (node.first..node.first + node.count).contains(&row) => false,
         Some(_) => true,
         None if ray.tmax.is_finite() => {

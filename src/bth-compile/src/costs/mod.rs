@@ -29,7 +29,7 @@ mod testing;
 mod tests;
 
 pub use area::area_steps;
-pub use bvh_walk::{Met, walk};
+pub use bvh_walk::{Traced, walk};
 pub use choose::{Storage, choose};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;
@@ -37,7 +37,7 @@ pub use least_useful::{Weighed, least_useful};
 pub use options::{Choice, Decision, OptimizeFor, Options, Probe, Report, Select, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
-pub(crate) use random::Random;
+pub(crate) use random::RayRng;
 pub use rays::{SampleRay, from_surface, outside};
 pub use tet_walk::{TetWalker, Walked, mean_steps};
 pub use weighting::Weighting;

@@ -1,4 +1,4 @@
-//! Options of the selection, and what it says of each node.
+//! Options of the selection, and its verdict on each node.
 
 use super::{Estimator, Profile, Weighting};
 use serde::{Serialize, Serializer};

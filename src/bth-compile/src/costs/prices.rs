@@ -1,6 +1,7 @@
-//! What tetrahedralizations of a size cost: time of rays, bytes, and time to make them.
+//! Costs of a tetrahedralization by its size: time of rays, bytes, and time to make them.
 
-use super::{Options, Start, Walk, profile::TetCosts};
+use super::profile::{BvhCosts, TetCosts};
+use super::{Options, Start, Walk};
 use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
 /// Tetrahedra and their vertices for each triangle, with free-space points: measured on scans.
@@ -14,7 +15,7 @@ pub(super) struct Prices<'a> {
     options: &'a Options,
     costs: &'a TetCosts,
     record: RecordKind,
-    /// By what the costs of tetrahedra are multiplied.
+    /// Factor on the costs of tetrahedra.
     scale: f64,
     /// Whether a BVH stays beside the tetrahedra for rays from outside.
     pub(super) keep_subtrees: bool,
@@ -25,6 +26,11 @@ impl<'a> Prices<'a> {
         let costs = options.profile.record(record);
         let scale = options.c_tet.map_or(1.0, |c| c / costs.surface.step[0].max(f64::MIN_POSITIVE));
         Prices { options, costs, record, scale, keep_subtrees }
+    }
+
+    /// Costs of the BVH.
+    pub(super) fn bvh(&self) -> BvhCosts {
+        self.options.profile.bvh
     }
 
     /// Bytes of the tetrahedra, vertices and faces of so many triangles.
@@ -40,7 +46,7 @@ impl<'a> Prices<'a> {
         f64::from(triangles) * self.options.profile.tetrahedralize * 1e-6
     }
 
-    /// What a step touches: the record and a vertex.
+    /// Bytes that walks touch: the records and the vertices.
     fn walked(&self, triangles: u32) -> f64 {
         f64::from(triangles) * (TETS * self.record.stride() as f64 + VERTICES * size_of::<TetVertex>() as f64)
     }

@@ -15,7 +15,8 @@ use super::{Weighting, subtree_sums::half_area};
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::tets::TetMesh;
+use crate::tets::{Leaf, TetMesh};
+use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
 use serde::Serialize;
 
@@ -53,9 +54,6 @@ pub struct ProbedLeaf {
     pub kept: bool,
 }
 
-/// Tetrahedralizations by their node.
-type Built = Vec<(u32, TetMesh)>;
-
 /// Drops the tetrahedralizations that do not win, and all of them if together they save less than the least gain.
 ///
 /// # Errors
@@ -63,11 +61,11 @@ type Built = Vec<(u32, TetMesh)>;
 pub fn probe(
     mesh: &Mesh,
     bvh: &BinaryBvh,
-    built: Built,
+    built: Vec<Leaf>,
     options: &Options,
     storage: Storage,
     monitor: &dyn Monitor,
-) -> Result<(Built, Option<ProbeReport>)> {
+) -> Result<(Vec<Leaf>, Option<ProbeReport>)> {
     if options.probe == Probe::Off || options.select != Select::Best || built.is_empty() {
         return Ok((built, None));
     }
@@ -77,14 +75,15 @@ pub fn probe(
     let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
     let all = super::gains::sample(mesh, bvh, options, scene);
     let count = (RAYS / built.len()).clamp(RAYS_OF_LEAF[0], RAYS_OF_LEAF[1]);
+    let prober = Prober { mesh, bvh, options, prices: &prices, count };
     let areas = surface_areas(mesh, bvh);
     let mut report =
         ProbeReport { cost_bvh: all.cost_bvh, cost_with_tets: all.cost_bvh, ..Default::default() };
     for (node, tets) in &built {
         monitor.check()?;
-        let mut leaf = surface(mesh, bvh, *node, tets, count, options, &prices, scene);
+        let mut leaf = prober.surface(*node, tets, scene);
         let rows = rows(bvh, *node);
-        // How many of the rays from surfaces start here.
+        // The share of the rays from surfaces that start here.
         let share = match scene {
             Some(scene) => share_of(scene, bvh, &rows),
             None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
@@ -93,7 +92,7 @@ pub fn probe(
             leaf.gain = weights[1] * share * (leaf.cost_bvh - leaf.cost_tet);
         }
         if !storage.keep_subtrees {
-            leaf.gain += weights[0] * entering(mesh, bvh, *node, tets, count, options, &prices);
+            leaf.gain += weights[0] * prober.entering(*node, tets);
         }
         leaf.kept = leaf.gain > 0.0;
         report.leaves.push(leaf);
@@ -109,24 +108,23 @@ pub fn probe(
     Ok((kept, Some(report)))
 }
 
+/// Rows of the BVH's order below a node.
 fn rows(bvh: &BinaryBvh, node: u32) -> std::ops::Range<usize> {
     let node = &bvh.nodes[node as usize];
     node.first as usize..(node.first + node.count) as usize
 }
 
-/// Sums of the triangles' areas up to each row of the order.
+/// Sums of the triangles' double areas up to each row of the order.
 fn surface_areas(mesh: &Mesh, bvh: &BinaryBvh) -> Vec<f64> {
-    use super::rays::{corners, cross, dot, sub};
     let mut sums = Vec::with_capacity(bvh.order.len() + 1);
     sums.push(0.0);
     for &triangle in &bvh.order {
-        let [a, b, c] = corners(mesh, triangle);
-        let n = cross(sub(b, a), sub(c, a));
-        sums.push(sums[sums.len() - 1] + dot(n, n).sqrt());
+        sums.push(sums[sums.len() - 1] + double_area(corners(mesh, triangle)).length());
     }
     sums
 }
 
+/// Share of the scene's rays from surfaces that start on the triangles of these rows.
 fn share_of(scene: &Weighting, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -> f64 {
     let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
     ids.sort_unstable();
@@ -134,79 +132,75 @@ fn share_of(scene: &Weighting, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -
     here.count() as f64 / scene.surface.len().max(1) as f64
 }
 
-/// Rays that start on the leaf's triangles.
-#[expect(clippy::too_many_arguments)]
-fn surface(
-    mesh: &Mesh,
-    bvh: &BinaryBvh,
-    node: u32,
-    tets: &TetMesh,
+/// Traces rays through the tetrahedra and the BVH of single leaves, and compares their costs.
+struct Prober<'a> {
+    mesh: &'a Mesh,
+    bvh: &'a BinaryBvh,
+    options: &'a Options,
+    prices: &'a Prices<'a>,
+    /// Rays for each leaf.
     count: usize,
-    options: &Options,
-    prices: &Prices<'_>,
-    scene: Option<&Weighting>,
-) -> ProbedLeaf {
-    let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
-    let rows = rows(bvh, node);
-    let of_scene: Option<Vec<SampleRay>> = scene.map(|scene| {
-        let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
-        ids.sort_unstable();
-        let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
-        here.copied().take(count).collect()
-    });
-    let rays = of_scene.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
-    let walker = TetWalker::new(tets);
-    let (mut steps, mut through_tets, mut through_bvh, mut traced) = (0.0, 0.0, 0.0, 0.0f64);
-    for ray in &rays {
-        let Some(walked) = walker.walk(ray) else { continue };
-        let met = walk(mesh, bvh, ray, |_| {});
-        let plain = costs.ray + costs.surface * f64::from(met.visits);
-        let mut time = prices.surface(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
-        if node != 0 && walked.left && leaves(ray, &met, at) {
-            time += plain;
-        }
-        steps += f64::from(walked.steps);
-        through_tets += time;
-        through_bvh += plain;
-        traced += 1.0;
-    }
-    let mean = |sum: f64| sum / traced.max(1.0);
-    ProbedLeaf {
-        node,
-        triangles: at.count,
-        steps: mean(steps),
-        cost_tet: mean(through_tets),
-        cost_bvh: mean(through_bvh),
-        gain: 0.0,
-        kept: false,
-    }
 }
 
-/// What is saved of rays from outside where no BVH stays beside the tetrahedra, for each that meets the root.
-fn entering(
-    mesh: &Mesh,
-    bvh: &BinaryBvh,
-    node: u32,
-    tets: &TetMesh,
-    count: usize,
-    options: &Options,
-    prices: &Prices<'_>,
-) -> f64 {
-    let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
-    let below = node..node + 2 * at.count - 1;
-    let walker = TetWalker::new(tets);
-    let (mut saved, mut traced) = (0.0, 0.0f64);
-    for ray in outside(at.lower, at.upper, count, 4 + u64::from(node)) {
-        let Some(walked) = walker.walk(&ray) else { continue };
-        let mut visits = 0u32;
-        walk(mesh, bvh, &ray, |i| visits += u32::from(below.contains(&i)));
-        let (steps, hits) = (f64::from(walked.steps), f64::from(u8::from(walked.hit)));
-        saved += costs.outside * f64::from(visits);
-        saved -= match node {
-            0 => prices.outside(at.count, steps, hits) - costs.ray,
-            _ => prices.alone(at.count, steps, hits),
-        };
-        traced += 1.0;
+impl Prober<'_> {
+    /// Traces rays that start on the leaf's triangles: the scene's, else sampled ones.
+    fn surface(&self, node: u32, tets: &TetMesh, scene: Option<&Weighting>) -> ProbedLeaf {
+        let Self { mesh, bvh, options, prices, count } = *self;
+        let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
+        let rows = rows(bvh, node);
+        let of_scene: Option<Vec<SampleRay>> = scene.map(|scene| {
+            let mut ids: Vec<u32> = bvh.order[rows.clone()].to_vec();
+            ids.sort_unstable();
+            let here = scene.surface.iter().filter(|r| r.from.is_some_and(|t| ids.binary_search(&t).is_ok()));
+            here.copied().take(count).collect()
+        });
+        let rays = of_scene.unwrap_or_else(|| from_surface(mesh, bvh, rows, count, 3 + u64::from(node)));
+        let walker = TetWalker::new(tets);
+        let (mut steps, mut through_tets, mut through_bvh, mut traced) = (0.0, 0.0, 0.0, 0.0f64);
+        for ray in &rays {
+            let Some(walked) = walker.walk(ray) else { continue };
+            let traced_bvh = walk(mesh, bvh, ray, |_| {});
+            let plain = costs.ray + costs.surface * f64::from(traced_bvh.visits);
+            let mut time = prices.surface(at.count, f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+            if node != 0 && walked.left && leaves(ray, &traced_bvh, at) {
+                time += plain;
+            }
+            steps += f64::from(walked.steps);
+            through_tets += time;
+            through_bvh += plain;
+            traced += 1.0;
+        }
+        let mean = |sum: f64| sum / traced.max(1.0);
+        ProbedLeaf {
+            node,
+            triangles: at.count,
+            steps: mean(steps),
+            cost_tet: mean(through_tets),
+            cost_bvh: mean(through_bvh),
+            gain: 0.0,
+            kept: false,
+        }
     }
-    half_area(at) / half_area(&bvh.nodes[0]) * saved / traced.max(1.0)
+
+    /// Nanoseconds saved for each ray from outside that enters the root, where no BVH stays beside the tetrahedra.
+    fn entering(&self, node: u32, tets: &TetMesh) -> f64 {
+        let Self { mesh, bvh, options, prices, count } = *self;
+        let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);
+        let below = node..node + 2 * at.count - 1;
+        let walker = TetWalker::new(tets);
+        let (mut saved, mut traced) = (0.0, 0.0f64);
+        for ray in outside(at.lower, at.upper, count, 4 + u64::from(node)) {
+            let Some(walked) = walker.walk(&ray) else { continue };
+            let mut visits = 0u32;
+            walk(mesh, bvh, &ray, |i| visits += u32::from(below.contains(&i)));
+            let (steps, hits) = (f64::from(walked.steps), f64::from(u8::from(walked.hit)));
+            saved += costs.outside * f64::from(visits);
+            saved -= match node {
+                0 => prices.outside(at.count, steps, hits) - costs.ray,
+                _ => prices.alone(at.count, steps, hits),
+            };
+            traced += 1.0;
+        }
+        half_area(at) / half_area(&bvh.nodes[0]) * saved / traced.max(1.0)
+    }
 }

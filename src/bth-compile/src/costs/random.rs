@@ -1,21 +1,21 @@
-//! Seeded random numbers for sampled rays: additions, products and square roots only, so that the same
-//! rays are drawn on every machine.
+//! Seeded random numbers for sampled rays: additions, products and square roots only, so that the same rays are drawn on
+//! every machine.
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
+use bth_random::Rng;
+
+/// The generator of sample rays.
 #[derive(Clone, Debug)]
-pub(crate) struct Random(pub(crate) u64);
+pub(crate) struct RayRng(Rng);
 
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+impl RayRng {
+    /// A generator whose numbers depend on the seed only.
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Rng::new(seed))
     }
 
     /// Uniform in [0, 1).
     pub(crate) fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+        (self.0.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// A uniform point of the unit sphere.
@@ -23,7 +23,7 @@ impl Random {
         loop {
             let p = [0; 3].map(|_| 2.0 * self.unit() - 1.0);
             let squared: f64 = p.iter().map(|x| x * x).sum();
-            // Points of the ball, the tiny ones left out: dividing them would lose their digits.
+            // Uniform in the ball but for its centre, where the division would lose digits.
             if (1e-6..=1.0).contains(&squared) {
                 return p.map(|x| x / squared.sqrt());
             }
@@ -37,7 +37,7 @@ mod tests {
 
     #[test]
     fn numbers_fill_the_unit_interval_and_directions_the_sphere() {
-        let mut random = Random(1);
+        let mut random = RayRng::new(1);
         let mean = (0..10_000).map(|_| random.unit()).sum::<f64>() / 1e4;
         assert!((mean - 0.5).abs() < 0.02, "{mean}");
         let mut sum = [0.0; 3];

@@ -1,8 +1,10 @@
-//! Rays that stand for those of a renderer: uniform lines from outside, and rays from surfaces.
+//! Sample rays in place of a renderer's: uniform lines from outside, and rays from surfaces.
 
-use super::random::Random;
+use super::random::RayRng;
 use crate::bvh::{BinaryBvh, Node};
+use crate::vectors::{corners, double_area, unit};
 use bth_import::Mesh;
+use glam::DVec3;
 
 /// A sampled ray, object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,46 +24,23 @@ const SHORT: f64 = 0.05;
 /// By how much rays are lifted off the surface that they start on, relative to the diagonal.
 const LIFT: f64 = 2e-5;
 
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// The point at `t` on a ray.
 pub(super) fn along(ray: &SampleRay, t: f64) -> [f64; 3] {
-    [0, 1, 2].map(|k| ray.origin[k] + t * ray.direction[k])
-}
-
-pub(super) fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
-    v.map(|x| x / length)
-}
-
-/// Corners of a triangle in double precision.
-pub(super) fn corners(mesh: &Mesh, triangle: u32) -> [[f64; 3]; 3] {
-    mesh.corners(triangle).map(|p| p.map(f64::from))
+    (DVec3::from(ray.origin) + t * DVec3::from(ray.direction)).into()
 }
 
 /// Length of a box's diagonal.
 pub(super) fn diagonal(node: &Node) -> f64 {
-    let d = [0, 1, 2].map(|k| f64::from(node.upper[k]) - f64::from(node.lower[k]));
-    dot(d, d).sqrt()
+    (DVec3::from(node.upper.map(f64::from)) - DVec3::from(node.lower.map(f64::from))).length()
 }
 
 /// Lines that are uniform in space (chords of the ball around the box), which start outside of it and
 /// meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
 pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
-    let mut random = Random(seed);
-    let middle: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(lower[k]) + f64::from(upper[k])));
-    let half: [f64; 3] = [0, 1, 2].map(|k| 0.5 * (f64::from(upper[k]) - f64::from(lower[k])));
-    let radius = dot(half, half).sqrt();
+    let mut random = RayRng::new(seed);
+    let ends = [lower, upper].map(|end| DVec3::from(end.map(f64::from)));
+    let middle = 0.5 * (ends[0] + ends[1]);
+    let radius = (0.5 * (ends[1] - ends[0])).length();
     let mut rays = Vec::with_capacity(count);
     // A box of zero size is met by no chord at all; one of zero width by few.
     for _ in 0..64 * count {
@@ -69,8 +48,9 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
             break;
         }
         let [p, q] = [0; 2].map(|_| random.sphere());
-        let [p, q] = [p, q].map(|p| [0, 1, 2].map(|k| middle[k] + 1.01 * radius * p[k]));
-        let ray = SampleRay { origin: p, direction: unit(sub(q, p)), tmax: f64::INFINITY, from: None };
+        let [p, q] = [p, q].map(|p| middle + 1.01 * radius * DVec3::from(p));
+        let (origin, direction) = (p.into(), unit(q - p).into());
+        let ray = SampleRay { origin, direction, tmax: f64::INFINITY, from: None };
         if ray.direction[0].is_finite() && enters(&ray, lower, upper, f64::INFINITY).is_some() {
             rays.push(ray);
         }
@@ -90,18 +70,14 @@ pub fn from_surface(
     seed: u64,
 ) -> Vec<SampleRay> {
     let Some(root) = bvh.nodes.first() else { return Vec::new() };
-    let (mut random, diagonal) = (Random(seed), diagonal(root));
+    let (mut random, diagonal) = (RayRng::new(seed), diagonal(root));
     let triangles = &bvh.order[rows];
-    let normal = |triangle: u32| {
-        let [a, b, c] = corners(mesh, triangle);
-        cross(sub(b, a), sub(c, a))
-    };
+    let normal = |triangle: u32| double_area(corners(mesh, triangle));
     let mut total = 0.0;
     let sums: Vec<f64> = triangles
         .iter()
         .map(|&t| {
-            let n = normal(t);
-            total += dot(n, n).sqrt();
+            total += normal(t).length();
             total
         })
         .collect();
@@ -120,11 +96,11 @@ pub fn from_surface(
             (u, v) = (1.0 - u, 1.0 - v);
         }
         let lift = LIFT * diagonal;
-        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + lift * n[k]);
-        let s = random.sphere();
-        let direction = unit([0, 1, 2].map(|k| n[k] + s[k]));
+        let origin = a + u * (b - a) + v * (c - a) + lift * n;
+        let direction = unit(n + DVec3::from(random.sphere()));
         let tmax = if i % 2 == 0 { f64::INFINITY } else { SHORT * diagonal };
-        if direction.iter().chain(&origin).all(|x| x.is_finite()) {
+        if direction.is_finite() && origin.is_finite() {
+            let (origin, direction) = (origin.into(), direction.into());
             rays.push(SampleRay { origin, direction, tmax, from: Some(triangle) });
         }
     }

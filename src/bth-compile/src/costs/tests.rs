@@ -131,7 +131,10 @@ fn a_ray_meets_what_trying_all_triangles_meets_and_enters_the_nodes_above() {
         let mut entered = vec![false; bvh.nodes.len()];
         let met = walk(&mesh, &bvh, &ray, |node| entered[node as usize] = true);
         let all = bvh.order.iter().enumerate().filter_map(|(row, &triangle)| {
-            Some((bvh_walk::crosses(&ray, rays::corners(&mesh, triangle), f64::INFINITY)?, row as u32))
+            Some((
+                bvh_walk::crosses(&ray, crate::vectors::corners(&mesh, triangle), f64::INFINITY)?,
+                row as u32,
+            ))
         });
         let nearest = all.min_by(|a, b| a.0.total_cmp(&b.0));
         assert_eq!(met.hit.map(|(_, t)| t), nearest.map(|(t, _)| t));

@@ -4,17 +4,19 @@
 //! tetrahedra. A ray through an edge may take a step more or less here than in the runtime.
 
 use super::bvh_walk::crosses;
-use super::rays::{SampleRay, cross, dot, sub};
+use super::rays::SampleRay;
 use crate::tets::{Behind, TetMesh};
+use crate::vectors::double_area;
+use glam::DVec3;
 
-/// How a walk went.
+/// Result of a walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walked {
     /// Tetrahedra on the way.
     pub steps: u32,
     /// Whether the ray ended at a triangle.
     pub hit: bool,
-    /// Whether the ray left the box, so that what lies beyond has to be asked.
+    /// Whether the ray left the box; the traversal of the BVH goes on beyond it.
     pub left: bool,
 }
 
@@ -29,7 +31,7 @@ pub struct TetWalker<'a> {
 }
 
 impl<'a> TetWalker<'a> {
-    /// Gathers what walks begin with.
+    /// Finds the hull faces and the rows of the triangles' faces, where walks begin.
     pub fn new(mesh: &'a TetMesh) -> Self {
         let hulls = |(t, behind): (usize, &[Behind; 4])| {
             let hull = behind.map(|b| b == Behind::Hull);
@@ -42,12 +44,12 @@ impl<'a> TetWalker<'a> {
         TetWalker { mesh, hull, face_of }
     }
 
-    fn corner(&self, tet: u32, k: usize) -> [f64; 3] {
-        self.mesh.vertices[self.mesh.tets[tet as usize][k] as usize].map(f64::from)
+    fn corner(&self, tet: u32, k: usize) -> DVec3 {
+        self.mesh.vertices[self.mesh.tets[tet as usize][k] as usize].map(f64::from).into()
     }
 
     /// Corners of the face opposite to vertex `k`.
-    fn face(&self, tet: u32, k: usize) -> [[f64; 3]; 3] {
+    fn face(&self, tet: u32, k: usize) -> [DVec3; 3] {
         [1, 2, 3].map(|i| self.corner(tet, (k + i) % 4))
     }
 
@@ -58,8 +60,8 @@ impl<'a> TetWalker<'a> {
             let row = self.face_of.binary_search_by_key(&triangle, |(id, _)| *id).ok()?;
             let row = self.face_of[row].1;
             let face = &self.mesh.faces[row as usize];
-            let [a, b, c] = face.vertex.map(|v| self.mesh.vertices[v as usize].map(f64::from));
-            let front = dot(cross(sub(b, a), sub(c, a)), ray.direction) > 0.0;
+            let corners = face.vertex.map(|v| self.mesh.vertices[v as usize].map(f64::from).into());
+            let front = double_area(corners).dot(ray.direction.into()) > 0.0;
             let tet = face.tet[usize::from(!front)];
             let k = self.mesh.behind[tet as usize].iter().position(|b| *b == Behind::Face(row))?;
             Some((tet, k))
@@ -84,16 +86,17 @@ impl<'a> TetWalker<'a> {
     }
 
     fn go(&self, ray: &SampleRay, mut tet: u32, mut entered: usize) -> Walked {
+        let (origin, direction) = (DVec3::from(ray.origin), DVec3::from(ray.direction));
         for steps in 1..=self.mesh.tets.len() as u32 {
             // Out through the nearest of the planes that the ray crosses outwards.
             let mut out = (f64::INFINITY, entered);
             for k in (0..4).filter(|k| *k != entered) {
                 let [a, b, c] = self.face(tet, k);
-                let normal = cross(sub(b, a), sub(c, a));
-                let inner = dot(normal, sub(self.corner(tet, k), a));
-                let outward = -dot(normal, ray.direction) * inner.signum();
+                let normal = double_area([a, b, c]);
+                let inner = normal.dot(self.corner(tet, k) - a);
+                let outward = -normal.dot(direction) * inner.signum();
                 if outward > 0.0 {
-                    let t = dot(normal, sub(a, ray.origin)) / dot(normal, ray.direction);
+                    let t = normal.dot(a - origin) / normal.dot(direction);
                     out = if t < out.0 { (t, k) } else { out };
                 }
             }

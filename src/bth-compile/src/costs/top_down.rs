@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::marks::Marks;
 use crate::monitor::Monitor;
 
-/// Nodes between two looks at whether the user asked to stop.
+/// Nodes between two checks for cancellation.
 const NODES_BETWEEN_CHECKS: usize = 1 << 14;
 
 /// Costs of the paper's rule, nanoseconds.

@@ -1,4 +1,4 @@
-//! All triangles in bad contact, for people who want to see or repair them and for cross-checks.
+//! All triangles in bad contact, for the repair of models and for cross-checks.
 
 use super::collide::{After, Gathered};
 use crate::bvh::BinaryBvh;

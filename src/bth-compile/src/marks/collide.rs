@@ -8,7 +8,7 @@ use crate::monitor::Monitor;
 use bth_import::Mesh;
 use rayon::prelude::*;
 
-/// Steps of a traversal between two looks at whether the user asked to stop.
+/// Steps of a traversal between two checks for cancellation.
 const STEPS_BETWEEN_CHECKS: u64 = 1 << 16;
 /// Triangles of two siblings beyond which their collision is worth several threads.
 const PARALLEL_COLLISION: u32 = 1 << 15;

@@ -2,23 +2,8 @@
 
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
+use bth_random::Rng;
 use std::collections::HashMap;
-
-/// SplitMix64 (Steele et al. 2014).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-    /// From 0 to `n - 1`.
-    pub(crate) fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
-    }
-}
 
 /// Welds bit-equal positions.
 pub(crate) fn weld(corners: &[[[f32; 3]; 3]]) -> Mesh {
@@ -77,7 +62,7 @@ fn split(mesh: &Mesh, nodes: &mut Vec<Node>, order: &mut [u32], first: u32) {
 
 /// A random mesh on a small grid: some connected fans, some loose triangles, many touching.
 pub(crate) fn patch(seed: u64, triangles: usize) -> Mesh {
-    let mut random = Random(seed);
+    let mut random = Rng::new(seed);
     let side = 3 + random.below(12);
     let mut point = || [0; 3].map(|_: i32| random.below(side) as f32);
     let mut corners: Vec<[[f32; 3]; 3]> = Vec::new();

@@ -95,12 +95,13 @@ fn vertex_neighbours_meet(a: [Point; 3], b: [Point; 3]) -> bool {
 mod tests {
     use super::super::coplanar::Projection;
     use super::super::oracle::oracle;
-    use super::super::testing::{Random, planted};
+    use super::super::testing::planted;
     use super::*;
+    use bth_random::Rng;
 
     /// Two random triangles of non-zero area on a grid of `side`³ points that share the given
     /// number of vertices; `flat` puts them into one plane.
-    fn pair(random: &mut Random, side: u64, shared: usize, flat: bool) -> [Triangle; 2] {
+    fn pair(random: &mut Rng, side: u64, shared: usize, flat: bool) -> [Triangle; 2] {
         loop {
             let slope = [random.below(3) as f32 - 1.0, random.below(3) as f32 - 1.0];
             let p: Vec<Point> = (0..6)
@@ -132,7 +133,7 @@ mod tests {
 
     #[test]
     fn agrees_with_rational_clipping_for_every_number_of_shared_vertices() {
-        let mut random = Random(7);
+        let mut random = Rng::new(7);
         for shared in 0..=3 {
             for flat in [false, true] {
                 let mut verdicts = [0; 2];
@@ -155,7 +156,7 @@ mod tests {
 
     #[test]
     fn the_verdict_survives_powers_of_two_and_turns_of_the_axes() {
-        let mut random = Random(11);
+        let mut random = Rng::new(11);
         for k in 0..4000 {
             let [a, b] = pair(&mut random, 4, k % 3, k % 2 == 0);
             let verdict = in_bad_contact(&a, &b);
@@ -174,7 +175,7 @@ mod tests {
     fn one_ulp_decides_between_contact_and_gap() {
         // Vertices of the second triangle on, or one ulp above, the first one's plane, which no
         // coordinate plane is parallel to.
-        let mut random = Random(13);
+        let mut random = Rng::new(13);
         for _ in 0..2000 {
             let [x, y] = [0; 2].map(|_: i32| 1.0 + random.below(1000) as f32 / 1024.0);
             let a = [[0.0, 0.0, 0.0], [8.0, 0.0, 8.0], [0.0, 8.0, 8.0]];

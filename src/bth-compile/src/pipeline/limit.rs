@@ -1,111 +1,111 @@
-//! The limit on the bytes that tracing reads: what the BVH takes before nodes are chosen, and what is left out when the
-//! tetrahedra turn out larger than estimated.
+//! The limit on the bytes that tracing reads: what the BVH takes before nodes are chosen, and which tetrahedralizations are
+//! left out when they turn out larger than estimated.
 
-use super::{FileReport, Options, wide};
-use crate::coordinates::OnGrid;
+use super::object::{TracedMesh, TracedRef, collapse};
+use super::{FileReport, Options, Structure};
 use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, tets};
 use bth_format::layout::Object as Header;
-use bth_import as mesh;
+use bth_import::Mesh;
 
-/// Tetrahedralizations by their node.
-type Built = Vec<(u32, tets::TetMesh)>;
-
-/// How the tetrahedra of a mesh will be stored; under a limit on bytes, beside a BVH of how many.
+/// How the tetrahedra of a mesh will be stored; under a limit on bytes, with the size of the BVH beside them.
 ///
 /// # Errors
 /// A limit of the format, cancellation.
 pub fn storage(
-    mesh: &mesh::Mesh,
+    mesh: &Mesh,
     tree: &bvh::BinaryBvh,
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<costs::Storage> {
-    storage_on(mesh, None, tree, options, monitor)
+    storage_of(TracedRef { mesh, on_grid: None, tree }, options, monitor)
 }
 
-pub(super) fn storage_on(
-    mesh: &mesh::Mesh,
-    on_grid: Option<&OnGrid>,
-    tree: &bvh::BinaryBvh,
+/// As [`storage`], for a mesh that may be on a grid.
+pub(super) fn storage_of(
+    traced: TracedRef<'_>,
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<costs::Storage> {
     let mut storage = options.storage();
     if options.costs.max_bytes_per_triangle.is_some() {
-        storage.plain_bytes = Some(Made { mesh, on_grid, tree, options }.bytes(&[], monitor)?);
+        storage.plain_bytes = Some(bytes(traced, &[], options, monitor)?);
     }
     Ok(storage)
 }
 
-/// What the stages made of a mesh.
-#[derive(Clone, Copy)]
-pub(super) struct Made<'a> {
-    pub(super) mesh: &'a mesh::Mesh,
-    pub(super) on_grid: Option<&'a OnGrid>,
-    pub(super) tree: &'a bvh::BinaryBvh,
-    pub(super) options: &'a Options,
+/// The limit that applies to tet leaves. A whole tetrahedralization that was asked for is not limited.
+pub(super) fn bytes_per_triangle(options: &Options) -> Option<f64> {
+    options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
 }
 
-impl Made<'_> {
-    /// Leaves out tetrahedralizations, those of least gain for a byte first, until tracing reads at most so many bytes a
-    /// triangle; all of them if the rest saves less than the least gain.
-    pub(super) fn within(
-        &self,
-        most: f64,
-        mut built: Built,
-        choice: &Choice,
-        mut probe: Option<&mut ProbeReport>,
-        monitor: &dyn Monitor,
-    ) -> Result<Built> {
-        let costs = &self.options.costs;
-        let most = most * self.mesh.triangles.len() as f64;
-        let before = built.len();
-        while !built.is_empty() {
-            let over = self.bytes(&built, monitor)? as f64 - most;
-            if over <= 0.0 {
-                break;
-            }
-            let weigh = |(node, tets): &(u32, tets::TetMesh)| Weighed {
-                gain: gain(self.tree, choice, probe.as_deref(), *node),
-                takes: tets::encoded_bytes(tets, self.options.record) as f64,
-            };
-            let items: Vec<Weighed> = built.iter().map(weigh).collect();
-            let out = least_useful(&items, over);
-            let mut row = 0..;
-            built.retain(|_| row.next().is_some_and(|row| out.binary_search(&row).is_err()));
+/// Leaves out tetrahedralizations, those of least gain for a byte first, until tracing reads at most `most` bytes a
+/// triangle; all of them if the rest saves less than the least gain. The probe's report follows.
+pub(super) fn fit(
+    traced: &TracedMesh,
+    most: f64,
+    mut leaves: Vec<tets::Leaf>,
+    (choice, mut probe): (&Choice, Option<&mut ProbeReport>),
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<Vec<tets::Leaf>> {
+    let traced = traced.by_ref();
+    let most = most * traced.mesh.triangles.len() as f64;
+    let before = leaves.len();
+    while !leaves.is_empty() {
+        let excess = bytes(traced, &leaves, options, monitor)? as f64 - most;
+        if excess <= 0.0 {
+            break;
         }
-        if let Some(probe) = &mut probe
-            && built.len() < before
-        {
-            let is_left = |node: u32| built.iter().any(|(n, _)| *n == node);
-            probe.leaves.iter_mut().for_each(|leaf| leaf.kept = leaf.kept && is_left(leaf.node));
-            let left: f64 = probe.leaves.iter().filter(|leaf| leaf.kept).map(|leaf| leaf.gain).sum();
-            probe.cost_with_tets = probe.cost_bvh - left;
-            if left < costs.minimum_gain * probe.cost_bvh {
-                probe.leaves.iter_mut().for_each(|leaf| leaf.kept = false);
-                probe.cost_with_tets = probe.cost_bvh;
-                built.clear();
-            }
-        }
-        Ok(built)
+        let weigh = |(node, tets): &tets::Leaf| Weighed {
+            gain: gain(traced.tree, choice, probe.as_deref(), *node),
+            takes: tets::encoded_bytes(tets, options.record) as f64,
+        };
+        let items: Vec<Weighed> = leaves.iter().map(weigh).collect();
+        let out = least_useful(&items, excess);
+        let mut row = 0..;
+        leaves.retain(|_| row.next().is_some_and(|row| out.binary_search(&row).is_err()));
     }
+    if let Some(probe) = &mut probe
+        && leaves.len() < before
+    {
+        follow(probe, &mut leaves, &options.costs);
+    }
+    Ok(leaves)
+}
 
-    /// Bytes that tracing reads of the object with these tet leaves.
-    fn bytes(&self, built: &[(u32, tets::TetMesh)], monitor: &dyn Monitor) -> Result<u64> {
-        let cut: Vec<u32> = built.iter().map(|(node, _)| *node).collect();
-        let wide = wide(self.mesh, self.on_grid, self.tree, &cut, self.options, monitor)?.wide;
-        let homes = if built.is_empty() { 0 } else { size_of::<u32>() * self.mesh.triangles.len() };
-        let rest = size_of::<Header>() + size_of_val(&wide.lines[..]) + size_of_val(&wide.triangle_ids[..]);
-        let tets = built.iter().map(|(_, tets)| tets::encoded_bytes(tets, self.options.record));
-        Ok((rest + homes) as u64 + tets.sum::<u64>())
+/// Brings the probe's report up to date after leaves were left out, and leaves out the rest if it saves too little.
+fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::Options) {
+    let is_left = |node: u32| leaves.iter().any(|(n, _)| *n == node);
+    probe.leaves.iter_mut().for_each(|leaf| leaf.kept = leaf.kept && is_left(leaf.node));
+    let left: f64 = probe.leaves.iter().filter(|leaf| leaf.kept).map(|leaf| leaf.gain).sum();
+    probe.cost_with_tets = probe.cost_bvh - left;
+    if left < costs.minimum_gain * probe.cost_bvh {
+        probe.leaves.iter_mut().for_each(|leaf| leaf.kept = false);
+        probe.cost_with_tets = probe.cost_bvh;
+        leaves.clear();
     }
 }
 
-/// What a tet leaf saves: as probed, else as estimated when it was chosen. A part of a chosen node, which could not be built
-/// whole, saves its share.
+/// Bytes that tracing reads of the object with these tet leaves.
+fn bytes(
+    traced: TracedRef<'_>,
+    leaves: &[tets::Leaf],
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<u64> {
+    let cut: Vec<u32> = leaves.iter().map(|(node, _)| *node).collect();
+    let wide = collapse(traced, &cut, options, monitor)?.0.wide;
+    let face_of_triangle = if leaves.is_empty() { 0 } else { size_of::<u32>() * traced.mesh.triangles.len() };
+    let rest = size_of::<Header>() + size_of_val(&wide.lines[..]) + size_of_val(&wide.triangle_ids[..]);
+    let tets = leaves.iter().map(|(_, tets)| tets::encoded_bytes(tets, options.record));
+    Ok((rest + face_of_triangle) as u64 + tets.sum::<u64>())
+}
+
+/// The gain of a tet leaf: as probed, else as estimated when it was chosen. A cell of a chosen node that could not be built
+/// whole has its share of the node's gain.
 fn gain(tree: &bvh::BinaryBvh, choice: &Choice, probe: Option<&ProbeReport>, node: u32) -> f64 {
     if let Some(probe) = probe {
         return probe.leaves.iter().find(|leaf| leaf.node == node).map_or(0.0, |leaf| leaf.gain);
@@ -116,16 +116,13 @@ fn gain(tree: &bvh::BinaryBvh, choice: &Choice, probe: Option<&ProbeReport>, nod
     verdict.map_or(0.0, |v| v.gain * share(v))
 }
 
-/// By how much an object is over the limit on bytes, in words; `None` if it is not.
-pub(crate) fn over(file: &FileReport, options: &Options) -> Option<String> {
-    let most = options.costs.max_bytes_per_triangle?;
+/// Warns if an object is over the limit on bytes.
+pub(crate) fn warn_over_limit(file: &FileReport, options: &Options, monitor: &dyn Monitor) {
+    let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = file.resident_bytes_per_triangle;
-    let what = if file.tet_leaves == 0 { "the BVH alone" } else { "the tetrahedralization" };
-    (each > most)
-        .then(|| format!("{what} takes {each:.1} bytes a triangle, more than the limit of {most} allows"))
-}
-
-/// Warns, if there is something to warn of.
-pub(crate) fn say(over: Option<String>, monitor: &dyn Monitor) {
-    over.iter().for_each(|message| monitor.warn(message));
+    if each > most {
+        let what = if file.tet_leaves == 0 { "the BVH alone" } else { "the tetrahedralization" };
+        monitor
+            .warn(&format!("{what} takes {each:.1} bytes a triangle, more than the limit of {most} allows"));
+    }
 }

@@ -1,86 +1,34 @@
-//! The compiler: calls the stages in order.
+//! The compilation of a model: import → coordinates → BVH → marks → costs → tets → probe → limit → collapse → file.
+//!
+//! Each stage is a function of its input and its options. The stages whose results can come from elsewhere are called
+//! through [`Stages`], which a cache implements outside of this module.
 
-mod kept;
+mod clock;
 mod limit;
-mod options;
-pub(crate) mod parts;
+pub(crate) mod object;
 pub(crate) mod provenance;
-mod structure;
+mod report;
+mod select;
+mod stages;
 
-pub use kept::{Foreseen, Outcome, compile_cached, foresee};
-pub(crate) use kept::{joined, tetgen, through};
+pub use crate::options::{Options, Structure};
+pub(crate) use clock::Clock;
+pub use clock::StageTime;
 pub use limit::storage;
-pub(crate) use limit::{over, say};
-pub use options::{Options, Structure};
+pub(crate) use limit::warn_over_limit;
+pub use object::{Compiled, assemble};
+pub(crate) use object::{Object, TracedMesh};
+pub(crate) use report::StageReports;
+pub use report::{FileReport, Report};
+pub(crate) use stages::{Direct, Stages};
 
-use crate::cached::{self, Cache, Topology};
-use crate::coordinates::Boxes;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::{bvh, coordinates, costs, marks, tets};
-use bth_import as mesh;
-use serde::{Deserialize, Serialize};
+use crate::source::{Model, SourceDigest};
+use crate::{coordinates, tets};
+use bth_import::Mesh;
+use report::TetReports;
 use std::path::Path;
-use std::time::Instant;
-
-/// A compiled file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Compiled {
-    /// Its bytes. They depend on the source's content and the options only.
-    pub bytes: Vec<u8>,
-}
-
-/// What the stages found and did.
-#[derive(Clone, Debug, Serialize)]
-pub struct Report {
-    /// BLAKE3 of the source file's bytes, hexadecimal.
-    pub source_blake3: String,
-    /// What each stage took, in order.
-    pub seconds: Vec<StageTime>,
-    /// Import.
-    pub mesh: mesh::Report,
-    /// Coordinates, unless they are `f32`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub coordinates: Option<coordinates::Report>,
-    /// Binary BVH.
-    pub bvh: bvh::Report,
-    /// Marking; absent when no tetrahedra were asked for, as the next two.
-    pub marks: Option<marks::Report>,
-    /// Selection.
-    pub costs: Option<costs::Report>,
-    /// Tetrahedralization.
-    pub tets: Option<tets::Report>,
-    /// What the probe made of the tetrahedra, if there were any.
-    pub probe: Option<costs::ProbeReport>,
-    /// Wide BVH.
-    pub collapse: bvh::CollapseReport,
-    /// The compiled file.
-    pub file: FileReport,
-}
-
-/// What a stage took.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct StageTime {
-    /// Name of the stage.
-    pub name: &'static str,
-    /// Seconds on the wall clock.
-    pub seconds: f64,
-}
-
-/// Size of the compiled file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct FileReport {
-    /// Bytes of the file.
-    pub bytes: u64,
-    /// Tet leaves.
-    pub tet_leaves: u64,
-    /// Triangles in tet leaves.
-    pub tet_triangles: u64,
-    /// Bytes of the sections that traversal reads.
-    pub resident_bytes: u64,
-    /// The same for each triangle of the source; 0 when it has none.
-    pub resident_bytes_per_triangle: f64,
-}
 
 /// Compiles a model.
 ///
@@ -88,228 +36,74 @@ pub struct FileReport {
 /// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
 pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
     let mut clock = Clock::default();
-    let digest = clock.time("hash", || cached::SourceDigest::of(source))?;
-    let (compiled, report) = compile_model(source, &digest, options, &Cache::none(), monitor, clock)?;
-    say(over(&report.file, options), monitor);
+    let digest = clock.time("hash", || SourceDigest::of(source))?;
+    let model = Model { path: source, digest: &digest };
+    let (compiled, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
+    warn_over_limit(&report.file, options, monitor);
     Ok((compiled, report))
 }
 
-/// Compiles a model whose files have been hashed.
-fn compile_model(
-    source: &Path,
-    digest: &cached::SourceDigest,
+/// Compiles a model whose files have been hashed; `clock` has the time of that.
+pub(crate) fn compile_model(
+    model: &Model<'_>,
     options: &Options,
-    cache: &Cache<'_>,
-    monitor: &dyn Monitor,
+    stages: &mut dyn Stages,
     mut clock: Clock,
+    monitor: &dyn Monitor,
 ) -> Result<(Compiled, Report)> {
-    let (mesh, facts) = clock.time("mesh", || {
-        cache.stage(
-            || cached::mesh(digest, source, "flat", options.attributes),
-            "",
-            monitor,
-            cached::decode,
-            cached::encode,
-            || {
-                let read = mesh::import(source, options.attributes, monitor)?;
-                digest.unchanged(source, cached::MeshFacts::of(read))
-            },
-        )
-    })?;
-    let (object, reports) = build(source, "", (mesh, &facts.geometry), options, cache, monitor, &mut clock)?;
-    let mesh_report = facts.report;
-    let source_blake3 = digest.file.hex();
+    let (mesh, import) = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let (object, reports) = compile_mesh(model.path, mesh, options, stages, &mut clock, monitor)?;
+    let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
-    let provenance = provenance::json(&source_blake3, &mesh_report.format, tetgen, options)?;
-    let (bytes, resident_bytes) = clock.time("file", || parts::file(&object, provenance, options))?;
-
-    let triangles = object.mesh.triangles.len();
-    let file = FileReport {
-        bytes: bytes.len() as u64,
-        tet_leaves: object.tet_leaves,
-        tet_triangles: object.tet_triangles,
-        resident_bytes,
-        resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
-    };
-    let Reports { coordinates, bvh, marks, costs, tets, probe, collapse } = reports;
-    let seconds = clock.0;
-    let mesh = mesh_report;
-    let report =
-        Report { source_blake3, seconds, mesh, coordinates, bvh, marks, costs, tets, probe, collapse, file };
-    Ok((Compiled { bytes }, report))
+    let provenance = provenance::of_model(&source_blake3, &import.format, tetgen, options)?;
+    let (compiled, file) = clock.time("file", || object.file(provenance, options))?;
+    Ok((compiled, Report::new(source_blake3, clock, import, reports, file)))
 }
 
-/// An object that is ready to be written.
-pub(crate) struct Object {
-    /// As it is traced.
-    pub(crate) mesh: mesh::Mesh,
-    /// How it was before, if its positions were moved.
-    on_grid: Option<coordinates::OnGrid>,
-    tree: bvh::BinaryBvh,
-    wide: bvh::Wide,
-    packed_nodes: bool,
-    /// Absent without tet leaves.
-    encoded: Option<tets::Encoded>,
-    pub(crate) tet_leaves: u64,
-    pub(crate) tet_triangles: u64,
-}
-
-/// What the stages from the mesh to the wide BVH found; see [`Report`].
-pub(crate) struct Reports {
-    coordinates: Option<coordinates::Report>,
-    bvh: bvh::Report,
-    marks: Option<marks::Report>,
-    costs: Option<costs::Report>,
-    pub(crate) tets: Option<tets::Report>,
-    probe: Option<costs::ProbeReport>,
-    collapse: bvh::CollapseReport,
-}
-
-/// Builds an object from its mesh and the hash of its geometry; `source` is for messages, `part` tells the objects of a source apart when misses of
-/// the cache are explained.
-pub(crate) fn build(
+/// Compiles a mesh into an object; `source` names the model in messages.
+pub(crate) fn compile_mesh(
     source: &Path,
-    part: &str,
-    (mut mesh, geometry): (mesh::Mesh, &bth_cache::Digest),
+    mesh: Mesh,
     options: &Options,
-    cache: &Cache<'_>,
-    monitor: &dyn Monitor,
+    stages: &mut dyn Stages,
     clock: &mut Clock,
-) -> Result<(Object, Reports)> {
-    let mut on_grid = None;
-    if options.coordinates != coordinates::Options::default() {
-        on_grid =
-            clock.time("coordinates", || coordinates::place(source, &mut mesh, &options.coordinates))?;
-    }
-    let moved = on_grid.as_ref().map(|_| cached::geometry(&mesh));
-    let geometry = moved.as_ref().unwrap_or(geometry);
-    let (tree, bvh_report) = clock.time("bvh", || {
-        cache.stage(
-            || cached::bvh(geometry, &options.bvh),
-            part,
-            monitor,
-            |bytes| cached::decode::<Topology>(bytes)?.over(&mesh),
-            |tree| cached::encode(&Topology::of(tree)),
-            || bvh::build(&mesh, &options.bvh, monitor),
-        )
-    })?;
-    let (mut meshes, mut reports, mut probe) = (Vec::new(), (None, None, None), None);
-    if options.structure != Structure::Bvh {
-        let (marks, marks_report) = clock.time("marks", || {
-            cache.stage(
-                || cached::marks(geometry, &options.bvh),
-                part,
-                monitor,
-                |bytes| cached::decode(bytes).filter(|m: &marks::Marks| m.suitable.len() == tree.nodes.len()),
-                cached::encode,
-                || marks::mark(&mesh, &tree, monitor),
-            )
-        })?;
-        let (choice, costs_report) = clock.time("costs", || {
-            let storage = limit::storage_on(&mesh, on_grid.as_ref(), &tree, options, monitor)?;
-            structure::choose(source, &mesh, &tree, &marks, options, storage, monitor)
-        })?;
-        let (built, tets_report) = clock.time("tets", || {
-            tets::build_cached(&mesh, &tree, &choice.chosen, &options.tets, cache, monitor)
-        })?;
-        structure::check_built(source, &tree, &built, options)?;
-        (meshes, probe) = clock.time("probe", || structure::probe(&mesh, &tree, built, options, monitor))?;
-        let made = limit::Made { mesh: &mesh, on_grid: on_grid.as_ref(), tree: &tree, options };
-        if let Some(most) =
-            options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
-        {
-            meshes = clock.time("limit", || made.within(most, meshes, &choice, probe.as_mut(), monitor))?;
-        }
-        reports = (Some(marks_report), costs_report, Some(tets_report));
-    }
-    let (object, collapse) =
-        clock.time("collapse", || object((mesh, on_grid), tree, meshes, options, monitor))?;
-    let (marks, costs, tets) = reports;
-    let coordinates = object.on_grid.as_ref().map(coordinates::OnGrid::report);
-    Ok((object, Reports { coordinates, bvh: bvh_report, marks, costs, tets, probe, collapse }))
-}
-
-/// Joins what the stages made of a mesh.
-fn object(
-    (mesh, on_grid): (mesh::Mesh, Option<coordinates::OnGrid>),
-    tree: bvh::BinaryBvh,
-    built: Vec<(u32, tets::TetMesh)>,
-    options: &Options,
     monitor: &dyn Monitor,
-) -> Result<(Object, bvh::CollapseReport)> {
-    let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = built.into_iter().unzip();
-    let Joined { wide, packed_nodes, collapse } =
-        wide(&mesh, on_grid.as_ref(), &tree, &cut, options, monitor)?;
-    if options.coordinates.boxes == Boxes::Bytes && !packed_nodes {
-        monitor.warn("boxes of nodes stay f32: coordinates are too great for steps of bytes");
-    }
-    let encoded = (!meshes.is_empty())
-        .then(|| tets::encode(&meshes, &wide.subtrees, options.record, mesh.triangles.len()));
-    let (tet_leaves, tet_triangles) =
-        (meshes.len() as u64, meshes.iter().map(|m| m.faces.len() as u64).sum());
-    Ok((Object { mesh, on_grid, tree, wide, packed_nodes, encoded, tet_leaves, tet_triangles }, collapse))
+) -> Result<(Object, StageReports)> {
+    let (mesh, on_grid) = match options.coordinates == coordinates::Options::default() {
+        true => (mesh, None),
+        false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
+    };
+    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &options.bvh, monitor))?;
+    let traced = TracedMesh { mesh, on_grid, tree };
+    let (leaves, tets) = match options.structure {
+        Structure::Bvh => (Vec::new(), TetReports::default()),
+        Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
+    };
+    let (object, collapse) = clock.time("collapse", || object::join(traced, leaves, options, monitor))?;
+    let coordinates = object.coordinates_report();
+    Ok((object, StageReports::new(coordinates, bvh, tets, collapse)))
 }
 
-/// A wide BVH as it will be stored.
-struct Joined {
-    wide: bvh::Wide,
-    packed_nodes: bool,
-    collapse: bvh::CollapseReport,
-}
-
-/// The wide BVH over a tree, tet leaves in place of nodes.
-fn wide(
-    mesh: &mesh::Mesh,
-    on_grid: Option<&coordinates::OnGrid>,
-    tree: &bvh::BinaryBvh,
-    cut: &[u32],
+/// Tetrahedralizes the nodes that pay: marks → costs → tets → probe → limit.
+fn tet_leaves(
+    source: &Path,
+    traced: &TracedMesh,
     options: &Options,
+    stages: &mut dyn Stages,
+    clock: &mut Clock,
     monitor: &dyn Monitor,
-) -> Result<Joined> {
-    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
-    let (mut wide, mut collapse) = bvh::collapse(mesh, tree, cut, &collapse_options, monitor)?;
-    let grid = on_grid.map(|on_grid| &on_grid.grid);
-    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
-    collapse.measure(&wide);
-    Ok(Joined { wide, packed_nodes, collapse })
-}
-
-/// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes: for
-/// measurements, which make one of these and look at it in several forms.
-///
-/// # Errors
-/// A limit of the format, cancellation.
-pub fn assemble(
-    mesh: &mesh::Mesh,
-    tree: &bvh::BinaryBvh,
-    built: &[(u32, tets::TetMesh)],
-    options: &Options,
-    monitor: &dyn Monitor,
-) -> Result<Compiled> {
-    let (object, _) = object((mesh.clone(), None), tree.clone(), built.to_vec(), options, monitor)?;
-    let (bytes, _) = parts::file(&object, "{}".to_owned(), options)?;
-    Ok(Compiled { bytes })
-}
-
-/// Times the stages on the wall clock; a stage that comes again adds to its time.
-#[derive(Default)]
-pub(crate) struct Clock(pub(crate) Vec<StageTime>);
-
-impl Clock {
-    pub(crate) fn time<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let result = work();
-        self.add(Clock(vec![StageTime { name, seconds: start.elapsed().as_secs_f64() }]));
-        result
+) -> Result<(Vec<tets::Leaf>, TetReports)> {
+    let TracedMesh { mesh, tree, .. } = traced;
+    let (marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &options.bvh, monitor))?;
+    let (choice, costs) = clock.time("costs", || select::choose(source, traced, &marks, options, monitor))?;
+    let (built, tets) =
+        clock.time("tets", || stages.tets(mesh, tree, &choice.chosen, &options.tets, monitor))?;
+    select::check_built(source, tree, &built, options)?;
+    let (mut leaves, mut probe) =
+        clock.time("probe", || select::probe(mesh, tree, built, options, monitor))?;
+    if let Some(most) = limit::bytes_per_triangle(options) {
+        let within = || limit::fit(traced, most, leaves, (&choice, probe.as_mut()), options, monitor);
+        leaves = clock.time("limit", within)?;
     }
-
-    /// Adds what another has timed.
-    pub(crate) fn add(&mut self, other: Clock) {
-        for StageTime { name, seconds } in other.0 {
-            match self.0.iter_mut().find(|stage| stage.name == name) {
-                Some(stage) => stage.seconds += seconds,
-                None => self.0.push(StageTime { name, seconds }),
-            }
-        }
-    }
+    Ok((leaves, TetReports { marks: Some(marks_report), costs, tets: Some(tets), probe }))
 }

@@ -1,5 +1,5 @@
-//! How a file came about: tool version, options and source content. No paths and no times, so that
-//! equal input gives equal bytes.
+//! The provenance section: tool version, options and source content. No paths and no times, so that equal input gives
+//! equal bytes.
 
 use super::{Options, Structure};
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ pub(super) fn tetgen(report: Option<&tets::Report>) -> Option<&str> {
 }
 
 /// The text of the provenance section of a single object.
-pub(super) fn json(
+pub(super) fn of_model(
     source_blake3: &str,
     format: &str,
     tetgen: Option<&str>,
@@ -26,11 +26,11 @@ pub(super) fn json(
         "version": env!("CARGO_PKG_VERSION"),
         "tetgen": tetgen,
         "source": {"format": format, "blake3": source_blake3},
-        "options": chosen(options),
+        "options": options_json(options),
     }))
 }
 
-/// The text of the provenance section of a scene; `sources` are format and hash of each.
+/// The text of the provenance section of a scene; `sources` are the format and BLAKE3 of each source.
 pub(crate) fn of_scene(
     sources: &[(String, String)],
     tetgen: Option<&str>,
@@ -42,12 +42,12 @@ pub(crate) fn of_scene(
         "version": env!("CARGO_PKG_VERSION"),
         "tetgen": tetgen,
         "sources": sources.iter().map(source).collect::<Vec<_>>(),
-        "options": chosen(options),
+        "options": options_json(options),
     }))
 }
 
-fn chosen(options: &Options) -> serde_json::Value {
-    let mut chosen = json!({
+fn options_json(options: &Options) -> serde_json::Value {
+    let mut json = json!({
         "structure": options.structure,
         "quality": options.bvh.quality,
         "attributes": options.attributes,
@@ -57,9 +57,9 @@ fn chosen(options: &Options) -> serde_json::Value {
         "geometry": options.geometry,
     });
     if options.coordinates != Default::default() {
-        chosen["coordinates"] = json!(options.coordinates);
+        json["coordinates"] = json!(options.coordinates);
     }
-    chosen
+    json
 }
 
 fn text(value: serde_json::Value) -> Result<String> {

@@ -1,73 +1,26 @@
-//! A manifest into a file: objects that may be seen, then the scene.
+//! The compilation of a manifest into a file: the objects that may be seen, then the scene.
 
-use super::objects::{self, ObjectReport, Objects};
-use super::outline::Outline;
-use super::previous::{Previous, keep_outline};
-use super::{encode, meshes, sources, visible, weights};
-use crate::cached::{self, Cache, ObjectKeys};
+use super::context::Context;
+use super::file_index::FileIndex;
+use super::objects::{self, Objects};
+use super::plan::Plan;
+use super::previous::Previous;
+use super::report::{ObjectReport, SceneReport};
+use super::{encode, meshes, sources, weights};
+use crate::cached::{self, Cache, DryRun, Outcome};
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
-use crate::pipeline::{self, Clock, Compiled, Foreseen, Options, Outcome, StageTime, Structure, provenance};
+use crate::options::{Options, Structure};
+use crate::pipeline::{Clock, Compiled, provenance};
 use crate::tets::WorkerStatus;
 use crate::write::{self, Content, FileBuilder, SceneParts};
 use bth_cache::{Key, Record};
+use bth_files::Digest;
 use bth_scene::Manifest;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
-
-/// What a scene file holds and how it was made.
-#[derive(Clone, Debug, Serialize)]
-pub struct SceneReport {
-    /// What each stage took, all objects together.
-    pub seconds: Vec<StageTime>,
-    /// Objects of the file, in order.
-    pub objects: Vec<ObjectReport>,
-    /// Objects of the manifest that no visible instance uses.
-    pub unused: Vec<String>,
-    /// Nodes.
-    pub nodes: u64,
-    /// Instances that may be seen.
-    pub instances: u64,
-    /// Tracks.
-    pub tracks: u64,
-    /// Cameras.
-    pub cameras: u64,
-    /// Lights.
-    pub lights: u64,
-    /// First frame.
-    pub first_frame: i32,
-    /// Last frame.
-    pub last_frame: i32,
-    /// Frames per second.
-    pub rate: f64,
-    /// Triangles of all objects.
-    pub triangles: u64,
-    /// Triangles of all instances.
-    pub instanced_triangles: u64,
-    /// Bytes of the file.
-    pub bytes: u64,
-    /// Bytes of the objects' sections that traversal reads.
-    pub resident_bytes: u64,
-    /// The tetrahedralization worker, if one was needed.
-    pub worker: Option<WorkerStatus>,
-}
-
-/// What the parts of a compilation need.
-pub(super) struct Context<'a> {
-    pub(super) options: &'a Options,
-    pub(super) cache: &'a Cache<'a>,
-    /// The tetrahedralizer as it stands in keys; nothing when objects may not be kept.
-    pub(super) tetgen: Option<String>,
-    /// The keys of objects, if they may be kept.
-    pub(super) keys: Option<Arc<ObjectKeys>>,
-    pub(super) monitor: &'a dyn Monitor,
-    /// The scene's rays for each object of the file, if they count.
-    pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
-    /// What an earlier compilation left where this one will write.
-    pub(super) previous: Option<Arc<Previous>>,
-}
 
 /// Compiles a scene; paths of the manifest count from `folder`, `name` stands for the scene in messages.
 ///
@@ -85,8 +38,8 @@ pub fn compile(
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, folder, &mut clock)?;
     let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
-    pipeline::say(over(&report.objects, options), monitor);
-    Ok((Compiled { bytes: pipeline::joined(&content)?.into_owned() }, report))
+    warn_over_limit(&report.objects, options, monitor);
+    Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
 }
 
 /// Where a scene is.
@@ -98,18 +51,18 @@ pub struct Place<'a> {
     pub name: &'a Path,
 }
 
-/// What is kept of a scene besides its objects.
+/// What the cache keeps of a scene besides its objects, and what the caller needs of it.
 #[derive(Clone, Copy)]
 pub struct Keep<'a> {
-    /// Whether the whole file is, for mapping it. Else it is put together from its objects when it is needed.
+    /// Whether the cache keeps the whole file, to be mapped. Else it is put together from its objects when it is needed.
     pub whole: bool,
-    /// Whether the bytes of a file that is kept are needed.
+    /// Whether the bytes of a file that the cache has are needed.
     pub needed: &'a dyn Fn(&Record) -> bool,
-    /// Where the file will be written: if the last one is still there, what has not changed is taken from it.
+    /// Where the file will be written: objects that have not changed are copied from the file that is there.
     pub target: Option<&'a Path>,
 }
 
-/// Compiles a scene, or takes what was made of the same content before.
+/// Compiles a scene through the cache.
 ///
 /// # Errors
 /// As [`compile`]; `BTH-O002` when a source changes meanwhile.
@@ -125,33 +78,33 @@ pub fn compile_cached(
     let mut clock = Clock::default();
     let plan = Plan::of(manifest, place.folder, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
-    let outcome = pipeline::through(cache, key.as_ref(), keep.needed, monitor, || {
+    let outcome = cached::compile_or_fetch(cache, key.as_ref(), keep.needed, monitor, || {
         context.previous = previous(keep.target, &context);
-        let (content, report, outline) = build(manifest, &plan, place.name, &context, clock)?;
+        let (content, report, index) = build(manifest, &plan, place.name, &context, clock)?;
         if keep.target.is_some() && !options.costs.for_scene {
-            keep_outline(&content.name(), &outline, &context);
+            keep_index(&content.name(), &index, &context);
         }
         Ok((content, report, keep.whole))
     })?;
     let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
-    pipeline::say(over(&objects, options), monitor);
+    warn_over_limit(&objects, options, monitor);
     Ok(outcome)
 }
 
-/// Which objects are over the limit on bytes, in words; `None` if none are.
-fn over(objects: &[ObjectReport], options: &Options) -> Option<String> {
-    let most = options.costs.max_bytes_per_triangle?;
+/// Warns if objects are over the limit on bytes.
+fn warn_over_limit(objects: &[ObjectReport], options: &Options, monitor: &dyn Monitor) {
+    let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
     let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
-    let worst = over.iter().max_by(|a, b| each(a).total_cmp(&each(b)))?;
-    Some(format!(
+    let Some(worst) = over.iter().max_by(|a, b| each(a).total_cmp(&each(b))) else { return };
+    monitor.warn(&format!(
         "{} of {} objects take more bytes a triangle than the limit of {most} allows, even without tetrahedra; the most \
          takes {}: {:.1}",
         over.len(),
         objects.len(),
         worst.names.first().map_or("an object", String::as_str),
         each(worst)
-    ))
+    ));
 }
 
 /// Compiles part `shard.0` of `shard.1` (from 1) of a scene's objects into the cache; how many there are in this part.
@@ -181,40 +134,49 @@ pub fn compile_objects(
     Ok(objects.reports.len() as u64)
 }
 
-/// What [`compile_cached`] would find; `target` as in [`Keep`]. Reads and hashes all sources, and does nothing else.
+/// What [`compile_cached`] would do; `target` as in [`Keep`]. Reads and hashes all sources, and does nothing else.
 ///
 /// # Errors
 /// When a source cannot be read.
-pub fn foresee(
+pub fn dry_run(
     manifest: &Manifest,
     place: Place<'_>,
     options: &Options,
     cache: &Cache<'_>,
     target: Option<&Path>,
     monitor: &dyn Monitor,
-) -> Result<Foreseen> {
+) -> Result<DryRun> {
     let mut context = Context::new(options, cache, monitor)?;
     context.previous = previous(target, &context);
     let plan = Plan::of(manifest, place.folder, &mut Clock::default())?;
-    let mut foreseen = Foreseen::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
-    if foreseen.record.is_none() {
+    let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
+    if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
-            if objects::known(file, &context).is_some() {
-                foreseen.kept += file.parts.len() as u64;
+            if objects::parts_without_reading(file, &context).is_some() {
+                found.reused += file.parts.len() as u64;
                 continue;
             }
             let missing = meshes::missing(file, &context);
-            foreseen.kept += (file.parts.len() - missing.len()) as u64;
-            foreseen.parts.extend(missing);
+            found.reused += (file.parts.len() - missing.len()) as u64;
+            found.parts.extend(missing);
         }
     }
-    Ok(foreseen)
+    Ok(found)
 }
 
-/// What an earlier compilation left, if it is of use: with the scene's rays an object depends on all others.
+/// The file of an earlier compilation at the target. Of no use with the scene's rays: then an object depends on all others.
 fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous>> {
     let target = target.filter(|_| !context.options.costs.for_scene)?;
-    Previous::open(target, context).map(Arc::new)
+    let tetgen = context.tetgen.as_ref()?;
+    Previous::open(target, context.options, tetgen, context.cache, context.monitor).map(Arc::new)
+}
+
+/// Keeps the index of a file under the name of its content.
+fn keep_index(named: &Digest, index: &FileIndex, context: &Context<'_>) {
+    if let Some(tetgen) = &context.tetgen {
+        let key = cached::file_index(named, context.options, tetgen);
+        context.cache.put_here(&key, &cached::encode(index), context.monitor);
+    }
 }
 
 /// The key of a scene, if it may be kept.
@@ -225,65 +187,14 @@ fn key(manifest: &Manifest, plan: &Plan<'_>, context: &Context<'_>) -> Result<Op
     Ok(Some(cached::scene(&parts, &sources::contents(manifest, &plan.sources), context.options, tetgen)))
 }
 
-impl<'a> Context<'a> {
-    fn new(options: &'a Options, cache: &'a Cache<'a>, monitor: &'a dyn Monitor) -> Result<Self> {
-        Ok(Self::of(options, cache, pipeline::tetgen(options, cache, monitor)?, monitor))
-    }
-
-    fn of(
-        options: &'a Options,
-        cache: &'a Cache<'a>,
-        tetgen: Option<String>,
-        monitor: &'a dyn Monitor,
-    ) -> Self {
-        let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
-        Self { options, cache, tetgen, keys, monitor, weights: None, previous: None }
-    }
-
-    /// With somebody else who watches.
-    pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
-        let Self { options, cache, ref tetgen, ref keys, ref weights, ref previous, .. } = *self;
-        Context {
-            options,
-            cache,
-            tetgen: tetgen.clone(),
-            keys: keys.clone(),
-            monitor,
-            weights: weights.clone(),
-            previous: previous.clone(),
-        }
-    }
-}
-
-/// What is to be done.
-struct Plan<'a> {
-    /// Nodes with parents before children.
-    order: Vec<usize>,
-    visible: Vec<bool>,
-    used: Vec<bool>,
-    sources: Vec<sources::File<'a>>,
-}
-
-impl<'a> Plan<'a> {
-    fn of(manifest: &'a Manifest, folder: &Path, clock: &mut Clock) -> Result<Self> {
-        let order = encode::order(manifest);
-        let visible = visible::visible(manifest, &order);
-        let mut used = vec![false; manifest.objects.len()];
-        for (node, _) in manifest.nodes.iter().zip(&visible).filter(|(_, visible)| **visible) {
-            node.object.into_iter().for_each(|object| used[object] = true);
-        }
-        let sources = clock.time("hash", || sources::files(manifest, folder, &used))?;
-        Ok(Self { order, visible, used, sources })
-    }
-}
-
+/// Compiles the objects and puts the file together.
 fn build(
     manifest: &Manifest,
     plan: &Plan<'_>,
     name: &Path,
     context: &Context<'_>,
     mut clock: Clock,
-) -> Result<(Content, SceneReport, Outline)> {
+) -> Result<(Content, SceneReport, FileIndex)> {
     let options = context.options;
     let weighed;
     let context = match options.costs.for_scene && options.structure == Structure::Bth {
@@ -302,7 +213,7 @@ fn build(
         _ => None,
     };
     let provenance = provenance::of_scene(&objects.sources, tetgen, options)?;
-    let (content, outline) = clock.time("file", || {
+    let (content, index) = clock.time("file", || {
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
@@ -310,13 +221,25 @@ fn build(
         builder.check_limits()?;
         let (content, table) = builder.content();
         check(&objects, &parts, &content, name)?;
-        Ok::<_, Error>((content, objects.outline_of(&table)))
+        Ok::<_, Error>((content, objects.file_index(&table)))
     })?;
 
+    let report = report(manifest, plan, (objects, clock), &parts, content.length());
+    Ok((content, report, index))
+}
+
+/// The report on a compiled scene.
+fn report(
+    manifest: &Manifest,
+    plan: &Plan<'_>,
+    (objects, clock): (Objects, Clock),
+    parts: &SceneParts,
+    bytes: u64,
+) -> SceneReport {
     let triangles = |object: u32| objects.reports[object as usize].triangles;
     let unused = manifest.objects.iter().zip(&plan.used).filter(|(_, used)| !**used);
-    let report = SceneReport {
-        seconds: clock.0,
+    SceneReport {
+        seconds: clock.into_times(),
         unused: unused.map(|(object, _)| object.name.clone()).collect(),
         nodes: parts.nodes.len() as u64,
         instances: parts.instances.len() as u64,
@@ -328,27 +251,26 @@ fn build(
         rate: manifest.frames.rate,
         triangles: objects.reports.iter().map(|o| o.triangles).sum(),
         instanced_triangles: parts.instances.iter().map(|i| triangles(i.object)).sum(),
-        bytes: content.length(),
+        bytes,
         resident_bytes: objects.reports.iter().map(|o| o.resident_bytes).sum(),
         worker: objects.worker.clone(),
         objects: objects.reports,
-    };
-    Ok((content, report, outline))
+    }
 }
 
-/// Checks what was put together as a reader will, without looking at the objects again: their sections have been checked
-/// one by one.
+/// Checks the first frame as a reader will. The sections of the objects have been checked one by one before, so the check
+/// reads a file with their OBJECT rows only.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
-    let mut outline = FileBuilder::new();
-    objects.outline(&mut outline)?;
-    write::scene(&mut outline, parts)?;
+    let mut rows_only = FileBuilder::new();
+    objects.write_rows(&mut rows_only)?;
+    write::scene(&mut rows_only, parts)?;
     let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
-    // Places in messages are those in the whole file.
+    // Offsets in messages are those in the whole file.
     let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
-    first_frame(&outline.finish()).map_err(|e| refused(name, &whole(e)))
+    first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
 }
 
-/// The rays of the scene that concern each object of the file, by way of a file with BVHs only.
+/// The rays of the scene that reach each object of the file, traced through a file with BVHs only.
 fn rays(
     manifest: &Manifest,
     plan: &Plan<'_>,
@@ -363,12 +285,12 @@ fn rays(
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
     let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;
-    let mut scene = bth::from_bytes(&pipeline::joined(&content)?).map_err(|e| refused(name, &e))?;
+    let mut scene = bth::from_bytes(&cached::joined(&content)?).map_err(|e| refused(name, &e))?;
     Ok(weights::weights(&mut scene, name)?.into_iter().map(Arc::new).collect())
 }
 
-/// The error for a file that the library does not take: the scene's fault when its first frame cannot be shown,
-/// else ours.
+/// The error for a file that fails the reader's check: an input error when the first frame cannot be shown, else a defect
+/// of the compiler.
 fn refused(name: &Path, error: &bth::Error) -> Error {
     match error.code() {
         bth::Code::Singular | bth::Code::NotFinite => Error::Input {

@@ -53,7 +53,7 @@ impl<'a> Names<'a> {
 }
 
 /// The sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
-/// instance uses; `visible` says which nodes may be seen: instances at others are left out.
+/// instance uses; `visible` tells for each node whether it may be seen; instances at other nodes are left out.
 ///
 /// # Errors
 /// `BTH-L050` beyond the limits of the format.
@@ -103,6 +103,14 @@ pub(super) fn encode(
         }
     }
     add_tracks(&mut parts, manifest, &row_of);
+    add_cameras(&mut parts, &mut names, manifest, &row_of);
+    add_lights(&mut parts, &mut names, manifest, &row_of);
+    parts.names = names.bytes;
+    Ok(parts)
+}
+
+/// Adds the cameras.
+fn add_cameras<'a>(parts: &mut SceneParts, names: &mut Names<'a>, manifest: &'a Manifest, row_of: &[u32]) {
     for camera in &manifest.cameras {
         let (name, name_length) = names.add(&camera.name);
         let (projection, size) = match camera.lens {
@@ -121,6 +129,10 @@ pub(super) fn encode(
             reserved: [0; 4],
         });
     }
+}
+
+/// Adds the lights.
+fn add_lights<'a>(parts: &mut SceneParts, names: &mut Names<'a>, manifest: &'a Manifest, row_of: &[u32]) {
     for light in &manifest.lights {
         let (name, name_length) = names.add(&light.name);
         let (kind, inner, outer) = match light.kind {
@@ -141,8 +153,6 @@ pub(super) fn encode(
             reserved: [0; 2],
         });
     }
-    parts.names = names.bytes;
-    Ok(parts)
 }
 
 fn check_limits(manifest: &Manifest) -> Result<()> {

@@ -1,46 +1,46 @@
 //! The meshes of a source file: known from the cache, or imported.
 
-use super::compile::Context;
-use super::objects::content;
+use super::context::Context;
 use super::sources::File;
-use crate::cached::{self, MeshFacts, Miss};
+use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
 use bth_cache::Key;
+use bth_files::Digest;
 use bth_import::{self as mesh, Mesh};
 
-/// A mesh, or what is known of one that the cache has.
-pub(super) struct Found {
-    pub(super) facts: MeshFacts,
+/// A mesh of a source; only its summary as long as the cache has the mesh.
+pub(super) struct SourceMesh {
+    pub(super) summary: MeshSummary,
     /// Number of the mesh; `None` for the whole file.
     pub(super) number: Option<u32>,
     mesh: Option<Mesh>,
 }
 
-/// The meshes that are used of a file, in order. All that the cache lacks are imported at once.
+/// The meshes of a file that are used, in order. Those that the cache lacks are imported together.
 ///
 /// # Errors
 /// Those of the import.
-pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<Found>> {
-    let known: Vec<Option<MeshFacts>> =
+pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceMesh>> {
+    let known: Vec<Option<MeshSummary>> =
         file.parts.iter().map(|(number, _)| known(&key(file, *number, context), context)).collect();
     let lacking: Vec<Option<u32>> =
         file.parts.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(p, _)| p.0).collect();
     let mut imported = import(file, &lacking, context)?.into_iter();
-    let found = file.parts.iter().zip(known).map(|((number, _), facts)| match facts {
-        Some(facts) => Some(Found { facts, number: *number, mesh: None }),
+    let found = file.parts.iter().zip(known).map(|((number, _), summary)| match summary {
+        Some(summary) => Some(SourceMesh { summary, number: *number, mesh: None }),
         None => {
-            let (mesh, facts) = imported.next()?;
-            Some(Found { facts, number: *number, mesh: Some(mesh) })
+            let (mesh, summary) = imported.next()?;
+            Some(SourceMesh { summary, number: *number, mesh: Some(mesh) })
         }
     });
     Ok(found.flatten().collect())
 }
 
-impl Found {
+impl SourceMesh {
     /// The mesh itself.
     ///
     /// # Errors
-    /// Those of the import, when the cache does not have it any more.
+    /// Those of the import, when the mesh has been evicted from the cache.
     pub(super) fn take(&mut self, file: &File<'_>, context: &Context<'_>) -> Result<Mesh> {
         if let Some(mesh) = self.mesh.take() {
             return Ok(mesh);
@@ -59,29 +59,29 @@ fn key(file: &File<'_>, number: Option<u32>, context: &Context<'_>) -> Key {
     cached::mesh(&file.digest, &file.full, &file.part(number), context.options.attributes)
 }
 
-/// What the cache knows of a mesh.
-fn known(key: &Key, context: &Context<'_>) -> Option<MeshFacts> {
+/// The summary of a mesh that the cache has.
+fn known(key: &Key, context: &Context<'_>) -> Option<MeshSummary> {
     let record = context.cache.find(key, context.monitor)?;
     serde_json::from_value(record.report).ok()
 }
 
-/// The objects of a file that neither the file that was there nor the cache has, and why.
+/// The objects of a file that neither the previous file nor the cache has, and why.
 pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |number: Option<u32>| {
         let part = file.name_of(number);
         let mesh = key(file, number, context);
-        let (Some(facts), Some(keys)) = (known(&mesh, context), &context.keys) else {
+        let (Some(summary), Some(keys)) = (known(&mesh, context), &context.keys) else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
         let old = context
             .previous
             .as_ref()
-            .and_then(|p| Some((p, p.outline.object_of(content(&facts).as_bytes())?)));
+            .and_then(|p| Some((p, p.index.object_of(content(&summary).as_bytes())?)));
         if old.is_some_and(|(previous, object)| previous.has(object)) {
             return None;
         }
-        let object = keys.of(&facts);
+        let object = keys.of(&summary);
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {
             return None;
@@ -92,8 +92,18 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     file.parts.iter().filter_map(|(number, _)| one(*number)).collect()
 }
 
+/// A hash that is equal for meshes of equal content, whatever file they are from.
+pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
+    let shading = mesh.shading.as_ref().map(Digest::hex);
+    blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
+}
+
 /// Imports meshes of a file and keeps them.
-fn import(file: &File<'_>, numbers: &[Option<u32>], context: &Context<'_>) -> Result<Vec<(Mesh, MeshFacts)>> {
+fn import(
+    file: &File<'_>,
+    numbers: &[Option<u32>],
+    context: &Context<'_>,
+) -> Result<Vec<(Mesh, MeshSummary)>> {
     if numbers.is_empty() {
         return Ok(Vec::new());
     }
@@ -106,13 +116,13 @@ fn import(file: &File<'_>, numbers: &[Option<u32>], context: &Context<'_>) -> Re
     };
     let meshes = file.digest.unchanged(&file.full, meshes)?;
     let keep = |(number, read): (&Option<u32>, (Mesh, mesh::Report))| {
-        let (mesh, facts) = MeshFacts::of(read);
+        let (mesh, summary) = MeshSummary::of(read);
         if cache.store().is_some() {
             let part = file.name_of(*number);
             cache.miss(&key(file, *number, context), &part);
-            cache.put(&key(file, *number, context), &part, &cached::encode(&mesh), &facts, *monitor);
+            cache.put(&key(file, *number, context), &part, &cached::encode(&mesh), &summary, *monitor);
         }
-        (mesh, facts)
+        (mesh, summary)
     };
     Ok(numbers.iter().zip(meshes).map(keep).collect())
 }

@@ -1,19 +1,23 @@
-//! Scenes: from glTF to a manifest (`import`), and from a manifest to a file (`compile`).
+//! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
+//!
+//! `compile` is on top; `objects` compiles all objects and `object` one; `meshes` and `sources` read what they are made
+//! from; `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
-mod at_once;
 mod compile;
+mod context;
 mod encode;
+mod file_index;
 mod meshes;
 mod object;
 mod objects;
-mod outline;
+mod parallel;
+mod plan;
 mod previous;
+mod report;
+mod sections;
 mod sources;
-mod stored;
 mod visible;
 mod weights;
 
-pub use bth_import::gltf::Chosen;
-pub use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
-pub use compile::{Keep, Place, SceneReport, compile, compile_cached, compile_objects, foresee};
-pub use objects::ObjectReport;
+pub use compile::{Keep, Place, compile, compile_cached, compile_objects, dry_run};
+pub use report::{ObjectReport, SceneReport};

@@ -1,13 +1,14 @@
 //! One object of a scene: from the cache, else built and kept, by one process if others want the same.
 
-use super::compile::Context;
-use super::meshes::Found;
-use super::objects::ObjectReport;
+use super::context::Context;
+use super::meshes::SourceMesh;
+use super::report::ObjectReport;
 use super::sources::File;
-use crate::cached::ObjectKeys;
+use crate::cached::{CachedStages, ObjectKeys};
 use crate::costs;
 use crate::error::{Error, Result};
-use crate::pipeline::{self, Clock, Options, parts};
+use crate::options::Options;
+use crate::pipeline::{self, Clock};
 use crate::tets;
 use crate::write::{self, FileBuilder, object};
 use bth_cache::Key;
@@ -19,14 +20,14 @@ const MEMORY_PER_TRIANGLE: u64 = 320;
 const MEMORY_AT_LEAST: u64 = 4 << 20;
 
 /// An object with its sections, every index of which has been checked.
-pub(super) struct Built {
+pub(super) struct BuiltObject {
     pub(super) file: bth_format::File,
-    pub(super) facts: Facts,
+    pub(super) record: ObjectRecord,
 }
 
-/// What the cache says of an object.
+/// The report that the cache keeps with an object.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Facts {
+pub(super) struct ObjectRecord {
     pub(super) object: ObjectReport,
     pub(super) worker: Option<tets::WorkerStatus>,
 }
@@ -36,82 +37,71 @@ pub(super) fn memory(triangles: u64) -> u64 {
     triangles.saturating_mul(MEMORY_PER_TRIANGLE).saturating_add(MEMORY_AT_LEAST)
 }
 
-/// An object, from the cache or built. `number` is that of the file, by which the scene's rays count.
+/// An object, from the cache or built. `number` is its number in the file, which selects the scene's rays.
 pub(super) fn build(
     file: &File<'_>,
-    mesh: &mut Found,
+    mesh: &mut SourceMesh,
     context: &Context<'_>,
     number: usize,
     clock: &mut Clock,
-) -> Result<Built> {
+) -> Result<BuiltObject> {
     let part = file.name_of(mesh.number);
     let rays = context.weights.as_ref().and_then(|weights| weights.get(number));
     let Some(rays) = rays else {
-        let key = context.keys.as_ref().map(|keys| keys.of(&mesh.facts));
-        return through(file, mesh, (key, &part), context.options, context, clock);
+        let key = context.keys.as_ref().map(|keys| keys.of(&mesh.summary));
+        return build_or_fetch(file, mesh, (key, &part), context.options, context, clock);
     };
     let costs = costs::Options { scene: Some(rays.clone()), ..context.options.costs.clone() };
     let options = Options { costs, ..context.options.clone() };
-    let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.facts));
-    through(file, mesh, (key, &part), &options, context, clock)
+    let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary));
+    build_or_fetch(file, mesh, (key, &part), &options, context, clock)
 }
 
-/// What a key stands for.
-fn through(
+/// The object of a key: from the cache, else built and kept.
+fn build_or_fetch(
     file: &File<'_>,
-    mesh: &mut Found,
+    mesh: &mut SourceMesh,
     (key, part): (Option<Key>, &str),
     options: &Options,
     context: &Context<'_>,
     clock: &mut Clock,
-) -> Result<Built> {
+) -> Result<BuiltObject> {
     let Context { cache, monitor, .. } = context;
-    let _working = match &key {
-        Some(key) => {
-            if let Some(found) = kept(key, part, context) {
-                return Ok(found);
-            }
-            let lock = cache.work(key, *monitor)?;
-            if lock.as_ref().is_some_and(|lock| lock.waited)
-                && let Some(found) = kept(key, part, context)
-            {
-                return Ok(found);
-            }
-            cache.miss(key, part);
-            lock
-        }
-        None => None,
-    };
+    let fetched = || key.as_ref().and_then(|key| fetch(key, part, context));
+    let (found, _working) = cache.find_or_lock((key.as_ref(), part), *monitor, fetched)?;
+    if let Some(found) = found {
+        return Ok(found);
+    }
     let triangles = clock.time("mesh", || mesh.take(file, context))?;
-    let geometry = (triangles, &mesh.facts.geometry);
-    let (built, reports) = pipeline::build(&file.full, part, geometry, options, cache, *monitor, clock)?;
+    let stages = &mut CachedStages::of_object(cache, part, mesh.summary.geometry);
+    let (built, reports) = pipeline::compile_mesh(&file.full, triangles, options, stages, clock, *monitor)?;
     let report = ObjectReport {
-        triangles: mesh.facts.report.triangles,
-        degenerate: mesh.facts.report.degenerate,
+        triangles: mesh.summary.report.triangles,
+        degenerate: mesh.summary.report.degenerate,
         tet_leaves: built.tet_leaves,
         tet_triangles: built.tet_triangles,
         ..ObjectReport::default()
     };
     let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
-    let facts = Facts { object: report, worker };
+    let record = ObjectRecord { object: report, worker };
     let bytes = clock.time("file", || {
         let mut builder = FileBuilder::new();
-        object(&mut builder, 0, &parts::parts(&built, options))?;
+        object(&mut builder, 0, &built.parts(options))?;
         Ok::<_, Error>(builder.finish())
     })?;
     drop(built);
     let file = clock.time("file", || write::checked(&bytes))?;
     if let Some(key) = key {
-        cache.put(&key, part, &bytes, &facts, *monitor);
+        cache.put(&key, part, &bytes, &record, *monitor);
     }
-    Ok(Built { file, facts })
+    Ok(BuiltObject { file, record })
 }
 
-/// An object that the cache has.
-fn kept(key: &Key, part: &str, context: &Context<'_>) -> Option<Built> {
+/// An object from the cache.
+fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<BuiltObject> {
     let record = context.cache.find(key, context.monitor)?;
     let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() == 1)?;
-    let facts = serde_json::from_value(record.report).ok()?;
+    let report = serde_json::from_value(record.report).ok()?;
     context.cache.hit(key, part);
-    Some(Built { file, facts })
+    Some(BuiltObject { file, record: report })
 }

@@ -1,22 +1,20 @@
-//! The objects of a scene: each source read once, equal geometry stored once, several at once.
+//! The objects of a scene: each source is read once, equal geometry is stored once, and several are compiled in parallel.
 
-use super::at_once::at_once;
-use super::compile::Context;
-use super::meshes::{self, Found};
-use super::object::{self, Built};
-use super::outline::{Hash, ObjectRow, Outline, PartRow, SectionRow};
+use super::context::Context;
+use super::file_index::{FileIndex, Hash, ObjectRow, PartRow, SectionRow};
+use super::meshes::{self, SourceMesh, content};
+use super::object::{self, BuiltObject};
+use super::parallel::run_parallel;
 use super::previous::Previous;
+use super::report::ObjectReport;
+use super::sections::ObjectSections;
 use super::sources::File;
-use super::stored::Stored;
-use crate::cached::MeshFacts;
 use crate::error::{Error, Place, Result};
 use crate::pipeline::Clock;
 use crate::tets;
 use crate::write::FileBuilder;
-use bth_cache::Digest;
 use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -25,57 +23,37 @@ use zerocopy::IntoBytes;
 /// Objects with more triangles keep all threads busy by themselves, and are compiled one after another.
 const LARGE: u64 = 1 << 17;
 
-/// What is stored of an object.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ObjectReport {
-    /// Its names in the manifest; several for equal geometry.
-    pub names: Vec<String>,
-    /// Triangles.
-    pub triangles: u64,
-    /// Triangles of zero area.
-    pub degenerate: u64,
-    /// Tet leaves.
-    pub tet_leaves: u64,
-    /// Triangles in tet leaves.
-    pub tet_triangles: u64,
-    /// Bytes of its sections that tracing reads.
-    #[serde(default)]
-    pub resident_bytes: u64,
-    /// Whether it was taken from a compiled file as it is.
-    pub copied: bool,
-}
-
 /// The objects of the file.
 #[derive(Default)]
 pub(super) struct Objects {
-    stored: Vec<Stored>,
+    stored: Vec<ObjectSections>,
     pub(super) reports: Vec<ObjectReport>,
     /// Per object of the manifest its number in the file; `None` for those that are not used.
     pub(super) number: Vec<Option<u32>>,
     /// Format and BLAKE3 of each source file, in order of first use.
     pub(super) sources: Vec<(String, String)>,
-    /// What became of the worker, where one was needed.
+    /// Status of the worker, where one was needed.
     pub(super) worker: Option<tets::WorkerStatus>,
-    /// What each part of a mesh file is, its format and the object that it became.
+    /// For each part of a mesh file the hash that identifies it, its format and its object.
     parts: Vec<(Hash, String, u32)>,
 }
 
-/// An object that comes from a mesh.
+/// An object that is built from a mesh.
 struct Task<'a> {
     file: &'a File<'a>,
-    mesh: Found,
+    mesh: SourceMesh,
     number: usize,
     content: blake3::Hash,
 }
 
 /// A part of a source.
 pub(super) enum Part {
-    /// The file that was there tells its format and its object there.
-    Known(String, u32),
-    Mesh(Box<Found>),
+    /// In the previous file: the format of the source, and the object in that file.
+    InPrevious(String, u32),
+    Mesh(Box<SourceMesh>),
 }
 
-/// Reads and builds the objects that are used, or takes them from the cache.
+/// Compiles the objects that are used, or takes them from the previous file or the cache.
 pub(super) fn build(
     manifest: &Manifest,
     sources: &[File<'_>],
@@ -84,8 +62,8 @@ pub(super) fn build(
 ) -> Result<Objects> {
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
     let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
-    // Copied objects have their place, the others get it when they are built.
-    let mut places: Vec<Option<(Stored, ObjectReport)>> = Vec::new();
+    // Copied objects are there at once, the others when they are built.
+    let mut places: Vec<Option<(ObjectSections, ObjectReport)>> = Vec::new();
     let mut tasks = Vec::new();
     let mut taken = 0;
     for (file, parts) in sources.iter().zip(read(sources, context, clock)?) {
@@ -95,8 +73,8 @@ pub(super) fn build(
             continue;
         }
         let format = match parts.first() {
-            Some(Part::Known(format, _)) => format.clone(),
-            Some(Part::Mesh(mesh)) => mesh.facts.report.format.clone(),
+            Some(Part::InPrevious(format, _)) => format.clone(),
+            Some(Part::Mesh(mesh)) => mesh.summary.report.format.clone(),
             None => String::new(),
         };
         objects.sources.push((format.clone(), file.digest.file.hex()));
@@ -109,18 +87,18 @@ pub(super) fn build(
                     match (old, what) {
                         (Some((file, object)), _) => {
                             taken += 1;
-                            objects.note_worker(file.outline.worker_of(object).clone());
+                            objects.note_worker(file.index.worker_of(object).clone());
                             places.push(Some((
-                                Stored::Old { file: file.clone(), object },
-                                file.outline.report_of(object),
+                                ObjectSections::InPrevious { file: file.clone(), object },
+                                file.index.report_of(object),
                             )));
                         }
                         (None, Part::Mesh(mesh)) => {
                             tasks.push(Task { file, mesh: *mesh, number, content });
                             places.push(None);
                         }
-                        (None, Part::Known(..)) => {
-                            unreachable!("what is known is in the file that was there")
+                        (None, Part::InPrevious(..)) => {
+                            unreachable!("a part without a mesh is in the previous file")
                         }
                     }
                     *free.insert(number as u32)
@@ -132,10 +110,12 @@ pub(super) fn build(
     }
     context.cache.hits("object", taken);
     for (number, content, built) in build_all(tasks, context, clock)? {
-        objects.note_worker(built.facts.worker.clone());
-        let made = Some((content, built.facts.worker));
-        places[number] =
-            Some((Stored::Read { file: Arc::new(built.file), object: 0, made }, built.facts.object));
+        objects.note_worker(built.record.worker.clone());
+        let made = Some((content, built.record.worker));
+        places[number] = Some((
+            ObjectSections::InFile { file: Arc::new(built.file), object: 0, made },
+            built.record.object,
+        ));
     }
     (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
@@ -151,13 +131,14 @@ pub(super) fn build(
 
 /// The parts of all files, in order; none of compiled ones.
 fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
-    let mut all: Vec<Option<Vec<Part>>> = sources.iter().map(|file| known(file, context)).collect();
+    let mut all: Vec<Option<Vec<Part>>> =
+        sources.iter().map(|file| parts_without_reading(file, context)).collect();
     let bytes = |file: &&File<'_>| std::fs::metadata(&file.full).map_or(0, |m| m.len());
     // The file and what is made of it.
     let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
     let unknown =
         sources.iter().zip(&all).filter(|(_, known)| known.is_none()).map(|(file, _)| file).collect();
-    let found = at_once(unknown, context, clock, estimate, |context, clock, file| {
+    let found = run_parallel(unknown, context, clock, estimate, |context, clock, file| {
         clock.time("mesh", || meshes::read(file, context))
     })?;
     let meshes =
@@ -169,48 +150,48 @@ fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Resul
     Ok(all.into_iter().flatten().collect())
 }
 
-/// The parts of a file, if it need not be read: it is a compiled one, or the file that was there has all of them.
-pub(super) fn known(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
+/// The parts of a file that need not be read, because it is a compiled one or the previous file has all of them.
+pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> Option<Vec<Part>> {
     if file.compiled {
         return Some(Vec::new());
     }
     let previous = context.previous.as_ref()?;
     let part = |number: Option<u32>| {
-        let row = previous.outline.part(&part_hash(file, number))?;
-        let format = previous.outline.formats[row.format as usize].clone();
-        previous.has(row.object).then_some(Part::Known(format, row.object))
+        let row = previous.index.part(&part_hash(file, number))?;
+        let format = previous.index.formats[row.format as usize].clone();
+        previous.has(row.object).then_some(Part::InPrevious(format, row.object))
     };
     file.parts.iter().map(|(number, _)| part(*number)).collect()
 }
 
-/// Where the file that was there has an object, and what makes it equal to others.
+/// Where the previous file has an object, and the hash by which equal objects are found.
 fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>, u32)>, blake3::Hash) {
     let previous = context.previous.as_ref();
     match part {
-        Part::Known(_, object) => {
-            let hash = previous.map_or([0; 32], |p| p.outline.objects[*object as usize].content);
+        Part::InPrevious(_, object) => {
+            let hash = previous.map_or([0; 32], |p| p.index.objects[*object as usize].content);
             (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
         }
         Part::Mesh(mesh) => {
-            let content = content(&mesh.facts);
-            let old = previous.and_then(|p| Some((p, p.outline.object_of(content.as_bytes())?)));
+            let content = content(&mesh.summary);
+            let old = previous.and_then(|p| Some((p, p.index.object_of(content.as_bytes())?)));
             (old.filter(|(p, object)| p.has(*object)), content)
         }
     }
 }
 
-/// What a part of a source is.
+/// The hash that identifies a part of a source.
 fn part_hash(file: &File<'_>, part: Option<u32>) -> Hash {
     *blake3::hash(file.content(part).as_bytes()).as_bytes()
 }
 
-/// Builds objects: large ones one by one, the others at once. With the number of each.
+/// Builds objects: large ones one after another, the others in parallel. Returns the number of each.
 fn build_all(
     tasks: Vec<Task<'_>>,
     context: &Context<'_>,
     clock: &mut Clock,
-) -> Result<Vec<(usize, blake3::Hash, Built)>> {
-    let triangles = |task: &Task<'_>| task.mesh.facts.report.triangles;
+) -> Result<Vec<(usize, blake3::Hash, BuiltObject)>> {
+    let triangles = |task: &Task<'_>| task.mesh.summary.report.triangles;
     let one = |context: &Context<'_>, clock: &mut Clock, mut task: Task<'_>| {
         let built = object::build(task.file, &mut task.mesh, context, task.number, clock)?;
         Ok((task.number, task.content, built))
@@ -223,7 +204,7 @@ fn build_all(
     }
     context.monitor.stage("objects", Some(small.iter().map(triangles).sum()));
     let estimate = |task: &Task<'_>| object::memory(triangles(task));
-    built.extend(at_once(small, context, clock, estimate, |parts, clock, task| {
+    built.extend(run_parallel(small, context, clock, estimate, |parts, clock, task| {
         let triangles = triangles(&task);
         let done = one(parts, clock, task);
         context.monitor.advance(triangles);
@@ -232,16 +213,10 @@ fn build_all(
     Ok(built)
 }
 
-/// A hash of what makes objects equal.
-pub(super) fn content(mesh: &MeshFacts) -> blake3::Hash {
-    let shading = mesh.shading.as_ref().map(Digest::hex);
-    blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
-}
-
 /// Takes objects from a compiled file.
 fn copy(
     objects: &mut Objects,
-    places: &mut Vec<Option<(Stored, ObjectReport)>>,
+    places: &mut Vec<Option<(ObjectSections, ObjectReport)>>,
     manifest: &Manifest,
     file: &File<'_>,
     of_content: &mut HashMap<blake3::Hash, u32>,
@@ -264,7 +239,7 @@ fn copy(
         hasher.update(b"compiled");
         for section in read.sections().filter(|s| s.entry.object == object) {
             hasher.update(&section.entry.kind.to_le_bytes()).update(&section.entry.stride.to_le_bytes());
-            // Not the hash that the file gives: whoever made the file made that too.
+            // Not the hash in the section table, which an untrusted file may give at will.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
         let number = *of_content.entry(hasher.finalize()).or_insert_with(|| {
@@ -276,7 +251,7 @@ fn copy(
                 copied: true,
                 ..ObjectReport::default()
             };
-            places.push(Some((Stored::Read { file: read.clone(), object, made: None }, report)));
+            places.push(Some((ObjectSections::InFile { file: read.clone(), object, made: None }, report)));
             places.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
@@ -285,7 +260,7 @@ fn copy(
 }
 
 impl Objects {
-    /// Keeps what says most of the worker.
+    /// Keeps the first status of a worker that was needed.
     fn note_worker(&mut self, needed: Option<tets::WorkerStatus>) {
         if self.worker.is_none() {
             self.worker = needed;
@@ -301,7 +276,7 @@ impl Objects {
     }
 
     /// Adds the OBJECT rows only: all that placing instances needs.
-    pub(super) fn outline(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
+    pub(super) fn write_rows(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
             if let Some(row) = stored.row() {
                 let stride = size_of::<layout::Object>() as u32;
@@ -311,24 +286,25 @@ impl Objects {
         Ok(())
     }
 
-    /// What the next compilation can take from the file with this section table. Without what was copied from files of the user.
-    pub(super) fn outline_of(&self, table: &[SectionEntry]) -> Outline {
-        let mut outline = Outline::default();
+    /// The index of the file with this section table, for the next compilation. Without objects that were copied from
+    /// compiled files.
+    pub(super) fn file_index(&self, table: &[SectionEntry]) -> FileIndex {
+        let mut index = FileIndex::default();
         let mut rows = vec![None; self.stored.len()];
         for (number, (stored, report)) in self.stored.iter().zip(&self.reports).enumerate() {
             let (Some((content, worker)), Some(object)) = (stored.made(), stored.row()) else { continue };
-            let first = outline.sections.len() as u32;
+            let first = index.sections.len() as u32;
             let start = table.partition_point(|e| e.object < number as u32);
             let sections = table[start..].iter().take_while(|e| e.object == number as u32);
-            outline.sections.extend(sections.map(|e| SectionRow {
+            index.sections.extend(sections.map(|e| SectionRow {
                 kind: e.kind,
                 stride: e.stride,
                 offset: e.offset,
                 length: e.length,
                 hash: e.hash,
             }));
-            rows[number] = Some(outline.objects.len() as u32);
-            outline.objects.push(ObjectRow {
+            rows[number] = Some(index.objects.len() as u32);
+            index.objects.push(ObjectRow {
                 content,
                 triangles: report.triangles,
                 degenerate: report.degenerate,
@@ -336,17 +312,17 @@ impl Objects {
                 tet_triangles: report.tet_triangles,
                 object,
                 first,
-                sections: outline.sections.len() as u32 - first,
-                worker: Outline::word(&mut outline.workers, worker),
+                sections: index.sections.len() as u32 - first,
+                worker: FileIndex::row_of(&mut index.workers, worker),
                 reserved: 0,
             });
         }
         for (part, format, number) in &self.parts {
             if let Some(object) = rows[*number as usize] {
-                let format = Outline::word(&mut outline.formats, format);
-                outline.parts.push(PartRow { part: *part, object, format });
+                let format = FileIndex::row_of(&mut index.formats, format);
+                index.parts.push(PartRow { part: *part, object, format });
             }
         }
-        outline
+        index
     }
 }

@@ -1,41 +1,47 @@
-//! The file that an earlier compilation of a scene left where this one will write: its objects need not be read from the
-//! cache nor written from memory.
+//! The file of an earlier compilation of a scene at the place where this one will write. Its objects need be neither read
+//! from the cache nor written from memory.
 
-use super::compile::Context;
-use super::outline::{Outline, SectionRow};
-use crate::cached;
+use super::file_index::{FileIndex, SectionRow};
+use crate::cached::{self, Cache};
+use crate::monitor::Monitor;
+use crate::options::Options;
 use crate::write::{Bytes, HEADER, are_zeros, name};
-use bth_cache::{Digest, Opened};
+use bth_files::OpenFile;
 use bth_format::file::hash128;
 use std::path::Path;
 use std::sync::Arc;
 
-/// An earlier file with its outline.
+/// An earlier file with its index.
 pub(super) struct Previous {
-    pub(super) outline: Outline,
-    file: Arc<Opened>,
-    /// Whether it is known that nobody has touched the file since it was written. Else each section is read and checked.
+    pub(super) index: FileIndex,
+    file: Arc<OpenFile>,
+    /// Whether the file is known to be unchanged since it was written. Else each section is read and checked.
     untouched: bool,
 }
 
 impl Previous {
-    /// The file at a path, if the cache knows how it came about and if it was made with the same options.
-    pub(super) fn open(path: &Path, context: &Context<'_>) -> Option<Self> {
-        let store = context.cache.store()?;
-        let file = Opened::open(path).ok()?;
+    /// The file at a path, if the cache has its index and it was made with the same options.
+    pub(super) fn open(
+        path: &Path,
+        options: &Options,
+        tetgen: &str,
+        cache: &Cache<'_>,
+        monitor: &dyn Monitor,
+    ) -> Option<Self> {
+        let store = cache.store()?;
+        let file = OpenFile::open(path).ok()?;
         let mut head = [0; HEADER];
         file.read_at(0, &mut head).ok()?;
         let named = name(&head);
-        let key = key(&named, context)?;
-        let record = context.cache.find(&key, context.monitor)?;
-        let outline = cached::decode(&context.cache.read(&record, context.monitor)?)?;
-        let untouched = store.stamped_opened(path, &file) == Some(named);
-        Some(Self { outline, file: Arc::new(file), untouched })
+        let record = cache.find(&cached::file_index(&named, options, tetgen), monitor)?;
+        let index = cached::decode(&cache.read(&record, monitor)?)?;
+        let untouched = store.content_of_open(path, &file) == Some(named);
+        Some(Self { index, file: Arc::new(file), untouched })
     }
 
-    /// Whether an object of the outline is whole in the file.
+    /// Whether an object of the index is whole in the file.
     pub(super) fn has(&self, object: u32) -> bool {
-        let sections = self.outline.sections_of(object);
+        let sections = self.index.sections_of(object);
         let (Some(first), Some(last)) = (sections.first(), sections.last()) else { return false };
         let (start, end) = (first.offset, last.offset.saturating_add(last.length));
         if end > self.file.length() {
@@ -62,17 +68,6 @@ impl Previous {
 
     /// Where the bytes of a section are.
     pub(super) fn bytes(&self, section: &SectionRow) -> Bytes<'static> {
-        Bytes::Old(self.file.clone(), section.offset..section.offset + section.length)
+        Bytes::OnDisk(self.file.clone(), section.offset..section.offset + section.length)
     }
-}
-
-/// Keeps the outline of a file under its name.
-pub(super) fn keep_outline(named: &Digest, outline: &Outline, context: &Context<'_>) {
-    if let Some(key) = key(named, context) {
-        context.cache.keep_here(&key, &cached::encode(outline), context.monitor);
-    }
-}
-
-fn key(named: &Digest, context: &Context<'_>) -> Option<bth_cache::Key> {
-    Some(cached::outline(named, context.options, context.tetgen.as_ref()?))
 }

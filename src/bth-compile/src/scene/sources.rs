@@ -1,14 +1,15 @@
 //! The files that a scene's objects come from.
 
-use crate::cached::{self, SourceDigest};
+use crate::cached;
 use crate::error::Result;
-use bth_cache::Digest;
+use crate::source::SourceDigest;
+use bth_files::Digest;
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// A source file and what of it is used.
+/// A source file and its parts that are used.
 pub(super) struct File<'a> {
     /// As the manifest has it.
     pub(super) path: &'a str,
@@ -21,24 +22,24 @@ pub(super) struct File<'a> {
 }
 
 impl File<'_> {
-    /// How a part of it stands in keys.
+    /// The name of a part in keys.
     pub(super) fn part(&self, part: Option<u32>) -> String {
         let kind = if self.compiled { "object" } else { "mesh" };
         part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
     }
 
-    /// What a part of it is, wherever the file lies.
+    /// Identifies a part by content, wherever the file lies.
     pub(super) fn content(&self, part: Option<u32>) -> String {
         format!("{} {} {}", self.digest.text(), self.part(part), cached::extension(&self.full))
     }
 
-    /// What stands for a part of it when misses of the cache are explained.
+    /// The name of a part in explanations of misses.
     pub(super) fn name_of(&self, part: Option<u32>) -> String {
         format!("{} {}", self.path, self.part(part))
     }
 }
 
-/// What each used object of the manifest is made from, as it stands in keys; `unused` for the others.
+/// For each object of the manifest the identity of its source in keys; `unused` for those that are not used.
 pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String> {
     let mut contents = vec!["unused".to_owned(); manifest.objects.len()];
     for file in sources {
@@ -78,7 +79,7 @@ pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) ->
         });
         parts[place].1.push(row);
     }
-    // Of several that cannot be read it is always the first that is named.
+    // Errors are taken in the order of the files, so that the message does not depend on timing.
     let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full)).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;

@@ -1,11 +1,13 @@
-//! Which objects and triangles the rays of a scene meet (`--for-scene`): rays from its cameras at some of its frames,
+//! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at some of its frames,
 //! bounces from what they hit, and rays from there to its lights.
 
-use crate::costs::{Random, SampleRay, Weighting};
+use crate::costs::{RayRng, SampleRay, Weighting};
 use crate::error::{Error, Place, Result};
+use crate::vectors::{double_area, unit};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_format::layout::{Camera, Light};
+use glam::DVec3;
 use std::path::Path;
 
 /// Frames at most, evenly over the range, and rays of a camera at each, in a grid of so many columns and rows.
@@ -16,10 +18,9 @@ const BOUNCES: usize = 2;
 /// By how much rays are lifted off the surface that they start on, relative to the size of the coordinates there.
 const LIFT: f64 = 1e-5;
 
-type Vector = [f64; 3];
 type Rows = [[f64; 4]; 3];
 
-/// The rays that concern each object of the scene, in its space.
+/// The rays that start on or hit each object of the scene, in the space of the object.
 ///
 /// # Errors
 /// `BTH-I062` when the scene has no camera.
@@ -29,7 +30,7 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
     let (first, last) = (view.scene[0].first_frame, view.scene[0].last_frame);
     let (cameras, lights) = (view.cameras.to_vec(), view.lights.to_vec());
     let count = (i64::from(last) - i64::from(first)).clamp(0, FRAMES - 1);
-    let mut random = Random(51);
+    let mut random = RayRng::new(51);
     for k in 0..=count {
         let frame = i64::from(first) + (i64::from(last) - i64::from(first)) * k / count.max(1);
         // A frame at which something cannot be placed shows nothing.
@@ -37,7 +38,7 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
             continue;
         }
         for camera in &cameras {
-            follow(scene, sights(scene, camera, &mut random), &lights, &mut random, &mut weights);
+            follow(scene, camera_rays(scene, camera, &mut random), &lights, &mut random, &mut weights);
         }
     }
     if cameras.is_empty() {
@@ -51,37 +52,32 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
     Ok(weights)
 }
 
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// The linear part of a row.
+fn linear([x, y, z, _]: [f64; 4]) -> DVec3 {
+    DVec3::new(x, y, z)
 }
 
-fn unit(a: Vector) -> Vector {
-    let length = dot(a, a).sqrt();
-    a.map(|x| x / length)
+/// A transformed point.
+fn point(rows: &Rows, p: DVec3) -> DVec3 {
+    rows.map(|row| linear(row).dot(p) + row[3]).into()
 }
 
-fn point(rows: &Rows, p: Vector) -> Vector {
-    rows.map(|r| r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3])
-}
-
-fn vector(rows: &Rows, v: Vector) -> Vector {
-    rows.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+/// A transformed vector.
+fn vector(rows: &Rows, v: DVec3) -> DVec3 {
+    rows.map(|row| linear(row).dot(v)).into()
 }
 
 /// The inverse of the linear part; `None` if there is none.
-fn inverse(rows: &Rows) -> Option<[Vector; 3]> {
-    let [a, b, c] = rows.map(|r| [r[0], r[1], r[2]]);
-    let cross = |u: Vector, v: Vector| {
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    };
-    let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
-    let determinant = dot(a, bc);
-    let inverse = [0, 1, 2].map(|k| [bc[k], ca[k], ab[k]].map(|x| x / determinant));
-    inverse.iter().flatten().all(|x| x.is_finite()).then_some(inverse)
+fn inverse(rows: &Rows) -> Option<[DVec3; 3]> {
+    let [a, b, c] = rows.map(linear);
+    let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
+    let determinant = a.dot(bc);
+    let inverse = [0, 1, 2].map(|k| DVec3::new(bc[k], ca[k], ab[k]) / determinant);
+    inverse.iter().all(|row| row.is_finite()).then_some(inverse)
 }
 
 /// Jittered rays of a camera, in the world.
-fn sights(scene: &Scene, camera: &Camera, random: &mut Random) -> Vec<Ray> {
+fn camera_rays(scene: &Scene, camera: &Camera, random: &mut RayRng) -> Vec<Ray> {
     let (rows, visible) = scene.node(camera.node);
     if !visible {
         return Vec::new();
@@ -98,8 +94,8 @@ fn sights(scene: &Scene, camera: &Camera, random: &mut Random) -> Vec<Ray> {
             let u = half * aspect * at(x, GRID[0], random.unit());
             let v = half * at(y, GRID[1], random.unit());
             let (origin, direction) = match camera.projection {
-                0 => ([0.0; 3], [u, v, -1.0]),
-                _ => ([u, v, 0.0], [0.0, 0.0, -1.0]),
+                0 => (DVec3::ZERO, DVec3::new(u, v, -1.0)),
+                _ => (DVec3::new(u, v, 0.0), DVec3::NEG_Z),
             };
             rays.extend(ray(point(&rows, origin), vector(&rows, direction), f64::INFINITY));
         }
@@ -107,51 +103,54 @@ fn sights(scene: &Scene, camera: &Camera, random: &mut Random) -> Vec<Ray> {
     rays
 }
 
-/// A ray of unit direction in single precision, if there is such a one.
-fn ray(origin: Vector, direction: Vector, tmax: f64) -> Option<Ray> {
+/// A ray of unit direction in single precision; `None` when it has a coordinate that is not finite.
+fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Option<Ray> {
     let direction = unit(direction);
-    let finite = direction.iter().chain(&origin).all(|x| x.is_finite());
-    let single = |v: Vector| v.map(|x| x as f32);
+    let finite = direction.is_finite() && origin.is_finite();
+    let single = |v: DVec3| v.to_array().map(|x| x as f32);
     finite.then(|| Ray { origin: single(origin), tmin: 0.0, direction: single(direction), tmax: tmax as f32 })
 }
 
-/// Traces rays and what follows from them, and notes what they meet.
-fn follow(scene: &Scene, sights: Vec<Ray>, lights: &[Light], random: &mut Random, weights: &mut [Weighting]) {
-    let mut rays: Vec<(Ray, Surface)> = sights.into_iter().map(|ray| (ray, Surface::NONE)).collect();
+/// Traces camera rays, their bounces and the shadow rays, and records each at the objects that it starts on and hits.
+fn follow(
+    scene: &Scene,
+    camera_rays: Vec<Ray>,
+    lights: &[Light],
+    random: &mut RayRng,
+    weights: &mut [Weighting],
+) {
+    let mut rays: Vec<(Ray, Surface)> = camera_rays.into_iter().map(|ray| (ray, Surface::NONE)).collect();
     for bounce in 0..=BOUNCES {
         let only: Vec<Ray> = rays.iter().map(|r| r.0).collect();
         let mut hits = vec![Hit::MISS; only.len()];
         scene.nearest_batch(&only, None, &mut hits);
         let mut next = Vec::new();
         for ((ray, from), hit) in rays.iter().zip(&hits) {
-            note(scene, ray, *from, hit, weights);
+            record(scene, ray, *from, hit, weights);
             let Some((start, normal)) = start(scene, ray, hit) else { continue };
             for light in lights {
                 let (rows, shines) = scene.node(light.node);
                 let towards = match light.kind {
-                    0 => vector(&rows, [0.0, 0.0, 1.0]),
-                    _ => [0, 1, 2].map(|k| rows[k][3] - start[k]),
+                    0 => vector(&rows, DVec3::Z),
+                    _ => DVec3::from(rows.map(|row| row[3])) - start,
                 };
-                let far = if light.kind == 0 { f64::INFINITY } else { dot(towards, towards).sqrt() };
-                if shines && dot(towards, normal) > 0.0 {
+                let far = if light.kind == 0 { f64::INFINITY } else { towards.length() };
+                if shines && towards.dot(normal) > 0.0 {
                     let shadow = self::ray(start, towards, far);
-                    shadow.iter().for_each(|ray| note(scene, ray, hit.surface, &Hit::MISS, weights));
+                    shadow.iter().for_each(|ray| record(scene, ray, hit.surface, &Hit::MISS, weights));
                 }
             }
             if bounce < BOUNCES {
-                let s = random.sphere();
-                next.extend(
-                    self::ray(start, [0, 1, 2].map(|k| normal[k] + s[k]), f64::INFINITY)
-                        .map(|ray| (ray, hit.surface)),
-                );
+                let bounced = self::ray(start, normal + DVec3::from(random.sphere()), f64::INFINITY);
+                next.extend(bounced.map(|ray| (ray, hit.surface)));
             }
         }
         rays = next;
     }
 }
 
-/// Where a ray goes on from a hit: off the surface, with the normal to that side; world space.
-fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(Vector, Vector)> {
+/// Start of the rays that follow a hit, lifted off the surface, and the normal on that side; world space.
+fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
     if !hit.is_hit() {
         return None;
     }
@@ -159,20 +158,17 @@ fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(Vector, Vector)> {
     let object = scene.object(scene.object_of(instance));
     let corners =
         object.triangles.get(triangle as usize)?.map(|v| object.positions[v as usize].map(f64::from));
-    let [a, b, c] = corners.map(|p| point(&scene.instance(instance).to_world, p));
-    let sub = |a: Vector, b: Vector| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let (u, v) = (sub(b, a), sub(c, a));
-    let n = unit([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]);
-    let (origin, direction) = (ray.origin.map(f64::from), ray.direction.map(f64::from));
-    let n = if dot(n, direction) > 0.0 { n.map(|x| -x) } else { n };
-    let at = [0, 1, 2].map(|k| origin[k] + f64::from(hit.t) * direction[k]);
-    let size = at.iter().fold(0.0f64, |m, x| m.max(x.abs())).max(f64::from(hit.t));
-    let start = [0, 1, 2].map(|k| at[k] + LIFT * size * n[k]);
-    n.iter().chain(&start).all(|x| x.is_finite()).then_some((start, n))
+    let n = unit(double_area(corners.map(|p| point(&scene.instance(instance).to_world, p.into()))));
+    let [origin, direction] = [ray.origin, ray.direction].map(|v| DVec3::from(v.map(f64::from)));
+    let n = if n.dot(direction) > 0.0 { -n } else { n };
+    let at = origin + f64::from(hit.t) * direction;
+    let size = at.to_array().iter().fold(0.0f64, |m, x| m.max(x.abs())).max(f64::from(hit.t));
+    let start = at + LIFT * size * n;
+    (n.is_finite() && start.is_finite()).then_some((start, n))
 }
 
-/// Notes a ray at the object that it starts on and at the one that it hits.
-fn note(scene: &Scene, ray: &Ray, from: Surface, hit: &Hit, weights: &mut [Weighting]) {
+/// Records a ray at the object that it starts on and at the one that it hits.
+fn record(scene: &Scene, ray: &Ray, from: Surface, hit: &Hit, weights: &mut [Weighting]) {
     if from != Surface::NONE
         && let Some(sample) = local(scene, ray, from.instance, Some(from.triangle))
     {
@@ -191,12 +187,13 @@ fn note(scene: &Scene, ray: &Ray, from: Surface, hit: &Hit, weights: &mut [Weigh
 fn local(scene: &Scene, ray: &Ray, instance: u32, from: Option<u32>) -> Option<SampleRay> {
     let rows = scene.instance(instance).to_world;
     let inverse = inverse(&rows)?;
-    let origin = ray.origin.map(f64::from);
-    let origin = [0, 1, 2].map(|k| origin[k] - rows[k][3]);
-    let origin = inverse.map(|row| dot(row, origin));
-    let direction = inverse.map(|row| dot(row, ray.direction.map(f64::from)));
-    let length = dot(direction, direction).sqrt();
-    let direction = direction.map(|x| x / length);
-    let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
-    finite.then(|| SampleRay { origin, direction, tmax: f64::from(ray.tmax) * length, from })
+    let [origin, direction] = [ray.origin, ray.direction].map(|v| DVec3::from(v.map(f64::from)));
+    let origin = origin - DVec3::from(rows.map(|row| row[3]));
+    let origin = DVec3::from(inverse.map(|row| row.dot(origin)));
+    let direction = DVec3::from(inverse.map(|row| row.dot(direction)));
+    let length = direction.length();
+    let direction = direction / length;
+    let tmax = f64::from(ray.tmax) * length;
+    let finite = origin.is_finite() && direction.is_finite();
+    finite.then(|| SampleRay { origin: origin.into(), direction: direction.into(), tmax, from })
 }

@@ -5,23 +5,21 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Instant;
 
 use crate::bvh::BinaryBvh;
-use crate::cached::Cache;
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use bth_import::Mesh;
 
-use super::kept::tetrahedralize;
-use super::node::Done;
-use super::pool::{Slot, find};
+use super::node::{BuildAll, NodeJob, NodeResult, NodeRunner, tetrahedralize};
+use super::pool::{WorkerSlot, find};
 use super::report::{NodeReport, Outcome, Report, WorkerStatus};
 use super::worker::Setup;
-use super::{Options, TetMesh};
+use super::{Leaf, Options, TetMesh};
 
 /// Tetrahedralizes the chosen nodes (ascending). The result holds, ascending by node, what was
 /// built: chosen nodes, or cells below them where they failed; the rest stays in the BVH. It is
 /// the same for any number of workers, as long as no deadline passes.
 ///
-/// Having no worker is no error: nothing is built then, and the report says how to get one.
+/// A missing worker is no error: nothing is built then, and the report has a hint how to get one.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; [`Error::Limit`] when the object exceeds a limit of the format;
@@ -32,22 +30,22 @@ pub fn build(
     chosen: &[u32],
     options: &Options,
     monitor: &dyn Monitor,
-) -> Result<(Vec<(u32, TetMesh)>, Report)> {
-    build_cached(mesh, bvh, chosen, options, &Cache::none(), monitor)
+) -> Result<(Vec<Leaf>, Report)> {
+    build_through(mesh, bvh, chosen, options, &BuildAll, monitor)
 }
 
-/// As [`build`], with nodes that the cache has taken from there.
+/// As [`build`], with every node run by `runner`.
 ///
 /// # Errors
 /// As [`build`].
-pub fn build_cached(
+pub(crate) fn build_through(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     chosen: &[u32],
     options: &Options,
-    cache: &Cache<'_>,
+    runner: &dyn NodeRunner,
     monitor: &dyn Monitor,
-) -> Result<(Vec<(u32, TetMesh)>, Report)> {
+) -> Result<(Vec<Leaf>, Report)> {
     let start = Instant::now();
     if !chosen.is_sorted_by(|a, b| a < b) || chosen.last().is_some_and(|&n| n as usize >= bvh.nodes.len()) {
         let message = format!("chosen nodes are not ascending below {}", bvh.nodes.len());
@@ -73,12 +71,12 @@ pub fn build_cached(
     };
     let setup = Setup { program, memory: options.memory };
     // The first worker tells whether workers work at all, before there are many.
-    let mut first = Slot::new(&setup);
+    let mut first = WorkerSlot::new(&setup);
     let version = match first.tetgen(monitor)? {
         Ok(tetgen) => tetgen.to_owned(),
-        Err(trouble) => {
-            monitor.warn(&trouble.to_string());
-            report.worker = WorkerStatus::Unusable { reason: trouble.to_string() };
+        Err(error) => {
+            monitor.warn(&error.to_string());
+            report.worker = WorkerStatus::Unusable { reason: error.to_string() };
             return Ok((Vec::new(), none_built(report)));
         }
     };
@@ -87,9 +85,10 @@ pub fn build_cached(
     let workers = if options.workers > 0 { options.workers } else { rayon::current_num_threads() };
     let queue = Queue::new(chosen.iter().map(|&node| (size(node), node)));
     let results = Mutex::new(Results::default());
-    let work = |mut slot: Slot<'_>| {
+    let work = |mut slot: WorkerSlot<'_>| {
         while let Some(node) = queue.next() {
-            let done = tetrahedralize(&mut slot, mesh, bvh, node, options, (cache, &version), monitor);
+            let job = NodeJob { mesh, bvh, node, options, tetgen: &version };
+            let done = runner.run(&job, &mut || tetrahedralize(&mut slot, &job, monitor));
             let cells = match done {
                 Ok(done) => lock(&results).take(done, bvh, options, monitor),
                 Err(error) => {
@@ -104,7 +103,7 @@ pub fn build_cached(
     };
     std::thread::scope(|scope| {
         for _ in 1..workers {
-            scope.spawn(|| work(Slot::new(&setup)));
+            scope.spawn(|| work(WorkerSlot::new(&setup)));
         }
         work(first);
     });
@@ -121,7 +120,7 @@ fn none_built(mut report: Report) -> Report {
     report
 }
 
-fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<(u32, TetMesh)>, Report)> {
+fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<Leaf>, Report)> {
     if let Some(error) = results.error {
         return Err(error);
     }
@@ -152,7 +151,7 @@ fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<(
     Ok((results.built.into_iter().collect(), report))
 }
 
-/// What the threads bring together.
+/// Results of all threads.
 #[derive(Default)]
 struct Results {
     built: BTreeMap<u32, TetMesh>,
@@ -164,10 +163,10 @@ struct Results {
 }
 
 impl Results {
-    /// Files the result of a node; the cells that replace it if it failed.
+    /// Adds the result of a node; returns the cells that replace it if it failed.
     fn take(
         &mut self,
-        Done { built, mut report, hopeless, .. }: Done,
+        NodeResult { built, mut report, no_worker, .. }: NodeResult,
         bvh: &BinaryBvh,
         options: &Options,
         monitor: &dyn Monitor,
@@ -181,7 +180,7 @@ impl Results {
         if let Some(mesh) = built {
             self.built.insert(report.node, mesh);
         } else {
-            if !hopeless {
+            if !no_worker {
                 (cells, settled) = replace(bvh, report.node, options);
             }
             if !cells.is_empty() {

@@ -5,12 +5,12 @@
 //! make up the box's surface, then the tetrahedra fill the box once: no point of it is missed
 //! or covered twice. The sum of the volumes is looked at as well, since it costs nothing.
 
-use bth_tetgen_protocol::Tetrahedra;
-use robust::{Coord3D, orient3d};
-
 use super::faces::{Faces, NONE, even, face};
-use super::gather::{Input, SIDES};
+use super::failure::Defect;
+use super::gather::{NodeInput, SIDES};
 use super::nudge;
+use super::orientation::orientation;
+use bth_tetgen_protocol::Tetrahedra;
 
 /// A tetrahedralization that holds, in the worker's order.
 #[derive(Clone, Debug)]
@@ -27,59 +27,13 @@ pub(super) struct Checked {
     pub(super) nudged: u32,
 }
 
-/// What does not hold.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Defect {
-    /// Points that were sent came back changed or not at all.
-    Moved,
-    /// There are more tetrahedra than rows can number.
-    TooMany,
-    /// Tetrahedra are flat or inside out, this many.
-    Orientation(usize),
-    /// A face has more than two tetrahedra, or two on the same side.
-    Manifold,
-    /// The hull is not the box's surface.
-    Hull,
-    /// The volumes do not add up to the box's.
-    Volume,
-    /// Triangles are no faces (this many), or lie on the hull.
-    Missing(usize),
-    /// Two triangles are the same face.
-    Duplicate,
-}
-
-impl Defect {
-    pub(super) fn name(&self) -> &'static str {
-        match self {
-            Defect::Moved => "points_moved",
-            Defect::TooMany => "too_many_tets",
-            Defect::Orientation(_) => "bad_orientation",
-            Defect::Manifold => "faces_do_not_match",
-            Defect::Hull => "hull_is_not_the_box",
-            Defect::Volume => "volumes_do_not_add_up",
-            Defect::Missing(_) => "triangles_missing",
-            Defect::Duplicate => "duplicate_triangles",
-        }
-    }
-}
-
-impl std::fmt::Display for Defect {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Defect::Orientation(n) => write!(f, "{n} tetrahedra are flat or inside out"),
-            Defect::Missing(n) => write!(f, "{n} triangles are no faces"),
-            other => f.write_str(other.name()),
-        }
-    }
-}
-
 /// Rounds, repairs what rounding broke, and checks. `sent` are the points that the worker got,
 /// plus `origin`; what it returned for them must be the same bits.
 ///
 /// # Errors
 /// The first defect found.
 pub(super) fn check(
-    input: &Input,
+    input: &NodeInput,
     sent: &[[f32; 3]],
     origin: [f64; 3],
     answer: Tetrahedra,
@@ -123,7 +77,12 @@ pub(super) fn check(
 }
 
 /// Checks that positively oriented tetrahedra fill the box once.
-fn fills_box(input: &Input, vertices: &[[f32; 3]], tets: &[[u32; 4]], behind: &[u32]) -> Result<(), Defect> {
+fn fills_box(
+    input: &NodeInput,
+    vertices: &[[f32; 3]],
+    tets: &[[u32; 4]],
+    behind: &[u32],
+) -> Result<(), Defect> {
     // Rows of the box's corners on each side of the box.
     let first = input.vertices.len() as u32;
     let mut halves: [Vec<[u32; 3]>; 6] = Default::default();
@@ -159,29 +118,13 @@ fn fills_box(input: &Input, vertices: &[[f32; 3]], tets: &[[u32; 4]], behind: &[
     Ok(())
 }
 
-/// Six times the signed volume; its sign is exact (Shewchuk 1997).
-pub(super) fn orientation(vertices: &[[f32; 3]], tet: [u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|v| coordinates(vertices[v as usize]));
-    orient3d(a, b, c, d)
-}
-
-/// Whether the point lies on the side that (v1-v0)x(v2-v0) points to; exact, false on the plane.
-pub(super) fn in_front(triangle: [[f32; 3]; 3], point: [f32; 3]) -> bool {
-    let [a, b, c] = triangle.map(coordinates);
-    // Shewchuk's sign is positive for points below a plane seen counterclockwise from above.
-    orient3d(a, b, c, coordinates(point)) < 0.0
-}
-
-fn coordinates([x, y, z]: [f32; 3]) -> Coord3D<f64> {
-    Coord3D { x: f64::from(x), y: f64::from(y), z: f64::from(z) }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::orientation::in_front;
     use super::*;
 
     /// The unit cube in six tetrahedra around a diagonal (Kuhn), with one triangle inside.
-    fn kuhn() -> (Input, Vec<[f32; 3]>, Tetrahedra) {
+    fn kuhn() -> (NodeInput, Vec<[f32; 3]>, Tetrahedra) {
         let corner: [[f32; 3]; 8] = std::array::from_fn(|i| std::array::from_fn(|k| (i >> k & 1) as f32));
         let mut tets = Vec::new();
         for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
@@ -189,7 +132,7 @@ mod tests {
             let positive = orientation(&corner, tet) > 0.0;
             tets.push(if positive { tet } else { [a, 0, b, 7] });
         }
-        let input = Input {
+        let input = NodeInput {
             lower: [0.0; 3],
             upper: [1.0; 3],
             vertices: vec![],

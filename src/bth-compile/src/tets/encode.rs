@@ -23,7 +23,7 @@ pub struct Encoded {
     /// `HULL_FACES`.
     pub hulls: Vec<HullFace>,
     /// `TRIANGLE_FACES`: per triangle of the source its row of `TET_FACES`, or `NONE`.
-    pub homes: Vec<u32>,
+    pub face_of_triangle: Vec<u32>,
 }
 
 /// Encodes meshes as [`super::build`] returned them, which holds their sum within the format's limits.
@@ -33,7 +33,7 @@ pub struct Encoded {
 /// # Panics
 /// When `subtrees` is shorter than `meshes`, or a face names a triangle beyond `triangles`.
 pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles: usize) -> Encoded {
-    let mut to = Encoded { homes: vec![NONE; triangles], ..Encoded::default() };
+    let mut to = Encoded { face_of_triangle: vec![NONE; triangles], ..Encoded::default() };
     let count: usize = meshes.iter().map(|m| m.tets.len()).sum();
     to.tets.reserve_exact(count * kind.stride());
     for (mesh, &subtree) in meshes.iter().zip(&subtrees[..meshes.len()]) {
@@ -41,7 +41,7 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
         let first_hull = to.hulls.len() as u32;
         to.vertices.extend(mesh.vertices.iter().map(|&position| TetVertex { position, reserved: 0 }));
         for (row, face) in mesh.faces.iter().enumerate() {
-            to.homes[face.triangle as usize] = base.face + row as u32;
+            to.face_of_triangle[face.triangle as usize] = base.face + row as u32;
             to.faces.push(TetFace {
                 vertex: face.vertex.map(|v| base.vertex + v),
                 triangle: face.triangle,
@@ -76,8 +76,8 @@ pub fn encode(meshes: &[TetMesh], subtrees: &[u32], kind: RecordKind, triangles:
     to
 }
 
-/// Bytes of the sections that a mesh adds to, but for the homes of the triangles, which are one for each triangle
-/// of the source.
+/// Bytes that a tetrahedralization adds to the sections, without the map from triangles to faces, which has a row for each
+/// triangle of the source.
 pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
     let hulls = mesh.behind.iter().flatten().filter(|behind| **behind == Behind::Hull).count();
     let bytes = mesh.tets.len() * kind.stride()
@@ -121,7 +121,11 @@ fn apex(tet: [u32; 4], face: [u32; 3]) -> u32 {
 fn inwards(mesh: &TetMesh, tet: [u32; 4], k: usize) -> [u32; 3] {
     let [a, b, c] = [tet[(k + 1) % 4], tet[(k + 2) % 4], tet[(k + 3) % 4]];
     let position = |v: u32| mesh.vertices[v as usize];
-    if super::check::in_front([a, b, c].map(position), position(tet[k])) { [a, b, c] } else { [a, c, b] }
+    if super::orientation::in_front([a, b, c].map(position), position(tet[k])) {
+        [a, b, c]
+    } else {
+        [a, c, b]
+    }
 }
 
 fn push_record(to: &mut Vec<u8>, kind: RecordKind, vertex: [u32; 4], link: [Link; 4]) {

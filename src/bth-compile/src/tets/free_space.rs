@@ -6,7 +6,8 @@
 
 use std::collections::HashSet;
 
-use super::gather::Input;
+use super::gather::NodeInput;
+use bth_random::Rng;
 
 /// Deepest level of the octree: cells of 1/2048 of the box.
 const DEPTH: u32 = 11;
@@ -18,7 +19,7 @@ const MARGIN: f64 = 0.02;
 
 /// The points, inside the box and different from every vertex and from each other. The same for
 /// the same input and seed. `most` vertices may share a cell; 0 gives no points.
-pub(super) fn points(input: &Input, most: u32, seed: u64) -> Vec<[f32; 3]> {
+pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
     if most == 0 {
         return Vec::new();
     }
@@ -34,9 +35,10 @@ pub(super) fn points(input: &Input, most: u32, seed: u64) -> Vec<[f32; 3]> {
         let count = cell.end - cell.first;
         if cell.depth >= 1 && (count <= most as usize || cell.depth >= DEPTH) {
             if count == 0 {
-                let mut random = splitmix(seed ^ cell.path.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+                let cell_seed = seed ^ cell.path.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let mut random = Rng::new(cell_seed).next();
                 let point = std::array::from_fn(|k| {
-                    random = splitmix(random);
+                    random = Rng::new(random).next();
                     let unit = (random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
                     (cell.centre[k] + 2.0 * JITTER * cell.half * unit) as f32
                 });
@@ -91,20 +93,12 @@ fn bits(p: &[f32; 3]) -> [u32; 3] {
     p.map(|x| (x + 0.0).to_bits())
 }
 
-/// A step of the SplitMix64 generator (Steele, Lea, Flood 2014).
-fn splitmix(state: u64) -> u64 {
-    let mut z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn input(vertices: Vec<[f32; 3]>) -> Input {
-        Input { lower: [-1.0; 3], upper: [1.0; 3], vertices, triangles: Vec::new(), ids: Vec::new() }
+    fn input(vertices: Vec<[f32; 3]>) -> NodeInput {
+        NodeInput { lower: [-1.0; 3], upper: [1.0; 3], vertices, triangles: Vec::new(), ids: Vec::new() }
     }
 
     #[test]
@@ -132,8 +126,13 @@ mod tests {
         let far = 1e6f32;
         let vertices: Vec<_> =
             (0..200).map(|i| [far + (i % 7) as f32 * 0.25, far + (i % 5) as f32, far]).collect();
-        let input =
-            Input { lower: [far - 1.0; 3], upper: [far + 5.0; 3], vertices, triangles: vec![], ids: vec![] };
+        let input = NodeInput {
+            lower: [far - 1.0; 3],
+            upper: [far + 5.0; 3],
+            vertices,
+            triangles: vec![],
+            ids: vec![],
+        };
         let points = points(&input, 4, 1);
         let distinct: HashSet<_> = points.iter().chain(&input.vertices).map(bits).collect();
         assert_eq!(distinct.len(), points.len() + 35);

@@ -3,21 +3,21 @@
 use crate::bvh::BinaryBvh;
 use bth_import::Mesh;
 
-use super::report::Trouble;
+use super::failure::AttemptError;
 
-/// What is tetrahedralized.
+/// The triangles that are tetrahedralized, and the box.
 #[derive(Clone, Debug)]
-pub(super) struct Input {
+pub(crate) struct NodeInput {
     /// Box that the tetrahedra will fill: larger than the triangles' bounds on every side.
     pub(super) lower: [f32; 3],
     /// Upper end of the box.
     pub(super) upper: [f32; 3],
     /// Corners of the triangles, in order of their rows in the mesh.
-    pub(super) vertices: Vec<[f32; 3]>,
+    pub(crate) vertices: Vec<[f32; 3]>,
     /// Rows of `vertices`, in source order.
-    pub(super) triangles: Vec<[u32; 3]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
     /// Ids of the triangles in the source, ascending.
-    pub(super) ids: Vec<u32>,
+    pub(crate) ids: Vec<u32>,
 }
 
 /// Gathers a node's triangles, and puts a box around them that exceeds their bounds by `inflation`
@@ -25,7 +25,12 @@ pub(super) struct Input {
 ///
 /// # Errors
 /// When the box leaves the range of `f32`.
-pub(super) fn gather(mesh: &Mesh, bvh: &BinaryBvh, node: u32, inflation: f32) -> Result<Input, Trouble> {
+pub(super) fn gather(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    node: u32,
+    inflation: f32,
+) -> Result<NodeInput, AttemptError> {
     let node = &bvh.nodes[node as usize];
     let mut ids = bvh.order[node.first as usize..][..node.count as usize].to_vec();
     ids.sort_unstable();
@@ -43,9 +48,9 @@ pub(super) fn gather(mesh: &Mesh, bvh: &BinaryBvh, node: u32, inflation: f32) ->
     let lower = lower.map(|x| ((f64::from(x) - margin) as f32).min(x.next_down()));
     let upper = upper.map(|x| ((f64::from(x) + margin) as f32).max(x.next_up()));
     if lower.iter().chain(&upper).any(|x| !x.is_finite()) {
-        return Err(Trouble::Unfit("the box exceeds the range of single precision"));
+        return Err(AttemptError::Unfit("the box exceeds the range of single precision"));
     }
-    Ok(Input { lower, upper, vertices, triangles, ids })
+    Ok(NodeInput { lower, upper, vertices, triangles, ids })
 }
 
 /// Bounds of points; empty (lower above upper) for none.
@@ -61,7 +66,7 @@ fn bounds(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
     (lower, upper)
 }
 
-impl Input {
+impl NodeInput {
     /// Corners of the box: bit k of the row chooses the upper end on axis k.
     pub(super) fn corners(&self) -> [[f32; 3]; 8] {
         std::array::from_fn(|i| {
@@ -70,7 +75,7 @@ impl Input {
     }
 }
 
-/// Sides of the box as quads of [`Input::corners`]: lower and upper x, y, z.
+/// Sides of the box as quads of [`NodeInput::corners`]: lower and upper x, y, z.
 pub(super) const SIDES: [[u32; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 

@@ -1,4 +1,4 @@
-//! Constrained tetrahedralizations of chosen nodes, by way of the TetGen worker, checked exactly.
+//! Constrained tetrahedralizations of chosen nodes by the TetGen worker, checked exactly.
 //!
 //! gather (triangles, box) → free_space (extra points) → worker (TetGen, a process of its own) →
 //! check (with nudge) → order (Hilbert) → encode (the file's sections). `build` schedules the
@@ -8,22 +8,29 @@ mod build;
 mod check;
 mod encode;
 mod faces;
+mod failure;
 mod free_space;
 mod gather;
-mod kept;
 mod node;
 mod nudge;
 mod options;
 mod order;
+mod orientation;
 mod pool;
 mod report;
 mod worker;
 
-pub use build::{build, build_cached};
+pub use build::build;
+pub(crate) use build::build_through;
 pub use encode::{Encoded, encode, encoded_bytes};
+pub(crate) use gather::NodeInput;
+pub(crate) use node::{NodeJob, NodeResult, NodeRunner};
 pub use options::Options;
 pub(crate) use pool::version;
 pub use report::{NodeReport, Outcome, Report, WorkerStatus};
+
+/// A tet leaf: the node of the binary BVH, and its tetrahedralization.
+pub type Leaf = (u32, TetMesh);
 
 /// A checked tetrahedralization of one node's triangles inside a box slightly larger than the node's.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,7 +52,7 @@ pub struct TetMesh {
     pub steiner_points: u32,
 }
 
-/// What lies behind a face of a tetrahedron.
+/// The neighbour of a tetrahedron across a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Behind {
     /// This tetrahedron.

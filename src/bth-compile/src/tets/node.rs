@@ -1,4 +1,4 @@
-//! One node: attempts with different points until one passes the checks.
+//! The tetrahedralization of one node: attempts with different points until one passes the checks.
 
 use std::time::{Duration, Instant};
 
@@ -9,20 +9,58 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use bth_import::Mesh;
 
-use super::gather::{Input, SIDES, gather};
-use super::pool::Slot;
-use super::report::{NodeReport, Outcome, Trouble};
+use super::failure::AttemptError;
+use super::gather::{NodeInput, SIDES, gather};
+use super::pool::WorkerSlot;
+use super::report::{NodeReport, Outcome};
 use super::{Options, TetMesh, check, free_space, order};
 
-/// What became of a node.
-pub(super) struct Done {
+/// A node that is to be tetrahedralized.
+#[derive(Clone, Copy)]
+pub(crate) struct NodeJob<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) bvh: &'a BinaryBvh,
+    /// Row of the BVH.
+    pub(crate) node: u32,
+    pub(crate) options: &'a Options,
+    /// Version of TetGen.
+    pub(crate) tetgen: &'a str,
+}
+
+impl NodeJob<'_> {
+    /// The triangles of the node in the smallest box; `None` when even that leaves the range of `f32`.
+    pub(crate) fn input(&self) -> Option<NodeInput> {
+        gather(self.mesh, self.bvh, self.node, 0.0).ok()
+    }
+}
+
+/// Wraps the work on single nodes from outside: returns an earlier result, or calls `build` and keeps what it returns.
+pub(crate) trait NodeRunner: Sync {
+    /// The result for a node.
+    ///
+    /// # Errors
+    /// Those of `build`.
+    fn run(&self, job: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult>;
+}
+
+/// Builds every node.
+pub(super) struct BuildAll;
+
+impl NodeRunner for BuildAll {
+    fn run(&self, _: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult> {
+        build()
+    }
+}
+
+/// Result of a node.
+pub(crate) struct NodeResult {
     /// Absent when every attempt failed.
-    pub(super) built: Option<TetMesh>,
-    pub(super) report: NodeReport,
-    /// Whether there is no worker that works: smaller nodes would fail as well.
-    pub(super) hopeless: bool,
-    /// Whether the same would come out again, on any machine at any time.
-    pub(super) certain: bool,
+    pub(crate) built: Option<TetMesh>,
+    pub(crate) report: NodeReport,
+    /// Whether no worker could be started: smaller nodes would fail as well.
+    pub(crate) no_worker: bool,
+    /// Whether the result would be the same on any machine at any time: no deadline passed and no worker died.
+    pub(crate) reproducible: bool,
 }
 
 /// The points of one attempt.
@@ -61,13 +99,11 @@ fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
 /// # Errors
 /// Cancelled.
 pub(super) fn tetrahedralize(
-    slot: &mut Slot<'_>,
-    mesh: &Mesh,
-    bvh: &BinaryBvh,
-    node: u32,
-    options: &Options,
+    slot: &mut WorkerSlot<'_>,
+    job: &NodeJob<'_>,
     monitor: &dyn Monitor,
-) -> Result<Done> {
+) -> Result<NodeResult> {
+    let NodeJob { mesh, bvh, node, options, .. } = *job;
     let start = Instant::now();
     let triangles = bvh.nodes[node as usize].count;
     let mut report = NodeReport {
@@ -82,14 +118,14 @@ pub(super) fn tetrahedralize(
         nudged: 0,
         seconds: 0.0,
     };
-    let mut troubles = Vec::new();
+    let mut errors = Vec::new();
     let mut built = None;
     let deadline = options.deadline + options.deadline_per_triangle.saturating_mul(triangles);
     let far = far(&bvh.nodes[node as usize]);
     for attempt in attempts(options, far, triangles) {
         let done = match gather(mesh, bvh, node, attempt.inflation) {
-            Ok(input) => run(slot, &input, &attempt, deadline, options, node, monitor)?,
-            Err(trouble) => Err(trouble),
+            Ok(input) => run(slot, job, &input, &attempt, deadline, monitor)?,
+            Err(error) => Err(error),
         };
         match done {
             Ok((tets, free_points, nudged)) => {
@@ -102,21 +138,21 @@ pub(super) fn tetrahedralize(
                 built = Some(tets);
                 break;
             }
-            Err(trouble) => {
-                let retry = trouble.retry(triangles);
-                let again = troubles.last() == Some(&Trouble::TimedOut) && trouble == Trouble::TimedOut;
-                troubles.push(trouble);
+            Err(error) => {
+                let retry = error.retry(triangles);
+                let again = errors.last() == Some(&AttemptError::TimedOut) && error == AttemptError::TimedOut;
+                errors.push(error);
                 if !retry || again {
                     break;
                 }
             }
         }
     }
-    report.failures = troubles.iter().map(Trouble::to_string).collect();
+    report.failures = errors.iter().map(AttemptError::to_string).collect();
     report.seconds = start.elapsed().as_secs_f64();
-    let hopeless = troubles.iter().any(|t| matches!(t, Trouble::Start(_)));
-    let certain = troubles.iter().all(Trouble::is_certain);
-    Ok(Done { built, report, hopeless, certain })
+    let no_worker = errors.iter().any(|t| matches!(t, AttemptError::Start(_)));
+    let reproducible = errors.iter().all(AttemptError::is_reproducible);
+    Ok(NodeResult { built, report, no_worker, reproducible })
 }
 
 /// Whether the node lies many times its size away from the origin, where coordinates have few
@@ -127,29 +163,29 @@ fn far(node: &Node) -> bool {
     away > 16.0 * size
 }
 
-/// A tetrahedralization, its free-space points and its nudged points.
-type Built = (TetMesh, u32, u32);
+/// A tetrahedralization, its number of free-space points and of nudged points.
+type AttemptResult = (TetMesh, u32, u32);
 
+/// Makes one attempt. The inner error is that of the attempt.
 fn run(
-    slot: &mut Slot<'_>,
-    input: &Input,
+    slot: &mut WorkerSlot<'_>,
+    job: &NodeJob<'_>,
+    input: &NodeInput,
     attempt: &Attempt,
     deadline: Duration,
-    options: &Options,
-    node: u32,
     monitor: &dyn Monitor,
-) -> Result<std::result::Result<Built, Trouble>> {
+) -> Result<std::result::Result<AttemptResult, AttemptError>> {
     let switches = match slot.tetgen(monitor)? {
         Ok(version) => switches(version),
-        Err(trouble) => return Ok(Err(trouble)),
+        Err(error) => return Ok(Err(error)),
     };
     let free = free_space::points(input, attempt.free_space, attempt.seed);
     let free_points = free.len() as u32;
     let sent: Vec<[f32; 3]> = input.vertices.iter().copied().chain(input.corners()).chain(free).collect();
     let (origin, points) = relative(&sent, if attempt.local { input.lower } else { [0.0; 3] });
     let first = input.vertices.len() as u32;
-    let request = match options.planted {
-        Some((at, fault)) if at == node => Request::Fault(fault),
+    let request = match job.options.planted {
+        Some((at, fault)) if at == job.node => Request::Fault(fault),
         _ => Request::Job(Job {
             switches: switches.into(),
             points,
@@ -159,14 +195,14 @@ fn run(
     };
     let answer = match slot.ask(&request, deadline, monitor)? {
         Ok(answer) => answer,
-        Err(trouble) => return Ok(Err(trouble)),
+        Err(error) => return Ok(Err(error)),
     };
     Ok(match check::check(input, &sent, origin, answer) {
         Ok(checked) => {
             let nudged = checked.nudged;
             Ok((order::order(input, checked), free_points, nudged))
         }
-        Err(defect) => Err(Trouble::Defect(defect)),
+        Err(defect) => Err(AttemptError::Defect(defect)),
     })
 }
 
@@ -194,7 +230,7 @@ fn switches(version: &str) -> &'static str {
     if version.starts_with("1.5") {
         "pzYMQJT1e-15"
     } else {
-        // 1.6 splits and merges facets by angle unless told otherwise.
+        // By default 1.6 splits and merges facets by angle.
         "pzYMQJT1e-15p179.9/0.1/15/179.9999"
     }
 }

@@ -1,7 +1,7 @@
 //! Repairs tetrahedra that rounding made flat or turned inside out, by moving points that are
-//! ours to move by one or two units in the last place.
+//! not part of the input by one or two units in the last place.
 
-use super::check::orientation;
+use super::orientation::orientation;
 
 /// More bad tetrahedra than this share of all is no matter of rounding.
 const SHARE: usize = 100;

@@ -1,13 +1,14 @@
 //! Puts a checked tetrahedralization in its final order: along a Hilbert curve, so that a ray's
 //! next tetrahedron is near in memory (1.3 to 1.5 times faster walks than in TetGen's order).
 
-use super::check::{Checked, in_front};
+use super::check::Checked;
 use super::faces::NONE;
-use super::gather::Input;
+use super::gather::NodeInput;
+use super::orientation::in_front;
 use super::{Behind, Face, TetMesh};
 
 /// The final form. Vertices that no tetrahedron uses are left out.
-pub(super) fn order(input: &Input, checked: Checked) -> TetMesh {
+pub(super) fn order(input: &NodeInput, checked: Checked) -> TetMesh {
     let curve = Curve::new(input.lower, input.upper);
     let Checked { vertices, tets, behind, sides, .. } = checked;
 

@@ -1,4 +1,4 @@
-//! Where the worker program is, and a place for a worker that is replaced after any failure.
+//! The path of the worker program, and a slot for a worker that is replaced after any failure.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 
 use super::Options;
-use super::report::Trouble;
+use super::failure::AttemptError;
 use super::worker::{Setup, Worker};
 
 /// File name of the worker program.
@@ -42,28 +42,28 @@ pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
     })
 }
 
-/// The tetrahedralizer that a compilation will use: TetGen and its version, or `none`; nothing when there is a worker
-/// that does not work.
+/// The tetrahedralizer that a compilation will use: the version of TetGen, or `none` without a worker; `None` when the worker
+/// fails.
 ///
 /// # Errors
 /// Cancelled.
 pub(crate) fn version(options: &Options, monitor: &dyn Monitor) -> Result<Option<String>> {
     let Ok(program) = find(options) else { return Ok(Some("none".to_owned())) };
     let setup = Setup { program, memory: options.memory };
-    let version = Slot::new(&setup).tetgen(monitor)?.map(str::to_owned);
+    let version = WorkerSlot::new(&setup).tetgen(monitor)?.map(str::to_owned);
     Ok(version.ok())
 }
 
-/// A place for one worker.
-pub(super) struct Slot<'a> {
+/// A slot for one worker.
+pub(super) struct WorkerSlot<'a> {
     setup: &'a Setup,
     worker: Option<Worker>,
-    /// Workers started in this place.
+    /// Workers started in this slot.
     pub(super) started: u64,
 }
 
-impl<'a> Slot<'a> {
-    /// An empty place.
+impl<'a> WorkerSlot<'a> {
+    /// An empty slot.
     pub(super) fn new(setup: &'a Setup) -> Self {
         Self { setup, worker: None, started: 0 }
     }
@@ -72,20 +72,23 @@ impl<'a> Slot<'a> {
     ///
     /// # Errors
     /// As [`Worker::start`].
-    pub(super) fn tetgen(&mut self, monitor: &dyn Monitor) -> Result<std::result::Result<&str, Trouble>> {
+    pub(super) fn tetgen(
+        &mut self,
+        monitor: &dyn Monitor,
+    ) -> Result<std::result::Result<&str, AttemptError>> {
         if self.worker.is_none() {
             match Worker::start(self.setup, monitor)? {
                 Ok(worker) => {
                     self.started += 1;
                     self.worker = Some(worker);
                 }
-                Err(trouble) => return Ok(Err(trouble)),
+                Err(error) => return Ok(Err(error)),
             }
         }
         Ok(Ok(self.worker.as_ref().map_or("", |w| w.tetgen.as_str())))
     }
 
-    /// Has the worker do a job. One that fails in any way is gone afterwards.
+    /// Sends a request to the worker, which is dropped after any failure.
     ///
     /// # Errors
     /// As [`Worker::ask`].
@@ -94,12 +97,12 @@ impl<'a> Slot<'a> {
         request: &Request,
         deadline: Duration,
         monitor: &dyn Monitor,
-    ) -> Result<std::result::Result<Tetrahedra, Trouble>> {
-        if let Err(trouble) = self.tetgen(monitor)? {
-            return Ok(Err(trouble));
+    ) -> Result<std::result::Result<Tetrahedra, AttemptError>> {
+        if let Err(error) = self.tetgen(monitor)? {
+            return Ok(Err(error));
         }
         let Some(mut worker) = self.worker.take() else {
-            return Ok(Err(Trouble::Start("no worker".into())));
+            return Ok(Err(AttemptError::Start("no worker".into())));
         };
         let answer = worker.ask(request, deadline, monitor)?;
         if answer.is_ok() {

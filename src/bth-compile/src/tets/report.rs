@@ -1,16 +1,15 @@
-//! What the tets stage did, and why a node failed.
+//! Reports of the tets stage.
 
 use std::collections::BTreeMap;
 
-use bth_tetgen_protocol::Failure;
 use serde::{Deserialize, Serialize};
 
-/// What became of the chosen nodes.
+/// Report on the chosen nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     /// The worker that was used, or why there was none.
     pub worker: WorkerStatus,
-    /// Nodes that were asked for.
+    /// Nodes that were to be tetrahedralized.
     pub chosen: u64,
     /// Triangles below them.
     pub chosen_triangles: u64,
@@ -70,7 +69,7 @@ pub enum WorkerStatus {
     },
 }
 
-/// What became of one node.
+/// Report on one node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     /// Index in the binary BVH.
@@ -105,73 +104,4 @@ pub enum Outcome {
     Split,
     /// It stays in the BVH.
     GivenUp,
-}
-
-/// Why an attempt failed.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Trouble {
-    /// The worker did not start or speaks another language.
-    Start(String),
-    /// The worker died.
-    Died(String),
-    /// The deadline passed.
-    TimedOut,
-    /// The worker said so.
-    Failed(Failure, String),
-    /// The worker answered what is no answer.
-    Answer(String),
-    /// The triangles or their box are no input for TetGen.
-    Unfit(&'static str),
-    /// The result does not hold.
-    Defect(super::check::Defect),
-}
-
-impl Trouble {
-    /// Stable name, for counting.
-    pub(super) fn name(&self) -> &'static str {
-        match self {
-            Trouble::Start(_) => "worker_did_not_start",
-            Trouble::Died(_) => "worker_died",
-            Trouble::TimedOut => "timed_out",
-            Trouble::Failed(Failure::Memory, _) => "out_of_memory",
-            Trouble::Failed(Failure::Internal, _) => "tetgen_internal",
-            Trouble::Failed(Failure::Intersection, _) => "tetgen_intersection",
-            Trouble::Failed(Failure::TooSmall, _) => "tetgen_too_small",
-            Trouble::Failed(..) => "tetgen_other",
-            Trouble::Answer(_) => "bad_answer",
-            Trouble::Unfit(_) => "unfit_input",
-            Trouble::Defect(defect) => defect.name(),
-        }
-    }
-
-    /// Whether the same attempt would fail in the same way again, on any machine at any time.
-    pub(super) fn is_certain(&self) -> bool {
-        matches!(self, Trouble::Failed(..) | Trouble::Unfit(_) | Trouble::Defect(_))
-    }
-
-    /// Whether another attempt with other points may succeed. TetGen hangs on some points and not
-    /// on others, but time spent on a large node is better spent on its parts.
-    pub(super) fn retry(&self, triangles: u32) -> bool {
-        match self {
-            Trouble::Died(_) | Trouble::Answer(_) => true,
-            Trouble::Defect(defect) => *defect != super::check::Defect::Duplicate,
-            Trouble::Failed(failure, _) => *failure != Failure::Memory,
-            Trouble::TimedOut => triangles <= 4096,
-            Trouble::Start(_) | Trouble::Unfit(_) => false,
-        }
-    }
-}
-
-impl std::fmt::Display for Trouble {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())?;
-        match self {
-            Trouble::Start(text) | Trouble::Died(text) | Trouble::Failed(_, text) | Trouble::Answer(text) => {
-                write!(f, ": {text}")
-            }
-            Trouble::Unfit(text) => write!(f, ": {text}"),
-            Trouble::Defect(defect) => write!(f, ": {defect}"),
-            Trouble::TimedOut => Ok(()),
-        }
-    }
 }

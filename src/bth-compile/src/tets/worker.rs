@@ -1,4 +1,4 @@
-//! One worker process: started, asked, and ended when it dies, hangs or is no longer needed.
+//! One worker process: start, requests, and end when it dies, hangs or is not needed.
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -13,7 +13,7 @@ use bth_tetgen_protocol::{
 use crate::error::Result;
 use crate::monitor::Monitor;
 
-use super::report::Trouble;
+use super::failure::AttemptError;
 
 /// How to start a worker.
 #[derive(Clone, Debug)]
@@ -24,9 +24,9 @@ pub(super) struct Setup {
     pub(super) memory: u64,
 }
 
-/// How often cancellation is looked at while a worker works.
-const GLANCE: Duration = Duration::from_millis(100);
-/// Time for a worker to say hello.
+/// Interval between checks for cancellation while a worker is busy.
+const CANCEL_INTERVAL: Duration = Duration::from_millis(100);
+/// Time limit for the greeting of a worker.
 const START: Duration = Duration::from_secs(20);
 
 /// A running worker. It ends with this value, or with this process, however that ends.
@@ -36,7 +36,7 @@ pub(super) struct Worker {
     pub(super) tetgen: String,
     requests: Option<Sender<Vec<u8>>>,
     replies: Receiver<std::result::Result<Reply, ProtocolError>>,
-    talker: Option<JoinHandle<()>>,
+    io_thread: Option<JoinHandle<()>>,
 }
 
 impl Worker {
@@ -44,9 +44,12 @@ impl Worker {
     ///
     /// # Errors
     /// Outer: cancelled. Inner: why it did not start.
-    pub(super) fn start(setup: &Setup, monitor: &dyn Monitor) -> Result<std::result::Result<Self, Trouble>> {
+    pub(super) fn start(
+        setup: &Setup,
+        monitor: &dyn Monitor,
+    ) -> Result<std::result::Result<Self, AttemptError>> {
         let fail = |what: &str, error: &dyn std::fmt::Display| {
-            Ok(Err(Trouble::Start(format!("{}: {what}: {error}", setup.program.display()))))
+            Ok(Err(AttemptError::Start(format!("{}: {what}: {error}", setup.program.display()))))
         };
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
@@ -68,7 +71,7 @@ impl Worker {
         let mut to = child.stdin.take().expect("stdin was piped");
         let mut from = child.stdout.take().expect("stdout was piped");
         // A thread of its own may block on the pipes; killing the process unblocks it.
-        let talker = std::thread::spawn(move || {
+        let io_thread = std::thread::spawn(move || {
             let mut receive = || Reply::from_bytes(&read_frame(&mut from)?);
             if inbox.send(receive()).is_err() {
                 return;
@@ -80,8 +83,13 @@ impl Worker {
                 }
             }
         });
-        let mut worker =
-            Self { child, tetgen: String::new(), requests: Some(requests), replies, talker: Some(talker) };
+        let mut worker = Self {
+            child,
+            tetgen: String::new(),
+            requests: Some(requests),
+            replies,
+            io_thread: Some(io_thread),
+        };
         Ok(match worker.wait(START, monitor)? {
             Ok(Reply::Hello { protocol: PROTOCOL, tetgen }) => {
                 worker.tetgen = tetgen;
@@ -91,7 +99,7 @@ impl Worker {
                 return fail("does not fit", &format!("protocol {PROTOCOL} expected, {protocol} found"));
             }
             Ok(_) => return fail("does not fit", &"no hello"),
-            Err(trouble) => return fail("does not work", &trouble),
+            Err(error) => return fail("does not work", &error),
         })
     }
 
@@ -104,16 +112,16 @@ impl Worker {
         request: &Request,
         deadline: Duration,
         monitor: &dyn Monitor,
-    ) -> Result<std::result::Result<Tetrahedra, Trouble>> {
+    ) -> Result<std::result::Result<Tetrahedra, AttemptError>> {
         let sent = self.requests.as_ref().is_some_and(|to| to.send(request.to_bytes()).is_ok());
         if !sent {
-            return Ok(Err(self.obituary()));
+            return Ok(Err(self.exit_error()));
         }
         Ok(match self.wait(deadline, monitor)? {
             Ok(Reply::Done(done)) => Ok(done),
-            Ok(Reply::Failed { failure, text }) => Err(Trouble::Failed(failure, text)),
-            Ok(Reply::Hello { .. }) => Err(Trouble::Answer("a second hello".into())),
-            Err(trouble) => Err(trouble),
+            Ok(Reply::Failed { failure, text }) => Err(AttemptError::Failed(failure, text)),
+            Ok(Reply::Hello { .. }) => Err(AttemptError::Answer("a second hello".into())),
+            Err(error) => Err(error),
         })
     }
 
@@ -121,26 +129,28 @@ impl Worker {
         &mut self,
         deadline: Duration,
         monitor: &dyn Monitor,
-    ) -> Result<std::result::Result<Reply, Trouble>> {
+    ) -> Result<std::result::Result<Reply, AttemptError>> {
         let start = Instant::now();
         loop {
             monitor.check()?;
             let left = deadline.saturating_sub(start.elapsed());
-            match self.replies.recv_timeout(left.min(GLANCE)) {
+            match self.replies.recv_timeout(left.min(CANCEL_INTERVAL)) {
                 Ok(Ok(reply)) => return Ok(Ok(reply)),
-                Ok(Err(ProtocolError::End | ProtocolError::Io(_))) => return Ok(Err(self.obituary())),
-                Ok(Err(error)) => return Ok(Err(Trouble::Answer(error.to_string()))),
-                Err(RecvTimeoutError::Disconnected) => return Ok(Err(self.obituary())),
-                Err(RecvTimeoutError::Timeout) if left <= GLANCE => return Ok(Err(Trouble::TimedOut)),
+                Ok(Err(ProtocolError::End | ProtocolError::Io(_))) => return Ok(Err(self.exit_error())),
+                Ok(Err(error)) => return Ok(Err(AttemptError::Answer(error.to_string()))),
+                Err(RecvTimeoutError::Disconnected) => return Ok(Err(self.exit_error())),
+                Err(RecvTimeoutError::Timeout) if left <= CANCEL_INTERVAL => {
+                    return Ok(Err(AttemptError::TimedOut));
+                }
                 Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }
 
-    /// How the process ended, now that its pipe has.
-    fn obituary(&mut self) -> Trouble {
+    /// The error for a process whose pipe has closed, with its exit status.
+    fn exit_error(&mut self) -> AttemptError {
         let _ = self.child.kill();
-        Trouble::Died(match self.child.wait() {
+        AttemptError::Died(match self.child.wait() {
             Ok(status) => status.to_string(),
             Err(error) => error.to_string(),
         })
@@ -149,12 +159,12 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may be in the midst of a job, or hang: there is nothing to save.
+        // It may be busy or hang; it has no state that would be lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.requests = None;
-        if let Some(talker) = self.talker.take() {
-            let _ = talker.join();
+        if let Some(io_thread) = self.io_thread.take() {
+            let _ = io_thread.join();
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Files that are whole or absent; how is `bth_cache`'s affair.
+//! Writes of whole files through `bth_files`, with the errors of the compiler.
 
 use super::Content;
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use std::path::Path;
 /// Writes a file that is whole or absent, replacing one of that name.
 ///
 /// # Errors
-/// `BTH-O020` with what the system said; the target is then as it was.
+/// `BTH-O020` with the message of the system; the target is then unchanged.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically_with(path, |out| out.write_all(bytes))
 }
@@ -21,15 +21,15 @@ pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> Result<()> {
-    bth_cache::replace(path, write).map_err(|e| cannot(path, &e))
+    bth_files::replace(path, write).map_err(|e| cannot(path, &e))
 }
 
-/// As [`write_atomically`]. What is in other files is copied by the system.
+/// As [`write_atomically`], for a content whose pieces may be in other files, which the system copies.
 ///
 /// # Errors
 /// As [`write_atomically`]; also when such a file cannot be read or has changed.
 pub fn write_content(path: &Path, content: &Content) -> Result<()> {
-    bth_cache::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
+    bth_files::replace_file(path, |file| content.write_to(file)).map_err(|e| cannot(path, &e))
 }
 
 fn cannot(path: &Path, error: &std::io::Error) -> Error {

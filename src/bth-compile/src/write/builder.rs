@@ -12,9 +12,9 @@ use zerocopy::IntoBytes;
 /// Collects the sections of a file.
 #[derive(Clone, Debug, Default)]
 pub struct FileBuilder<'a> {
-    /// By (object, kind), the order of the table.
+    /// Keyed by (object, kind), which is the order of the table.
     sections: BTreeMap<(u32, u32), Section<'a>>,
-    /// What the objects need of a reader.
+    /// Features that a reader needs for the objects.
     required_features: u64,
 }
 
@@ -33,7 +33,7 @@ impl<'a> FileBuilder<'a> {
     }
 
     /// Adds a section of elements of `stride` bytes; `object` is `NONE` for sections of the whole file.
-    /// What tracing reads and what describes the scene is flagged as required.
+    /// Sections that tracing reads or that describe the scene are flagged as required.
     ///
     /// # Errors
     /// `BTH-X031` when the bytes are not whole elements or the section is there already.
@@ -53,7 +53,7 @@ impl<'a> FileBuilder<'a> {
         }
         let hash = hash128(&bytes);
         let coordinates = coordinates_of(kind, &bytes);
-        self.known_section(Known { kind, object, stride, hash }, coordinates, Bytes::Here(bytes))
+        self.hashed_section(SectionHead { kind, object, stride, hash }, coordinates, Bytes::Owned(bytes))
     }
 
     /// As [`Self::section`], for a section whose hash is known already. `coordinates` is that field of the row, if it is an
@@ -61,9 +61,9 @@ impl<'a> FileBuilder<'a> {
     ///
     /// # Errors
     /// As [`Self::section`].
-    pub(crate) fn known_section(
+    pub(crate) fn hashed_section(
         &mut self,
-        Known { kind, object, stride, hash }: Known,
+        SectionHead { kind, object, stride, hash }: SectionHead,
         coordinates: Option<u32>,
         bytes: Bytes<'a>,
     ) -> Result<&mut Self> {
@@ -92,7 +92,7 @@ impl<'a> FileBuilder<'a> {
         self.section(kind, object, size_of::<T>() as u32, rows.as_bytes())
     }
 
-    /// Adds how the file came about, UTF-8 JSON that is no part of the content id. No times, no paths.
+    /// Adds the provenance, UTF-8 JSON that is no part of the content id. No times, no paths.
     ///
     /// # Errors
     /// As [`Self::section`].
@@ -105,7 +105,7 @@ impl<'a> FileBuilder<'a> {
         content_id(&self.entries())
     }
 
-    /// Fails beyond what a reader takes.
+    /// Checks the number of sections.
     ///
     /// # Errors
     /// `BTH-L032` with more sections than the format allows.
@@ -202,8 +202,8 @@ impl<'a> FileBuilder<'a> {
     }
 }
 
-/// What is known of a section without its bytes.
-pub(crate) struct Known {
+/// Table entry of a section whose bytes have been hashed before.
+pub(crate) struct SectionHead {
     pub(crate) kind: u32,
     /// `NONE` for sections of the whole file.
     pub(crate) object: u32,
@@ -218,7 +218,7 @@ fn coordinates_of(kind: u32, bytes: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.try_into().ok()?))
 }
 
-/// What an object with such coordinates needs of a reader.
+/// Features that a reader needs for such coordinates.
 fn features(coordinates: u32) -> u64 {
     let grid = if coordinates & !PACKED_NODES != 0 { FEATURE_GRID } else { 0 };
     grid | if coordinates & PACKED_NODES != 0 { FEATURE_PACKED_NODES } else { 0 }

@@ -1,7 +1,7 @@
-//! A file that is ready to be written, in pieces that need not be in one place, nor in memory.
+//! A file that is ready to be written, in pieces in memory and in other files.
 
 use super::whole::{are_zeros, name};
-use bth_cache::{Digest, Opened};
+use bth_files::{Digest, OpenFile};
 use std::borrow::Cow;
 use std::io::{Error, Result, Write};
 use std::ops::Range;
@@ -10,30 +10,30 @@ use std::sync::Arc;
 /// Where the bytes of a section are.
 #[derive(Clone, Debug)]
 pub(crate) enum Bytes<'a> {
-    /// Here.
-    Here(Cow<'a, [u8]>),
-    /// In a file that was read.
-    In(Arc<bth_format::File>, Range<usize>),
-    /// In a file that was opened.
-    Old(Arc<Opened>, Range<u64>),
+    /// Owned or borrowed.
+    Owned(Cow<'a, [u8]>),
+    /// In a file in memory.
+    InFile(Arc<bth_format::File>, Range<usize>),
+    /// In an open file on disk.
+    OnDisk(Arc<OpenFile>, Range<u64>),
 }
 
 impl Bytes<'_> {
-    /// How many there are.
+    /// Number of bytes.
     pub(super) fn length(&self) -> u64 {
         match self {
-            Self::Here(bytes) => bytes.len() as u64,
-            Self::In(_, range) => range.len() as u64,
-            Self::Old(_, range) => range.end - range.start,
+            Self::Owned(bytes) => bytes.len() as u64,
+            Self::InFile(_, range) => range.len() as u64,
+            Self::OnDisk(_, range) => range.end - range.start,
         }
     }
 
-    /// They themselves, unless they are still in a file.
+    /// The bytes, unless they are on disk.
     pub(super) fn in_memory(&self) -> Option<&[u8]> {
         match self {
-            Self::Here(bytes) => Some(bytes),
-            Self::In(file, range) => file.bytes().get(range.clone()),
-            Self::Old(..) => None,
+            Self::Owned(bytes) => Some(bytes),
+            Self::InFile(file, range) => file.bytes().get(range.clone()),
+            Self::OnDisk(..) => None,
         }
     }
 }
@@ -43,7 +43,7 @@ impl Bytes<'_> {
 pub struct Content {
     pieces: Vec<Bytes<'static>>,
     length: u64,
-    /// Bytes of the length that are no piece yet: zeros.
+    /// Zeros at the end that are part of the length and of no piece.
     pad: usize,
 }
 
@@ -56,33 +56,33 @@ impl From<Vec<u8>> for Content {
 impl Content {
     /// From the first bytes.
     pub(super) fn new(bytes: Vec<u8>) -> Self {
-        Self { length: bytes.len() as u64, pieces: vec![Bytes::Here(bytes.into())], pad: 0 }
+        Self { length: bytes.len() as u64, pieces: vec![Bytes::Owned(bytes.into())], pad: 0 }
     }
 
-    /// Goes on with zeros up to a place that is not before its end.
+    /// Appends zeros up to an offset that is not before the end.
     pub(super) fn pad_to(&mut self, end: u64) {
         self.pad += (end - self.length) as usize;
         self.length = end;
-        // Files that were read often end alike.
-        if let Some(Bytes::In(file, range)) = self.pieces.last_mut()
+        // The file in memory often has the same zeros.
+        if let Some(Bytes::InFile(file, range)) = self.pieces.last_mut()
             && file.bytes().get(range.end..range.end + self.pad).is_some_and(are_zeros)
         {
             range.end += std::mem::take(&mut self.pad);
         }
     }
 
-    /// Goes on with the bytes of a section. What follows each other in the same file becomes one piece.
+    /// Appends the bytes of a section. Adjacent ranges of the same file become one piece.
     pub(super) fn push(&mut self, bytes: Bytes<'_>) {
         self.length += bytes.length();
         let pad = self.pad;
         match (self.pieces.last_mut(), bytes) {
-            (Some(Bytes::In(file, old)), Bytes::In(other, new))
+            (Some(Bytes::InFile(file, old)), Bytes::InFile(other, new))
                 if Arc::ptr_eq(file, &other) && pad == 0 && old.end == new.start =>
             {
                 old.end = new.end;
             }
-            // Between the sections of an old file that is used there are zeros.
-            (Some(Bytes::Old(file, old)), Bytes::Old(other, new))
+            // Between the sections of a compiled file there are zeros, so that they are copied along.
+            (Some(Bytes::OnDisk(file, old)), Bytes::OnDisk(other, new))
                 if Arc::ptr_eq(file, &other) && old.end + pad as u64 == new.start =>
             {
                 old.end = new.end;
@@ -91,15 +91,15 @@ impl Content {
             (_, bytes) => {
                 self.fill();
                 match bytes {
-                    Bytes::Here(bytes) => self.append(&bytes),
-                    Bytes::In(file, range) => self.pieces.push(Bytes::In(file, range)),
-                    Bytes::Old(file, range) => self.pieces.push(Bytes::Old(file, range)),
+                    Bytes::Owned(bytes) => self.append(&bytes),
+                    Bytes::InFile(file, range) => self.pieces.push(Bytes::InFile(file, range)),
+                    Bytes::OnDisk(file, range) => self.pieces.push(Bytes::OnDisk(file, range)),
                 }
             }
         }
     }
 
-    /// Makes a piece of the zeros.
+    /// Turns the zeros at the end into a piece.
     fn fill(&mut self) {
         let pad = std::mem::take(&mut self.pad);
         if pad > 0 {
@@ -109,17 +109,18 @@ impl Content {
 
     fn append(&mut self, bytes: &[u8]) {
         match self.pieces.last_mut() {
-            Some(Bytes::Here(last)) => last.to_mut().extend_from_slice(bytes),
-            _ => self.pieces.push(Bytes::Here(bytes.to_vec().into())),
+            Some(Bytes::Owned(last)) => last.to_mut().extend_from_slice(bytes),
+            _ => self.pieces.push(Bytes::Owned(bytes.to_vec().into())),
         }
     }
 
-    /// Its bytes.
+    /// Length in bytes.
     pub fn length(&self) -> u64 {
         self.length
     }
 
-    /// What names it: the hash of its header, which has that of the section table, which has those of the sections.
+    /// The name of the content: the hash of the header, which contains that of the section table, which contains those of the
+    /// sections.
     pub fn name(&self) -> Digest {
         let head = self.pieces.first().and_then(Bytes::in_memory).unwrap_or_default();
         name(head)
@@ -131,10 +132,10 @@ impl Content {
     /// Those of the writer, and when an old file that it takes sections from cannot be read or has changed.
     pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> Result<()> {
         let mut at = 0;
-        let mut used: Option<&Arc<Opened>> = None;
+        let mut used: Option<&Arc<OpenFile>> = None;
         for piece in &self.pieces {
             match piece {
-                Bytes::Old(file, range) => {
+                Bytes::OnDisk(file, range) => {
                     file.copy_to(range.clone(), out, at)?;
                     used = Some(file);
                 }
@@ -151,12 +152,12 @@ impl Content {
         }
     }
 
-    /// All bytes in one place.
+    /// All bytes in memory.
     ///
     /// # Errors
     /// As [`Self::write_to`].
     pub fn bytes(&self) -> Result<Cow<'_, [u8]>> {
-        if let ([Bytes::Here(bytes)], 0) = (&self.pieces[..], self.pad) {
+        if let ([Bytes::Owned(bytes)], 0) = (&self.pieces[..], self.pad) {
             return Ok(Cow::Borrowed(bytes));
         }
         let mut bytes = Vec::with_capacity(self.length as usize);

@@ -1,4 +1,4 @@
-//! From sections to the bytes of a file, and from bytes to a file that is whole or absent.
+//! Sections into the bytes of a file, and bytes into a file that is whole or absent.
 
 mod atomic;
 mod builder;
@@ -9,7 +9,7 @@ mod whole;
 
 pub use atomic::{write_atomically, write_atomically_with, write_content};
 pub use builder::FileBuilder;
-pub(crate) use builder::Known;
+pub(crate) use builder::SectionHead;
 pub(crate) use content::Bytes;
 pub use content::Content;
 pub use object::{ObjectParts, Source, object};
@@ -30,7 +30,7 @@ pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     Ok(file)
 }
 
-/// As [`checked`]; `deep` looks at what `bthc verify` does.
+/// As [`checked`]; `deep` also makes the checks of `bthc verify`.
 ///
 /// # Errors
 /// As [`checked`].

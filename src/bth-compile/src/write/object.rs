@@ -7,7 +7,7 @@ use bth_format::layout::*;
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// What the stages made of a mesh, as it goes into the file.
+/// The contents of an object's sections.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObjectParts<'a> {
     /// Bounds of the triangles that can be hit; `None` without any.
@@ -72,7 +72,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         );
         return Err(Error::Limit { code: "BTH-L031", message });
     }
-    // Without tet leaves there is no record, and no triangle has a home.
+    // Without tet leaves there are neither records nor faces to map triangles to.
     let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
     let (lower, upper) = parts.bounds.unwrap_or_default();
     let (coordinates, grid_origin) = parts.grid.map_or_else(Default::default, |(grid, _)| grid.fields());

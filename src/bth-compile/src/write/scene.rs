@@ -11,7 +11,7 @@ pub struct SceneParts {
     pub scene: Scene,
     /// Parents before children.
     pub nodes: Vec<Node>,
-    /// What stands where.
+    /// Objects at nodes.
     pub instances: Vec<Instance>,
     /// By node and property.
     pub tracks: Vec<Track>,

@@ -1,19 +1,19 @@
-//! What names a file without reading all of it, and whether all of it is what the name says.
+//! The name of a file's content, which its header determines, and the check of a whole file against it.
 
-use bth_cache::Digest;
+use bth_files::Digest;
 use bth_format::file::hash128;
 use std::path::Path;
 
-/// Bytes that name a file: its header.
+/// Bytes of the header, whose hash is the name.
 pub(crate) const HEADER: usize = size_of::<bth_format::layout::Header>();
 
-/// What names a file: the hash of its header, which has that of the section table, which has those of the sections. Between
-/// them there are zeros.
+/// The name of a file's content: the hash of the header, which contains that of the section table, which contains those of
+/// the sections. Between sections there are zeros.
 pub(crate) fn name(head: &[u8]) -> Digest {
     Digest::of(head.get(..HEADER).unwrap_or(head))
 }
 
-/// What names a compiled file, if every byte of it is what the name says.
+/// The name of a compiled file's content, if every byte of the file agrees with it.
 pub fn name_if_whole(path: &Path) -> Option<Digest> {
     let file = bth_format::File::read(path).ok()?;
     let bytes = file.bytes();

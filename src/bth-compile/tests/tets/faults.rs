@@ -99,7 +99,7 @@ fn a_program_that_is_no_worker_is_unusable() {
     }
 }
 
-/// Cancels after it was asked a few times.
+/// Cancels after a few checks.
 struct Impatient(AtomicU32);
 
 impl Monitor for Impatient {

@@ -53,7 +53,7 @@ fn assert_decodes(meshes: &[TetMesh], kind: RecordKind, encoded: &Encoded) {
             let record = encoded.faces[leaf.first_face as usize + row];
             assert_eq!(record.vertex, face.vertex.map(|v| v + leaf.first_vertex));
             assert_eq!(record.triangle, face.triangle);
-            assert_eq!(encoded.homes[face.triangle as usize], leaf.first_face + row as u32);
+            assert_eq!(encoded.face_of_triangle[face.triangle as usize], leaf.first_face + row as u32);
             for side in 0..2 {
                 assert_eq!(record.tet[side], face.tet[side] + leaf.first_tet);
                 let tet = mesh.tets[face.tet[side] as usize];
@@ -118,7 +118,7 @@ fn every_record_decodes_to_what_was_encoded() {
     let meshes = [five(0.0, 2), five(4.0, 0)];
     for kind in RecordKind::ALL {
         let encoded = encode(&meshes, &[5, NONE], kind, 4);
-        assert_eq!(encoded.homes, [1, NONE, 0, NONE]);
+        assert_eq!(encoded.face_of_triangle, [1, NONE, 0, NONE]);
         assert_eq!(encoded.leaves.iter().map(|l| l.subtree).collect::<Vec<_>>(), [5, NONE]);
         assert_eq!((encoded.leaves[1].first_tet, encoded.leaves[1].first_vertex), (5, 8));
         assert_eq!(encoded.leaves[1].first_face, 1);
@@ -129,7 +129,7 @@ fn every_record_decodes_to_what_was_encoded() {
 #[test]
 fn nothing_encodes_to_nothing() {
     let encoded = encode(&[], &[], RecordKind::Link32, 3);
-    assert_eq!(encoded.homes, [NONE; 3]);
+    assert_eq!(encoded.face_of_triangle, [NONE; 3]);
     assert!(encoded.leaves.is_empty() && encoded.tets.is_empty() && encoded.hulls.is_empty());
 }
 
@@ -144,7 +144,7 @@ fn records_of_a_real_tetrahedralization_decode() {
     for kind in RecordKind::ALL {
         let encoded = encode(&meshes, &vec![NONE; meshes.len()], kind, mesh.triangles.len());
         assert_decodes(&meshes, kind, &encoded);
-        assert!(encoded.homes.iter().all(|&row| row != NONE));
+        assert!(encoded.face_of_triangle.iter().all(|&row| row != NONE));
         for hull in &encoded.hulls {
             let p = |v: u32| encoded.vertices[v as usize].position.map(f64::from);
             let [a, b, c] = hull.vertex.map(p);

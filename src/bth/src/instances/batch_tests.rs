@@ -55,7 +55,7 @@ fn brute(world: &World, file: &File, ray: &Ray) -> Hit {
         let Some(placed) = placed else { continue };
         let object = placed.inverse.ray(ray);
         let view = file.object(placed.object()).unwrap();
-        let hit = object::nearest(&view, &object.ray, NONE, number as u32);
+        let hit = object::nearest(&view, &object.ray, bth_format::layout::NONE, number as u32);
         best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
     }
     best

@@ -99,14 +99,14 @@ pub(crate) struct Gltf {
 
 impl Gltf {
     /// The options of the import.
-    pub(crate) fn options(&self) -> bth_compile::scene::ImportOptions {
-        use bth_compile::scene::Chosen;
+    pub(crate) fn options(&self) -> bth_import::gltf::scene::ImportOptions {
+        use bth_import::gltf::Chosen;
         let animation = match self.animation.as_str() {
             "all" => Chosen::All,
             "none" => Chosen::None,
             name => Chosen::One(name.to_owned()),
         };
-        bth_compile::scene::ImportOptions {
+        bth_import::gltf::scene::ImportOptions {
             scene: self.scene.clone(),
             animation,
             rate: self.rate,

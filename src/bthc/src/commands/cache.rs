@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, bytes, count};
-use bth_cache::{Digest, Store, Survey};
+use bth_cache::{Digest, Inventory, Store};
 use bth_compile::Monitor;
 use serde_json::{Value, json};
 
@@ -16,8 +16,8 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
     };
     let (value, text) = match &args.command {
         Command::Stats => {
-            let survey = store.survey();
-            (json!(survey), stats(&survey))
+            let inventory = store.inventory();
+            (json!(inventory), stats(&inventory))
         }
         Command::List { stage } => list(&store, stage.as_deref()),
         Command::Gc => {
@@ -48,27 +48,27 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
     Ok(())
 }
 
-fn stats(survey: &Survey) -> String {
+fn stats(inventory: &Inventory) -> String {
     let mut table = Table::default();
-    let tally = &survey.tally;
-    table.row(["folder", &survey.folder]);
-    table.row(["size", &format!("{} of {}", bytes(survey.bytes), bytes(survey.cap))]);
-    table.row(["contents", &count(survey.contents)]);
-    for (stage, records) in &survey.records {
+    let statistics = &inventory.statistics;
+    table.row(["folder", &inventory.folder]);
+    table.row(["size", &format!("{} of {}", bytes(inventory.bytes), bytes(inventory.cap))]);
+    table.row(["contents", &count(inventory.contents)]);
+    for (stage, records) in &inventory.records {
         table.row([&format!("entries of {stage}"), &count(*records)]);
     }
-    for (stage, hits) in &tally.hits {
+    for (stage, hits) in &statistics.hits {
         table.row([&format!("hits of {stage}"), &count(*hits)]);
     }
-    for (stage, reasons) in &tally.misses {
+    for (stage, reasons) in &statistics.misses {
         for (reason, misses) in reasons {
             table.row([&format!("misses of {stage}, {reason}"), &count(*misses)]);
         }
     }
-    table.row(["hits of the shared cache", &count(tally.shared_hits)]);
-    table.row(["written", &format!("{} ({})", count(tally.stored), bytes(tally.stored_bytes))]);
-    table.row(["evicted", &format!("{} ({})", count(tally.evictions), bytes(tally.evicted_bytes))]);
-    table.row(["damaged", &count(tally.damaged)]);
+    table.row(["hits of the shared cache", &count(statistics.shared_hits)]);
+    table.row(["written", &format!("{} ({})", count(statistics.stored), bytes(statistics.stored_bytes))]);
+    table.row(["evicted", &format!("{} ({})", count(statistics.evictions), bytes(statistics.evicted_bytes))]);
+    table.row(["damaged", &count(statistics.damaged)]);
     table.render()
 }
 
@@ -85,7 +85,7 @@ fn list(store: &Store, stage: Option<&str>) -> (Value, String) {
 
 fn verify(store: &Store, as_json: bool) -> Result<(), Failure> {
     let progress = Progress::new(as_json);
-    progress.stage("verify", Some(store.survey().bytes));
+    progress.stage("verify", Some(store.inventory().bytes));
     let verdict = store.verify(&|bytes| {
         progress.advance(bytes);
         !progress.cancelled()

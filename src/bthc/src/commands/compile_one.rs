@@ -5,7 +5,6 @@ use super::summary::summary;
 use super::{deliver, scene};
 use crate::failure::Failure;
 use bth_compile::Monitor;
-use bth_compile::pipeline;
 
 /// Compiles a model or scene, or takes it from the cache, and brings it to its target.
 ///
@@ -21,9 +20,9 @@ pub(super) fn compile_one(
     }
     let cache = cache(context, &job.model);
     let needed = |record: &_| job.target.needs(record, context.store.as_ref());
-    let outcome = pipeline::compile_cached(&job.model, &context.options, &cache, &needed, monitor)?;
+    let outcome = bth_compile::cached::compile(&job.model, &context.options, &cache, &needed, monitor)?;
     let mut report =
-        deliver::deliver(context, job, &outcome, &cache, &|| bth_compile::cached::files(&job.model))?;
+        deliver::deliver(context, job, &outcome, &cache, &|| bth_compile::source::files(&job.model))?;
     report.json["report"] = outcome.report;
     if let Some(built) = &outcome.built {
         report.text = format!("{}{}", summary(built), report.text);

@@ -4,8 +4,7 @@ use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
 use crate::table::{bytes, seconds};
 use bth_cache::{Record, Store};
-use bth_compile::cached::Cache;
-use bth_compile::pipeline::Outcome;
+use bth_compile::cached::{Cache, Outcome};
 use bth_compile::write::{self, Content};
 use serde_json::json;
 use std::fs::File;
@@ -29,7 +28,7 @@ pub(super) fn deliver<R>(
         (Target::File(path), Some(content)) => {
             write::write_content(path, content)?;
             if let (Some(store), Some(record)) = (&context.store, &outcome.record) {
-                store.stamp(path, record.blob);
+                store.store_fingerprint(path, record.blob);
             }
         }
         (Target::File(path), None) => {
@@ -95,7 +94,7 @@ fn touch(path: &Path, record: Option<&Record>, store: Option<&Store>) -> Result<
     let file = File::options().append(true).open(path).map_err(failed)?;
     file.set_modified(SystemTime::now()).map_err(failed)?;
     if let (Some(record), Some(store)) = (record, store) {
-        store.stamp(path, record.blob);
+        store.store_fingerprint(path, record.blob);
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::job::{Job, JobContext, Target};
 use super::scene;
 use crate::failure::Failure;
-use bth_compile::{cached, write};
+use bth_compile::{source, write};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
 pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
     match scene::is_scene(&job.model, context.args) {
         true => scene::inputs(&job.model),
-        false => Ok(cached::files(&job.model)?),
+        false => Ok(source::files(&job.model)?),
     }
 }
 

@@ -5,7 +5,7 @@ use super::scene;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
-use bth_compile::pipeline::{self, Foreseen};
+use bth_compile::cached::{self, DryRun};
 use serde_json::json;
 
 /// Prints for each job what would be done.
@@ -17,24 +17,24 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
     let mut text = String::new();
     for job in jobs {
         let cache = cache(context, &job.model);
-        let foreseen = match scene::is_scene(&job.model, context.args) {
-            true => scene::foresee(context, job, &cache, &progress)?,
-            false => pipeline::foresee(&job.model, &context.options, &cache, &progress)?,
+        let found = match scene::is_scene(&job.model, context.args) {
+            true => scene::dry_run(context, job, &cache, &progress)?,
+            false => cached::dry_run(&job.model, &context.options, &cache, &progress)?,
         };
-        let (what, why) = action(context, job, &foreseen);
+        let (what, why) = action(context, job, &found);
         let why = why.join(", ");
         let behind = if why.is_empty() { String::new() } else { format!(" ({why})") };
         text.push_str(&format!("{}: {what}{behind}\n", job.target.name()));
-        for part in &foreseen.parts {
+        for part in &found.parts {
             text.push_str(&format!("  {}: compile ({})\n", part.part, part.because.join(", ")));
         }
         reports.push(json!({
             "model": job.model.to_string_lossy(),
             "output": job.target.name(),
             "action": what,
-            "because": foreseen.because,
-            "objects": foreseen.parts,
-            "objects_kept": foreseen.kept,
+            "because": found.because,
+            "objects": found.parts,
+            "objects_kept": found.reused,
         }));
     }
     drop(progress);
@@ -44,11 +44,11 @@ pub(super) fn show(context: &JobContext<'_>, jobs: &[Job], progress: Progress) -
     Ok(output::text(&text)?)
 }
 
-fn action<'a>(context: &JobContext<'_>, job: &Job, foreseen: &'a Foreseen) -> (&'static str, &'a [String]) {
-    match &foreseen.record {
+fn action<'a>(context: &JobContext<'_>, job: &Job, found: &'a DryRun) -> (&'static str, &'a [String]) {
+    match &found.record {
         Some(record) if !job.target.needs(record, context.store.as_ref()) => ("nothing to do", &[]),
-        Some(_) if job.target == Target::Cache => ("make again", &foreseen.because),
+        Some(_) if job.target == Target::Cache => ("make again", &found.because),
         Some(_) => ("take from the cache", &[]),
-        None => ("compile", &foreseen.because),
+        None => ("compile", &found.because),
     }
 }

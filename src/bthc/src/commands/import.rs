@@ -6,8 +6,8 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, count};
-use bth_compile::scene::{self, ImportReport};
 use bth_compile::write;
+use bth_import::gltf::scene::{self, ImportReport};
 use serde_json::json;
 use std::path::{Component, Path};
 

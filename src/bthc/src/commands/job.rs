@@ -70,7 +70,7 @@ impl Target {
 
 /// Whether a file has the content of a record, by its fingerprint in the store, or else by reading it.
 fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
-    if store.and_then(|store| store.stamped(path)) == Some(record.blob) {
+    if store.and_then(|store| store.content_of(path)) == Some(record.blob) {
         return true;
     }
     let same_size = std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() == record.bytes);
@@ -83,7 +83,7 @@ fn contains(path: &Path, record: &Record, store: Option<&Store>) -> bool {
     };
     let same = same_size && same();
     if let (true, Some(store)) = (same, store) {
-        store.stamp(path, record.blob);
+        store.store_fingerprint(path, record.blob);
     }
     same
 }

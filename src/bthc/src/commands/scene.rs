@@ -7,9 +7,10 @@ use crate::args::{Compile, Gltf};
 use crate::failure::Failure;
 use crate::table::{Table, bytes, count, seconds};
 use bth_compile::Monitor;
-use bth_compile::cached::{self, Cache};
-use bth_compile::pipeline::Foreseen;
-use bth_compile::scene::{self, ImportReport, Keep, Place, SceneReport};
+use bth_compile::cached::{Cache, DryRun};
+use bth_compile::scene::{self, Keep, Place, SceneReport};
+use bth_compile::source;
+use bth_import::gltf::scene::{ImportReport, import};
 use bth_scene::Manifest;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -47,7 +48,7 @@ fn read(
         return Ok((bth_scene::read(model)?, None));
     }
     let name = model.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let (manifest, report) = scene::import(model, &name, &gltf.options(), monitor)?;
+    let (manifest, report) = import(model, &name, &gltf.options(), monitor)?;
     Ok((manifest, Some(report)))
 }
 
@@ -95,21 +96,21 @@ fn shard_report(job: &Job, cache: &Cache<'_>, built: u64) -> JobReport {
 }
 
 /// What a compilation of a scene would do.
-pub(super) fn foresee(
+pub(super) fn dry_run(
     context: &JobContext<'_>,
     job: &Job,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
-) -> Result<Foreseen, Failure> {
+) -> Result<DryRun, Failure> {
     let (manifest, _) = read(&job.model, &context.args.gltf, monitor)?;
     let place = Place { folder: folder(&job.model), name: &job.model };
-    Ok(scene::foresee(&manifest, place, &context.options, cache, job.target.path(), monitor)?)
+    Ok(scene::dry_run(&manifest, place, &context.options, cache, job.target.path(), monitor)?)
 }
 
 /// All files that a scene is made from.
 pub(super) fn inputs(model: &Path) -> Result<Vec<PathBuf>, Failure> {
     if is_gltf(model) {
-        return Ok(cached::files(model)?);
+        return Ok(source::files(model)?);
     }
     Ok(files(&bth_scene::read(model)?, model)?)
 }
@@ -124,7 +125,7 @@ fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>>
         let path = model.parent().unwrap_or(Path::new("")).join(path);
         // The file of an object without visible instances may be missing.
         if path != *model && path.exists() {
-            files.extend(cached::files(&path)?);
+            files.extend(source::files(&path)?);
         }
     }
     Ok(files)

@@ -3,6 +3,7 @@
 
 mod bins;
 mod boxes;
+mod greedy;
 mod order;
 pub mod record;
 mod spatial;

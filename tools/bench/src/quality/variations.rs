@@ -1,11 +1,12 @@
 //! What is varied, one step of the builder at a time.
 
 use super::order::{Order, reordered};
-use super::spatial;
+use super::{greedy, spatial};
 use crate::clock::Clock;
 use anyhow::Result;
 use bth_compile::Silent;
-use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Costs, Effort, Plan, Quality, Rule};
+use bth_compile::bvh::{self, CollapseOptions, CollapseReport, Costs, Effort, Plan, Quality};
+use bth_compile::comparison::collapse_by;
 use bth_compile::write::{self, FileBuilder, ObjectParts};
 use bth_import::Mesh;
 use std::collections::HashSet;
@@ -22,6 +23,8 @@ pub(super) struct Variation {
     pub(super) name: &'static str,
     tree: Tree,
     plan: Plan,
+    /// Whether wide nodes are chosen greedily, not at least cost.
+    greedy: bool,
     costs: Costs,
     order: Order,
 }
@@ -36,14 +39,16 @@ pub(super) fn all() -> Vec<Variation> {
         name: "",
         tree: Tree::Built(effort),
         plan: Plan::default(),
+        greedy: false,
         costs: Costs::default(),
         order: Order::DepthFirst,
     };
     let with = |bins, sweep_count, reinsertion: &[f64]| {
         built(Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() })
     };
-    let planned = |rule, children, triangles| Variation {
-        plan: Plan { rule, children, triangles },
+    let planned = |greedy, children, triangles| Variation {
+        plan: Plan { children, triangles },
+        greedy,
         ..built(Quality::Balanced.effort())
     };
     let costs = Costs::default();
@@ -62,7 +67,7 @@ pub(super) fn all() -> Vec<Variation> {
         named("full sweep", with(32, usize::MAX, &[])),
         named("one pass of reinsertion", with(32, sweep, &[0.05])),
         named("`best`", built(Quality::Best.effort())),
-        named("greedy collapse", planned(Rule::Largest, 16, 16)),
+        named("greedy collapse", planned(true, 16, 16)),
         named("lines for nothing", priced(Costs { line: 0.0, ..costs })),
         named("leaves at 0.7 of their cost", leaves(0.7)),
         named("leaves at 1.3 of their cost", leaves(1.3)),
@@ -71,9 +76,9 @@ pub(super) fn all() -> Vec<Variation> {
         named("random order", ordered(Order::Random)),
         named("spatial splits", spatial(1.0)),
         named("spatial splits, n^0.4", spatial(0.4)),
-        named("8 children", planned(Rule::Least, 8, 16)),
-        named("8 triangles", planned(Rule::Least, 16, 8)),
-        named("8 children, 8 triangles", planned(Rule::Least, 8, 8)),
+        named("8 children", planned(false, 8, 16)),
+        named("8 triangles", planned(false, 16, 8)),
+        named("8 children, 8 triangles", planned(false, 8, 8)),
     ]
 }
 
@@ -129,7 +134,10 @@ impl Variation {
             }
         };
         let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };
-        let (wide, report) = bvh::collapse(mesh, &tree, &[], &options, &Silent)?;
+        let (wide, report) = match self.greedy {
+            true => collapse_by(mesh, &tree, &[], &options, &greedy::decide, &Silent)?,
+            false => bvh::collapse(mesh, &tree, &[], &options, &Silent)?,
+        };
         Ok((tree, wide, report))
     }
 }

@@ -1,4 +1,4 @@
-//! The options of a compilation.
+//! The options of a compilation: those of all stages.
 
 use crate::{bvh, coordinates, costs, tets};
 use bth_format::layout::RecordKind;
@@ -9,7 +9,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Structure {
-    /// A BVH, some nodes of which are tetrahedralized where the cost model says that it pays.
+    /// A BVH, some nodes of which are tetrahedralized where that saves time according to the cost model.
     #[default]
     Bth,
     /// A BVH only.
@@ -41,8 +41,8 @@ pub struct Options {
     pub keep_subtrees: bool,
     /// Whether to store the positions and triangles of the source.
     pub geometry: bool,
-    /// Bytes that the objects of a scene may take which are compiled at once, by an estimate; one is compiled in any case.
-    /// The result is the same for any number.
+    /// Estimated bytes of memory for the objects of a scene that are compiled at the same time; one is compiled in any case.
+    /// The result does not depend on it.
     pub objects_memory: u64,
 }
 
@@ -65,7 +65,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// How tetrahedra will be stored; what the BVH takes is not known.
+    /// How tetrahedra will be stored; the size of the BVH is left open.
     pub fn storage(&self) -> costs::Storage {
         costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }
     }

@@ -1,44 +1,46 @@
-//! A compilation by way of the cache.
+//! The compilation of a model through the cache.
 
-use super::{Clock, Options, Report, Structure, compile_model, over, say};
-use crate::cached::{self, Cache, Miss, SourceDigest};
+use super::{Cache, CachedStages, Miss, keys};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
+use crate::options::{Options, Structure};
+use crate::pipeline::{Clock, FileReport, Report, compile_model, warn_over_limit};
+use crate::source::{Model, SourceDigest};
 use crate::write::Content;
 use bth_cache::{Key, Record};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::borrow::Cow;
 use std::path::Path;
 
-/// What came of a compilation.
+/// Result of a compilation through the cache.
 #[derive(Debug)]
 pub struct Outcome<R> {
     /// The compiled file; absent when the cache has it and it was not needed.
     pub content: Option<Content>,
-    /// What the stages did, if they did anything.
+    /// The report of the stages; absent when the file came from the cache.
     pub built: Option<R>,
-    /// The record of the compiled file, if it is kept.
+    /// The record of the compiled file, if the cache has one.
     pub record: Option<Record>,
-    /// The report as JSON: of the compilation that made the file, whenever that was.
+    /// The report as JSON, of the compilation that made the file, whenever that was.
     pub report: Value,
 }
 
-/// What a compilation would find.
+/// What a compilation through the cache would do.
 #[derive(Clone, Debug, Default)]
-pub struct Foreseen {
-    /// The record of the compiled file, if it is kept.
+pub struct DryRun {
+    /// The record of the compiled file, if the cache has it.
     pub record: Option<Record>,
-    /// Else what differs from the last time.
+    /// Else what differs from the last compilation of the same source.
     pub because: Vec<String>,
     /// Objects of a scene that would be built.
     pub parts: Vec<Miss>,
-    /// Objects of a scene that are kept.
-    pub kept: u64,
+    /// Number of a scene's objects that would come from the cache or the previous file.
+    pub reused: u64,
 }
 
-impl Foreseen {
-    /// What a key would find.
+impl DryRun {
+    /// Looks a key up.
     pub(crate) fn of(key: Option<&Key>, cache: &Cache<'_>, monitor: &dyn Monitor) -> Self {
         let record = key.and_then(|key| cache.find(key, monitor));
         let because = match (&record, key) {
@@ -50,26 +52,21 @@ impl Foreseen {
     }
 }
 
-/// What [`compile_cached`] would find. Reads and hashes the model, and does nothing else.
+/// What [`compile`] would do. Reads and hashes the model, and does nothing else.
 ///
 /// # Errors
 /// When the model cannot be read.
-pub fn foresee(
-    source: &Path,
-    options: &Options,
-    cache: &Cache<'_>,
-    monitor: &dyn Monitor,
-) -> Result<Foreseen> {
+pub fn dry_run(source: &Path, options: &Options, cache: &Cache<'_>, monitor: &dyn Monitor) -> Result<DryRun> {
     let (_, key) = identify(source, options, cache, monitor, &mut Clock::default())?;
-    Ok(Foreseen::of(key.as_ref(), cache, monitor))
+    Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// Compiles a model, or takes what was made of the same content before. `needed` says whether the bytes of a file
-/// that is kept are needed.
+/// Compiles a model, or takes from the cache what was made of the same content before. `needed` decides whether the bytes
+/// of a file in the cache are read.
 ///
 /// # Errors
-/// As [`super::compile`]; `BTH-O002` when the model changes meanwhile.
-pub fn compile_cached(
+/// As [`crate::pipeline::compile`]; `BTH-O002` when the model changes meanwhile.
+pub fn compile(
     source: &Path,
     options: &Options,
     cache: &Cache<'_>,
@@ -78,16 +75,19 @@ pub fn compile_cached(
 ) -> Result<Outcome<Report>> {
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
-    let outcome = through(cache, key.as_ref(), needed, monitor, || {
-        let (compiled, report) = compile_model(source, &digest, options, cache, monitor, clock)?;
+    let model = Model { path: source, digest: &digest };
+    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
+        let stages = &mut CachedStages::of_model(cache);
+        let (compiled, report) = compile_model(&model, options, stages, clock, monitor)?;
         Ok((compiled.bytes.into(), report, true))
     })?;
-    let file = super::FileReport::deserialize(&outcome.report["file"]).ok();
-    say(file.and_then(|file| over(&file, options)), monitor);
+    if let Ok(file) = FileReport::deserialize(&outcome.report["file"]) {
+        warn_over_limit(&file, options, monitor);
+    }
     Ok(outcome)
 }
 
-/// Hashes a model; its key, if it may be kept.
+/// Hashes a model. With its key, if the compiled file may be kept.
 fn identify(
     source: &Path,
     options: &Options,
@@ -97,18 +97,22 @@ fn identify(
 ) -> Result<(SourceDigest, Option<Key>)> {
     // Starting the worker takes as long as hashing a small model.
     let (digest, tetgen) = std::thread::scope(|scope| {
-        let tetgen = scope.spawn(|| tetgen(options, cache, monitor));
+        let tetgen = scope.spawn(|| tetgen_in_keys(options, cache, monitor));
         let digest = clock.time("hash", || SourceDigest::of(source));
         (digest, tetgen.join())
     });
     let digest = digest?;
     let tetgen = tetgen.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-    let key = tetgen.map(|tetgen| cached::file(&digest, source, options, &tetgen));
+    let key = tetgen.map(|tetgen| keys::file(&digest, source, options, &tetgen));
     Ok((digest, key))
 }
 
-/// The tetrahedralizer as it stands in keys, if one is needed; `None` when nothing may be kept.
-pub(crate) fn tetgen(options: &Options, cache: &Cache<'_>, monitor: &dyn Monitor) -> Result<Option<String>> {
+/// The name of the tetrahedralizer in keys, empty if none is needed; `None` when nothing may be kept.
+pub(crate) fn tetgen_in_keys(
+    options: &Options,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Option<String>> {
     if cache.store().is_none() || options.tets.planted.is_some() {
         return Ok(None);
     }
@@ -118,31 +122,20 @@ pub(crate) fn tetgen(options: &Options, cache: &Cache<'_>, monitor: &dyn Monitor
     }
 }
 
-/// What a key stands for: from the cache if it is there, else built, by one process if others want the same. `build` also
-/// says whether the bytes are to be kept.
-pub(crate) fn through<R: serde::Serialize>(
+/// The file of a key: from the cache if it is there, else built, by one process if several want the same. `build` also
+/// returns whether the bytes are to be kept.
+pub(crate) fn compile_or_fetch<R: Serialize>(
     cache: &Cache<'_>,
     key: Option<&Key>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
     build: impl FnOnce() -> Result<(Content, R, bool)>,
 ) -> Result<Outcome<R>> {
-    let _working = match key {
-        Some(key) => {
-            if let Some(found) = kept(cache, key, needed, monitor) {
-                return Ok(found);
-            }
-            let lock = cache.work(key, monitor)?;
-            if lock.as_ref().is_some_and(|lock| lock.waited)
-                && let Some(found) = kept(cache, key, needed, monitor)
-            {
-                return Ok(found);
-            }
-            cache.miss(key, "");
-            lock
-        }
-        None => None,
-    };
+    let fetched = || key.and_then(|key| fetch(cache, key, needed, monitor));
+    let (found, _working) = cache.find_or_lock((key, ""), monitor, fetched)?;
+    if let Some(found) = found {
+        return Ok(found);
+    }
     let (content, built, keep) = build()?;
     let report = serde_json::to_value(&built).map_err(|e| Error::Internal {
         code: "BTH-X081",
@@ -165,7 +158,8 @@ pub(crate) fn joined(content: &Content) -> Result<Cow<'_, [u8]>> {
     })
 }
 
-fn kept<R>(
+/// The file of a key, if the cache has it.
+fn fetch<R>(
     cache: &Cache<'_>,
     key: &Key,
     needed: &dyn Fn(&Record) -> bool,

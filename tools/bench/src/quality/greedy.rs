@@ -1,26 +1,27 @@
-//! The wide tree as most builders make it, to compare with: from the top, the child of the largest area is opened
+//! The wide tree as most builders choose it, for comparison: from the top, the child of the largest area is opened
 //! while there is room ("Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays", Dammertz,
 //! Hanika and Keller 2008); leaves are as large as they can be.
 
-use super::BinaryBvh;
-use super::plan::{Decision, Planner, Role, Vertices};
-use crate::error::Result;
+use bth_compile::Result;
+use bth_compile::bvh::BinaryBvh;
+use bth_compile::comparison::{Decision, Planner, Role, Vertices};
 use bth_format::layout::{INDEXED_LINES, NODE_LINES, WIDTH};
 
-/// Decides for all nodes; returns the cost as [`Planner::run`] does.
-pub(super) fn decide(planner: &Planner<'_>, cut: &[u32], decisions: &mut [Decision]) -> Result<f32> {
+/// Decides for all nodes; also returns the cost of the tree without its tet leaves.
+pub(super) fn decide(planner: &Planner<'_>, cut: &[u32]) -> Result<(Vec<Decision>, f32)> {
+    let mut decisions = vec![Decision::default(); planner.bvh.nodes.len()];
     let fits = fits(planner, cut);
     for &at in cut {
         decisions[at as usize].set_cut();
     }
-    let mut greedy = Greedy { planner, fits: &fits, decisions };
+    let mut greedy = Greedy { planner, fits: &fits, decisions: &mut decisions };
     let cost = if cut.first() == Some(&0) { 0.0 } else { greedy.tree(0)? };
     if planner.below_cut {
         for &at in cut {
             greedy.tree(at)?;
         }
     }
-    Ok(cost)
+    Ok((decisions, cost))
 }
 
 /// Which nodes can be leaves: they have at most 16 vertices and the most triangles, and no cut node below.
@@ -103,7 +104,7 @@ impl Greedy<'_> {
     }
 }
 
-/// Notes how many children lie below a node that has been opened, and returns it; 1 for another.
+/// Sets how many children lie below a node that has been opened, and returns the number; 1 for other nodes.
 fn share(bvh: &BinaryBvh, opened: &[u32], at: u32, decisions: &mut [Decision]) -> usize {
     if !opened.contains(&at) {
         return 1;
@@ -112,4 +113,43 @@ fn share(bvh: &BinaryBvh, opened: &[u32], at: u32, decisions: &mut [Decision]) -
     let all = left + share(bvh, opened, bvh.nodes[at as usize].right, decisions);
     decisions[at as usize].set_share(all, left);
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth_compile::Silent;
+    use bth_compile::bvh::{self, CollapseOptions, Plan};
+    use bth_compile::comparison::collapse_by;
+    use bth_import::Mesh;
+
+    /// A bumpy field of `n` by `n` squares.
+    fn field(n: u32) -> Mesh {
+        let height = |row: u32| (row.wrapping_mul(2_654_435_761) >> 22) as f32 * 0.009;
+        let point = |row: u32| [(row % (n + 1)) as f32, (row / (n + 1)) as f32, height(row)];
+        let positions = (0..(n + 1) * (n + 1)).map(point).collect();
+        let square = |k: u32| {
+            let a = k / n * (n + 1) + k % n;
+            [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
+        };
+        Mesh { positions, triangles: (0..n * n).flat_map(square).collect(), attributes: None }
+    }
+
+    #[test]
+    fn the_greedy_tree_costs_at_least_as_much_as_the_least_one() {
+        let mesh = field(40);
+        let (tree, _) = bvh::build(&mesh, &bvh::Options::default(), &Silent).unwrap();
+        let cut = [tree.nodes[0].right];
+        for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
+            let options =
+                CollapseOptions { plan: Plan { children, triangles }, ..CollapseOptions::default() };
+            for cut in [&cut[..], &[]] {
+                let (_, least) = bvh::collapse(&mesh, &tree, cut, &options, &Silent).unwrap();
+                let (wide, greedy) = collapse_by(&mesh, &tree, cut, &options, &decide, &Silent).unwrap();
+                assert!(least.cost <= greedy.cost * (1.0 + 1e-5), "{children} {triangles}");
+                assert_eq!(wide.triangle_ids.len() as u64, greedy.indexed_triangles + greedy.raw_triangles);
+                assert!(greedy.children <= greedy.nodes * children as u64);
+            }
+        }
+    }
 }

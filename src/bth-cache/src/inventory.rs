@@ -1,18 +1,18 @@
-//! What is in a store: listed, summed, verified, cleared.
+//! The contents of a store: list, sums, verification, removal.
 
 use crate::evict::{is_locked, sweep};
 use crate::files::{named, remove};
-use crate::{Digest, Record, Store, Tally};
+use crate::{Digest, Record, Statistics, Store};
 use serde::Serialize;
 use std::collections::{BTreeMap, HashSet};
 use std::time::SystemTime;
 
-/// A record, and its content's state.
+/// A record and the state of its content.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
     /// Hash of the key.
     pub id: Digest,
-    /// The record, without the report.
+    /// Stage of the key.
     pub stage: String,
     /// Names and values of the key.
     pub components: Vec<(String, String)>,
@@ -26,7 +26,7 @@ pub struct Entry {
 
 /// Sums over a store.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Survey {
+pub struct Inventory {
     /// Folder of the store.
     pub folder: String,
     /// Records by stage.
@@ -37,13 +37,14 @@ pub struct Survey {
     pub bytes: u64,
     /// Bytes that are kept.
     pub cap: u64,
-    /// What happened so far.
-    pub tally: Tally,
+    /// Hits, misses and evictions so far.
+    #[serde(rename = "tally")]
+    pub statistics: Statistics,
 }
 
-/// What a verification found.
+/// Findings of a verification.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Verdict {
+pub struct Verification {
     /// Records that were checked.
     pub records: u64,
     /// Contents that were checked.
@@ -52,7 +53,7 @@ pub struct Verdict {
     pub bytes: u64,
     /// Damaged records and contents, which were removed.
     pub damaged: Vec<String>,
-    /// What killed processes left, which was removed.
+    /// Files left by killed processes, which were removed.
     pub leftovers: u64,
 }
 
@@ -79,34 +80,35 @@ impl Store {
         entries
     }
 
-    /// Sums.
-    pub fn survey(&self) -> Survey {
-        let mut survey = Survey {
+    /// Sums over the store.
+    pub fn inventory(&self) -> Inventory {
+        let mut inventory = Inventory {
             folder: self.folder().display().to_string(),
             cap: self.cap,
-            tally: self.tally(),
-            ..Survey::default()
+            statistics: self.statistics(),
+            ..Inventory::default()
         };
-        self.list().into_iter().for_each(|e| *survey.records.entry(e.stage).or_default() += 1);
+        self.list().into_iter().for_each(|e| *inventory.records.entry(e.stage).or_default() += 1);
         let blobs = self.files.below("blobs");
-        survey.contents = blobs.len() as u64;
+        inventory.contents = blobs.len() as u64;
         let all =
             blobs.iter().chain(&self.files.below("keys")).map(|e| e.metadata().map_or(0, |m| m.len())).sum();
-        survey.bytes = all;
-        survey
+        inventory.bytes = all;
+        inventory
     }
 
-    /// Reads everything; what is damaged or was left by killed processes is removed. Stops early when `go_on` says so.
-    pub fn verify(&self, go_on: &dyn Fn(u64) -> bool) -> Verdict {
-        let mut verdict = Verdict { leftovers: sweep(&self.files), ..Verdict::default() };
+    /// Reads everything, and removes damaged entries and files left by killed processes. Stops early when `go_on`, which gets
+    /// the bytes read, returns false.
+    pub fn verify(&self, go_on: &dyn Fn(u64) -> bool) -> Verification {
+        let mut found = Verification { leftovers: sweep(&self.files), ..Verification::default() };
         for entry in self.files.below("keys") {
             let (path, id) = (entry.path(), named(&entry.path()));
             // It may have been evicted meanwhile.
             let Ok(text) = std::fs::read(&path) else { continue };
-            verdict.records += 1;
-            verdict.bytes += text.len() as u64;
+            found.records += 1;
+            found.bytes += text.len() as u64;
             if id.is_none_or(|id| Record::from_text(&text, &id).is_err()) && remove(&path) {
-                verdict.damaged.push(path.display().to_string());
+                found.damaged.push(path.display().to_string());
             }
         }
         for entry in self.files.below("blobs") {
@@ -114,20 +116,20 @@ impl Store {
             let Ok((digest, bytes)) = std::fs::File::open(&path).and_then(Digest::of_reader) else {
                 continue;
             };
-            verdict.contents += 1;
-            verdict.bytes += bytes;
+            found.contents += 1;
+            found.bytes += bytes;
             if named(&path) != Some(digest) && remove(&path) {
-                verdict.damaged.push(path.display().to_string());
+                found.damaged.push(path.display().to_string());
             }
             if !go_on(bytes) {
                 break;
             }
         }
-        for path in &verdict.damaged {
+        for path in &found.damaged {
             self.damaged(path, "found by verification");
         }
         self.flush();
-        verdict
+        found
     }
 
     /// Removes everything but what is in use; how many contents were removed, and how many not.
@@ -153,7 +155,7 @@ impl Store {
             remove(&entry.path());
         });
         sweep(&self.files);
-        remove(&self.files.tally());
+        remove(&self.files.statistics());
         (removed, in_use)
     }
 }

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::io::Read;
 
-/// Bytes beyond which several threads hash together.
+/// Inputs of at least this many bytes are hashed by several threads.
 const PARALLEL: usize = 1 << 20;
-/// Bytes that there is room for at first: many files have fewer.
+/// Initial capacity of the read buffer; many files are smaller.
 const FIRST: usize = 1 << 16;
 
 /// A BLAKE3 hash.

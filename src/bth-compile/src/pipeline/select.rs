@@ -1,22 +1,23 @@
-//! What differs between the structures: which nodes to tetrahedralize.
+//! Selection of the nodes to tetrahedralize, by structure: none, those that pay, or the root.
 
+use super::limit;
+use super::object::TracedMesh;
 use super::{Options, Structure};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
 use crate::{bvh, costs, marks, tets};
-use bth_import as mesh;
+use bth_import::Mesh;
 use std::path::Path;
 
 /// The nodes to tetrahedralize, in ascending order.
 pub(super) fn choose(
     source: &Path,
-    mesh: &mesh::Mesh,
-    tree: &bvh::BinaryBvh,
+    traced: &TracedMesh,
     marks: &marks::Marks,
     options: &Options,
-    storage: costs::Storage,
     monitor: &dyn Monitor,
 ) -> Result<(costs::Choice, Option<costs::Report>)> {
+    let TracedMesh { mesh, tree, .. } = traced;
     match (options.structure, marks.suitable.first()) {
         (Structure::Bvh, _) | (Structure::Tets, None) => Ok((costs::Choice::default(), None)),
         (Structure::Tets, Some(true)) => Ok((costs::Choice { chosen: vec![0], verdicts: Vec::new() }, None)),
@@ -35,34 +36,32 @@ pub(super) fn choose(
             ))
         }
         (Structure::Bth, _) => {
+            let storage = limit::storage_of(traced.by_ref(), options, monitor)?;
             let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, storage, monitor)?;
             Ok((choice, Some(report)))
         }
     }
 }
 
-/// Tetrahedralizations by their node.
-type Built = Vec<(u32, tets::TetMesh)>;
-
-/// What stays of the tetrahedralizations; a whole one that was asked for always does.
+/// The tetrahedralizations that save time according to sample rays; a whole one that was asked for always stays.
 pub(super) fn probe(
-    mesh: &mesh::Mesh,
+    mesh: &Mesh,
     tree: &bvh::BinaryBvh,
-    built: Built,
+    built: Vec<tets::Leaf>,
     options: &Options,
     monitor: &dyn Monitor,
-) -> Result<(Built, Option<costs::ProbeReport>)> {
+) -> Result<(Vec<tets::Leaf>, Option<costs::ProbeReport>)> {
     match options.structure {
         Structure::Bth => costs::probe(mesh, tree, built, &options.costs, options.storage(), monitor),
         Structure::Bvh | Structure::Tets => Ok((built, None)),
     }
 }
 
-/// Fails when a whole tetrahedralization was asked for and did not come about.
+/// Fails when a whole tetrahedralization was asked for and failed.
 pub(super) fn check_built(
     source: &Path,
     tree: &bvh::BinaryBvh,
-    built: &[(u32, tets::TetMesh)],
+    built: &[tets::Leaf],
     options: &Options,
 ) -> Result<()> {
     let whole = matches!(built, [(0, _)]);

@@ -1,30 +1,30 @@
-//! An object of a scene as it goes into the file: where its sections are.
+//! Where the sections of a scene's objects are, before they go into the file.
 
-use super::outline::Hash;
+use super::file_index::Hash;
 use super::previous::Previous;
 use crate::error::Result;
 use crate::tets;
-use crate::write::{Bytes, FileBuilder, Known};
+use crate::write::{Bytes, FileBuilder, SectionHead};
 use bth_format::layout::{self, SectionEntry, kind};
 use std::sync::Arc;
 use zerocopy::FromBytes;
 
 /// The sections of an object, every index of which has been checked.
-pub(super) enum Stored {
-    /// In a file that was read.
-    Read {
+pub(super) enum ObjectSections {
+    /// In a file in memory.
+    InFile {
         file: Arc<bth_format::File>,
         object: u32,
-        /// What is known of it, unless it was copied from a file of the user: then the hashes of the sections are not known to
-        /// be right, either.
+        /// Hash by which equal objects are found and status of the worker. Absent for objects copied from compiled files:
+        /// those are untrusted, so the hashes of their sections are computed again.
         made: Option<(blake3::Hash, Option<tets::WorkerStatus>)>,
     },
-    /// In the file that was there.
-    Old { file: Arc<Previous>, object: u32 },
+    /// In the previous file.
+    InPrevious { file: Arc<Previous>, object: u32 },
 }
 
-impl Stored {
-    /// Its sections in a file that was read; kinds that we do not know may mean what we would break.
+impl ObjectSections {
+    /// Its sections in a file in memory. Unknown kinds are left out: their meaning could depend on what changes.
     fn sections(
         file: &bth_format::File,
         object: u32,
@@ -36,19 +36,24 @@ impl Stored {
     /// Adds its sections.
     pub(super) fn write(&self, number: u32, builder: &mut FileBuilder<'_>) -> Result<()> {
         match self {
-            Self::Read { file, object, made } => {
+            Self::InFile { file, object, made } => {
                 for section in Self::sections(file, *object) {
                     let e = section.entry;
                     let hash = if made.is_some() { e.hash } else { bth_format::file::hash128(section.bytes) };
-                    let known = Known { kind: e.kind, object: number, stride: e.stride, hash };
+                    let head = SectionHead { kind: e.kind, object: number, stride: e.stride, hash };
                     let range = e.offset as usize..(e.offset + e.length) as usize;
-                    builder.known_section(known, self.coordinates(e.kind), Bytes::In(file.clone(), range))?;
+                    builder.hashed_section(
+                        head,
+                        self.coordinates(e.kind),
+                        Bytes::InFile(file.clone(), range),
+                    )?;
                 }
             }
-            Self::Old { file, object } => {
-                for row in file.outline.sections_of(*object) {
-                    let known = Known { kind: row.kind, object: number, stride: row.stride, hash: row.hash };
-                    builder.known_section(known, self.coordinates(row.kind), file.bytes(row))?;
+            Self::InPrevious { file, object } => {
+                for row in file.index.sections_of(*object) {
+                    let head =
+                        SectionHead { kind: row.kind, object: number, stride: row.stride, hash: row.hash };
+                    builder.hashed_section(head, self.coordinates(row.kind), file.bytes(row))?;
                 }
             }
         }
@@ -58,10 +63,10 @@ impl Stored {
     /// Its OBJECT row.
     pub(super) fn row(&self) -> Option<layout::Object> {
         match self {
-            Self::Read { file, object, .. } => {
+            Self::InFile { file, object, .. } => {
                 layout::Object::read_from_bytes(file.section(*object, kind::OBJECT)?.bytes).ok()
             }
-            Self::Old { file, object } => Some(file.outline.objects[*object as usize].object),
+            Self::InPrevious { file, object } => Some(file.index.objects[*object as usize].object),
         }
     }
 
@@ -69,12 +74,12 @@ impl Stored {
         (kind == kind::OBJECT).then(|| self.row().map(|row| row.coordinates)).flatten()
     }
 
-    /// What makes it equal to others, and what became of the worker.
+    /// Hash by which equal objects are found, and the status of the worker.
     pub(super) fn made(&self) -> Option<(Hash, &Option<tets::WorkerStatus>)> {
         match self {
-            Self::Read { made, .. } => made.as_ref().map(|(content, worker)| (*content.as_bytes(), worker)),
-            Self::Old { file, object } => {
-                Some((file.outline.objects[*object as usize].content, file.outline.worker_of(*object)))
+            Self::InFile { made, .. } => made.as_ref().map(|(content, worker)| (*content.as_bytes(), worker)),
+            Self::InPrevious { file, object } => {
+                Some((file.index.objects[*object as usize].content, file.index.worker_of(*object)))
             }
         }
     }
@@ -83,11 +88,11 @@ impl Stored {
     pub(super) fn resident_bytes(&self) -> u64 {
         let resident = |kind: u32, length: u64| if kind <= kind::TRIANGLE_FACES { length } else { 0 };
         match self {
-            Self::Read { file, object, .. } => {
+            Self::InFile { file, object, .. } => {
                 Self::sections(file, *object).map(|s| resident(s.entry.kind, s.entry.length)).sum()
             }
-            Self::Old { file, object } => {
-                file.outline.sections_of(*object).iter().map(|s| resident(s.kind, s.length)).sum()
+            Self::InPrevious { file, object } => {
+                file.index.sections_of(*object).iter().map(|s| resident(s.kind, s.length)).sum()
             }
         }
     }

@@ -1,16 +1,55 @@
-//! Results of the stages as rows, and what must hold of them when they come back.
+//! Results of the stages as bytes, and the checks on bytes that come back.
 
-use super::rows::{Parts, Rows};
-use super::{Stored, keys};
+use super::rows::{HashedRows, RowReader, RowWriter};
 use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
-use bth_cache::Digest;
+use bth_files::Digest;
 use bth_import::{self as mesh, Attributes, Mesh};
 use serde::{Deserialize, Serialize};
 
-/// What is known of a mesh without having it.
+/// A result that can be kept.
+pub(crate) trait Codec: Sized {
+    /// Writes the rows of the result.
+    fn write(&self, to: &mut RowWriter);
+    /// The result from its rows; `None` when they are not valid.
+    fn read(from: &mut RowReader<'_>) -> Option<Self>;
+}
+
+/// The bytes of a result.
+pub(crate) fn encode<T: Codec>(value: &T) -> Vec<u8> {
+    let mut rows = RowWriter::default();
+    value.write(&mut rows);
+    rows.finish()
+}
+
+/// A result from its bytes; `None` unless they are valid and all of them are used.
+pub(crate) fn decode<T: Codec>(bytes: &[u8]) -> Option<T> {
+    let mut rows = RowReader::new(bytes);
+    let value = T::read(&mut rows)?;
+    rows.is_empty().then_some(value)
+}
+
+/// Hash of a mesh's positions and triangles, the input of all stages between import and file.
+pub(super) fn geometry(mesh: &Mesh) -> Digest {
+    let mut hasher = HashedRows::new("geometry");
+    hasher.add(&mesh.positions);
+    hasher.add(&mesh.triangles);
+    hasher.finish()
+}
+
+/// Hash of a mesh's shading attributes, if it has any.
+fn shading(mesh: &Mesh) -> Option<Digest> {
+    let attributes = mesh.attributes.as_ref()?;
+    let mut hasher = HashedRows::new("shading");
+    hasher.add(&attributes.corners);
+    hasher.add(&attributes.normals);
+    hasher.add(&attributes.uvs);
+    Some(hasher.finish())
+}
+
+/// Report and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct MeshFacts {
+pub(crate) struct MeshSummary {
     /// The import's report.
     pub(crate) report: mesh::Report,
     /// Hash of positions and triangles.
@@ -19,16 +58,16 @@ pub(crate) struct MeshFacts {
     pub(crate) shading: Option<Digest>,
 }
 
-impl MeshFacts {
-    /// A mesh with its facts.
+impl MeshSummary {
+    /// A mesh with its summary.
     pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
-        let facts = Self { report, geometry: keys::geometry(&mesh), shading: keys::shading(&mesh) };
-        (mesh, facts)
+        let summary = Self { report, geometry: geometry(&mesh), shading: shading(&mesh) };
+        (mesh, summary)
     }
 }
 
-impl Stored for Mesh {
-    fn rows(&self, to: &mut Rows) {
+impl Codec for Mesh {
+    fn write(&self, to: &mut RowWriter) {
         to.add(&self.positions);
         to.add(&self.triangles);
         to.add(&[u8::from(self.attributes.is_some())]);
@@ -39,7 +78,7 @@ impl Stored for Mesh {
         }
     }
 
-    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let (positions, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>) = (from.take()?, from.take()?);
         let attributes = match from.one::<u8>()? {
             0 => None,
@@ -56,12 +95,12 @@ impl Stored for Mesh {
     }
 }
 
-impl Stored for Marks {
-    fn rows(&self, to: &mut Rows) {
+impl Codec for Marks {
+    fn write(&self, to: &mut RowWriter) {
         to.add(&self.suitable.iter().map(|s| u8::from(*s)).collect::<Vec<_>>());
     }
 
-    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let suitable: Vec<u8> = from.take()?;
         Some(Marks { suitable: suitable.iter().map(|s| *s != 0).collect() })
     }
@@ -71,10 +110,9 @@ impl Stored for Marks {
 const FACE: u32 = 1 << 31;
 const HULL: u32 = u32::MAX;
 
-/// A tetrahedralization whose faces name triangles by their place among the node's, so that it does not
-/// depend on where in a model the node is.
-impl Stored for TetMesh {
-    fn rows(&self, to: &mut Rows) {
+/// In the cache the faces of a tetrahedralization number triangles within the node.
+impl Codec for TetMesh {
+    fn write(&self, to: &mut RowWriter) {
         let code = |behind: &Behind| match *behind {
             Behind::Tet(tet) => tet,
             Behind::Face(face) => FACE | face,
@@ -89,7 +127,7 @@ impl Stored for TetMesh {
         to.add(&[self.steiner_points]);
     }
 
-    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let bounds: Vec<[f32; 3]> = from.take()?;
         let [lower, upper] = *bounds.as_slice() else { return None };
         let (vertices, tets): (Vec<[f32; 3]>, Vec<[u32; 4]>) = (from.take()?, from.take()?);
@@ -117,7 +155,6 @@ impl Stored for TetMesh {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{decode, encode};
     use super::*;
 
     #[test]

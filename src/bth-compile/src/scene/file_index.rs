@@ -1,22 +1,22 @@
-//! What is in the file of a scene, and what each object of it was made from: so that the next compilation can take from it
-//! what has not changed.
+//! The index of a scene file: its objects, their sections and what each was made from. With it the next compilation copies
+//! from the file what has not changed.
 
-use super::objects::ObjectReport;
-use crate::cached::{Parts, Rows, Stored};
+use super::report::ObjectReport;
+use crate::cached::{Codec, RowReader, RowWriter};
 use crate::tets::WorkerStatus;
 use bth_format::layout as on_disk;
 use bth_format::layout::ALIGNMENT;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
-/// A hash, of what makes objects equal or of what a part of a source is.
+/// BLAKE3 of an object's content or of what identifies a part of a source.
 pub(super) type Hash = [u8; 32];
 
 /// An object of the file.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
 pub(super) struct ObjectRow {
-    /// What makes it equal to others.
+    /// Hash by which equal objects are found.
     pub(super) content: Hash,
     pub(super) triangles: u64,
     pub(super) degenerate: u64,
@@ -24,7 +24,7 @@ pub(super) struct ObjectRow {
     pub(super) tet_triangles: u64,
     /// Its OBJECT row.
     pub(super) object: on_disk::Object,
-    /// Its sections: rows of the outline.
+    /// Its sections: rows of the index.
     pub(super) first: u32,
     pub(super) sections: u32,
     /// Row of the workers.
@@ -48,7 +48,7 @@ pub(super) struct SectionRow {
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
 pub(super) struct PartRow {
-    /// What it is.
+    /// Hash that identifies the part.
     pub(super) part: Hash,
     /// Row of the objects.
     pub(super) object: u32,
@@ -56,23 +56,23 @@ pub(super) struct PartRow {
     pub(super) format: u32,
 }
 
-/// What is in the file of a scene.
+/// The index of a scene file.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Outline {
+pub(super) struct FileIndex {
     pub(super) objects: Vec<ObjectRow>,
     pub(super) sections: Vec<SectionRow>,
     pub(super) parts: Vec<PartRow>,
     /// Formats of sources.
     pub(super) formats: Vec<String>,
-    /// What became of the worker, for the objects that needed one.
+    /// Status of the worker, for the objects that needed one.
     pub(super) workers: Vec<Option<WorkerStatus>>,
     by_content: HashMap<Hash, u32>,
     by_part: HashMap<Hash, u32>,
 }
 
-impl Outline {
-    /// Adds a word to a list unless it is there; its row.
-    pub(super) fn word<T: PartialEq + Clone>(words: &mut Vec<T>, word: &T) -> u32 {
+impl FileIndex {
+    /// The row of a word in a list, to which it is added if it is not there.
+    pub(super) fn row_of<T: PartialEq + Clone>(words: &mut Vec<T>, word: &T) -> u32 {
         let there = words.iter().position(|known| known == word);
         there.unwrap_or_else(|| {
             words.push(word.clone());
@@ -80,12 +80,12 @@ impl Outline {
         }) as u32
     }
 
-    /// The object that is equal to others of this content.
+    /// The object of this content.
     pub(super) fn object_of(&self, content: &Hash) -> Option<u32> {
         self.by_content.get(content).copied()
     }
 
-    /// What became of a part of a source.
+    /// The row of a part of a source.
     pub(super) fn part(&self, part: &Hash) -> Option<&PartRow> {
         self.parts.get(*self.by_part.get(part)? as usize)
     }
@@ -96,12 +96,12 @@ impl Outline {
         &self.sections[row.first as usize..][..row.sections as usize]
     }
 
-    /// What became of the worker for an object.
+    /// Status of the worker for an object.
     pub(super) fn worker_of(&self, object: u32) -> &Option<WorkerStatus> {
         &self.workers[self.objects[object as usize].worker as usize]
     }
 
-    /// What is said of an object.
+    /// The report on an object.
     pub(super) fn report_of(&self, object: u32) -> ObjectReport {
         let row = &self.objects[object as usize];
         ObjectReport {
@@ -113,8 +113,8 @@ impl Outline {
         }
     }
 
-    /// Whether all rows and places are there, each object's sections one behind the other.
-    fn holds(&self) -> bool {
+    /// Whether all rows are in range and each object's sections follow each other.
+    fn is_valid(&self) -> bool {
         let sections = |row: &ObjectRow| {
             let end = row.first.checked_add(row.sections)?;
             let sections = self.sections.get(row.first as usize..end as usize)?;
@@ -134,8 +134,8 @@ impl Outline {
     }
 }
 
-impl Stored for Outline {
-    fn rows(&self, to: &mut Rows) {
+impl Codec for FileIndex {
+    fn write(&self, to: &mut RowWriter) {
         to.add(&self.objects);
         to.add(&self.sections);
         to.add(&self.parts);
@@ -143,15 +143,15 @@ impl Stored for Outline {
         to.add(&serde_json::to_vec(&(&self.formats, &self.workers)).unwrap_or_default());
     }
 
-    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let (objects, sections, parts) = (from.take()?, from.take()?, from.take()?);
         let words: Vec<u8> = from.take()?;
         let (formats, workers) = serde_json::from_slice(&words).ok()?;
-        let mut outline = Self { objects, sections, parts, formats, workers, ..Self::default() };
+        let mut index = Self { objects, sections, parts, formats, workers, ..Self::default() };
         let numbered = |hashes: &mut dyn Iterator<Item = Hash>| hashes.zip(0..).collect();
-        outline.by_content = numbered(&mut outline.objects.iter().map(|row| row.content));
-        outline.by_part = numbered(&mut outline.parts.iter().map(|row| row.part));
-        outline.holds().then_some(outline)
+        index.by_content = numbered(&mut index.objects.iter().map(|row| row.content));
+        index.by_part = numbered(&mut index.parts.iter().map(|row| row.part));
+        index.is_valid().then_some(index)
     }
 }
 
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
     use crate::cached::{decode, encode};
 
-    fn outline() -> Outline {
+    fn index() -> FileIndex {
         let section = |kind, offset, length| SectionRow { kind, stride: 4, offset, length, hash: [9; 16] };
         let object = on_disk::Object::read_from_bytes(&[0; size_of::<on_disk::Object>()]).unwrap();
         let row = ObjectRow {
@@ -175,19 +175,19 @@ mod tests {
             worker: 0,
             reserved: 0,
         };
-        Outline {
+        FileIndex {
             objects: vec![row],
             sections: vec![section(1, 0, 0), section(1, 640, 100), section(2, 768, 8)],
             parts: vec![PartRow { part: [2; 32], object: 0, format: 0 }],
             formats: vec!["obj".into()],
             workers: vec![None],
-            ..Outline::default()
+            ..FileIndex::default()
         }
     }
 
     #[test]
-    fn an_outline_comes_back_and_is_searched() {
-        let back: Outline = decode(&encode(&outline())).unwrap();
+    fn an_index_comes_back_and_is_searched() {
+        let back: FileIndex = decode(&encode(&index())).unwrap();
         assert_eq!((back.object_of(&[1; 32]), back.object_of(&[2; 32])), (Some(0), None));
         assert_eq!(back.part(&[2; 32]).map(|part| part.object), Some(0));
         assert!(back.part(&[1; 32]).is_none());
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn rows_out_of_range_and_sections_apart_do_not_come_back() {
-        let changes: [fn(&mut Outline); 7] = [
+        let changes: [fn(&mut FileIndex); 7] = [
             |o| o.objects[0].sections = 3,
             |o| o.objects[0].first = u32::MAX,
             |o| o.objects[0].sections = 0,
@@ -207,9 +207,9 @@ mod tests {
             |o| o.sections[2].offset = 832,
         ];
         for (number, change) in changes.iter().enumerate() {
-            let mut outline = outline();
-            change(&mut outline);
-            assert!(decode::<Outline>(&encode(&outline)).is_none(), "change {number}");
+            let mut index = index();
+            change(&mut index);
+            assert!(decode::<FileIndex>(&encode(&index)).is_none(), "change {number}");
         }
     }
 }

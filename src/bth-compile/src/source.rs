@@ -1,18 +1,25 @@
-//! The files that a model consists of, and what they contain.
+//! The files of a model and the hashes of their contents.
 
 use crate::error::{Error, Result};
-use bth_cache::Digest;
+use bth_files::Digest;
 use bth_import::gltf::external_files;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What a model's files contain.
+/// Hashes of a model's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceDigest {
     /// BLAKE3 of the model's file.
     pub file: Digest,
-    /// BLAKE3 of those that it refers to, in order.
+    /// BLAKE3 of the files that it refers to, in order.
     pub others: Vec<Digest>,
+}
+
+/// A model whose files have been hashed.
+#[derive(Clone, Copy)]
+pub(crate) struct Model<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) digest: &'a SourceDigest,
 }
 
 impl SourceDigest {
@@ -25,7 +32,7 @@ impl SourceDigest {
         Ok(Self { file: digest(path)?, others })
     }
 
-    /// Passes on what was read, if the files still contain what they did when they were hashed.
+    /// Returns `read` if the files still have these hashes: nothing else proves that it was read from the hashed content.
     ///
     /// # Errors
     /// `BTH-O002` when they do not.
@@ -40,14 +47,14 @@ impl SourceDigest {
         })
     }
 
-    /// As it stands in keys.
+    /// The text of all hashes, as cache keys contain it.
     pub(crate) fn text(&self) -> String {
         let all: Vec<String> = std::iter::once(&self.file).chain(&self.others).map(Digest::hex).collect();
         all.join("+")
     }
 }
 
-/// The files of a model: itself, then those that a glTF document refers to. What is no glTF document refers to none.
+/// The files of a model: its own, then those that a glTF document refers to.
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.

@@ -1,11 +1,11 @@
 //! A binary BVH without its boxes, which are those of its triangles: 8 bytes a triangle instead of 80.
 
-use super::Stored;
-use super::rows::{Parts, Rows};
+use super::codec::Codec;
+use super::rows::{RowReader, RowWriter};
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
 
-/// What cannot be told from the mesh.
+/// The part of a BVH that does not follow from the mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Topology {
     /// Triangles left of each inner node, in depth-first order.
@@ -21,7 +21,7 @@ impl Topology {
         Self { left, order: bvh.order.clone() }
     }
 
-    /// The BVH over a mesh; `None` when this is none of that mesh.
+    /// The BVH over a mesh; `None` when the topology does not fit the mesh.
     pub(crate) fn over(self, mesh: &Mesh) -> Option<BinaryBvh> {
         let count = u32::try_from(self.order.len()).ok()?;
         if self.left.len() != self.order.len().saturating_sub(1)
@@ -76,20 +76,20 @@ impl Topology {
     }
 }
 
-impl Stored for Topology {
-    fn rows(&self, to: &mut Rows) {
+impl Codec for Topology {
+    fn write(&self, to: &mut RowWriter) {
         to.add(&self.left);
         to.add(&self.order);
     }
 
-    fn from_rows(from: &mut Parts<'_>) -> Option<Self> {
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
         Some(Self { left: from.take()?, order: from.take()? })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{decode, encode};
+    use super::super::codec::{decode, encode};
     use super::*;
     use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 //!
 //! On Linux the bytes go to a file without a name (`O_TMPFILE`), so a killed program leaves nothing.
 //! The finished file gets a hidden name and is renamed over the target at once. Where nameless files
-//! are not supported, the bytes go to a hidden file in the target's folder; it is removed on failure, and
-//! what a killed program left is removed by the next write to the same target (its lock is free).
+//! are not supported, the bytes go to a hidden file in the target's folder; it is removed on failure. A
+//! file left by a killed program is removed by the next write to the same target, which finds it unlocked.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -11,12 +11,12 @@ use std::io::{BufWriter, Error as IoError, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// End of the names of unfinished files.
-pub(crate) const SUFFIX: &str = ".bth-part";
+pub const SUFFIX: &str = ".bth-part";
 
 /// Writes a file that is whole or absent, replacing one of that name; it is on the disk on return.
 ///
 /// # Errors
-/// What the system or `write` said; the target is then as it was.
+/// Those of the system and of `write`; the target is then as it was.
 pub fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
@@ -28,7 +28,7 @@ pub fn replace(
     })
 }
 
-/// As [`replace`], for who writes in large pieces or lets the system copy.
+/// As [`replace`] without a buffer, for callers that write large pieces or copy from file to file.
 ///
 /// # Errors
 /// As [`replace`].
@@ -69,11 +69,11 @@ pub fn replace_file(
 }
 
 /// Writes a read-only file that is whole or absent, unless there is one of that name already; whether it
-/// was written. It may be lost when the machine stops: who reads it must check it.
+/// was written. It is not flushed to disk and may be lost when the machine stops, so readers must check it.
 ///
 /// # Errors
-/// What the system said.
-pub(crate) fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
+/// Those of the system.
+pub fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<bool> {
     let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
         return Err(IoError::new(ErrorKind::InvalidInput, "not the name of a file"));
     };
@@ -165,7 +165,7 @@ fn unused_name<T>(
     Err(IoError::new(ErrorKind::AlreadyExists, "no unused name for the unfinished file"))
 }
 
-/// Removes unfinished files of this target that nobody has locked: their programs are gone.
+/// Removes unfinished files of this target that are not locked: the programs that wrote them have ended.
 fn remove_stale(folder: &Path, prefix: &OsString) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

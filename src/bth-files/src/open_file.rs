@@ -1,4 +1,4 @@
-//! A file outside of the store that is read while others may change it.
+//! A file that is read while other processes may change it.
 
 use std::fs::{File, Metadata};
 use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
@@ -6,29 +6,34 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// What file systems that share blocks between files share: nothing smaller.
+/// The unit in which file systems share blocks between files, in bytes.
 const BLOCK: u64 = 4096;
 
-/// Which file, and when it was last changed. The system sets the time of change on every change of content, name or
-/// attributes, and nobody else can.
+/// Identity of a file and the time of its last change. The system sets that time on every change of content, name or
+/// attributes, and no program can set it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct State {
-    pub(crate) device: u64,
-    pub(crate) inode: u64,
-    pub(crate) bytes: u64,
-    pub(crate) changed: (i64, i64),
+pub struct FileState {
+    /// Device that holds the file; 0 where the system does not tell.
+    pub device: u64,
+    /// Number of the file on its device; 0 where the system does not tell.
+    pub inode: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+    /// Time of the last change: seconds since 1970 and nanoseconds.
+    pub changed: (i64, i64),
 }
 
-impl State {
+impl FileState {
+    /// The state of a file.
     #[cfg(unix)]
-    pub(crate) fn of(m: &Metadata) -> Self {
+    pub fn of(m: &Metadata) -> Self {
         use std::os::unix::fs::MetadataExt;
         Self { device: m.dev(), inode: m.ino(), bytes: m.len(), changed: (m.ctime(), m.ctime_nsec()) }
     }
 
-    /// Elsewhere nothing is as good as the time of change.
+    /// The state of a file. Systems other than Unix have no time of change, so the time of modification stands in for it.
     #[cfg(not(unix))]
-    pub(crate) fn of(m: &Metadata) -> Self {
+    pub fn of(m: &Metadata) -> Self {
         let since =
             m.modified().ok().and_then(|t| t.duration_since(std::time::UNIX_EPOCH).ok()).unwrap_or_default();
         Self {
@@ -40,26 +45,26 @@ impl State {
     }
 }
 
-/// An open file, and how it was when it was opened.
+/// An open file with its state at the time of opening.
 #[derive(Debug)]
-pub struct Opened {
-    /// Its place for reading is that of whoever has the lock.
+pub struct OpenFile {
+    /// The read position is valid only while the lock is held.
     file: Mutex<File>,
-    state: State,
+    state: FileState,
 }
 
-impl Opened {
+impl OpenFile {
     /// Opens a file for reading.
     ///
     /// # Errors
-    /// What the system said; when it is no regular file.
+    /// Those of the system; `InvalidInput` for anything but a regular file.
     pub fn open(path: &Path) -> Result<Self> {
         // Before it is opened: pipes would wait for a writer.
         if !std::fs::metadata(path)?.is_file() {
             return Err(Error::new(ErrorKind::InvalidInput, "not a regular file"));
         }
         let file = File::open(path)?;
-        let state = State::of(&file.metadata()?);
+        let state = FileState::of(&file.metadata()?);
         Ok(Self { file: Mutex::new(file), state })
     }
 
@@ -68,27 +73,27 @@ impl Opened {
         self.state.bytes
     }
 
-    /// Whether nobody has changed it since.
+    /// Whether the file has not changed since it was opened.
     pub fn is_unchanged(&self) -> bool {
         let file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.metadata().is_ok_and(|m| State::of(&m) == self.state)
+        file.metadata().is_ok_and(|m| FileState::of(&m) == self.state)
     }
 
-    /// Reads bytes from a place on.
+    /// Fills `bytes` from offset `at`.
     ///
     /// # Errors
-    /// What the system said; when there are fewer.
+    /// Those of the system; `UnexpectedEof` when the file ends before.
     pub fn read_at(&self, at: u64, bytes: &mut [u8]) -> Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.seek(SeekFrom::Start(at))?;
         file.read_exact(bytes)
     }
 
-    /// Writes a part of it to `out`, where `out_at` bytes have been written before. From file to file the system copies, and on
-    /// file systems that can it shares the blocks that lie alike in both.
+    /// Writes a range of the file to `out`, in which `out_at` bytes precede it. Between two files the system copies, and file
+    /// systems that support it share the blocks whose offsets are aligned alike.
     ///
     /// # Errors
-    /// What the system said; when there are fewer bytes.
+    /// Those of the system; `UnexpectedEof` when the file ends before.
     pub fn copy_to(&self, part: Range<u64>, out: &mut (impl Write + ?Sized), out_at: u64) -> Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         file.seek(SeekFrom::Start(part.start))?;
@@ -107,7 +112,8 @@ impl Opened {
         Ok(())
     }
 
-    pub(crate) fn state(&self) -> State {
+    /// The state of the file when it was opened.
+    pub fn state(&self) -> FileState {
         self.state
     }
 }
@@ -122,7 +128,7 @@ mod tests {
         let (from, to) = (folder.path().join("from"), folder.path().join("to"));
         let bytes: Vec<u8> = (0..50_000u32).map(|i| (i * 31 % 251) as u8).collect();
         std::fs::write(&from, &bytes).unwrap();
-        let opened = Opened::open(&from).unwrap();
+        let opened = OpenFile::open(&from).unwrap();
         assert_eq!(opened.length(), 50_000);
         for part in [0..50_000, 4096..8192, 100..100, 100..200, 4000..20_001, 8191..49_999] {
             for before in [0usize, 100, 4000, 4096] {
@@ -151,7 +157,7 @@ mod tests {
     #[test]
     fn folders_and_what_is_not_there_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(Opened::open(folder.path()).is_err());
-        assert!(Opened::open(&folder.path().join("missing")).is_err());
+        assert!(OpenFile::open(folder.path()).is_err());
+        assert!(OpenFile::open(&folder.path().join("missing")).is_err());
     }
 }

@@ -6,16 +6,16 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, Write};
 
-/// Bytes of lines beyond which they are summed into one.
+/// A longer file is summed into one line, in bytes.
 const LONG: u64 = 64 << 10;
 
-/// What happened in a store. Counts are only counts: a process that is killed takes its own with it.
+/// Counts of events in a store. A killed process loses its own counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Tally {
-    /// Results that were there, by stage.
+pub struct Statistics {
+    /// Results that the store had, by stage.
     pub hits: BTreeMap<String, u64>,
-    /// Results that were not, by stage and by the component of the key that differed from the source's last
+    /// Results that the store did not have, by stage and by the component of the key that differed from the source's last
     /// key; `new` for sources never seen, `evicted` for keys that had been there.
     pub misses: BTreeMap<String, BTreeMap<String, u64>>,
     /// Hits that the shared store answered.
@@ -32,7 +32,7 @@ pub struct Tally {
     pub damaged: u64,
 }
 
-impl Tally {
+impl Statistics {
     pub(crate) fn hit(&mut self, stage: &str, hits: u64) {
         *self.hits.entry(stage.to_owned()).or_default() += hits;
     }
@@ -45,7 +45,7 @@ impl Tally {
         }
     }
 
-    fn add(&mut self, other: Tally) {
+    fn add(&mut self, other: Statistics) {
         for (stage, count) in other.hits {
             *self.hits.entry(stage).or_default() += count;
         }
@@ -68,7 +68,7 @@ impl Tally {
         if *self == Self::default() {
             return Ok(());
         }
-        let path = files.tally();
+        let path = files.statistics();
         let mut file = File::options().read(true).append(true).create(true).open(path)?;
         // Without locks lines may mix, and mixed lines are left out when they are read.
         let _ = file.lock();
@@ -83,7 +83,7 @@ impl Tally {
 
     /// The counters of the store.
     pub(crate) fn read(files: &Files) -> Self {
-        File::open(files.tally()).and_then(|mut file| Self::sum(&mut file)).unwrap_or_default()
+        File::open(files.statistics()).and_then(|mut file| Self::sum(&mut file)).unwrap_or_default()
     }
 
     fn line(&self) -> std::io::Result<String> {
@@ -109,20 +109,20 @@ mod tests {
     fn counts_add_up_over_processes_and_damaged_lines_are_left_out() {
         let folder = tempfile::tempdir().unwrap();
         let files = Files::open(folder.path()).unwrap();
-        let mut one = Tally { stored: 1, ..Tally::default() };
+        let mut one = Statistics { stored: 1, ..Statistics::default() };
         one.hit("bvh", 1);
         one.miss("tets", &["quality: fast -> best".to_owned(), "source".to_owned()]);
-        let mut expected = Tally::default();
+        let mut expected = Statistics::default();
         for round in 0..1000 {
             one.append(&files).unwrap();
             expected.add(one.clone());
             if round == 10 {
-                let mut file = File::options().append(true).open(files.tally()).unwrap();
+                let mut file = File::options().append(true).open(files.statistics()).unwrap();
                 file.write_all(b"{\"stored\": \n").unwrap();
             }
         }
-        assert_eq!(Tally::read(&files), expected);
+        assert_eq!(Statistics::read(&files), expected);
         assert_eq!(expected.misses["tets"]["quality"], 1000);
-        assert!(std::fs::metadata(files.tally()).unwrap().len() <= LONG + 1000);
+        assert!(std::fs::metadata(files.statistics()).unwrap().len() <= LONG + 1000);
     }
 }

@@ -1,15 +1,15 @@
-//! The parts of a scene, as many at once as there are threads and memory.
+//! Runs the parts of a scene in parallel, limited by threads and memory.
 
-use super::compile::Context;
+use super::context::Context;
 use crate::error::Result;
 use crate::jobs;
 use crate::monitor::Monitor;
 use crate::pipeline::Clock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Does the same with all items, as many at once as there are threads and as `estimate` allows in bytes. The first failure
-/// in the order of the items, if there is one.
-pub(super) fn at_once<J: Send, T: Send>(
+/// Runs `work` on all items in parallel, as many as there are threads and as the `estimate` of their memory in bytes allows.
+/// Fails with the first failure in the order of the items.
+pub(super) fn run_parallel<J: Send, T: Send>(
     items: Vec<J>,
     context: &Context<'_>,
     clock: &mut Clock,
@@ -17,8 +17,8 @@ pub(super) fn at_once<J: Send, T: Send>(
     work: impl Fn(&Context<'_>, &mut Clock, J) -> Result<T> + Sync,
 ) -> Result<Vec<T>> {
     let threads = rayon::current_num_threads().min(items.len());
-    let quiet = Quiet(context.monitor);
-    let context = context.with_monitor(&quiet);
+    let without_stages = WithoutStages(context.monitor);
+    let context = context.with_monitor(&without_stages);
     let failed = AtomicUsize::new(usize::MAX);
     let one = |(place, item): (usize, J)| {
         let mut clock = Clock::default();
@@ -33,7 +33,7 @@ pub(super) fn at_once<J: Send, T: Send>(
     };
     let memory = context.options.objects_memory;
     let items = items.into_iter().enumerate().collect();
-    let within = |worker: &(dyn Fn() + Sync)| match alone(threads) {
+    let within = |worker: &(dyn Fn() + Sync)| match own_pool(threads) {
         Some(pool) => pool.install(worker),
         None => worker(),
     };
@@ -45,18 +45,18 @@ pub(super) fn at_once<J: Send, T: Send>(
     results.collect()
 }
 
-/// A pool of one thread: what runs there takes no other. In the pool of all, an item that waits for another process
-/// could hold up one that it waits for.
-fn alone(threads: usize) -> Option<rayon::ThreadPool> {
+/// A pool of one thread for one item. In the shared pool an item that waits for another process could block the item that
+/// this process waits for.
+fn own_pool(threads: usize) -> Option<rayon::ThreadPool> {
     let pool = || rayon::ThreadPoolBuilder::new().num_threads(1).build();
     // Without one the work goes to the global pool, which only takes more threads.
     (threads > 1).then(pool)?.ok()
 }
 
-/// Watches one of several: shows no stages.
-struct Quiet<'a>(&'a dyn Monitor);
+/// A monitor for one of several items: shows no stages.
+struct WithoutStages<'a>(&'a dyn Monitor);
 
-impl Monitor for Quiet<'_> {
+impl Monitor for WithoutStages<'_> {
     fn cancelled(&self) -> bool {
         self.0.cancelled()
     }

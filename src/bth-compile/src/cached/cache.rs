@@ -1,0 +1,256 @@
+//! Access to the store: lookups, results that are kept, the log of hits and misses.
+
+use super::log::{Log, Miss};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::tets;
+use bth_cache::{Key, Record, Store, WorkLock};
+use bth_files::Digest;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// The cache of a compilation, or none.
+pub struct Cache<'a> {
+    store: Option<&'a Store>,
+    /// Name of the source, under which its last keys are stored to explain misses.
+    subject: String,
+    log: Mutex<Log>,
+    tetgen: OnceLock<Option<String>>,
+}
+
+impl<'a> Cache<'a> {
+    /// Keeps nothing.
+    pub fn none() -> Self {
+        Self { store: None, subject: String::new(), log: Mutex::default(), tetgen: OnceLock::new() }
+    }
+
+    /// Keeps results in a store. `subject` names what is compiled, such as its absolute path: a miss is explained by the last
+    /// key of the same subject; no result depends on it.
+    pub fn new(store: &'a Store, subject: impl Into<String>) -> Self {
+        Self { store: Some(store), subject: subject.into(), ..Self::none() }
+    }
+
+    /// The hits and misses so far.
+    pub fn log(&self) -> Log {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The store.
+    pub fn store(&self) -> Option<&'a Store> {
+        self.store
+    }
+
+    /// The name of the tetrahedralizer in keys. Found out once, since starting the worker takes some milliseconds. `None`
+    /// when the worker fails: then nothing that needs it is kept.
+    pub(crate) fn tetgen(&self, options: &tets::Options, monitor: &dyn Monitor) -> Result<Option<&str>> {
+        if self.tetgen.get().is_none() {
+            let found = tets::version(options, monitor)?;
+            let _ = self.tetgen.set(found);
+        }
+        Ok(self.tetgen.get().and_then(Option::as_deref))
+    }
+
+    /// The record of a key. Not counted as a hit: it may be useless without its content.
+    pub(crate) fn find(&self, key: &Key, monitor: &dyn Monitor) -> Option<Record> {
+        let store = self.store?;
+        let found = store.find(key);
+        pass_notes(store, monitor);
+        found
+    }
+
+    /// What differs from the last key of the same subject.
+    pub(crate) fn reasons(&self, key: &Key, part: &str) -> Vec<String> {
+        self.store.map_or(Vec::new(), |store| store.reasons(key, &self.subject_of(part)))
+    }
+
+    /// The content of a record.
+    pub(crate) fn read(&self, record: &Record, monitor: &dyn Monitor) -> Option<Vec<u8>> {
+        let store = self.store?;
+        let bytes = store.read(record);
+        pass_notes(store, monitor);
+        bytes
+    }
+
+    /// The content of a record as a file, of which nothing but its hash, header and table has been checked.
+    pub(crate) fn open(&self, record: &Record, monitor: &dyn Monitor) -> Option<bth_format::File> {
+        let store = self.store?;
+        let copy = |bytes: &[u8]| bth_format::File::from_bytes(bytes).ok();
+        let file =
+            store.read_as(record, |path| bth_format::File::read(path).ok(), copy, bth_format::File::bytes);
+        pass_notes(store, monitor);
+        file
+    }
+
+    /// Whether the content of a record is there.
+    pub(crate) fn holds(&self, record: &Record) -> bool {
+        self.store.is_some_and(|store| store.holds(record))
+    }
+
+    /// Record and content of a key, counted as hit or miss. `part` tells apart what has the same subject.
+    pub(crate) fn fetch(&self, key: &Key, part: &str, monitor: &dyn Monitor) -> Option<(Record, Vec<u8>)> {
+        let found = self.find(key, monitor).and_then(|record| {
+            let bytes = self.read(&record, monitor)?;
+            Some((record, bytes))
+        });
+        match &found {
+            Some(_) => self.hit(key, part),
+            None => self.miss(key, part),
+        }
+        found
+    }
+
+    /// Keeps a content; a failure is a warning.
+    pub(crate) fn put(
+        &self,
+        key: &Key,
+        part: &str,
+        bytes: &[u8],
+        report: &impl Serialize,
+        monitor: &dyn Monitor,
+    ) -> Option<Record> {
+        let store = self.store?;
+        let report = serde_json::to_value(report).map_err(std::io::Error::from);
+        self.note_put(key, part, report.and_then(|report| store.put(key, bytes, report)), monitor)
+    }
+
+    /// Keeps only the name of a content; see [`Store::put_name`].
+    pub(crate) fn put_name(
+        &self,
+        key: &Key,
+        (blob, bytes): (Digest, u64),
+        report: &serde_json::Value,
+        monitor: &dyn Monitor,
+    ) -> Option<Record> {
+        self.note_put(key, "", self.store?.put_name(key, blob, bytes, report.clone()), monitor)
+    }
+
+    /// Keeps a content that is of use on this machine only and whose misses need no explanation.
+    pub(crate) fn put_here(&self, key: &Key, bytes: &[u8], monitor: &dyn Monitor) {
+        let Some(store) = self.store else { return };
+        self.warn_once(store.put_here(key, bytes, serde_json::Value::Null), monitor);
+    }
+
+    /// Notes the key as the last one of its subject.
+    fn note_put(
+        &self,
+        key: &Key,
+        part: &str,
+        put: std::io::Result<Record>,
+        monitor: &dyn Monitor,
+    ) -> Option<Record> {
+        let store = self.store?;
+        store.note_last(key, &self.subject_of(part));
+        self.warn_once(put, monitor)
+    }
+
+    /// The record; the first failure of a compilation is a warning.
+    fn warn_once(&self, put: std::io::Result<Record>, monitor: &dyn Monitor) -> Option<Record> {
+        let store = self.store?;
+        pass_notes(store, monitor);
+        match put {
+            Ok(record) => Some(record),
+            Err(e) => {
+                let first = !std::mem::replace(&mut self.lock_log().failed, true);
+                if first {
+                    monitor.warn(&format!("cache: {} cannot be written: {e}", store.folder().display()));
+                }
+                None
+            }
+        }
+    }
+
+    /// The lock for building what a key stands for, where the file system has locks.
+    fn work(&self, key: &Key, monitor: &dyn Monitor) -> Result<Option<WorkLock>> {
+        let lock = self.store.and_then(|store| store.work_lock(key, &|| monitor.cancelled()));
+        monitor.check()?;
+        Ok(lock)
+    }
+
+    /// The result of a stage: from the cache if it is there and `decode` accepts it, else built and kept. `part` as in
+    /// [`Cache::fetch`].
+    pub(super) fn get_or_build<T, R: Serialize + DeserializeOwned>(
+        &self,
+        (key, part): (Key, &str),
+        monitor: &dyn Monitor,
+        decode: impl FnOnce(&[u8]) -> Option<T>,
+        encode: impl FnOnce(&T) -> Vec<u8>,
+        build: impl FnOnce() -> Result<(T, R)>,
+    ) -> Result<(T, R)> {
+        if let Some((record, bytes)) = self.fetch(&key, part, monitor)
+            && let Some(value) = decode(&bytes)
+            && let Ok(report) = serde_json::from_value(record.report)
+        {
+            return Ok((value, report));
+        }
+        let (value, report) = build()?;
+        self.put(&key, part, &encode(&value), &report, monitor);
+        Ok((value, report))
+    }
+
+    /// What `fetched` finds for a key, else the lock for building it, if it may be kept. Another process that holds the lock
+    /// is waited for; then it is looked up again.
+    pub(crate) fn find_or_lock<T>(
+        &self,
+        (key, part): (Option<&Key>, &str),
+        monitor: &dyn Monitor,
+        fetched: impl Fn() -> Option<T>,
+    ) -> Result<(Option<T>, Option<WorkLock>)> {
+        let Some(key) = key else { return Ok((None, None)) };
+        if let Some(found) = fetched() {
+            return Ok((Some(found), None));
+        }
+        let lock = self.work(key, monitor)?;
+        if lock.as_ref().is_some_and(|lock| lock.waited)
+            && let Some(found) = fetched()
+        {
+            return Ok((Some(found), lock));
+        }
+        self.miss(key, part);
+        Ok((None, lock))
+    }
+
+    /// Counts a hit.
+    pub(crate) fn hit(&self, key: &Key, part: &str) {
+        if let Some(store) = self.store {
+            // A scene may have thousands of objects: for those only misses are noted.
+            if part.is_empty() {
+                store.note_last(key, &self.subject_of(part));
+            }
+        }
+        self.hits(key.stage(), 1);
+    }
+
+    /// Counts hits of a stage.
+    pub(crate) fn hits(&self, stage: &str, hits: u64) {
+        if let Some(store) = self.store.filter(|_| hits > 0) {
+            store.count_hits(stage, hits);
+            *self.lock_log().hits.entry(stage.to_owned()).or_default() += hits;
+        }
+    }
+
+    /// Counts a miss and logs what differs from the last key.
+    pub(crate) fn miss(&self, key: &Key, part: &str) {
+        if let Some(store) = self.store {
+            let because = store.count_miss(key, &self.subject_of(part));
+            self.lock_log().misses.push(Miss {
+                stage: key.stage().to_owned(),
+                part: part.to_owned(),
+                because,
+            });
+        }
+    }
+
+    fn subject_of(&self, part: &str) -> String {
+        format!("{}#{part}", self.subject)
+    }
+
+    fn lock_log(&self) -> std::sync::MutexGuard<'_, Log> {
+        self.log.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Passes the notes of the store to the monitor.
+fn pass_notes(store: &Store, monitor: &dyn Monitor) {
+    store.take_notes().iter().for_each(|note| monitor.warn(note));
+}

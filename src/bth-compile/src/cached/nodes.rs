@@ -1,0 +1,64 @@
+//! Tetrahedralizations of single nodes from the cache.
+
+use super::{Cache, decode, encode, keys};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh};
+
+/// Takes results of nodes from the cache. A result that does not depend on clocks and machines is kept, failures too.
+pub(super) struct CachedNodes<'a> {
+    pub(super) cache: &'a Cache<'a>,
+    pub(super) monitor: &'a dyn Monitor,
+}
+
+impl NodeRunner for CachedNodes<'_> {
+    fn run(&self, job: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult> {
+        if self.cache.store().is_none() || job.options.planted.is_some() {
+            return build();
+        }
+        // The key has the triangles alone: the box around them follows from the options.
+        let Some(input) = job.input() else { return build() };
+        let key = keys::tets_of_node(&input.vertices, &input.triangles, job.options, job.tetgen);
+        if let Some((record, bytes)) = self.cache.fetch(&key, "", self.monitor)
+            && let Ok(mut report) = serde_json::from_value::<NodeReport>(record.report)
+            && let Some(built) = with_ids_of_mesh(&bytes, &input, report.outcome)
+        {
+            report.node = job.node;
+            return Ok(NodeResult { built, report, no_worker: false, reproducible: true });
+        }
+        let result = build()?;
+        if result.reproducible {
+            let encoded = |mesh| encode(&with_ids_of_node(mesh, &input));
+            let bytes = result.built.as_ref().map_or(Vec::new(), encoded);
+            self.cache.put(&key, "", &bytes, &result.report, self.monitor);
+        }
+        Ok(result)
+    }
+}
+
+/// The tetrahedralization with triangles numbered within the node, so that it does not depend on where in a model the node
+/// is.
+fn with_ids_of_node(mesh: &TetMesh, input: &NodeInput) -> TetMesh {
+    let mut mesh = mesh.clone();
+    for face in &mut mesh.faces {
+        let number = input.ids.binary_search(&face.triangle);
+        face.triangle = number.expect("every face is a triangle of the node") as u32;
+    }
+    mesh
+}
+
+/// The reverse of [`with_ids_of_node`], from bytes. The inner `None` is a failure that was kept, the outer one means damaged
+/// bytes.
+fn with_ids_of_mesh(bytes: &[u8], input: &NodeInput, outcome: Outcome) -> Option<Option<TetMesh>> {
+    if outcome != Outcome::Built {
+        return bytes.is_empty().then_some(None);
+    }
+    let mut mesh: TetMesh = decode(bytes)?;
+    if mesh.faces.len() != input.ids.len() {
+        return None;
+    }
+    for face in &mut mesh.faces {
+        face.triangle = *input.ids.get(face.triangle as usize)?;
+    }
+    Some(Some(mesh))
+}

@@ -1,0 +1,127 @@
+//! The pipeline's stages as a decorator: results come from the cache where it has them.
+
+use super::codec::{self, MeshSummary};
+use super::nodes::CachedNodes;
+use super::topology::Topology;
+use super::{Cache, decode, encode, keys};
+use crate::coordinates::{self, OnGrid};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::pipeline::{Direct, Stages};
+use crate::source::Model;
+use crate::{bvh, marks, tets};
+use bth_files::Digest;
+use bth_import::{self as mesh, Keep, Mesh};
+use std::path::Path;
+
+/// The stages of one object.
+pub(crate) struct CachedStages<'a> {
+    cache: &'a Cache<'a>,
+    /// Which object of the source it is, to explain misses.
+    part: &'a str,
+    /// Hash of the geometry that the next stage reads; hashed when a stage first needs it.
+    geometry: Option<Digest>,
+}
+
+impl<'a> CachedStages<'a> {
+    /// The stages of a model.
+    pub(super) fn of_model(cache: &'a Cache<'a>) -> Self {
+        Self { cache, part: "", geometry: None }
+    }
+
+    /// The stages of an object whose mesh has been imported; `geometry` is the hash of that.
+    pub(crate) fn of_object(cache: &'a Cache<'a>, part: &'a str, geometry: Digest) -> Self {
+        Self { cache, part, geometry: Some(geometry) }
+    }
+}
+
+/// The known hash of a mesh's geometry, else hashes it.
+fn hash_once(known: &mut Option<Digest>, mesh: &Mesh) -> Digest {
+    *known.get_or_insert_with(|| codec::geometry(mesh))
+}
+
+impl Stages for CachedStages<'_> {
+    fn import(
+        &mut self,
+        model: &Model<'_>,
+        keep: Keep,
+        monitor: &dyn Monitor,
+    ) -> Result<(Mesh, mesh::Report)> {
+        if self.cache.store().is_none() {
+            return Direct.import(model, keep, monitor);
+        }
+        let (mesh, summary) = self.cache.get_or_build(
+            (keys::mesh(model.digest, model.path, "flat", keep), ""),
+            monitor,
+            decode,
+            encode,
+            || Ok(MeshSummary::of(Direct.import(model, keep, monitor)?)),
+        )?;
+        self.geometry = Some(summary.geometry);
+        Ok((mesh, summary.report))
+    }
+
+    fn coordinates(
+        &mut self,
+        source: &Path,
+        mesh: Mesh,
+        options: &coordinates::Options,
+    ) -> Result<(Mesh, Option<OnGrid>)> {
+        let (mesh, on_grid) = Direct.coordinates(source, mesh, options)?;
+        if on_grid.is_some() {
+            self.geometry = None;
+        }
+        Ok((mesh, on_grid))
+    }
+
+    fn bvh(
+        &mut self,
+        mesh: &Mesh,
+        options: &bvh::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(bvh::BinaryBvh, bvh::Report)> {
+        if self.cache.store().is_none() {
+            return Direct.bvh(mesh, options, monitor);
+        }
+        let geometry = hash_once(&mut self.geometry, mesh);
+        self.cache.get_or_build(
+            (keys::bvh(&geometry, options), self.part),
+            monitor,
+            |bytes| decode::<Topology>(bytes)?.over(mesh),
+            |tree| encode(&Topology::of(tree)),
+            || Direct.bvh(mesh, options, monitor),
+        )
+    }
+
+    fn marks(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        options: &bvh::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(marks::Marks, marks::Report)> {
+        if self.cache.store().is_none() {
+            return Direct.marks(mesh, tree, options, monitor);
+        }
+        let geometry = hash_once(&mut self.geometry, mesh);
+        self.cache.get_or_build(
+            (keys::marks(&geometry, options), self.part),
+            monitor,
+            |bytes| decode(bytes).filter(|m: &marks::Marks| m.suitable.len() == tree.nodes.len()),
+            encode,
+            || Direct.marks(mesh, tree, options, monitor),
+        )
+    }
+
+    fn tets(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        chosen: &[u32],
+        options: &tets::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
+        let nodes = CachedNodes { cache: self.cache, monitor };
+        tets::build_through(mesh, tree, chosen, options, &nodes, monitor)
+    }
+}

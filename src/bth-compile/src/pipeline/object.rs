@@ -1,0 +1,191 @@
+//! An object from the results of the stages, and the file with one object.
+
+use super::{FileReport, Options};
+use crate::coordinates::{Boxes, OnGrid};
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::{bvh, coordinates, tets, write};
+use bth_format::layout::Object as Header;
+use bth_import::Mesh;
+
+/// A compiled file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Compiled {
+    /// Its bytes. They depend on the source's content and the options only.
+    pub bytes: Vec<u8>,
+}
+
+/// A mesh as it is traced, with its binary BVH.
+pub(crate) struct TracedMesh {
+    /// The mesh; its vertices are on the grid, if there is one.
+    pub(crate) mesh: Mesh,
+    /// The grid and the original positions, if vertices were moved.
+    pub(crate) on_grid: Option<OnGrid>,
+    pub(crate) tree: bvh::BinaryBvh,
+}
+
+/// As [`TracedMesh`], borrowed.
+#[derive(Clone, Copy)]
+pub(super) struct TracedRef<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) on_grid: Option<&'a OnGrid>,
+    pub(super) tree: &'a bvh::BinaryBvh,
+}
+
+impl TracedMesh {
+    pub(super) fn by_ref(&self) -> TracedRef<'_> {
+        TracedRef { mesh: &self.mesh, on_grid: self.on_grid.as_ref(), tree: &self.tree }
+    }
+}
+
+/// An object that is ready to be written.
+pub(crate) struct Object {
+    traced: TracedMesh,
+    wide: bvh::Wide,
+    packed_nodes: bool,
+    /// Absent without tet leaves.
+    encoded: Option<tets::Encoded>,
+    pub(crate) tet_leaves: u64,
+    pub(crate) tet_triangles: u64,
+}
+
+/// Puts an object together: collapses the BVH with tet leaves in place of their nodes, and encodes the tet leaves.
+pub(super) fn join(
+    traced: TracedMesh,
+    leaves: Vec<tets::Leaf>,
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(Object, bvh::CollapseReport)> {
+    let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
+    let (PackedWide { wide, packed_nodes }, collapse) = collapse(traced.by_ref(), &cut, options, monitor)?;
+    if options.coordinates.boxes == Boxes::Bytes && !packed_nodes {
+        monitor.warn("boxes of nodes stay f32: coordinates are too great for steps of bytes");
+    }
+    let triangles = traced.mesh.triangles.len();
+    let encoded =
+        (!meshes.is_empty()).then(|| tets::encode(&meshes, &wide.subtrees, options.record, triangles));
+    let tet_leaves = meshes.len() as u64;
+    let tet_triangles = meshes.iter().map(|m| m.faces.len() as u64).sum();
+    Ok((Object { traced, wide, packed_nodes, encoded, tet_leaves, tet_triangles }, collapse))
+}
+
+/// A wide BVH as it will be stored.
+pub(super) struct PackedWide {
+    pub(super) wide: bvh::Wide,
+    packed_nodes: bool,
+}
+
+/// The wide BVH over a binary one, in which the nodes `cut` are tet leaves.
+pub(super) fn collapse(
+    traced: TracedRef<'_>,
+    cut: &[u32],
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<(PackedWide, bvh::CollapseReport)> {
+    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
+    let (mut wide, mut report) = bvh::collapse(traced.mesh, traced.tree, cut, &collapse_options, monitor)?;
+    let grid = traced.on_grid.map(|on_grid| &on_grid.grid);
+    let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
+    report.measure(&wide);
+    Ok((PackedWide { wide, packed_nodes }, report))
+}
+
+/// The bytes of a file from a mesh, its binary BVH and the tetrahedralizations of some of its nodes. For benchmarks, which
+/// store one tetrahedralization in several forms.
+///
+/// # Errors
+/// A limit of the format, cancellation.
+pub fn assemble(
+    mesh: &Mesh,
+    tree: &bvh::BinaryBvh,
+    built: &[tets::Leaf],
+    options: &Options,
+    monitor: &dyn Monitor,
+) -> Result<Compiled> {
+    let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
+    let (object, _) = join(traced, built.to_vec(), options, monitor)?;
+    Ok(object.file("{}".to_owned(), options)?.0)
+}
+
+impl Object {
+    /// The file with this object only, checked as a reader will.
+    pub(super) fn file(&self, provenance: String, options: &Options) -> Result<(Compiled, FileReport)> {
+        let parts = self.parts(options);
+        let mut builder = write::FileBuilder::new();
+        write::object(&mut builder, 0, &parts)?;
+        builder.provenance(provenance)?;
+        let bytes = builder.finish();
+        write::self_check(&bytes, false)?;
+        let resident_bytes = resident_bytes(&parts);
+        let triangles = self.traced.mesh.triangles.len();
+        let report = FileReport {
+            bytes: bytes.len() as u64,
+            tet_leaves: self.tet_leaves,
+            tet_triangles: self.tet_triangles,
+            resident_bytes,
+            resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
+        };
+        Ok((Compiled { bytes }, report))
+    }
+
+    /// The report on the coordinates, if vertices were moved.
+    pub(super) fn coordinates_report(&self) -> Option<coordinates::Report> {
+        self.traced.on_grid.as_ref().map(OnGrid::report)
+    }
+
+    /// The contents of the object's sections.
+    pub(crate) fn parts(&self, options: &Options) -> write::ObjectParts<'_> {
+        let TracedMesh { mesh, on_grid, tree } = &self.traced;
+        let mut parts = write::ObjectParts {
+            bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
+            root: self.wide.root,
+            triangles: mesh.triangles.len() as u32,
+            dropped: (mesh.triangles.len() - tree.order.len()) as u32,
+            lines: &self.wide.lines,
+            triangle_ids: &self.wide.triangle_ids,
+            grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
+            packed_nodes: self.packed_nodes,
+            source: Some(source(mesh, on_grid.as_ref(), options)),
+            ..Default::default()
+        };
+        if let Some(encoded) = &self.encoded {
+            parts.record = Some(options.record);
+            parts.tet_leaves = &encoded.leaves;
+            parts.tets = &encoded.tets;
+            parts.tet_vertices = &encoded.vertices;
+            parts.tet_faces = &encoded.faces;
+            parts.hull_faces = &encoded.hulls;
+            parts.triangle_faces = &encoded.face_of_triangle;
+        }
+        parts
+    }
+}
+
+/// The geometry and the attributes of the source that the file keeps.
+fn source<'a>(mesh: &'a Mesh, on_grid: Option<&'a OnGrid>, options: &Options) -> write::Source<'a> {
+    let mut source = write::Source::default();
+    if options.geometry {
+        source.positions = on_grid.map_or(&mesh.positions, |on| &on.source);
+        source.triangles = &mesh.triangles;
+    }
+    if let Some(attributes) = &mesh.attributes {
+        source.corners = &attributes.corners;
+        source.normals = &attributes.normals;
+        source.uvs = &attributes.uvs;
+    }
+    source
+}
+
+/// Bytes of the sections that tracing reads.
+fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
+    let bytes = size_of::<Header>()
+        + size_of_val(parts.lines)
+        + size_of_val(parts.triangle_ids)
+        + size_of_val(parts.tet_leaves)
+        + size_of_val(parts.tets)
+        + size_of_val(parts.tet_vertices)
+        + size_of_val(parts.tet_faces)
+        + size_of_val(parts.hull_faces)
+        + size_of_val(parts.triangle_faces);
+    bytes as u64
+}

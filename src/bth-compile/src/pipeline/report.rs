@@ -1,0 +1,94 @@
+//! Reports of a compilation.
+
+use super::{Clock, StageTime};
+use crate::{bvh, coordinates, costs, marks, tets};
+use bth_import as mesh;
+use serde::{Deserialize, Serialize};
+
+/// Reports of all stages of a model's compilation.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// BLAKE3 of the source file's bytes, hexadecimal.
+    pub source_blake3: String,
+    /// Wall-clock time of each stage, in order.
+    pub seconds: Vec<StageTime>,
+    /// Import.
+    pub mesh: mesh::Report,
+    /// Coordinates, unless they are `f32`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coordinates: Option<coordinates::Report>,
+    /// Binary BVH.
+    pub bvh: bvh::Report,
+    /// Marking; absent when no tetrahedra were asked for, as the next two.
+    pub marks: Option<marks::Report>,
+    /// Selection.
+    pub costs: Option<costs::Report>,
+    /// Tetrahedralization.
+    pub tets: Option<tets::Report>,
+    /// Probe of the tetrahedralizations, if there were any.
+    pub probe: Option<costs::ProbeReport>,
+    /// Wide BVH.
+    pub collapse: bvh::CollapseReport,
+    /// The compiled file.
+    pub file: FileReport,
+}
+
+/// Size of the compiled file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FileReport {
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Tet leaves.
+    pub tet_leaves: u64,
+    /// Triangles in tet leaves.
+    pub tet_triangles: u64,
+    /// Bytes of the sections that traversal reads.
+    pub resident_bytes: u64,
+    /// The same for each triangle of the source; 0 when it has none.
+    pub resident_bytes_per_triangle: f64,
+}
+
+/// Reports of the stages between the mesh and the wide BVH; see [`Report`].
+pub(crate) struct StageReports {
+    coordinates: Option<coordinates::Report>,
+    bvh: bvh::Report,
+    marks: Option<marks::Report>,
+    costs: Option<costs::Report>,
+    pub(crate) tets: Option<tets::Report>,
+    probe: Option<costs::ProbeReport>,
+    collapse: bvh::CollapseReport,
+}
+
+/// Reports of the stages that lead to tet leaves.
+#[derive(Default)]
+pub(super) struct TetReports {
+    pub(super) marks: Option<marks::Report>,
+    pub(super) costs: Option<costs::Report>,
+    pub(super) tets: Option<tets::Report>,
+    pub(super) probe: Option<costs::ProbeReport>,
+}
+
+impl StageReports {
+    pub(super) fn new(
+        coordinates: Option<coordinates::Report>,
+        bvh: bvh::Report,
+        TetReports { marks, costs, tets, probe }: TetReports,
+        collapse: bvh::CollapseReport,
+    ) -> Self {
+        Self { coordinates, bvh, marks, costs, tets, probe, collapse }
+    }
+}
+
+impl Report {
+    pub(super) fn new(
+        source_blake3: String,
+        clock: Clock,
+        mesh: mesh::Report,
+        stages: StageReports,
+        file: FileReport,
+    ) -> Self {
+        let StageReports { coordinates, bvh, marks, costs, tets, probe, collapse } = stages;
+        let seconds = clock.into_times();
+        Self { source_blake3, seconds, mesh, coordinates, bvh, marks, costs, tets, probe, collapse, file }
+    }
+}

@@ -1,0 +1,88 @@
+//! The stages that a decorator may wrap.
+
+use crate::coordinates::OnGrid;
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::source::Model;
+use crate::{bvh, coordinates, marks, tets};
+use bth_import::{self as mesh, Keep, Mesh};
+use std::path::Path;
+
+/// The stages of the pipeline whose results may come from elsewhere. The provided methods call the stages; a decorator
+/// overrides them, returns an earlier result where it has one, and calls [`Direct`] otherwise.
+pub(crate) trait Stages {
+    /// Reads the mesh of a model whose files have been hashed.
+    ///
+    /// # Errors
+    /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
+    fn import(
+        &mut self,
+        model: &Model<'_>,
+        keep: Keep,
+        monitor: &dyn Monitor,
+    ) -> Result<(Mesh, mesh::Report)> {
+        let read = mesh::import(model.path, keep, monitor)?;
+        model.digest.unchanged(model.path, read)
+    }
+
+    /// Moves the vertices to a grid.
+    ///
+    /// # Errors
+    /// As [`coordinates::place`].
+    fn coordinates(
+        &mut self,
+        source: &Path,
+        mut mesh: Mesh,
+        options: &coordinates::Options,
+    ) -> Result<(Mesh, Option<OnGrid>)> {
+        let on_grid = coordinates::place(source, &mut mesh, options)?;
+        Ok((mesh, on_grid))
+    }
+
+    /// Builds the binary BVH.
+    ///
+    /// # Errors
+    /// As [`bvh::build`].
+    fn bvh(
+        &mut self,
+        mesh: &Mesh,
+        options: &bvh::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(bvh::BinaryBvh, bvh::Report)> {
+        bvh::build(mesh, options, monitor)
+    }
+
+    /// Marks the nodes of a BVH, built with `_options`, that can be tetrahedralized.
+    ///
+    /// # Errors
+    /// As [`marks::mark`].
+    fn marks(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        _options: &bvh::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(marks::Marks, marks::Report)> {
+        marks::mark(mesh, tree, monitor)
+    }
+
+    /// Tetrahedralizes the chosen nodes.
+    ///
+    /// # Errors
+    /// As [`tets::build`].
+    fn tets(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        chosen: &[u32],
+        options: &tets::Options,
+        monitor: &dyn Monitor,
+    ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
+        tets::build(mesh, tree, chosen, options, monitor)
+    }
+}
+
+/// Calls every stage.
+pub(crate) struct Direct;
+
+impl Stages for Direct {}

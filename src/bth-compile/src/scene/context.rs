@@ -1,0 +1,59 @@
+//! What all parts of a scene's compilation share.
+
+use super::previous::Previous;
+use crate::cached::{self, Cache, ObjectKeys};
+use crate::costs;
+use crate::error::Result;
+use crate::monitor::Monitor;
+use crate::options::Options;
+use std::sync::Arc;
+
+/// What all parts of a scene's compilation share.
+pub(super) struct Context<'a> {
+    pub(super) options: &'a Options,
+    pub(super) cache: &'a Cache<'a>,
+    /// The name of the tetrahedralizer in keys; `None` when objects may not be kept.
+    pub(super) tetgen: Option<String>,
+    /// The keys of objects, if they may be kept.
+    pub(super) keys: Option<Arc<ObjectKeys>>,
+    pub(super) monitor: &'a dyn Monitor,
+    /// The scene's rays for each object of the file, if they weight the costs.
+    pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
+    /// The file of an earlier compilation where this one will write.
+    pub(super) previous: Option<Arc<Previous>>,
+}
+
+impl<'a> Context<'a> {
+    /// The context of a compilation through a cache.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(super) fn new(options: &'a Options, cache: &'a Cache<'a>, monitor: &'a dyn Monitor) -> Result<Self> {
+        Ok(Self::of(options, cache, cached::tetgen_in_keys(options, cache, monitor)?, monitor))
+    }
+
+    /// The context with a known tetrahedralizer.
+    pub(super) fn of(
+        options: &'a Options,
+        cache: &'a Cache<'a>,
+        tetgen: Option<String>,
+        monitor: &'a dyn Monitor,
+    ) -> Self {
+        let keys = tetgen.as_ref().map(|tetgen| Arc::new(ObjectKeys::new(options, tetgen)));
+        Self { options, cache, tetgen, keys, monitor, weights: None, previous: None }
+    }
+
+    /// The same with another monitor.
+    pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
+        let Self { options, cache, ref tetgen, ref keys, ref weights, ref previous, .. } = *self;
+        Context {
+            options,
+            cache,
+            tetgen: tetgen.clone(),
+            keys: keys.clone(),
+            monitor,
+            weights: weights.clone(),
+            previous: previous.clone(),
+        }
+    }
+}

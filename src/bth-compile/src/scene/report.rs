@@ -1,0 +1,62 @@
+//! Reports of a scene's compilation.
+
+use crate::pipeline::StageTime;
+use crate::tets::WorkerStatus;
+use serde::{Deserialize, Serialize};
+
+/// Report on an object of the file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObjectReport {
+    /// Its names in the manifest; several for equal geometry.
+    pub names: Vec<String>,
+    /// Triangles.
+    pub triangles: u64,
+    /// Triangles of zero area.
+    pub degenerate: u64,
+    /// Tet leaves.
+    pub tet_leaves: u64,
+    /// Triangles in tet leaves.
+    pub tet_triangles: u64,
+    /// Bytes of its sections that tracing reads.
+    #[serde(default)]
+    pub resident_bytes: u64,
+    /// Whether it was taken from a compiled file as it is.
+    pub copied: bool,
+}
+
+/// Report on a scene and the stages of its compilation.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneReport {
+    /// Wall-clock time of each stage, summed over all objects.
+    pub seconds: Vec<StageTime>,
+    /// Objects of the file, in order.
+    pub objects: Vec<ObjectReport>,
+    /// Objects of the manifest that no visible instance uses.
+    pub unused: Vec<String>,
+    /// Nodes.
+    pub nodes: u64,
+    /// Instances that may be seen.
+    pub instances: u64,
+    /// Tracks.
+    pub tracks: u64,
+    /// Cameras.
+    pub cameras: u64,
+    /// Lights.
+    pub lights: u64,
+    /// First frame.
+    pub first_frame: i32,
+    /// Last frame.
+    pub last_frame: i32,
+    /// Frames per second.
+    pub rate: f64,
+    /// Triangles of all objects.
+    pub triangles: u64,
+    /// Triangles of all instances.
+    pub instanced_triangles: u64,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Bytes of the objects' sections that traversal reads.
+    pub resident_bytes: u64,
+    /// The tetrahedralization worker, if one was needed.
+    pub worker: Option<WorkerStatus>,
+}

@@ -1,0 +1,10 @@
+//! Files as the compiler and its cache use them: content hashes ([`Digest`]), writes that leave a whole file or none
+//! ([`replace`], [`write_once`]) and copies of ranges from a file that others may change ([`OpenFile`]).
+
+mod atomic;
+mod digest;
+mod open_file;
+
+pub use atomic::{SUFFIX, replace, replace_file, write_once};
+pub use digest::Digest;
+pub use open_file::{FileState, OpenFile};

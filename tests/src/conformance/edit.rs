@@ -30,7 +30,7 @@ impl Editor {
     pub fn new(bytes: &[u8]) -> Self {
         Self { bytes: bytes.to_vec() }
     }
-    /// The header as it stands.
+    /// The header of the file.
     pub fn header(&self) -> Header {
         Header::read_from_prefix(&self.bytes).expect("a whole header").0
     }

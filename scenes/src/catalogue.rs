@@ -7,7 +7,7 @@ use crate::{Model, blob, gyroid, hairball, hall, knot, soup};
 pub struct Entry {
     /// Name, as on the command line.
     pub name: &'static str,
-    /// Faces when no number is asked for.
+    /// Faces by default.
     pub faces: u32,
     /// What it is.
     pub about: &'static str,
@@ -15,7 +15,7 @@ pub struct Entry {
     pub make: fn(u32) -> Model,
 }
 
-/// The greatest number of faces that can be asked for: some hundred times what tests and benchmarks use.
+/// The greatest number of faces of `--faces`: some hundred times what tests and benchmarks use.
 pub const MAX_FACES: u32 = 50_000_000;
 
 /// All models.

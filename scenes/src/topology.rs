@@ -1,4 +1,4 @@
-//! Counts that say what kind of surface a model is.
+//! Topology of a model: boundary, non-manifold and inconsistently oriented edges, and components.
 
 use std::collections::HashMap;
 

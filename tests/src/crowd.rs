@@ -5,7 +5,7 @@ use bth_format::layout::*;
 use bth_random::Rng;
 use zerocopy::IntoBytes;
 
-/// A file of so many instances that all move: every node has a track of its own, or only the root has one.
+/// A file with `count` moving instances: every node has a track of its own, or only the root has one.
 pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
     let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]];
     let row = |k: usize| std::array::from_fn(|i| corners.get(i).unwrap_or(&corners[0])[k]);
@@ -31,7 +31,7 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
         ..ObjectParts::default()
     };
     let mut rng = Rng::new(1);
-    let mut random = |scale: f64| (f64::from(rng.unit_f32()) - 0.5) * scale;
+    let mut centered = |width: f64| (f64::from(rng.unit_f32()) - 0.5) * width;
     let side = f64::from(count).cbrt() * 2.0;
     let node = |translation: [f64; 3], parent| {
         let mut transform = [0.0; 12];
@@ -59,10 +59,10 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
         track(0, Property::Rotation, &[0.0, 0.0, 0.0, 1.0], &[0.0, 1.0, 0.0, 0.0]);
     }
     for i in 1..=count {
-        let place = [(); 3].map(|()| random(side));
-        nodes.push(node(place, 0));
+        let position = [(); 3].map(|()| centered(side));
+        nodes.push(node(position, 0));
         if own_tracks {
-            track(i, Property::Translation, &place, &place.map(|x| -x));
+            track(i, Property::Translation, &position, &position.map(|x| -x));
             track(i, Property::Rotation, &[0.0, 0.0, 0.0, 1.0], &[0.6, 0.0, 0.8, 0.0]);
         }
     }

@@ -1,11 +1,11 @@
-//! Changes bytes of a valid file and makes its hashes right again, so that one rule is broken alone.
+//! Changes bytes of a valid file and recomputes its hashes, so that exactly one rule is broken.
 
 use bth_format::file::{content_id, hash128};
 use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Up to where hashes are recomputed.
+/// Which hashes are recomputed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seal {
     /// Nothing.
@@ -18,7 +18,7 @@ pub enum Seal {
     Sections,
 }
 
-/// A file that is being changed.
+/// A file under change.
 #[derive(Clone, Debug)]
 pub struct Editor {
     /// The whole file.
@@ -30,11 +30,11 @@ impl Editor {
     pub fn new(bytes: &[u8]) -> Self {
         Self { bytes: bytes.to_vec() }
     }
-    /// The header as it stands.
+    /// The header of the file.
     pub fn header(&self) -> Header {
         Header::read_from_prefix(&self.bytes).expect("a whole header").0
     }
-    /// Entries of the section table as they stand; fewer when they do not fit.
+    /// The entries of the section table that lie within the file.
     pub fn entries(&self) -> Vec<SectionEntry> {
         let count = self.header().section_count as usize;
         self.bytes[128..]
@@ -71,7 +71,7 @@ impl Editor {
         let at = self.section_at(kind) + at;
         u32::from_le_bytes(self.bytes[at..at + 4].try_into().unwrap())
     }
-    /// Makes hashes right; entries that lead out of the file keep theirs.
+    /// Recomputes hashes; entries of sections beyond the end of the file keep theirs.
     pub fn seal(&mut self, seal: Seal) -> Vec<u8> {
         if seal == Seal::Sections {
             for (i, e) in self.entries().iter().enumerate() {

@@ -4,7 +4,7 @@ use super::{Case, Editor, Seal, valid};
 use bth_format::layout::*;
 use std::mem::offset_of;
 
-/// Files that fail when they are opened, checked or verified, by the code that they fail with.
+/// Files that are rejected when they are opened, checked or verified, each with its code.
 pub fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(tree());
@@ -15,7 +15,7 @@ pub fn invalid() -> Vec<Case> {
     cases
 }
 
-/// Changes a valid file and seals it again.
+/// A case made by changing a valid file and recomputing the hashes that `seal` names.
 fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
     let base = valid().into_iter().find(|c| c.name == base).expect("a valid file of that name");
     let mut editor = Editor::new(&base.bytes);
@@ -30,6 +30,7 @@ fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
     })
 }
 
+/// Faults of the container. A table of cases, hence its length.
 fn container() -> Vec<Case> {
     let one = 1u32.to_le_bytes();
     let entry = |name, base, seal, kind, field: usize, value: u64, bytes: usize| {

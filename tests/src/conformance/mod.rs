@@ -1,4 +1,4 @@
-//! The conformance files of `format-spec/conformance`, made here byte by byte.
+//! The conformance files of `format-spec/conformance`, made byte by byte.
 //!
 //! `BTH_BLESS=1 cargo test -p bth-tests --test conformance` writes them; without it the test
 //! compares the committed files with what is made here.
@@ -25,7 +25,7 @@ impl Case {
     fn new(name: &str, bytes: Vec<u8>) -> Self {
         Self { name: name.into(), bytes }
     }
-    /// The code that the file must be refused with, such as `BTH-F012`.
+    /// The code with which the file must be rejected, such as `BTH-F012`.
     pub fn code(&self) -> String {
         format!("BTH-{}", self.name.split('-').next().unwrap_or_default())
     }

@@ -7,7 +7,7 @@ use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
 
-/// A turned quaternion.
+/// A quaternion other than the identity.
 const TURN: [f64; 4] = [0.0, 0.6, 0.0, 0.8];
 
 fn parts(translation: [f64; 3], rotation: [f64; 4], scale: [f64; 3]) -> [f64; 12] {
@@ -102,7 +102,7 @@ fn moving() -> SceneParts {
     parts
 }
 
-/// A file of so many equal objects and a scene.
+/// A file with a number of equal objects and a scene.
 fn file(objects: u32, scene_parts: &SceneParts) -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let parts = ObjectParts {

@@ -129,8 +129,8 @@ fn triangle_bare() -> Vec<u8> {
 }
 
 /// A grid of 4 by 5 squares, two triangles each: 12 squares in an inner node with indexed and raw leaves, 8 in
-/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are on a
-/// grid, a little beside the source's positions; boxes of nodes may be packed.
+/// leaves beside it; and a triangle without area. Normals and texture coordinates are kept. With bits, the leaves are
+/// quantized to a grid that moves the source's positions slightly; boxes of nodes may be packed.
 fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     let mut positions = Vec::new();
     for y in 0..6 {
@@ -235,11 +235,11 @@ fn unknown_section() -> Vec<u8> {
 
 /// Vertices of the five tetrahedra that fill a cube whose corner i is at (i & 1, i >> 1 & 1, i >> 2).
 const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7], [1, 4, 5, 7], [2, 4, 6, 7]];
-/// Two faces of the middle one.
+/// Two faces of the middle tetrahedron.
 const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
-/// Two cubes as tet leaves, each around two triangles, the first with a subtree beside it; a triangle
-/// leaf; and a triangle without area.
+/// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf; and a triangle without
+/// area.
 fn tets(record: RecordKind) -> Vec<u8> {
     let mut positions: Vec<[f32; 3]> = Vec::new();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
@@ -303,7 +303,31 @@ struct TetParts {
     hulls: Vec<HullFace>,
 }
 
+/// Whether a vertex lies on the side of a face from which its corners are counter-clockwise.
+fn is_in_front(points: &[[f32; 3]], face: &[u32; 3], vertex: u32) -> bool {
+    let [a, b, c, d] = [face[0], face[1], face[2], vertex].map(|v| points[v as usize].map(f64::from));
+    let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+    let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
+    minor(1, 2) * w[0] + minor(2, 0) * w[1] + minor(0, 1) * w[2] > 0.0
+}
+
 impl TetParts {
+    /// Encodes a tetrahedron with its neighbours and the vertices opposite in them.
+    fn push_record(&mut self, record: RecordKind, vertices: [u32; 4], next: [u32; 4], opposite: [u32; 4]) {
+        let [a, b, c, d] = vertices;
+        let xor = a ^ b ^ c ^ d;
+        let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
+        match record {
+            RecordKind::Link32 => self.records.extend(Link32 { link }.as_bytes()),
+            RecordKind::Tet32 => self.records.extend(Tet32 { vertex: [a, b, c], xor, next }.as_bytes()),
+            RecordKind::Tet20 => self.records.extend(Tet20 { xor, next }.as_bytes()),
+            RecordKind::Tet16 => {
+                let next = [0, 1, 2].map(|i| next[i] ^ next[3]);
+                self.records.extend(Tet16 { xor, next }.as_bytes());
+            }
+        }
+    }
+
     /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles number from `ids`.
     fn add(
         &mut self,
@@ -322,12 +346,7 @@ impl TetParts {
         let without = |tet: [u32; 4], slot: usize| -> Vec<u32> {
             tet.into_iter().filter(|v| *v != tet[slot]).collect()
         };
-        let in_front = |face: &[u32; 3], v: u32| {
-            let [a, b, c, d] = [face[0], face[1], face[2], v].map(|v| points[v as usize].map(f64::from));
-            let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
-            let minor = |i: usize, j: usize| u[i] * v[j] - u[j] * v[i];
-            minor(1, 2) * w[0] + minor(2, 0) * w[1] + minor(0, 1) * w[2] > 0.0
-        };
+        let in_front = |face: &[u32; 3], v: u32| is_in_front(points, face, v);
         self.faces.extend(faces.iter().enumerate().map(|(i, f)| TetFace {
             vertex: f.map(|v| first_vertex + v),
             triangle: ids + i as u32,
@@ -368,18 +387,7 @@ impl TetParts {
                     }
                 };
             }
-            let [a, b, c, d] = tet.map(|v| first_vertex + v);
-            let xor = a ^ b ^ c ^ d;
-            let link = std::array::from_fn(|i| Link { next: next[i], opposite: opposite[i] });
-            match record {
-                RecordKind::Link32 => self.records.extend(Link32 { link }.as_bytes()),
-                RecordKind::Tet32 => self.records.extend(Tet32 { vertex: [a, b, c], xor, next }.as_bytes()),
-                RecordKind::Tet20 => self.records.extend(Tet20 { xor, next }.as_bytes()),
-                RecordKind::Tet16 => {
-                    let next = [0, 1, 2].map(|i| next[i] ^ next[3]);
-                    self.records.extend(Tet16 { xor, next }.as_bytes());
-                }
-            }
+            self.push_record(record, tet.map(|v| first_vertex + v), next, opposite);
         }
         self.leaves.push(TetLeaf {
             lower,

@@ -85,7 +85,7 @@ impl Grid {
         Ray { origin: ray.origin.map(|x| float(x, self.exponent)), tmin, direction, tmax }
     }
 
-    /// Where a ray's line meets a triangle, in t; `None` also where it lies in the triangle's plane.
+    /// The t at which the line of a ray meets a triangle; `None` if it misses or lies in the plane of the triangle.
     pub fn intersection(&self, ray: &GridRay, triangle: u32) -> Option<Quotient> {
         let [a, b, c] =
             self.triangles[triangle as usize].map(|v| sub(self.positions[v as usize], ray.origin));

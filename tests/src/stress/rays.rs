@@ -138,19 +138,7 @@ fn ray(shape: &Shape, kind: Kind, rng: &mut Rng) -> Aimed {
                 ray.exponent = -149;
             }
         },
-        Kind::Range => {
-            let one = 1.0f32;
-            let ends = [
-                [0.0, one],
-                [one, f32::INFINITY],
-                [one, one],
-                [0.0, one.next_down()],
-                [one.next_up(), f32::INFINITY],
-                [-one, one],
-                [f32::NEG_INFINITY, f32::INFINITY],
-            ];
-            ray.range = ends[rng.below(ends.len() as u64) as usize];
-        }
+        Kind::Range => ray.range = range_about_one(rng),
         Kind::OnSurface => {
             ray.direction = sub(somewhere, a);
             ray.origin = a;
@@ -172,6 +160,21 @@ fn ray(shape: &Shape, kind: Kind, rng: &mut Rng) -> Aimed {
         }
     }
     Aimed { kind, ray, through }
+}
+
+/// A range that begins or ends at t = 1, where the target is, or just beside it.
+fn range_about_one(rng: &mut Rng) -> [f32; 2] {
+    let one = 1.0f32;
+    let ranges = [
+        [0.0, one],
+        [one, f32::INFINITY],
+        [one, one],
+        [0.0, one.next_down()],
+        [one.next_up(), f32::INFINITY],
+        [-one, one],
+        [f32::NEG_INFINITY, f32::INFINITY],
+    ];
+    ranges[rng.below(ranges.len() as u64) as usize]
 }
 
 /// A point of the grid in a box three times as wide as the shape, often in its middle planes or at its bounds.

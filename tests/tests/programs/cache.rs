@@ -56,13 +56,13 @@ fn an_unchanged_model_is_neither_compiled_nor_written_again() {
     assert_eq!(second["report"]["file"], first["report"]["file"]);
     assert_eq!(modified(&output), written);
 
-    // Newer and yet the same: build systems want an output that is newer still.
+    // A model that is newer but has the same bytes: the output gets a newer time, as build systems expect.
     let model = folder.path().join("a.obj");
     std::fs::write(&model, sphere(16)).unwrap();
     assert_eq!(compile(folder.path(), &["a.obj"])["written"], false);
     assert!(modified(&output) >= modified(&model));
 
-    // An output that is gone or was changed comes from the cache.
+    // An output that was removed or changed is restored from the cache.
     let good = std::fs::read(&output).unwrap();
     std::fs::write(&output, b"something else").unwrap();
     let third = compile(folder.path(), &["a.obj"]);
@@ -99,7 +99,7 @@ fn one_option_redoes_what_depends_on_it_and_says_so() {
     assert_eq!((&misses[..], hits.contains(&"bvh 1".into())), (&["file".into(), "mesh".into()][..], true));
 
     let (hits, misses) = found(&compile(folder.path(), &["a.obj", "--quality", "best"]));
-    // The node has the same triangles in the other tree, too.
+    // The node has the same triangles in both trees.
     assert_eq!(hits.iter().any(|h| h == "tets 1"), tets, "{hits:?}");
     assert!(hits.contains(&"mesh 1".into()) && hits.len() == 1 + usize::from(tets), "{hits:?}");
     assert!(misses.starts_with(&["file".into(), "bvh".into(), "marks".into()]), "{misses:?}");
@@ -222,7 +222,7 @@ fn machines_share_what_they_made() {
     compile(here.path(), &["s.manifest", "--shared-cache", place]);
     let json = compile(there.path(), &["s.manifest", "--shared-cache", place]);
     let (hits, misses) = found(&json);
-    // The scene itself is put together: it is not kept, but its objects are.
+    // The scene is assembled anew; the cache holds only its objects.
     assert_eq!((&hits[..], &misses[..]), (&["object 3".into()][..], &["scene".into()][..]));
     let read = |folder: &tempfile::TempDir| std::fs::read(folder.path().join("s.bth")).unwrap();
     assert!(read(&here) == read(&there));
@@ -252,7 +252,7 @@ fn objects_that_are_compiled_at_once_come_to_the_same_file() {
     let one_by_one = compiled(&["--threads", "1"]);
     assert!(compiled(&["--threads", "5"]) == one_by_one);
     assert!(compiled(&["--threads", "3", "--memory", "1"]) == one_by_one, "without memory for two");
-    // Of several faulty objects the first is named, whichever fails first.
+    // Of several faulty objects the error names the first in the manifest, whichever fails first.
     for faulty in ["1.obj", "4.obj"] {
         std::fs::write(path.join(faulty), "f 1 2 3\n").unwrap();
     }

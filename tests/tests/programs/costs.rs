@@ -30,7 +30,7 @@ fn limits_and_weights_decide_what_is_tetrahedralized() {
     let few = triangles(&compile(&["--max-bytes-per-triangle", "80"]));
     assert!(few > 0 && few < all, "{few} of {all}");
     assert!(triangles(&compile(&["--budget", "0.005"])) < all);
-    // Rays from outside take the BVH beside the tetrahedra.
+    // Rays from outside are traced through the BVH, which accompanies the tetrahedra.
     assert_eq!(triangles(&compile(&["--optimize-for", "camera"])), 0);
     assert_eq!(triangles(&compile(&["--optimize-for", "secondary"])), all);
     assert_eq!(triangles(&compile(&["--select", "paper"])), all);
@@ -67,7 +67,7 @@ fn tracing_reads_no_more_bytes_than_the_limit_and_what_cannot_be_held_is_said() 
                 some += u32::from(limited["tet_leaves"].as_u64() > Some(0));
             }
             assert!(some > 2, "{select} {more:?}: nothing is tetrahedralized within most limits");
-            // The file says what it was made with; all else is the same.
+            // Only the provenance record, which stores the options, may differ.
             let mut generous = with(1e4);
             generous["bytes"] = all["bytes"].clone();
             assert_eq!(generous, all);
@@ -146,7 +146,7 @@ cameras = [{ name = "eye", node = "eye", fov = 30 }]
         return;
     }
     assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
-    // What bounces off a ball alone meets nothing more, but starts on it.
+    // Rays that bounce off a convex ball hit nothing else, but they start on it.
     let weighed = compile(&["--for-scene"]);
     assert!(weighed[0] > 0 && weighed[1] == 0, "{weighed:?}");
     assert_eq!(compile(&["--for-scene"]), weighed);

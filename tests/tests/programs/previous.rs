@@ -6,7 +6,7 @@ use crate::support::sphere;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Compiles the scene over what is there, compares with a compilation without a cache, and returns the file.
+/// Compiles the scene over the existing output, compares with a compilation without a cache, and returns the file.
 #[track_caller]
 fn same_as_new(path: &Path, options: &[&str]) -> Vec<u8> {
     compile(path, &[&["s.manifest"], options].concat());
@@ -16,12 +16,12 @@ fn same_as_new(path: &Path, options: &[&str]) -> Vec<u8> {
     bytes
 }
 
-/// Removes what the cache has of meshes and objects: what is found then was in the file that was there.
+/// Removes meshes and objects from the cache, so that they can only come from the existing output.
 fn forget_objects(path: &Path) {
     let list = crate::cache::cached(path, &["cache", "list", "--json"]).expect(0).json();
     for entry in list["entries"].as_array().unwrap() {
         let stage = entry["stage"].as_str().unwrap();
-        // Records whose content is gone already are of no use.
+        // Records without their content are of no use.
         if (stage == "object" || stage == "mesh") && !entry["idle_seconds"].is_null() {
             let file =
                 crate::cache::cached(path, &["cache", "path", entry["id"].as_str().unwrap()]).expect(0);
@@ -36,7 +36,7 @@ fn unchanged_objects_come_from_the_file_that_was_there() {
     let path = folder.path();
     compile(path, &["s.manifest"]);
     forget_objects(path);
-    // Greater than before: what follows it moves.
+    // A larger object moves the sections that follow it.
     std::fs::write(path.join("2.obj"), sphere(17)).unwrap();
     let dry = ["compile", "--dry-run", "--json", "--min-tet-triangles", "64", "--c-tet", "0.5", "s.manifest"];
     let dry = &crate::cache::cached(path, &dry).expect(0).json()["jobs"][0];
@@ -46,7 +46,7 @@ fn unchanged_objects_come_from_the_file_that_was_there() {
     assert!(misses[1..].iter().all(|miss| miss.ends_with("2.obj flat") || miss == "tets"), "{misses:?}");
     same_as_new(path, &[]);
     forget_objects(path);
-    // An object goes, one stands where another stood, one comes twice; a path changes and no content does.
+    // One object is removed, one replaced, one used twice; and a path changes without its content.
     std::fs::rename(path.join("0.obj"), path.join("other.obj")).unwrap();
     std::fs::copy(path.join("3.obj"), path.join("1.obj")).unwrap();
     let text = std::fs::read_to_string(path.join("s.manifest")).unwrap();
@@ -54,7 +54,7 @@ fn unchanged_objects_come_from_the_file_that_was_there() {
     let (hits, misses) = found(&compile(path, &["s.manifest"]));
     assert_eq!((&hits[..], &misses[..]), (&["object 4".into()][..], &["scene".into()][..]));
     same_as_new(path, &[]);
-    // Options are part of what an object is.
+    // Objects compiled with other options are not reused.
     same_as_new(path, &["--attributes", "all"]);
     same_as_new(path, &["--structure", "bvh"]);
 }
@@ -67,7 +67,7 @@ fn damage_of_the_file_that_was_there_does_not_spread() {
     let whole = std::fs::read(path.join("s.bth")).unwrap();
     let mut sizes = (9..14).cycle();
     let mut changed = |bytes: &[u8]| {
-        // The scene changes while the file does.
+        // The scene changes together with the file.
         std::fs::write(path.join("1.obj"), sphere(sizes.next().unwrap())).unwrap();
         std::fs::write(path.join("s.bth"), bytes).unwrap();
         same_as_new(path, &[])
@@ -91,7 +91,7 @@ fn damage_of_the_file_that_was_there_does_not_spread() {
 fn a_large_file_that_was_there_is_taken_unread_only_if_nobody_touched_it() {
     let folder = scene(2);
     let path = folder.path();
-    // Above the size from which files are known by their stamps.
+    // Above the size from which files are recognized by their fingerprints.
     std::fs::write(path.join("0.obj"), sphere(200)).unwrap();
     let options = ["--structure", "bvh"];
     let compile = |args: &[&str]| compile(path, &[args, &options[..]].concat());
@@ -101,7 +101,7 @@ fn a_large_file_that_was_there_is_taken_unread_only_if_nobody_touched_it() {
     for round in 0..3 {
         std::fs::write(path.join("1.obj"), sphere(30 + round)).unwrap();
         if round > 0 {
-            // In the middle of the large object, with the times as they were; then only touched.
+            // A change in the middle of the large object that keeps the times of the file; then a change of the times only.
             let modified = std::fs::metadata(&output).unwrap().modified().unwrap();
             let mut file = std::fs::File::options().read(true).write(true).open(&output).unwrap();
             if round == 1 {

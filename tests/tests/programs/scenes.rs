@@ -106,7 +106,7 @@ fn numbered_frames_are_resumed_shared_out_and_forced() {
     let shard = |part| rendered(play(folder.path(), &[&all[..], &["--shard", part]].concat()));
     assert_eq!(shard("1/2"), [0, 2, 4]);
     let bytes = std::fs::read(folder.path().join("out/0002.png")).unwrap();
-    // Cut off in the middle, and of another size: both are rendered again.
+    // A truncated picture and one of another size are rendered again.
     std::fs::write(folder.path().join("out/0002.png"), &bytes[..bytes.len() - 7]).unwrap();
     let small =
         ["scene.bth", "-o", "out/####.png", "--frames", "4", "--force", "--size", "8x8", "--spp", "1"];
@@ -218,7 +218,7 @@ fn manifests_are_played_through_the_cache() {
     run("bth-play", folder.path(), &args).expect(0);
     assert_eq!(kept(), 2, "a changed model is");
 
-    // Without the compiler beside it the player says what to do.
+    // Without the compiler in the same folder the error of the player tells what to do.
     let alone = tempfile::tempdir().unwrap();
     let program = alone.path().join("bth-play");
     let built = bth_tests::target_folder().join("bth-play");

@@ -33,7 +33,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
     let inputs: Vec<String> = (0..6).map(|i| format!("{i}.obj")).chain(["s.manifest".into()]).collect();
     let options: [&[&str]; 3] =
         [&["--min-tet-triangles", "64"], &["--structure", "bvh"], &["--quality", "best"]];
-    // What each must come to, compiled without any cache.
+    // The expected outputs, compiled without a cache.
     let mut expected = std::collections::HashMap::new();
     for input in &inputs {
         for (i, options) in options.iter().enumerate() {
@@ -55,7 +55,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
                     let input = &inputs[rng.below(inputs.len() as u64) as usize];
                     let choice = rng.below(3) as usize;
                     let output = format!("out-{number}.bth");
-                    // A small store: entries are evicted while others read them.
+                    // The store is small, so that entries are evicted while other processes read them.
                     let args =
                         ["compile", input, "-o", &output, "-q", "--cache-size", "400k", "--threads", "1"];
                     let mut command = command("bthc", path, &[&args, options[choice]].concat());
@@ -79,7 +79,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
                             options[choice]
                         );
                     }
-                    // What stays is what the next may take unchanged objects from.
+                    // A later compilation may reuse unchanged objects of an output that is left in place.
                     if rng.below(2) == 0 {
                         let _ = std::fs::remove_file(path.join(&output));
                     }
@@ -101,7 +101,7 @@ fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
     assert_eq!(std::fs::read_dir(temporary).unwrap().count(), 0);
     let partial = |name: &String| name.ends_with(".bth-part");
     let left = || files(&path.join("cache")).into_iter().filter(partial).collect::<Vec<_>>();
-    // None where files can be written without a name.
+    // There are none on systems where files can be written without a name.
     println!("{} unfinished files before verification", left().len());
     let verdict = cached(path, &["cache", "verify", "--json"]).expect(0).json();
     assert_eq!(verdict["damaged"], serde_json::json!([]));

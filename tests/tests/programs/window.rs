@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// A display without a screen; ends with the value.
+/// A virtual display, which ends when the value is dropped.
 struct Display {
     server: Child,
     name: String,
 }
 
 impl Display {
-    /// Starts one that keeps its screen in a folder; `None`, with a line that says why, where that is not possible.
+    /// Starts a display that keeps its screen in a file of the folder; `None`, and a printed reason, where that is impossible.
     fn start(folder: &Path) -> Option<Display> {
         let there = |program: &str, arg: &str| {
             let found = Command::new(program).arg(arg).stdout(Stdio::null()).stderr(Stdio::null()).status();
@@ -45,7 +45,7 @@ impl Display {
         String::from_utf8_lossy(&output.stdout).trim().to_owned()
     }
 
-    /// The command for the player here.
+    /// The command that starts the player on this display.
     fn play(&self, folder: &Path, args: &[&str]) -> Command {
         let mut all = vec!["scene.bth", "--window", "--size", "96x54", "--spp", "1", "--json"];
         all.extend(args);
@@ -62,7 +62,7 @@ impl Drop for Display {
     }
 }
 
-/// Asks again and again until there is an answer.
+/// Polls until there is a value.
 #[track_caller]
 fn until<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -128,7 +128,7 @@ fn keys_move_the_window_and_it_shows_what_pictures_show() {
     run("bth-play", folder.path(), &args).expect(0);
     assert!(shot == std::fs::read(folder.path().join("x.png")).unwrap(), "what -o writes");
 
-    // The same pixels are on the screen, but for the bar.
+    // The screen shows the same pixels, except for the playback bar.
     let (width, height, pixels) = picture(&folder.path().join("x.png"));
     assert_eq!((width, height), (96, 54));
     let shown = screen(folder.path());

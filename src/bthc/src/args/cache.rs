@@ -101,7 +101,7 @@ impl Keeping {
     /// The store, unless the options exclude it. A default folder that cannot be used is only a warning.
     ///
     /// # Errors
-    /// As [`CacheLocation::store`] for a folder that was asked for.
+    /// As [`CacheLocation::store`] for a folder that the options name.
     pub(crate) fn store(&self, warn: &dyn Fn(&str)) -> Result<Option<Store>, Failure> {
         let set = |name: &str| std::env::var(name).ok().filter(|v| !v.is_empty());
         let asked = self.location.cache_dir.is_some() || self.in_cache;

@@ -3,7 +3,7 @@
 use clap::Args as Group;
 use std::path::PathBuf;
 
-/// How many models are compiled at once, and what build systems are told.
+/// How many models are compiled at once, and output for build systems.
 #[derive(Clone, Debug, Group)]
 #[command(next_help_heading = "Many models and build systems")]
 pub(crate) struct Jobs {

@@ -5,7 +5,7 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`write`] | the stages |
+//! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
 //! | [`scene`] | many objects, each by the pipeline, into one file |

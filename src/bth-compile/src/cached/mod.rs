@@ -1,6 +1,6 @@
 //! Compilation through the cache: what was made of the same content before is taken from there.
 //!
-//! This module wraps the pipeline from outside; no stage depends on it. [`cache`] accesses the store, `keys` lists what each
+//! This module wraps the pipeline from outside; no stage depends on it. `cache` accesses the store, `keys` lists what each
 //! result depends on, `codec`, `rows` and `topology` turn results into bytes, `stages` and `nodes` are the decorators of the
 //! pipeline and of the tetrahedralization, and `compile` runs the pipeline through them. A damaged result is built again; a
 //! cache that cannot be written costs time and nothing else.

@@ -1,7 +1,7 @@
 //! The compilation of a model: import → coordinates → BVH → marks → costs → tets → probe → limit → collapse → file.
 //!
 //! Each stage is a function of its input and its options. The stages whose results can come from elsewhere are called
-//! through [`Stages`], which a cache implements outside of this module.
+//! through the trait `Stages`, which a cache implements outside of this module.
 
 mod clock;
 mod limit;

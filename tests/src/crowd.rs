@@ -21,7 +21,7 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
     };
     let words: Vec<u32> =
         leaf.as_bytes().chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
-    let lines: Vec<Line> = words.chunks_exact(16).map(|w| Line(w.try_into().unwrap())).collect();
+    let lines: Vec<CacheLine> = words.chunks_exact(16).map(|w| CacheLine(w.try_into().unwrap())).collect();
     let parts = ObjectParts {
         bounds: Some(([0.0; 3], [1.0, 1.0, 0.5])),
         root: Child::Indexed(0).code(),

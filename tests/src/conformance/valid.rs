@@ -73,9 +73,9 @@ fn node(children: &[(Child, Bounds)]) -> WideNode {
     node
 }
 
-pub(super) fn lines(block: &[u8]) -> Vec<Line> {
+pub(super) fn lines(block: &[u8]) -> Vec<CacheLine> {
     let word = |b: &[u8]| u32::from_le_bytes(b.try_into().unwrap());
-    block.chunks_exact(64).map(|b| Line(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
+    block.chunks_exact(64).map(|b| CacheLine(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
 }
 
 fn file(parts: &ObjectParts) -> Vec<u8> {

@@ -6,7 +6,7 @@ use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use bth_format::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES};
+use bth_format::layout::{Child, INDEXED_LINES, CacheLine, NODE_LINES, NONE, RAW_LINES};
 use bth_import::Mesh;
 use serde::Serialize;
 use std::time::Instant;
@@ -26,7 +26,7 @@ pub struct CollapseOptions {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
     /// Nodes in depth-first order, then leaves; after them the same for each kept subtree.
-    pub lines: Vec<Line>,
+    pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
     /// [`Child`] code of the root, `NONE` when no triangle can be hit.
@@ -271,7 +271,7 @@ impl Writer<'_> {
         }
         check_lines(next)?;
 
-        self.wide.lines.resize(next, Line([0; 16]));
+        self.wide.lines.resize(next, CacheLine([0; 16]));
         for (i, Inner { first, count }) in inner.iter().enumerate() {
             let slots =
                 slots[*first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));

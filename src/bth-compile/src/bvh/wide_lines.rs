@@ -1,14 +1,14 @@
 //! Contents of the wide BVH's nodes and leaves.
 
 use super::Node;
-use bth_format::layout::{IndexedLeaf, Line, NONE, RawLeaf, WIDTH, WideNode};
+use bth_format::layout::{IndexedLeaf, CacheLine, NONE, RawLeaf, WIDTH, WideNode};
 use bth_import::Mesh;
 use zerocopy::{Immutable, IntoBytes};
 
 /// Writes a structure at a line.
-pub(super) fn put<T: IntoBytes + Immutable>(lines: &mut [Line], at: usize, value: &T) {
+pub(super) fn put<T: IntoBytes + Immutable>(lines: &mut [CacheLine], at: usize, value: &T) {
     let bytes = value.as_bytes();
-    lines[at..at + bytes.len() / size_of::<Line>()].as_mut_bytes().copy_from_slice(bytes);
+    lines[at..at + bytes.len() / size_of::<CacheLine>()].as_mut_bytes().copy_from_slice(bytes);
 }
 
 /// A wide node over at most 16 nodes of the binary BVH and their child codes.

@@ -58,7 +58,7 @@ pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bo
     let mut packed = Packed {
         old: &wide.lines,
         code_at: vec![NONE; wide.lines.len()],
-        lines: vec![Line([0; 16]); (end as usize).div_ceil(2)],
+        lines: vec![CacheLine([0; 16]); (end as usize).div_ceil(2)],
         grid,
     };
     for block in &blocks {
@@ -115,16 +115,16 @@ fn blocks(wide: &Wide) -> Vec<Block> {
     found.into_iter().map(|(_, block)| block).collect()
 }
 
-fn read<T: FromBytes + KnownLayout + Immutable>(lines: &[Line], line: u32) -> &T {
-    let bytes = &lines.as_bytes()[line as usize * size_of::<Line>()..][..size_of::<T>()];
+fn read<T: FromBytes + KnownLayout + Immutable>(lines: &[CacheLine], line: u32) -> &T {
+    let bytes = &lines.as_bytes()[line as usize * size_of::<CacheLine>()..][..size_of::<T>()];
     T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")
 }
 
 struct Packed<'a> {
-    old: &'a [Line],
+    old: &'a [CacheLine],
     /// New child code of the block at each old line.
     code_at: Vec<u32>,
-    lines: Vec<Line>,
+    lines: Vec<CacheLine>,
     grid: Option<&'a Grid>,
 }
 

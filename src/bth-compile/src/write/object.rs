@@ -23,7 +23,7 @@ pub struct ObjectParts<'a> {
     /// Whether all nodes are packed; else none is.
     pub packed_nodes: bool,
     /// Nodes and triangle leaves.
-    pub lines: &'a [Line],
+    pub lines: &'a [CacheLine],
     /// Source id of each triangle in leaf order.
     pub triangle_ids: &'a [u32],
     /// Record of the tetrahedra; `None` without tet leaves.

@@ -1,7 +1,7 @@
 //! Memory that holds the bytes of a file, aligned for every structure in it.
 
 use crate::error::{Code, Error, Result};
-use crate::layout::Line;
+use crate::layout::CacheLine;
 use memmap2::{Mmap, MmapMut};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -26,7 +26,7 @@ pub(super) struct Owned {
 
 #[derive(Debug)]
 enum Memory {
-    Lines(Vec<Line>),
+    Lines(Vec<CacheLine>),
     /// Anonymous pages, which are large ones where the system has them, and the index of the first byte in use.
     #[cfg_attr(
         not(target_os = "linux"),
@@ -46,10 +46,10 @@ impl Owned {
         {
             return Some(Owned { memory, length });
         }
-        let count = length.div_ceil(size_of::<Line>());
+        let count = length.div_ceil(size_of::<CacheLine>());
         let mut lines = Vec::new();
         lines.try_reserve_exact(count).ok()?;
-        lines.resize(count, Line([0; 16]));
+        lines.resize(count, CacheLine([0; 16]));
         Some(Owned { memory: Memory::Lines(lines), length })
     }
 

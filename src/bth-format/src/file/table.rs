@@ -41,7 +41,7 @@ pub fn content_id(entries: &[SectionEntry]) -> [u8; 32] {
 pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
-        kind::LINES => size_of::<Line>(),
+        kind::LINES => size_of::<CacheLine>(),
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::TETS => 0,

@@ -6,19 +6,19 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 /// 64 bytes: the unit in which nodes and leaves are addressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C, align(64))]
-pub struct Line(pub [u32; 16]);
+pub struct CacheLine(pub [u32; 16]);
 
 /// What a child code leads to. Codes are `u32`: bits 31 to 29 are the kind of child, with bit 31 set for leaves; bits 28 to
 /// 0 are an index. [`super::NONE`] is an empty slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// Line of a [`WideNode`].
+    /// CacheLine of a [`WideNode`].
     Node(u32),
-    /// Line of a [`PackedNode`].
+    /// CacheLine of a [`PackedNode`].
     Packed(u32),
-    /// Line of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or [`super::IndexedLeaf21`].
+    /// CacheLine of an [`IndexedLeaf`]; on a grid the half line of an [`super::IndexedLeaf16`] or [`super::IndexedLeaf21`].
     Indexed(u32),
-    /// Line of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or [`super::RawLeaf21`].
+    /// CacheLine of a [`RawLeaf`]; on a grid the half line of a [`super::RawLeaf16`] or [`super::RawLeaf21`].
     Raw(u32),
     /// Row of `TET_LEAVES`.
     Tets(u32),
@@ -145,7 +145,7 @@ pub const INDEXED_LINES: usize = size_of::<IndexedLeaf>() / 64;
 pub const RAW_LINES: usize = size_of::<RawLeaf>() / 64;
 
 assert_layout! {
-    Line 64 {}
+    CacheLine 64 {}
     WideNode 448 { child 384 }
     PackedNode 192 { child 96, origin 160, step 172, reserved 184 }
     IndexedLeaf 256 { corner 192, first 240, triangles 244, vertices 248 }

@@ -4,7 +4,7 @@ use super::assert_layout::assert_layout;
 use super::bvh::WIDTH;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Bytes of half a [`super::Line`]: the unit in which leaves on a grid are addressed.
+/// Bytes of half a [`super::CacheLine`]: the unit in which leaves on a grid are addressed.
 pub const HALF_LINE: usize = 32;
 
 /// An [`super::IndexedLeaf`] of 16-bit coordinates: 4 half lines.

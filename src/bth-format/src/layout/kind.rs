@@ -2,7 +2,7 @@
 
 /// One [`super::Object`].
 pub const OBJECT: u32 = 1;
-/// [`super::Line`]s that hold the nodes and triangle leaves.
+/// [`super::CacheLine`]s that hold the nodes and triangle leaves.
 pub const LINES: u32 = 2;
 /// `u32` per triangle, in the order of the leaves: its id in the source.
 pub const TRIANGLE_IDS: u32 = 3;

@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 /// Methods that return a node or leaf panic when the lines end before it does; after [`crate::File::check`] they never do.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeBase<'a> {
-    lines: &'a [Line],
+    lines: &'a [CacheLine],
     /// [`Child::LEAF_BIT`] where leaves are on a grid, so that their indices count half lines; else 0.
     halved: u32,
 }
@@ -40,7 +40,7 @@ impl<'a> NodeBase<'a> {
     }
     /// Address of the block of a child code, to prefetch. It is not valid for every code: do not dereference it.
     #[inline(always)]
-    pub fn block_address(self, code: u32) -> *const Line {
+    pub fn block_address(self, code: u32) -> *const CacheLine {
         let index = code & (Child::INDEX_LIMIT - 1);
         self.lines.as_ptr().wrapping_add((index >> ((code & self.halved) >> 31)) as usize)
     }

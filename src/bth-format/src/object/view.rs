@@ -14,7 +14,7 @@ pub struct ObjectView<'a> {
     /// The points that coordinates of triangle leaves can be; `None` where these are `f32`.
     pub grid: Option<Grid>,
     /// Nodes and triangle leaves.
-    pub lines: &'a [Line],
+    pub lines: &'a [CacheLine],
     /// Source id of each triangle, in the order of the leaves.
     pub triangle_ids: &'a [u32],
     /// Tet leaves.

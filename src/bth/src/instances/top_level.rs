@@ -4,7 +4,7 @@
 //! or three, whose empty slots cost memory and time.
 
 use super::placement::Placed;
-use bth_format::layout::{Child, Line, NODE_LINES, NONE, WIDTH, WideNode};
+use bth_format::layout::{Child, CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Rays whose origin has no greater coordinate than this times that of the world's boxes take the boxes as they
@@ -19,7 +19,7 @@ pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 pub(crate) struct TopLevel {
     /// Its nodes, the root first, on lines of their own as those of objects are: rows that cross lines take twice as long to
     /// read. Children are codes: the line of a node, or [`INSTANCE`] and a row of the instances.
-    lines: Vec<Line>,
+    lines: Vec<CacheLine>,
     /// Greatest coordinate of the boxes.
     pub(crate) extent: f32,
     /// Rays that start farther than this from the world's origin widen the boxes by `looseness` times their own
@@ -158,7 +158,7 @@ impl TopLevel {
 
     /// Adds a node without children; returns its code.
     fn add_node(&mut self) -> u32 {
-        const LINES: [Line; NODE_LINES] = zerocopy::transmute!(EMPTY);
+        const LINES: [CacheLine; NODE_LINES] = zerocopy::transmute!(EMPTY);
         let code = self.lines.len();
         self.lines.extend_from_slice(&LINES);
         code as u32
@@ -193,7 +193,7 @@ impl TopLevel {
 
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        self.lines.capacity() * size_of::<Line>()
+        self.lines.capacity() * size_of::<CacheLine>()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The blocks of a wide BVH in other orders than the compiler's, which is depth first with nodes before leaves.
 
 use bth_compile::bvh::Wide;
-use bth_format::layout::{Child, INDEXED_LINES, Line, NODE_LINES, NONE, RAW_LINES, WideNode};
+use bth_format::layout::{Child, INDEXED_LINES, CacheLine, NODE_LINES, NONE, RAW_LINES, WideNode};
 use bth_random::Rng;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, IntoBytes};
@@ -97,7 +97,7 @@ fn moved(wide: &Wide, blocks: &[u32]) -> Wide {
         codes.insert(old, new.code());
         next += lines;
     }
-    let mut lines: Vec<Line> = Vec::with_capacity(next);
+    let mut lines: Vec<CacheLine> = Vec::with_capacity(next);
     for &old in blocks {
         match Child::from_code(old) {
             Some(Child::Node(line)) => {
@@ -105,7 +105,7 @@ fn moved(wide: &Wide, blocks: &[u32]) -> Wide {
                 let mut node = WideNode::read_from_bytes(bytes).expect("a node");
                 node.child = node.child.map(|code| codes.get(&code).copied().unwrap_or(NONE));
                 let at = lines.len();
-                lines.resize(at + NODE_LINES, Line([0; 16]));
+                lines.resize(at + NODE_LINES, CacheLine([0; 16]));
                 lines[at..].as_mut_bytes().copy_from_slice(node.as_bytes());
             }
             Some(Child::Indexed(line)) => lines.extend(&wide.lines[line as usize..][..INDEXED_LINES]),

@@ -7,7 +7,7 @@ use crate::query::{Any, Nearest, Query};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::{
-    Child, INDEXED_LINES, IndexedLeaf, Line, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
+    Child, INDEXED_LINES, IndexedLeaf, CacheLine, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
 };
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
@@ -22,7 +22,7 @@ const BLOCK: [usize; 2] = [2, 4];
 /// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
 struct Surface {
     header: Object,
-    lines: Vec<Line>,
+    lines: Vec<CacheLine>,
     ids: Vec<u32>,
     /// Its points.
     points: Vec<[f32; 3]>,
@@ -32,9 +32,9 @@ struct Surface {
 const ALWAYS: MinimumUse = MinimumUse { coherent: 0, short: 0 };
 
 /// A block that follows the lines.
-fn append(lines: &mut Vec<Line>, block: &[u8]) -> u32 {
+fn append(lines: &mut Vec<CacheLine>, block: &[u8]) -> u32 {
     let line = lines.len() as u32;
-    lines.resize(lines.len() + block.len() / 64, Line([0; 16]));
+    lines.resize(lines.len() + block.len() / 64, CacheLine([0; 16]));
     lines[line as usize..].as_mut_bytes().copy_from_slice(block);
     line
 }
@@ -65,7 +65,7 @@ impl Surface {
             [(2.0 * x as f32 + away) * scale, 2.0 * y as f32 * scale, z * scale]
         };
         let (mut ids, mut points, mut leaves) = (vec![], vec![], vec![]);
-        let mut lines = vec![Line([0; 16]); NODE_LINES * (1 + WIDTH)];
+        let mut lines = vec![CacheLine([0; 16]); NODE_LINES * (1 + WIDTH)];
         for i in 0..QUADS[0] / BLOCK[0] * QUADS[1] / BLOCK[1] {
             let (x0, y0) = (i % 16 * BLOCK[0], i / 16 * BLOCK[1]);
             let first = ids.len() as u32;

@@ -1,17 +1,20 @@
-//! Where sixteen rays cross the triangles that f32 is sure they hit: in f64, all at once.
+//! The arithmetic of [`super::exact`] in f64 for sixteen pairs of a ray and a triangle that the f32 filter is sure the ray hits.
 
-use super::exact::reported;
-use crate::intersect::exact::{OriginTerms, Weighed, reported_share, size, wide};
+use crate::intersect::exact::{
+    OriginTerms, RoundedIntersection, max_norm, reported, reported_barycentric, wide,
+};
 use crate::simd::{LANES, Simd};
 
-/// Sixteen of a number.
+/// A number of each of sixteen rays or triangles.
 pub(crate) type Many = [f32; LANES];
 
-/// Sixteen rays and a triangle of each.
+/// Sixteen rays, and for each a triangle, in object space.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Pairs {
+    /// By axis.
     pub(crate) origin: [Many; 3],
+    /// By axis.
     pub(crate) direction: [Many; 3],
     /// `[corner][axis]`.
     pub(crate) corner: [[Many; 3]; 3],
@@ -22,64 +25,72 @@ impl Pairs {
         Pairs { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], corner: [[[0.0; LANES]; 3]; 3] };
 }
 
-/// Numbers of a [`OriginTerms`].
-const SEEN: usize = 11;
+/// Numbers in [`OriginTerms`].
+const TERMS: usize = 11;
 
-/// Up to sixteen triangles, seen from one point.
+/// [`OriginTerms`] of up to sixteen triangles for one common origin of rays, a row for each number.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct OriginTermsLanes {
-    rows: [[f64; LANES]; SEEN],
+    rows: [[f64; LANES]; TERMS],
 }
 
 impl OriginTermsLanes {
-    pub(crate) const NONE: OriginTermsLanes = OriginTermsLanes { rows: [[0.0; LANES]; SEEN] };
+    pub(crate) const NONE: OriginTermsLanes = OriginTermsLanes { rows: [[0.0; LANES]; TERMS] };
 
-    /// The first of these triangles (`[corner][axis]`).
+    /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and of those that complete a half.
     #[inline(always)]
     pub(crate) fn compute(&mut self, origin: [f32; 3], corner: &[[Many; 3]; 3], count: usize) {
-        const AT_ONCE: usize = LANES / 2;
+        const HALF: usize = LANES / 2;
         let origin = wide(origin);
-        for first in (0..count.min(LANES)).step_by(AT_ONCE) {
-            for i in first..first + AT_ONCE {
+        for first in (0..count.min(LANES)).step_by(HALF) {
+            for i in first..first + HALF {
                 let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
-                let OriginTerms { whole, second, third, volume, least } = OriginTerms::new(origin, corners);
+                let OriginTerms { normal, second, third, volume, min_determinant } =
+                    OriginTerms::new(origin, corners);
                 for k in 0..3 {
                     (self.rows[k][i], self.rows[3 + k][i], self.rows[6 + k][i]) =
-                        (whole[k], second[k], third[k]);
+                        (normal[k], second[k], third[k]);
                 }
-                (self.rows[9][i], self.rows[10][i]) = (volume, least);
+                (self.rows[9][i], self.rows[10][i]) = (volume, min_determinant);
             }
         }
     }
 }
 
-/// One of them.
+/// The terms of lane `i`.
 #[inline(always)]
-fn seen_of(rows: &[[f64; LANES]; SEEN], i: usize) -> OriginTerms {
-    let three = |first: usize| [rows[first][i], rows[first + 1][i], rows[first + 2][i]];
-    OriginTerms { whole: three(0), second: three(3), third: three(6), volume: rows[9][i], least: rows[10][i] }
+fn lane_terms(rows: &[[f64; LANES]; TERMS], i: usize) -> OriginTerms {
+    let vector = |first: usize| [rows[first][i], rows[first + 1][i], rows[first + 2][i]];
+    OriginTerms {
+        normal: vector(0),
+        second: vector(3),
+        third: vector(6),
+        volume: rows[9][i],
+        min_determinant: rows[10][i],
+    }
 }
 
-/// One of sixteen points.
+/// The vector of lane `i`.
 #[inline(always)]
 fn lane(rows: &[Many; 3], i: usize) -> [f64; 3] {
     [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()]
 }
 
-/// What f64 makes of the triangles that wait to be computed.
+/// Intersections of sixteen rays, rounded for the answer. In the bit sets, bit i stands for lane i.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Intersections {
-    /// As it is reported.
+    /// Ids of the triangles.
     pub(crate) triangle: [u32; LANES],
     pub(crate) t: Many,
     pub(crate) u: Many,
     pub(crate) v: Many,
-    /// Lanes that certainly cross theirs, at t, u and v, which are rounded for the answer. (They lie in the rays' ranges,
-    /// else the triangles would have been decided upon at once.)
+    /// Lanes whose t, u and v are accurate. Their hits lie in the rays' ranges, because the filter is sure only of such
+    /// triangles.
     pub(crate) certain: u32,
-    /// The others, which must be looked at one by one. (f32 was sure of all of them, so none is certainly missed.)
+    /// Lanes whose t, u or v may be inaccurate, to be computed one by one. They are hits as well, since the filter was sure of
+    /// them.
     pub(crate) open: u32,
 }
 
@@ -93,56 +104,60 @@ impl Intersections {
         v: [0.0; LANES],
     };
 
-    /// Computes those of lanes whose bit is set; what they are is left as it is.
+    /// Computes the intersections of the lanes whose bit is set; `triangle` is not changed.
     #[inline(always)]
     pub(crate) fn compute<S: Simd>(&mut self, s: S, lanes: u32, pairs: &Pairs) {
         let Pairs { origin, direction, corner } = pairs;
-        let mut good = [0; LANES];
-        // Without branches, so that it is compiled to vectors.
+        let mut accurate = [0; LANES];
+        // There are no branches in this loop, so that the compiler vectorizes it.
         for i in 0..LANES {
             let corners = [lane(&corner[0], i), lane(&corner[1], i), lane(&corner[2], i)];
             let direction = lane(direction, i);
-            let seen = OriginTerms::new(lane(origin, i), corners);
-            self.put(i, &Weighed::new(&seen, direction, size(direction)), &mut good);
+            let terms = OriginTerms::new(lane(origin, i), corners);
+            let rounded = RoundedIntersection::new(&terms, direction, max_norm(direction));
+            self.store_lane(i, &rounded, &mut accurate);
         }
-        self.divide(s, lanes, &good);
+        self.set_masks(s, lanes, &accurate);
     }
 
-    /// The same of triangles that are seen from the one point at which all rays start: which of them each ray hits.
+    /// As [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the greatest |component| of each
+    /// direction, and `hit` for each ray the index of its triangle in `terms`; with `FIRST_HALF`, all indices are below eight.
     #[inline(always)]
-    pub(crate) fn compute_from_point<S: Simd, const FEWEST_OF_GROUP: bool>(
+    pub(crate) fn compute_from_point<S: Simd, const FIRST_HALF: bool>(
         &mut self,
         s: S,
         lanes: u32,
         direction: &[Many; 3],
-        size: &Many,
-        seen: &OriginTermsLanes,
+        norm: &Many,
+        terms: &OriginTermsLanes,
         hit: S::U,
     ) {
-        let mut rows = [[0.0; LANES]; SEEN];
-        for k in 0..SEEN {
-            rows[k] = s.lookup_f64::<FEWEST_OF_GROUP>(&seen.rows[k], hit);
+        let mut rows = [[0.0; LANES]; TERMS];
+        for k in 0..TERMS {
+            rows[k] = s.lookup_f64::<FIRST_HALF>(&terms.rows[k], hit);
         }
-        let mut good = [0; LANES];
+        let mut accurate = [0; LANES];
         for i in 0..LANES {
-            let seen = seen_of(&rows, i);
-            self.put(i, &Weighed::new(&seen, lane(direction, i), size[i].into()), &mut good);
+            let terms = lane_terms(&rows, i);
+            let rounded = RoundedIntersection::new(&terms, lane(direction, i), norm[i].into());
+            self.store_lane(i, &rounded, &mut accurate);
         }
-        self.divide(s, lanes, &good);
+        self.set_masks(s, lanes, &accurate);
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, weighed: &Weighed, good: &mut [u32; LANES]) {
-        let [second, third, _] = weighed.weight;
-        good[i] = u32::from(weighed.is_good);
-        self.t[i] = reported(weighed.t);
-        self.u[i] = reported_share(second * weighed.share);
-        self.v[i] = reported_share(third * weighed.share);
+    fn store_lane(&mut self, i: usize, rounded: &RoundedIntersection, accurate: &mut [u32; LANES]) {
+        let [second, third, _] = rounded.weight;
+        accurate[i] = u32::from(rounded.is_accurate);
+        self.t[i] = reported(rounded.t);
+        self.u[i] = reported_barycentric(second * rounded.inverse);
+        self.v[i] = reported_barycentric(third * rounded.inverse);
     }
 
+    /// Sets `certain` and `open` of the given lanes.
     #[inline(always)]
-    fn divide<S: Simd>(&mut self, s: S, lanes: u32, good: &[u32; LANES]) {
-        self.certain = s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(good))) & lanes;
+    fn set_masks<S: Simd>(&mut self, s: S, lanes: u32, accurate: &[u32; LANES]) {
+        self.certain = s.mask_bits(s.lt_u(s.splat_u(0), s.load_u(accurate))) & lanes;
         self.open = lanes & !self.certain;
     }
 }

@@ -1,20 +1,21 @@
-//! A ray as f32 lanes see triangles: conservative, to leave out those that certainly do not matter.
+//! Conservative f32 filter of the triangles of a leaf: it excludes those that the ray certainly misses.
 //!
-//! The same projection as [`crate::intersect::line`], in f32 and for sixteen triangles at a time. Every
-//! triangle that `Line::crossing` could accept remains a candidate, and what is called sure is accepted by it
-//! without doubt; the rest is for f64 to decide. So the lanes of an instruction set never show in an answer.
+//! It is the projection of [`crate::intersect::line`] in f32, for sixteen triangles at a time. Every triangle that
+//! `Line::crossing` could accept remains a candidate, and every triangle that is called sure is accepted by `Line::crossing`.
+//! The other candidates are decided in f64, so the result of a query does not depend on the instruction set.
 //!
-//! **Error of a weight.** u = 2^-24, and for the corners of one triangle M >= |x| + |y| as projected, r their greatest
-//! coordinate seen from the ray's origin. Differences are off by ur, the shear by a factor 1±2u, its product by as much and
-//! by what the depth is off (|shear| <= 1), the last sum by 2ur: sheared coordinates are off by less than
-//! δ = 8ur. A cross product of two is off by 2δM + 2δ² from its points and 3uM² <= δM from its own roundings,
-//! together below 4δ(M + δ). Products below the least normal number add at most that. For r serves the corner of the
-//! object's box that is farthest from the origin, so that 8δ and 4δ² are numbers of the ray; for M twice the greatest |x| or |y|.
-//! (Packets take M + |depth| for r: closer, and faster by measurement.)
+//! **Error of a weight.** Let u = 2^-24. For the corners of one triangle, let M >= |x| + |y| as projected, and let r be their
+//! greatest |coordinate| relative to the ray's origin. Differences are off by ur, the shear by a factor 1±2u, its product with
+//! the depth by the same factor and by the error of the depth (|shear| <= 1), and the last sum by 2ur: sheared coordinates are
+//! off by less than δ = 8ur. A cross product of two points is off by 2δM + 2δ² because of its points and by 3uM² <= δM because
+//! of its own roundings, together by less than 4δ(M + δ). Products that underflow add at most the least normal number. The
+//! filter takes for r the distance (maximum norm) to the farthest corner of the object's box, so that 8δ and 4δ² are constants
+//! of the ray, and for M twice the greatest |x| or |y|. Packets take r = M + |depth|, which is tighter and was measured to be
+//! faster.
 //!
-//! **Error of a depth.** Moving three weights by e each moves the depth by at most 3e·range/(|sum| - 3e), range
-//! being that of the corners' depths, and never out of it; the depth's own roundings stay below 8u of the
-//! greatest |depth|.
+//! **Error of a depth.** A change of the three weights by e each changes the depth by at most 3e·range/(|sum| - 3e), where
+//! `range` is the range of the corners' depths, and never moves it out of that range. The roundings of the depth itself stay
+//! below 8u of the greatest |depth|.
 
 use crate::intersect::boxes::RaySlabs;
 use crate::intersect::line::Line;
@@ -25,62 +26,66 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 const _: () = assert!(WIDTH == LANES);
 
-/// 8 roundings of f32: bounds the error of a sheared coordinate relative to the ray's reach.
+/// 8u = 2^-21: bounds the error δ of a sheared coordinate relative to the reach r.
 pub(crate) const PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
-/// A little more than eight times that, for the roundings of what is made of it.
+/// 8δ/r, a little enlarged to cover the roundings of the bounds that are computed from it.
 pub(crate) const ERROR_SLOPE: f32 = 8.01 * PROJECTION_ERROR as f32;
-/// Farther coordinates could overflow the products of weights and depths: all triangles are candidates then.
-const FARTHEST: f64 = (1u64 << 40) as f64;
-/// Slack of depths, relative to the greatest: their roundings, with some to spare.
+/// From this reach on, products of weights and depths could overflow: all triangles are candidates then.
+const MAX_REACH: f64 = (1u64 << 40) as f64;
+/// Slack of depths relative to the greatest |depth|: twice the bound of their roundings.
 const DEPTH_SLACK: f32 = 16.0 / (1 << 24) as f32;
 
-/// A ray prepared for the triangles of leaves. The depth of points, and t, are measured as in [`RaySlabs`].
+/// Per-ray constants of the filter, in object space. Depths are t times the greatest |component| of the direction, as in
+/// [`RaySlabs`].
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub(crate) struct TriangleFilter {
-    /// The two axes of the projection and the one along the ray.
+    /// The two axes of the plane of projection, and the axis of the direction's greatest |component|.
     pub(crate) axis: [u32; 3],
-    /// Bound of the error of a weight of points at the line; infinite where products may overflow.
+    /// Constant part of the bound of a weight's error; infinite where products may overflow.
     pub(crate) error_floor: f32,
-    /// Along the axes of the plane.
+    /// The ray's origin along the two axes of the plane.
     pub(crate) origin: [f32; 2],
+    /// Change of the plane's coordinates along the ray per unit of depth.
     pub(crate) shear: [f32; 2],
-    /// Depth of a coordinate along the third axis: this times it,
+    /// 1 or -1, the sign of the direction along the third axis. The depth of a coordinate z is `forward * z + start`.
     pub(crate) forward: f32,
-    /// plus this; both exact.
+    /// Depth of the coordinate 0 along the third axis. It is exact, as is `forward`.
     pub(crate) start: f32,
-    /// Hits certainly lie in the ray's range from this depth
+    /// Least depth from which a hit certainly lies in the ray's range.
     pub(crate) first: f32,
-    /// to this.
+    /// Greatest depth up to which a hit certainly lies in the ray's range.
     pub(crate) last: f32,
-    /// What the bound grows by with the greatest |x| or |y| of the points.
+    /// Growth of the bound of a weight's error with the greatest |x| or |y| of the projected corners.
     pub(crate) error_slope: f32,
 }
 
-/// Triangles of a leaf that the ray may hit, a bit each.
+/// Triangles of a leaf that the ray may hit: in the bit sets, bit i stands for triangle i of the leaf.
 #[derive(Clone, Copy)]
 pub(crate) struct Candidates<S: Simd> {
-    /// Those that are not certainly missed.
+    /// Triangles that are not certainly missed.
     pub(crate) maybe: u32,
-    /// Of these, those that are certainly hit, within the ray's range.
+    /// Subset of `maybe`: triangles that are certainly hit within the ray's range.
     pub(crate) sure: u32,
-    /// Between which depths they are hit, if they are.
+    /// Lower bounds of the depths of the hits.
     pub(crate) nearest: S::F,
+    /// Upper bounds of the depths of the hits.
     pub(crate) farthest: S::F,
 }
 
-/// A triangle of a leaf that is certainly hit, and no other nearer.
+/// A triangle of a leaf that is certainly hit, and certainly nearer than the others of its leaf.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Certain {
-    /// Place in the leaf.
+    /// Index in the leaf.
     pub(crate) triangle: usize,
-    /// Between which depths.
+    /// Lower bound of the depth of the hit.
     pub(crate) near: f32,
+    /// Upper bound of the depth of the hit.
     pub(crate) far: f32,
 }
 
 impl<S: Simd> Candidates<S> {
-    /// Those that may be the nearest, a bit each, and that one if it is certain.
+    /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain. `maybe` must not be empty.
     #[inline(always)]
     pub(crate) fn nearest_of_all(&self, s: S) -> (u32, Option<Certain>) {
         let &Candidates { mut maybe, sure, nearest, farthest } = self;
@@ -99,17 +104,19 @@ impl<S: Simd> Candidates<S> {
     }
 }
 
-/// Projected corners, sixteen triangles: `[corner][x, y, depth]`.
+/// Projected corners of sixteen triangles: `[corner][x, y, depth]`.
 pub(crate) type Corners<S> = [[<S as Simd>::F; 3]; 3];
 
-/// The triangles of a leaf.
+/// The triangles of a leaf, in either of the leaf's record formats. Indices of triangles are taken modulo [`WIDTH`].
 pub(crate) trait TriangleBlock {
+    /// Index of the leaf's first triangle in the object's leaf order.
     fn first(&self) -> u32;
+    /// Number of triangles; above [`WIDTH`] only in a file that was not checked.
     fn triangles(&self) -> u32;
-    /// The number of the triangle is taken modulo [`WIDTH`] here and below.
+    /// Corners of a triangle: `[corner][axis]`, object space.
     #[inline(always)]
     fn corners(&self, triangle: usize) -> [[f32; 3]; 3] {
-        // Not by maps over rows, which are copied for that.
+        // Loops, because `map` over the rows would copy them first.
         let mut out = [[0.0; 3]; 3];
         for c in 0..3 {
             for k in 0..3 {
@@ -120,29 +127,30 @@ pub(crate) trait TriangleBlock {
     }
     /// One coordinate of a corner.
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
-    fn project<S: Simd>(&self, s: S, sight: &TriangleFilter) -> Corners<S>;
+    /// Projects the corners of all triangles.
+    fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S>;
 }
 
-/// The points at these places.
+/// For each lane the point whose index stands in `row`, out of sixteen points.
 #[inline(always)]
-fn pick<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3] {
+fn lookup_points<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> [S::F; 3] {
     let at = s.load_bytes(row);
     [s.lookup(x, at), s.lookup(y, at), s.lookup(depth, at)]
 }
 
-/// Twice the signed area of the triangle of the line and two points.
+/// Twice the signed area of the triangle (origin, p, q) in the plane of projection.
 #[inline(always)]
 pub(crate) fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
     s.fnma(p[1], q[0], s.mul(p[0], q[1]))
 }
 
-/// The greatest |x| or |y|.
+/// The greatest |x| or |y| of the three corners.
 #[inline(always)]
 fn greatest_coordinate<S: Simd>(s: S, [a, b, c]: &Corners<S>) -> S::F {
     s.max(s.max(s.max_abs(a[0], a[1]), s.max_abs(b[0], b[1])), s.max_abs(c[0], c[1]))
 }
 
-/// |x| + |y|.
+/// |x| + |y| of a projected point.
 #[inline(always)]
 pub(crate) fn size<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
     s.add(s.abs(p[0]), s.abs(p[1]))
@@ -162,9 +170,13 @@ impl TriangleBlock for IndexedLeaf {
         self.vertex[axis][usize::from(self.corner[corner][triangle % WIDTH]) % WIDTH]
     }
     #[inline(always)]
-    fn project<S: Simd>(&self, s: S, sight: &TriangleFilter) -> Corners<S> {
-        let points = sight.project(s, &self.vertex);
-        [pick(s, points, &self.corner[0]), pick(s, points, &self.corner[1]), pick(s, points, &self.corner[2])]
+    fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S> {
+        let points = filter.project(s, &self.vertex);
+        [
+            lookup_points(s, points, &self.corner[0]),
+            lookup_points(s, points, &self.corner[1]),
+            lookup_points(s, points, &self.corner[2]),
+        ]
     }
 }
 
@@ -182,22 +194,23 @@ impl TriangleBlock for RawLeaf {
         self.corner[corner][axis][triangle % WIDTH]
     }
     #[inline(always)]
-    fn project<S: Simd>(&self, s: S, sight: &TriangleFilter) -> Corners<S> {
+    fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S> {
         [
-            sight.project(s, &self.corner[0]),
-            sight.project(s, &self.corner[1]),
-            sight.project(s, &self.corner[2]),
+            filter.project(s, &self.corner[0]),
+            filter.project(s, &self.corner[1]),
+            filter.project(s, &self.corner[2]),
         ]
     }
 }
 
 impl TriangleFilter {
+    /// Computes the constants in f64, for any ray that has a line.
     pub(crate) fn new(ray: &Ray, line: &Line, slabs: &RaySlabs, object: &Object) -> TriangleFilter {
         let reach = line.reach_of_box(object.lower, object.upper);
         let [first, last] = slabs.certain_range(ray);
         let forward = 1f32.copysign(line.direction[line.axis[2]] as f32);
         let [error_slope, error_floor] =
-            if reach < FARTHEST { errors(reach as f32) } else { [0.0, f32::INFINITY] };
+            if reach < MAX_REACH { error_coefficients(reach as f32) } else { [0.0, f32::INFINITY] };
         TriangleFilter {
             axis: line.axis.map(|k| k as u32),
             error_floor,
@@ -211,7 +224,7 @@ impl TriangleFilter {
         }
     }
 
-    /// Projects points given as rows of x, y and z.
+    /// Projects sixteen points, given as rows of x, y and z, to x, y and depth.
     #[inline(always)]
     fn project<S: Simd>(&self, s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
         let depth = s.fma(s.load(&rows[self.axis[2] as usize]), s.splat(self.forward), s.splat(self.start));
@@ -220,7 +233,7 @@ impl TriangleFilter {
         [s.fnma(s.splat(self.shear[0]), depth, x), s.fnma(s.splat(self.shear[1]), depth, y), depth]
     }
 
-    /// The triangles of a leaf that may be hit between the start of the ray's range and a depth.
+    /// The triangles of a leaf that may be hit at a depth between `first` and `limit`.
     #[inline(always)]
     pub(crate) fn candidates<S: Simd, B: TriangleBlock>(
         &self,
@@ -233,9 +246,9 @@ impl TriangleFilter {
         let greatest = greatest_coordinate(s, &corners);
         let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
         let sides = sides(s, &corners, error);
-        // Of no more than there are lanes, whatever an unchecked file says.
+        // At most as many triangles as lanes, even if an unchecked file has a greater count.
         let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
-        // Most leaves that a ray enters have no triangle that it could meet: then depths do not matter.
+        // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
         if valid & !s.mask_bits(sides.missed) == 0 {
             return Candidates { maybe: 0, sure: 0, nearest: error, farthest: error };
         }
@@ -248,45 +261,51 @@ impl TriangleFilter {
     }
 }
 
-/// What f32 makes of sixteen pairs of a line and a triangle.
+/// Result of the filter for sixteen pairs of a line and a triangle.
 #[derive(Clone, Copy)]
 pub(crate) struct FilteredTriangles<S: Simd> {
-    /// Certainly missed, or out of range.
+    /// Pairs that certainly miss, or whose hit certainly lies out of the range of depths.
     pub(crate) out: S::M,
-    /// Certainly hit, in range or not.
+    /// Pairs that certainly hit, within the range of depths or outside of it.
     pub(crate) certain: S::M,
-    /// ObjectBounds of the depth of a hit.
+    /// Lower bounds of the depths of the hits.
     pub(crate) nearest: S::F,
+    /// Upper bounds of the depths of the hits.
     pub(crate) farthest: S::F,
 }
 
-/// What [`TriangleFilter`] says of errors, for points up to this far from the origin.
+/// `error_slope` and `error_floor` of a [`TriangleFilter`], for points whose coordinates relative to the origin do not
+/// exceed `reach`.
 #[inline(always)]
-pub(crate) fn errors(reach: f32) -> [f32; 2] {
+pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
     let slope = reach * ERROR_SLOPE;
     [slope, slope * slope + f32::MIN_POSITIVE]
 }
 
-/// Bound of the error of weights, from the greatest size and depth of projected corners.
+/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`size`) and |depth| of the projected corners.
 #[inline(always)]
 pub(crate) fn error<S: Simd>(s: S, size: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
     let reach = s.add(size, greatest_depth);
     const DELTA: f32 = PROJECTION_ERROR as f32;
-    // A little more than 4δ(M + δ), for the roundings of δ itself.
+    // A little more than 4, to cover the roundings of δ itself.
     s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), size), floor)
 }
 
-/// On which sides of triangles lines pass.
+/// Sides on which sixteen lines pass the edges of their triangles.
 #[derive(Clone, Copy)]
 struct Sides<S: Simd> {
+    /// Weights of the three corners: twice the signed areas opposite to them, not normalized.
     weight: [S::F; 3],
-    /// Bound of their error.
+    /// Bound of the error of the weights.
     error: S::F,
+    /// Pairs that certainly miss.
     missed: S::M,
+    /// Pairs that certainly hit.
     certain: S::M,
 }
 
-/// Weighs triangles for hits between two depths, given a bound of the error of weights; see the top of this file.
+/// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of the weights, see the
+/// head of this file.
 #[inline(always)]
 pub(crate) fn weigh<S: Simd>(
     s: S,
@@ -304,31 +323,34 @@ fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
     let minus_error = s.sub(s.splat(0.0), error);
     let least = s.min(s.min(weight[0], weight[1]), weight[2]);
     let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-    // By what is certain, so that NaN stays a candidate.
+    // Comparisons with NaN are false, so a pair with NaN is neither missed nor certain and remains a candidate.
     let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
     let certain = s.or(s.lt(error, least), s.lt(greatest, minus_error));
     Sides { weight, error, missed, certain }
 }
 
 impl<S: Simd> Sides<S> {
-    /// Where the lines hit, between two depths.
+    /// Bounds the depths of the hits and compares them with the range from `first` to `limit`.
     #[inline(always)]
     fn weigh(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> FilteredTriangles<S> {
         let Sides { weight, error, missed, certain } = self;
-        let shallow = s.min(s.min(a[2], b[2]), c[2]);
-        let deep = s.max(s.max(a[2], b[2]), c[2]);
+        let least_depth = s.min(s.min(a[2], b[2]), c[2]);
+        let greatest_depth = s.max(s.max(a[2], b[2]), c[2]);
         let sum = s.add(s.add(weight[0], weight[1]), weight[2]);
-        // Shares, and not the sum of products by the sum of weights: those of a small triangle would underflow.
-        let inverse = s.div(s.splat(1.0), sum);
-        let share = [s.mul(weight[0], inverse), s.mul(weight[1], inverse), s.mul(weight[2], inverse)];
-        let range = s.sub(deep, shallow);
-        // Where |sum| <= 6e this exceeds the range, and is cut to it.
-        let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse)));
+        // The weights are normalized before they are multiplied with depths: products of a small triangle's own weights would
+        // underflow.
+        let inverse_sum = s.div(s.splat(1.0), sum);
+        let barycentric =
+            [s.mul(weight[0], inverse_sum), s.mul(weight[1], inverse_sum), s.mul(weight[2], inverse_sum)];
+        let range = s.sub(greatest_depth, least_depth);
+        // 3e·range/(|sum| - 3e) <= 6e·range/|sum| where |sum| >= 6e. Elsewhere this is at least the range and is clamped to it.
+        let shift = s.mul(s.mul(error, s.splat(6.0)), s.mul(range, s.abs(inverse_sum)));
         let shift = s.min(shift, range);
-        let depth = s.fma(share[2], c[2], s.fma(share[1], b[2], s.mul(share[0], a[2])));
-        let slack = s.fma(s.max_abs(shallow, deep), s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
-        let nearest = s.sub(s.select(certain, s.sub(depth, shift), shallow), slack);
-        let farthest = s.add(s.select(certain, s.add(depth, shift), deep), slack);
+        let depth = s.fma(barycentric[2], c[2], s.fma(barycentric[1], b[2], s.mul(barycentric[0], a[2])));
+        let slack =
+            s.fma(s.max_abs(least_depth, greatest_depth), s.splat(DEPTH_SLACK), s.splat(f32::MIN_POSITIVE));
+        let nearest = s.sub(s.select(certain, s.sub(depth, shift), least_depth), slack);
+        let farthest = s.add(s.select(certain, s.add(depth, shift), greatest_depth), slack);
         let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));
         FilteredTriangles { out: s.or(out, missed), certain, nearest, farthest }
     }

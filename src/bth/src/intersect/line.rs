@@ -1,48 +1,51 @@
-//! The line of a ray, and on which side of it points and edges lie: what walks through tetrahedra ask.
+//! The line of a ray, and the side of it on which points and edges lie: the predicates of walks through tetrahedra.
 //!
 //! Points are projected along the ray by the axis shear of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection",
-//! JCGT 2013), in f64: the line becomes the origin of a plane. A sign that rounding might have got wrong is said to be
-//! uncertain. Whether, where and how lines cross triangles is decided in [`super::crossing`], which says of every triangle
-//! exactly whether the real line meets it (lines in its plane miss it).
+//! JCGT 2013), in f64: the line becomes the origin of a plane. A sign that rounding errors might change is reported as
+//! [`Sign::Uncertain`]. The intersection of lines with triangles is decided exactly in [`super::exact`]; a line in the plane of a
+//! triangle misses it.
 
 use crate::intersect::exact::RATIO_ERROR;
 use crate::rays::Ray;
 
-/// 8 units of f64 rounding (2^-53 each): bounds the error of a projected coordinate relative
-/// to the greatest coordinate of the point seen from the ray's origin; see [`Line::project`].
+/// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the greatest |coordinate| of the point relative to
+/// the ray's origin; see [`Line::project`].
 pub(crate) const PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
-/// The line of a ray, prepared.
+/// The line of a ray in the ray's space, with the constants of its projection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     pub(crate) origin: [f64; 3],
     pub(crate) direction: [f64; 3],
-    /// The axes of the projection: two in the plane, and the one along which the direction is greatest.
+    /// The two axes of the plane of projection, and the axis of the direction's greatest |component|.
     pub(crate) axis: [usize; 3],
+    /// Change of the plane's coordinates along the line per unit of depth.
     pub(crate) shear: [f64; 2],
-    /// 1 / direction[axis[2]]: turns depths into t.
+    /// 1 / direction[axis[2]], the factor from depth to t.
     pub(crate) inverse_depth: f64,
 }
 
-/// A point as seen along the line.
+/// A point projected along the line.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projected {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// Along the greatest axis, from the ray's origin.
+    /// Coordinate along the third axis, relative to the ray's origin.
     pub(crate) depth: f64,
 }
 
 impl Projected {
+    /// |x| + |y|.
     fn size(&self) -> f64 {
         self.x.abs() + self.y.abs()
     }
 }
 
-/// A sign that is known, or that rounding hides.
+/// The sign of a value with rounding errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sign {
     Negative,
+    /// The value lies within its error bound of 0.
     Uncertain,
     Positive,
 }
@@ -52,13 +55,13 @@ fn wide(v: [f32; 3]) -> [f64; 3] {
 }
 
 /// Twice the signed area of the triangle (origin, p, q) in the plane of projection. Antisymmetric
-/// in its arguments bit for bit, so two triangles never disagree about their shared edge.
+/// in its arguments bit for bit, so two triangles get opposite signs for their shared edge.
 fn cross(p: &Projected, q: &Projected) -> f64 {
     p.x * q.y - p.y * q.x
 }
 
 impl Line {
-    /// None if the ray has no line: a component that is not finite, or a zero direction.
+    /// None if the ray has no line, because a component is not finite or the direction is zero.
     pub(crate) fn new(ray: &Ray) -> Option<Line> {
         let (origin, direction) = (wide(ray.origin), wide(ray.direction));
         let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
@@ -75,7 +78,7 @@ impl Line {
         }
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
         if direction[z] < 0.0 {
-            // Keeps the handedness: faces whose normal points along the ray are counterclockwise.
+            // Keeps the orientation: faces whose normal points along the ray are counterclockwise.
             std::mem::swap(&mut x, &mut y);
         }
         let inverse_depth = 1.0 / direction[z];
@@ -88,23 +91,23 @@ impl Line {
         })
     }
 
-    /// Projects a point. With u = 2^-53 and R the greatest |coordinate| of point - origin, the
-    /// differences are off by uR, the shear by a factor of 1±2u, its product with the depth by one more and the depth's own
-    /// uR, and |shear| <= 1: x and y are off by less than uR + 4uR + 2uR < 8uR.
+    /// Projects a point. Let u = 2^-53 and R the greatest |coordinate| of point - origin. The differences are off by uR, the
+    /// shear by a factor of 1±2u, its product with the depth by one more rounding and by the depth's own uR, and |shear| <= 1:
+    /// x and y are off by less than uR + 4uR + 2uR < 8uR.
     #[inline(always)]
     pub(crate) fn project(&self, point: [f32; 3]) -> Projected {
         let [x, y, z] = self.axis.map(|k| f64::from(point[k]) - self.origin[k]);
         Projected { x: x - self.shear[0] * z, y: y - self.shear[1] * z, depth: z }
     }
 
-    /// Bound on the error of x and y of [`Self::project`], for points no farther (in the maximum
-    /// norm) from the origin than `reach`.
+    /// Bound on the error of x and y of [`Self::project`], for points whose distance from the origin in the maximum norm does not
+    /// exceed `reach`.
     #[inline(always)]
     pub(crate) fn projection_error(reach: f64) -> f64 {
         PROJECTION_ERROR * reach
     }
 
-    /// Greatest coordinate of any point of a box, seen from the origin.
+    /// Greatest |coordinate| of any point of a box relative to the origin.
     pub(crate) fn reach_of_box(&self, lower: [f32; 3], upper: [f32; 3]) -> f64 {
         (0..3).fold(0.0, |reach: f64, k| {
             let (lo, hi) = (f64::from(lower[k]) - self.origin[k], f64::from(upper[k]) - self.origin[k]);
@@ -112,8 +115,8 @@ impl Line {
         })
     }
 
-    /// Side of the line on which the edge p→q passes, given the error of the coordinates.
-    /// The products are off by error·(sizes + error) plus their own rounding, below one more of these.
+    /// Side of the line on which the edge p→q passes, given the error of the coordinates. The products are off by
+    /// error·(sizes + error) because of the coordinates, and by less than the same again because of their own roundings.
     #[inline(always)]
     pub(crate) fn side(p: &Projected, q: &Projected, error: f64) -> Sign {
         let value = cross(p, q);
@@ -127,26 +130,28 @@ impl Line {
         }
     }
 
-    /// Greatest and least t at which the line can cross a triangle with these corners.
+    /// Least and greatest t at which the line can cross a triangle with these corners.
     #[inline(always)]
     pub(crate) fn t_range(&self, corners: [&Projected; 3]) -> (f64, f64) {
         let t = corners.map(|p| p.depth * self.inverse_depth);
         (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]))
     }
 
-    /// Whether the corners of a triangle that the line crosses for certain go around it clockwise.
+    /// Whether the corners of a triangle that the line certainly crosses are clockwise about it.
     pub(crate) fn turns_clockwise([a, b, c]: [&Projected; 3]) -> bool {
         cross(b, c) + cross(c, a) + cross(a, b) < 0.0
     }
 
-    /// A t before which the line does not cross a triangle that it certainly crosses, with coordinates of this error.
+    /// Lower bound of the t at which the line crosses a triangle that it certainly crosses, given the error of the projected
+    /// coordinates.
     pub(crate) fn t_before(&self, [a, b, c]: [&Projected; 3], error: f64) -> f64 {
         let weight = [cross(b, c), cross(c, a), cross(a, b)];
         let bound = 4.0 * error * (a.size() + b.size() + c.size() + error);
         let sum = weight[0] + weight[1] + weight[2];
         let depth = (weight[0] * a.depth + weight[1] * b.depth + weight[2] * c.depth) / sum;
         let farthest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
-        // Errors of the weights shift the depth within the range of depths, those of this sum by less than 2^-48.
+        // The errors of the weights shift the depth within the range of depths. The roundings of the sum above shift it by less
+        // than 2^-48 of the greatest |depth|.
         let shift =
             2.0 * farthest * (4.0 * bound / (sum.abs() - 4.0 * bound).max(0.0)) + farthest * RATIO_ERROR;
         depth * self.inverse_depth - shift * self.inverse_depth.abs()

@@ -1,9 +1,9 @@
-//! Rays against boxes and triangles.
+//! Intersection of rays with boxes and triangles, in object space.
 //!
-//! f32 lanes are conservative: [`boxes`] and [`filter`] leave out what is certainly missed. What remains is decided in f64, and
-//! exactly where its error bounds leave a sign or a digit open: [`exact`] for one ray and triangle, [`exact_lanes`] for
-//! sixteen, to the same bits. [`line`] is the projection along a ray that both use, and [`prepare`] makes of rays what boxes
-//! and filter need.
+//! The f32 tests [`boxes`] and [`filter`] are conservative: they exclude only boxes and triangles that are certainly missed.
+//! The remaining triangles are decided in f64, and in exact arithmetic where the error bounds of f64 leave a sign or a digit
+//! uncertain: [`exact`] computes one ray and triangle, [`exact_lanes`] sixteen pairs at a time with the same bits. [`line`]
+//! projects points along a ray in f64, and [`prepare`] computes the per-ray constants of the box test and of the filter.
 
 pub(crate) mod boxes;
 pub(crate) mod exact;

@@ -1,4 +1,4 @@
-//! What a traversal looks for: the nearest hit or any hit; and what it counts.
+//! Queries over rays, nearest hit and any hit, and the statistics of their traversal.
 
 pub(crate) mod sink;
 
@@ -8,104 +8,113 @@ use crate::rays::{Hit, Ray, Surface};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 
-/// What sixteen rays hit in an object.
+/// Hits of sixteen rays in an object.
 pub(crate) struct AnswerLanes<'a> {
-    /// Those that hit anything, a bit each.
+    /// Bits of the rays that hit anything.
     pub(crate) lanes: u32,
     pub(crate) intersections: &'a Intersections,
+    /// Instance that is reported with the hits.
     pub(crate) instance: u32,
 }
 
-/// A triangle, by its id or by its place in leaf order among the ids of an object. An id is most often a cache miss, and of no
-/// use until the query ends: it is asked for when the triangle is offered, and read then.
+/// A triangle, by its id or by its index in the leaf order of an object. Reading an id is most often a cache miss, and the id
+/// is not needed until the query ends: traversals prefetch it when they find the triangle, and the query reads it at its end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleRef<'a> {
-    pub(crate) word: u32,
-    pub(crate) is_place: bool,
-    pub(crate) ids: &'a [u32],
+    /// The id, or the index in `ids`.
+    value: u32,
+    is_place: bool,
+    /// Ids of the object's triangles, in leaf order.
+    ids: &'a [u32],
 }
 
 impl<'a> TriangleRef<'a> {
+    /// The triangle with this id.
     #[inline(always)]
     pub(crate) fn id(id: u32, ids: &'a [u32]) -> Self {
-        TriangleRef { word: id, is_place: false, ids }
+        TriangleRef { value: id, is_place: false, ids }
     }
+    /// The triangle whose id is `ids[place]`.
     #[inline(always)]
     pub(crate) fn place(place: u32, ids: &'a [u32]) -> Self {
-        TriangleRef { word: place, is_place: true, ids }
+        TriangleRef { value: place, is_place: true, ids }
     }
+    /// The id.
     fn read(&self) -> u32 {
-        if self.is_place { self.ids[self.word as usize] } else { self.word }
+        if self.is_place { self.ids[self.value as usize] } else { self.value }
     }
 }
 
-/// A query in progress over one ray.
+/// State of a query over one ray: its range of t and the best hit so far. Values of t are in units of the ray's direction.
 pub(crate) trait Query: Copy {
-    /// Whether any hit will do.
+    /// Whether the query ends at the first hit found.
     const ANY: bool;
-    /// What the caller gets.
+    /// Result of the query.
     type Answer;
-    /// `ids` are those of the object, in leaf order.
+    /// The result of a traversal that has ended. `ids` are the ids of the object's triangles in leaf order, and `instance` is
+    /// reported with a hit.
     fn answer(&self, ids: &[u32], instance: u32) -> Self::Answer;
-    /// The same, given t, u and v as they are to be reported.
+    /// The result for a hit in the ray's range whose t, u and v are already rounded.
     fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
-    /// The same of sixteen rays; those whose bit is not set hit nothing.
-    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, to: &mut [Self::Answer; LANES]);
-    /// Merges an answer that was found in an object into that of the ray of a scene; `t_scale` turns t of the object into that
-    /// of the world.
+    /// Writes the results of sixteen rays; rays whose bit is not set in `hits.lanes` are misses.
+    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, answers: &mut [Self::Answer; LANES]);
+    /// Merges the answer of a ray in an object into the answer of its ray in the scene. `t_scale` is the factor from t in
+    /// object space to t in world space.
     fn merge(best: &mut Self::Answer, found: Self::Answer, ray: &Ray, t_scale: f32);
+    /// A query without hits over the range of `ray`.
     fn new(ray: &Ray) -> Self;
-    /// Whether walks should keep an eye on how far they are: where rays are often short, and where
-    /// [`Self::is_settled_by`] has a use for it.
+    /// Whether walks through tetrahedra keep track of depths, for queries whose rays are often short and that can be ended by
+    /// [`Self::is_settled_by`].
     const KEEPS_DEPTHS: bool = false;
-    /// Offers a crossing within the object; true ends the traversal.
+    /// Offers an intersection with a triangle of the object. Returns whether the query is complete.
     fn offer(&mut self, triangle: TriangleRef<'_>, crossing: Intersection) -> bool;
-    /// Tells of a crossing whose t certainly lies between two values, roundings included; true if that is all that the
-    /// query wants to know.
+    /// Offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether the
+    /// query is complete.
     fn is_settled_by(&mut self, _t: (f64, f64)) -> bool {
         false
     }
-    /// Nothing whose exact t lies beyond this can be of interest.
+    /// Upper bound of the exact t of intersections that can still change the result.
     fn limit(&self) -> f64;
-    /// Whether a crossing between two values of t can be of interest. (Those of triangles that a ray starts on mostly are
-    /// not, and exact arithmetic need not be troubled.)
+    /// Whether an intersection with a t between two values can change the result. It seldom can for the triangle on which a ray
+    /// starts; exact arithmetic is then avoided.
     fn may_matter(&self, t: [f64; 2]) -> bool;
-    /// t of the nearest hit so far, if the query wants the nearest.
+    /// t of the nearest hit so far, if there is one; always None for any-hit queries.
     fn found(&self) -> Option<f64>;
-    /// Between which t the nearest hit so far lies, if there is one and the query wants the nearest.
+    /// Lower and upper bound of the t of [`Self::found`].
     #[inline(always)]
     fn found_between(&self) -> Option<[f64; 2]> {
         let limit = self.limit();
-        // As far below as the limit lies above.
+        // The lower bound lies as far below t as the limit lies above it.
         self.found().map(|t| [2.0 * t - limit, limit])
     }
-    /// A triangle is certainly hit within the ray's range; of use where any hit will do.
+    /// Notes that a triangle is certainly hit within the ray's range, which completes an any-hit query.
     fn accept(&mut self);
 }
 
-/// `t` and all that could be taken for it: t is compared with the ray's range after rounding to f32, and
-/// computed only to 2^-28 of itself (`super::crossing`), so of two equal hits one may seem nearer.
+/// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
+/// and it has a relative error of 2^-28 ([`crate::intersect::exact::RATIO_ERROR`]), so one of two equal hits may appear nearer.
 fn widened(t: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1 << 23) as f64;
     const LEAST: f64 = f32::from_bits(1) as f64;
     t + (t.abs() * SLACK + LEAST)
 }
 
-/// Least t, then least triangle id: an order that does not depend on the traversal.
+/// Query for the nearest hit: the least t, and among equal t the least triangle id. This order does not depend on the traversal.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Nearest {
     tmin: f32,
     tmax: f32,
-    /// An id, or a place among the ids ([`TriangleRef`]); `NONE` where nothing is hit.
+    /// The nearest triangle so far, by its id or by its index in leaf order ([`TriangleRef`]); `NONE` if nothing is hit.
     triangle: u32,
     is_place: bool,
+    /// The nearest intersection so far. Its t is `tmax` if nothing is hit.
     best: Intersection,
 }
 
 impl Nearest {
     /// The nearest triangle so far.
-    fn named<'a>(&self, ids: &'a [u32]) -> TriangleRef<'a> {
-        TriangleRef { word: self.triangle, is_place: self.is_place, ids }
+    fn best_triangle<'a>(&self, ids: &'a [u32]) -> TriangleRef<'a> {
+        TriangleRef { value: self.triangle, is_place: self.is_place, ids }
     }
 }
 
@@ -116,7 +125,7 @@ impl Query for Nearest {
         if self.triangle == NONE {
             return Hit::MISS;
         }
-        let surface = Surface { instance, triangle: self.named(ids).read() };
+        let surface = Surface { instance, triangle: self.best_triangle(ids).read() };
         let [u, v] = self.best.uv();
         Self::answer_of(surface, reported(self.best.t), u, v)
     }
@@ -125,16 +134,19 @@ impl Query for Nearest {
         Hit { t, u, v, surface }
     }
     #[inline(always)]
-    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, to: &mut [Hit; LANES]) {
-        let &AnswerLanes { lanes, intersections: crossings, instance } = hits;
+    fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, answers: &mut [Hit; LANES]) {
+        let &AnswerLanes { lanes, intersections, instance } = hits;
         let m = s.mask(lanes);
         let Hit { t, u, v, surface } = Hit::MISS;
-        let t = s.select(m, s.load(&crossings.t), s.splat(t));
-        let u = s.select(m, s.load(&crossings.u), s.splat(u));
-        let v = s.select(m, s.load(&crossings.v), s.splat(v));
+        let t = s.select(m, s.load(&intersections.t), s.splat(t));
+        let u = s.select(m, s.load(&intersections.u), s.splat(u));
+        let v = s.select(m, s.load(&intersections.v), s.splat(v));
         let instance = s.select_u(m, s.splat_u(instance), s.splat_u(surface.instance));
-        let triangle = s.select_u(m, s.load_u(&crossings.triangle), s.splat_u(surface.triangle));
-        s.store_rows5([s.bits(t), s.bits(u), s.bits(v), instance, triangle], zerocopy::transmute_mut!(to));
+        let triangle = s.select_u(m, s.load_u(&intersections.triangle), s.splat_u(surface.triangle));
+        s.store_rows5(
+            [s.bits(t), s.bits(u), s.bits(v), instance, triangle],
+            zerocopy::transmute_mut!(answers),
+        );
     }
     #[inline]
     fn merge(best: &mut Hit, found: Hit, ray: &Ray, t_scale: f32) {
@@ -148,9 +160,9 @@ impl Query for Nearest {
     fn offer(&mut self, triangle: TriangleRef<'_>, crossing: Intersection) -> bool {
         let nearer = self.triangle == NONE
             || crossing.t < self.best.t
-            || (crossing.t == self.best.t && triangle.read() < self.named(triangle.ids).read());
+            || (crossing.t == self.best.t && triangle.read() < self.best_triangle(triangle.ids).read());
         if nearer && in_range(crossing.t as f32, self.tmin, self.tmax) {
-            (self.triangle, self.is_place) = (triangle.word, triangle.is_place);
+            (self.triangle, self.is_place) = (triangle.value, triangle.is_place);
             self.best = crossing;
         }
         false
@@ -168,13 +180,13 @@ impl Query for Nearest {
     fn accept(&mut self) {}
 }
 
-/// The better of two hits of a ray of a scene: least t, then least instance. None where the new one is no better, or where its t
-/// lies outside the ray's range once it is scaled to the world's.
+/// The new hit of a ray in a scene, with its t in world space, if it is better than `best`: a lesser t, or an equal t and a
+/// lesser instance. None if it is not better, or if its t in world space lies outside the ray's range.
 pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<Hit> {
     if !hit.is_hit() {
         return None;
     }
-    // A factor of 1 leaves every t as it is, without a rounding.
+    // With a factor of 1, t is not rounded again.
     let t = if t_scale == 1.0 { hit.t } else { hit.t * t_scale };
     let hit = Hit { t, ..*hit };
     let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
@@ -182,18 +194,18 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
     (in_range && nearer).then_some(hit)
 }
 
-/// Whether a t between two values may lie in a range, rounding counted in.
+/// Whether a t between two values may lie between `tmin` and `limit` after rounding to f32.
 fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
-/// Whether a t, rounded as it will be reported, lies in the ray's range.
+/// Whether a t that is already rounded for the answer lies in the ray's range.
 #[inline(always)]
 fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t < f32::INFINITY
 }
 
-/// Ends at the first crossing in range.
+/// Query for any hit: it is complete at the first intersection in the ray's range.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Any {
     tmin: f32,
@@ -210,8 +222,8 @@ impl Query for Any {
     fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
         true
     }
-    fn answers_of<S: Simd>(_s: S, hits: &AnswerLanes<'_>, to: &mut [bool; LANES]) {
-        for (lane, found) in to.iter_mut().enumerate() {
+    fn answers_of<S: Simd>(_s: S, hits: &AnswerLanes<'_>, answers: &mut [bool; LANES]) {
+        for (lane, found) in answers.iter_mut().enumerate() {
             *found = hits.lanes >> lane & 1 != 0;
         }
     }
@@ -247,18 +259,23 @@ impl Query for Any {
     }
 }
 
-/// Counts the work of a traversal, or nothing at all.
+/// Receiver of the statistics of a traversal; `()` counts nothing.
 pub(crate) trait Count {
+    /// A wide node was entered.
     fn node(&mut self) {}
+    /// A leaf was entered.
     fn leaf(&mut self) {}
+    /// This many triangles were tested.
     fn triangles(&mut self, _n: u32) {}
+    /// A tetrahedron was walked through.
     fn tet(&mut self) {}
+    /// A walk was repeated exactly.
     fn flood(&mut self) {}
 }
 
 impl Count for () {}
 
-/// Work that one ray took.
+/// Statistics of the traversal of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steps {
     /// Wide nodes entered.
@@ -269,7 +286,7 @@ pub struct Steps {
     pub triangles: u32,
     /// Tetrahedra walked through.
     pub tets: u32,
-    /// Walks that met a tie (a ray through a vertex, edge or face plane) and were done again exactly.
+    /// Walks through tetrahedra that were repeated exactly, because the ray passes through a vertex, an edge or a face plane.
     pub floods: u32,
 }
 

@@ -1,96 +1,98 @@
-//! Where a batch's answers go: one type for models and for scenes, so that every kernel is compiled once for both.
+//! Destination of the answers of a batch: one type for models and for scenes, so that every kernel is compiled once for both.
 
 use super::{AnswerLanes, Query};
 use crate::intersect::exact_lanes::Intersections;
 use crate::rays::{Ray, Surface};
 use crate::simd::{LANES, Simd};
 
-/// A ray of a scene that is traced through an instance.
+/// The traversal of one instance by one ray of a scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Visit {
-    /// Place of the ray in the scene's batch.
+    /// Index of the ray in the scene's batch.
     pub(crate) ray: u32,
     pub(crate) instance: u32,
 }
 
-/// Relates the rays of a batch in object space to those of the scene that they come from.
+/// Maps the rays of a batch in object space to the rays of the scene's batch from which they were transformed.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneRays<'a> {
     /// All rays of the scene's batch, in world space.
     pub(crate) rays: &'a [Ray],
-    /// For each ray in object space the one it comes from, and its instance.
+    /// For each ray in object space its ray in the scene, and the instance.
     pub(crate) visits: &'a [Visit],
-    /// For each ray in object space the factor that turns its t into the world's.
+    /// For each ray in object space the factor from its t to t in world space.
     pub(crate) t_scale: &'a [f32],
 }
 
-/// Takes in what the rays of a batch hit. Rays of which nothing is reported keep the answer that is there: a miss at first.
+/// Stores the answers of the rays of a batch. Rays for which nothing is reported keep their initial answer, a miss.
 pub(crate) struct Sink<'a, Q: Query> {
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
     answers: &'a mut [Q::Answer],
-    /// The instance that is reported with a hit, unless the visit names it.
+    /// Instance that is reported with a hit if there is no `scene`.
     instance: u32,
+    /// If set, answers are merged into those of the scene's rays.
     scene: Option<SceneRays<'a>>,
-    /// Place in the batch of the ray that kernels count from.
+    /// Index in the batch of the ray with index 0 in calls.
     first: usize,
 }
 
 impl<'a, Q: Query> Sink<'a, Q> {
-    /// Answers by the places of their rays in the batch.
+    /// Stores the answer of ray i in `answers[i]`.
     pub(crate) fn new(ids: &'a [u32], answers: &'a mut [Q::Answer], instance: u32) -> Self {
         Sink { ids, answers, instance, scene: None, first: 0 }
     }
 
-    /// Answers of all rays of a scene's batch: what a visit finds is merged into its ray's.
+    /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
     pub(crate) fn of_scene(ids: &'a [u32], answers: &'a mut [Q::Answer], scene: SceneRays<'a>) -> Self {
         Sink { ids, answers, instance: 0, scene: Some(scene), first: 0 }
     }
 
-    /// The same answers for a part of the rays, which begins at `first`.
+    /// A sink for the rays from `first` on, whose indices in calls begin at 0.
     #[inline(always)]
     pub(crate) fn part(&mut self, first: usize) -> Sink<'_, Q> {
         let Sink { ids, instance, scene, .. } = *self;
         Sink { ids, answers: self.answers, instance, scene, first: self.first + first }
     }
 
-    /// Takes in the answer of a query that has ended.
+    /// Stores the answer of a query that has ended.
     #[inline(always)]
     pub(crate) fn query(&mut self, ray: usize, query: &Q) {
-        let at = self.first + ray;
+        let index = self.first + ray;
         match &self.scene {
-            None => self.answers[at] = query.answer(self.ids, self.instance),
+            None => self.answers[index] = query.answer(self.ids, self.instance),
             Some(scene) => {
-                let answer = query.answer(self.ids, scene.visits[at].instance);
-                self.merge(at, answer);
+                let answer = query.answer(self.ids, scene.visits[index].instance);
+                self.merge(index, answer);
             }
         }
     }
 
-    /// Takes in the nearest hit of a ray, as it is reported. (The numbers come one by one, because a pair of them that passes
-    /// through memory stalls the load that follows.)
+    /// Stores the nearest hit of a ray; t, u and v are already rounded. They are separate parameters, because an aggregate
+    /// would be passed through memory and stall the load that follows.
     #[inline(always)]
     pub(crate) fn hit(&mut self, ray: usize, triangle: u32, t: f32, u: f32, v: f32) {
-        let at = self.first + ray;
+        let index = self.first + ray;
         match &self.scene {
             None => {
-                self.answers[at] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
+                self.answers[index] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
             }
             Some(scene) => {
-                let instance = scene.visits[at].instance;
-                self.merge(at, Q::answer_of(Surface { instance, triangle }, t, u, v));
+                let instance = scene.visits[index].instance;
+                self.merge(index, Q::answer_of(Surface { instance, triangle }, t, u, v));
             }
         }
     }
 
-    /// Takes in the hits of up to sixteen rays from this one on, a bit each, of which nothing has been reported before.
+    /// Stores the hits of up to sixteen consecutive rays from `ray` on. Bit i of `lanes` is set if ray i hits; nothing may have
+    /// been reported for these rays before.
     #[inline(always)]
     pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, mut lanes: u32, found: &Intersections) {
         if self.scene.is_none()
-            && let Some(to) = self.answers[self.first + ray..].first_chunk_mut()
+            && let Some(answers) = self.answers[self.first + ray..].first_chunk_mut()
         {
             let hits = AnswerLanes { lanes, intersections: found, instance: self.instance };
-            return Q::answers_of(s, &hits, to);
+            return Q::answers_of(s, &hits, answers);
         }
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
@@ -99,7 +101,7 @@ impl<'a, Q: Query> Sink<'a, Q> {
         }
     }
 
-    /// Merges the answer of a visit into that of its ray.
+    /// Merges the answer of a visit into the answer of its ray.
     #[inline(never)]
     fn merge(&mut self, visit: usize, answer: Q::Answer) {
         let Some(SceneRays { rays, visits, t_scale }) = &self.scene else { return };

@@ -1,17 +1,17 @@
-//! Which instruction set the kernels use: found once, or told.
+//! Choice of the instruction set of the kernels: detected once, or set by environment variable or call.
 
 use super::{Kernel, Scalar};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Names the instruction set to use in place of the best: `scalar`, `avx2` or `avx512`.
+/// Environment variable with the name of the instruction set to use in place of the best: `scalar`, `avx2` or `avx512`.
 const VARIABLE: &str = "BTH_ISA";
 
-/// An instruction set that kernels are compiled for. Answers are the same bits on all.
+/// An instruction set for which kernels are compiled. Answers have the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Isa {
-    /// Whatever the target has at least.
+    /// The baseline of the compilation target.
     Scalar,
     /// AVX2 and FMA (x86-64-v3).
     Avx2,
@@ -19,12 +19,12 @@ pub enum Isa {
     Avx512,
 }
 
-/// An instruction set cannot be used.
+/// Why an instruction set cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum IsaError {
-    /// No such name.
+    /// There is no instruction set of this name.
     Unknown(String),
-    /// This machine lacks it.
+    /// This machine does not have the instruction set.
     Missing(Isa),
 }
 
@@ -63,22 +63,22 @@ impl FromStr for Isa {
     }
 }
 
-/// 0: not chosen yet; else the place in `ALL`, plus one.
+/// 0 as long as none is chosen, else the index in [`Isa::ALL`] plus one.
 static CHOSEN: AtomicU8 = AtomicU8::new(0);
 const SCALAR: u8 = Isa::Scalar as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
-/// UncachedHits, so that what runs kernels stays short.
+/// Runs a kernel in scalar code. Not inlined, so that callers of [`Isa::run`] stay small.
 #[inline(never)]
-fn plain<K: Kernel>(kernel: K) -> K::Output {
+fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Scalar)
 }
 
 impl Isa {
-    /// All, the plainest first.
+    /// All instruction sets, from the least to the most capable.
     pub const ALL: [Isa; 3] = [Isa::Scalar, Isa::Avx2, Isa::Avx512];
 
-    /// Whether this machine has it.
+    /// Whether this machine has the instruction set.
     pub fn is_available(self) -> bool {
         #[cfg(target_arch = "x86_64")]
         return match self {
@@ -90,15 +90,15 @@ impl Isa {
         return self == Isa::Scalar;
     }
 
-    /// The best that this machine has.
+    /// The most capable instruction set of this machine.
     pub fn best() -> Isa {
         Isa::ALL.into_iter().rev().find(|isa| isa.is_available()).unwrap_or(Isa::Scalar)
     }
 
-    /// What all tracing in this process uses from now on.
+    /// Uses this instruction set for all tracing in this process from now on.
     ///
     /// # Errors
-    /// [`IsaError::Missing`] when this machine lacks it; nothing changes then.
+    /// [`IsaError::Missing`] if this machine does not have it; the choice is then unchanged.
     pub fn choose(self) -> Result<(), IsaError> {
         if !self.is_available() {
             return Err(IsaError::Missing(self));
@@ -107,8 +107,8 @@ impl Isa {
         Ok(())
     }
 
-    /// What tracing uses: what [`Self::choose`] said, else what the environment variable `BTH_ISA` says if this
-    /// machine has it, else the best.
+    /// The instruction set that tracing uses: the last one set by [`Self::choose`], else the one named by the environment
+    /// variable `BTH_ISA` if this machine has it, else the best.
     #[inline]
     pub fn chosen() -> Isa {
         match CHOSEN.load(Ordering::Relaxed) {
@@ -122,26 +122,26 @@ impl Isa {
     #[cold]
     fn choose_first() -> Isa {
         let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
-        // Two threads that get here at once store the same.
+        // Threads that run this concurrently store the same value.
         CHOSEN.store(isa as u8 + 1, Ordering::Relaxed);
         isa
     }
 
-    /// What the environment variable `BTH_ISA` says, if it is set. Programs check it at their start; the
-    /// library passes over what it cannot follow.
+    /// The instruction set named by the environment variable `BTH_ISA`; None if it is not set or empty. Programs report the
+    /// error at their start; the library ignores an invalid value.
     ///
     /// # Errors
-    /// When it names none, or one that this machine lacks.
+    /// [`IsaError`] if the value names no instruction set, or one that this machine does not have.
     pub fn from_environment() -> Result<Option<Isa>, IsaError> {
         let Some(name) = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) else { return Ok(None) };
         let isa: Isa = name.to_string_lossy().parse()?;
         if isa.is_available() { Ok(Some(isa)) } else { Err(IsaError::Missing(isa)) }
     }
 
-    /// Runs a kernel with this instruction set, or with plain code if the machine lacks it.
+    /// Runs a kernel with this instruction set, or in scalar code if the machine does not have it.
     #[inline(always)]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // Not by way of `run_wide`, whose result would be one more copy.
+        // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
         #[cfg(target_arch = "x86_64")]
         match self {
             Isa::Scalar => {}
@@ -156,11 +156,11 @@ impl Isa {
                 }
             }
         }
-        plain(kernel)
+        run_scalar(kernel)
     }
 
-    /// Runs a kernel with this instruction set unless that is plain code: gives it back then. For kernels that are no
-    /// gain without vectors, and a lot of code.
+    /// Runs a kernel with this instruction set; returns the kernel as the error if there are no vectors. For large kernels that
+    /// are no faster than other code without vectors: they are not compiled to scalar code.
     #[inline(always)]
     pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
         #[cfg(target_arch = "x86_64")]

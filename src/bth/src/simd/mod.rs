@@ -1,13 +1,13 @@
-//! Sixteen lanes of f32 or u32, whatever the machine: the small vector trait over which kernels are written once.
+//! Vectors of sixteen f32 or u32 lanes on any machine: the trait over which kernels are generic.
 //!
-//! An implementation is a token that exists only on machines that have its instructions, so its methods are
-//! safe to call, and every `unsafe` of the kernels lies in the files beside this one. All methods, and
-//! everything generic over [`Simd`], must be `#[inline(always)]`: only so does code end up
-//! inside the one function per instruction set that enables its features ([`Isa::run`]). A closure, or
-//! a library function that takes one (`array::map`), is compiled on its own and must not touch lanes.
+//! An implementation is a token that exists only on machines that have its instructions, so its methods are safe to call, and
+//! all `unsafe` code of the kernels is in this folder. All methods, and all functions that are generic over [`Simd`], must be
+//! `#[inline(always)]`, so that they are compiled inside the one function per instruction set that enables its features
+//! ([`Isa::run`]). A closure, or a library function that takes one (`array::map`), is compiled as a function of its own,
+//! without these features, and must not use lanes.
 //!
-//! Kernels use these lanes only to *leave out* what certainly does not matter; hits are decided elsewhere, in f64
-//! (`trace::crossing`). So it does no harm that `fma` rounds once or twice, depending on the machine.
+//! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64 ([`crate::intersect::exact`]).
+//! Answers therefore do not depend on whether `fma` rounds once or twice.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -24,22 +24,23 @@ pub(crate) use scalar::Scalar;
 /// Number of lanes.
 pub(crate) const LANES: usize = 16;
 
-/// Work that is generic over the instruction set. `run` must be `#[inline(always)]`.
+/// A function that is generic over the instruction set, with its arguments.
 pub(crate) trait Kernel {
     type Output;
+    /// Must be `#[inline(always)]`.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
-/// Sixteen lanes. Lane i of a mask is bit i.
+/// Operations on vectors of sixteen lanes. Where masks are given as bits, bit i stands for lane i.
 pub(crate) trait Simd: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
     /// u32 lanes.
     type U: Copy;
-    /// A truth value a lane.
+    /// A mask: a truth value for each lane.
     type M: Copy;
 
-    /// Whether the lanes are vectors of the machine. Where they are not, kernels that only pay with vectors are left out.
+    /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
     const HAS_VECTORS: bool = true;
 
     fn splat(self, x: f32) -> Self::F;
@@ -58,7 +59,7 @@ pub(crate) trait Simd: Copy + 'static {
     /// The greater; `b` where either is NaN.
     fn max(self, a: Self::F, b: Self::F) -> Self::F;
     fn abs(self, a: Self::F) -> Self::F;
-    /// The greater of |a| and |b|; which of them is open where either is NaN.
+    /// The greater of |a| and |b|; either of them where one is NaN.
     fn max_abs(self, a: Self::F, b: Self::F) -> Self::F;
     /// a < b; false for NaN.
     fn lt(self, a: Self::F, b: Self::F) -> Self::M;
@@ -68,16 +69,19 @@ pub(crate) trait Simd: Copy + 'static {
     fn select(self, m: Self::M, a: Self::F, b: Self::F) -> Self::F;
     /// Lane `at[i] % 16` of the table.
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
-    /// The least of all lanes; none may be NaN.
+    /// The least of all lanes, none of which may be NaN.
     fn least(self, a: Self::F) -> f32;
-    /// Rows of four by their columns: lane i of the k-th is element k of row `row[i]`; undefined where the mask is clear.
-    /// Panics if a row of a lane that is set lies outside. Much faster than four gathers, on any machine.
+    /// Loads rows of four and transposes them: lane i of vector k is element k of row `row[i]`, and is undefined where the mask
+    /// is clear. Much faster than four gathers on all instruction sets.
+    ///
+    /// # Panics
+    /// If the index of a row lies outside of `from` where the mask is set.
     fn rows4(self, m: Self::M, from: &[[f32; 4]], row: Self::U) -> [Self::F; 4];
-    /// As [`Self::rows4`], rows of eight words.
+    /// As [`Self::rows4`], for rows of eight words.
     fn rows8(self, m: Self::M, from: &[[u32; 8]], row: Self::U) -> [Self::U; 8];
-    /// Sixteen rows of eight words by their columns.
+    /// Transposes sixteen rows of eight words: lane i of vector k is element k of row i.
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [Self::U; 8];
-    /// Columns of five words as rows: element k of row i is lane i of the k-th.
+    /// Transposes five vectors to rows: element k of row i is lane i of vector k.
     #[inline(always)]
     fn store_rows5(self, columns: [Self::U; 5], to: &mut [[u32; 5]; LANES]) {
         let mut words = [[0; LANES]; 5];
@@ -88,15 +92,17 @@ pub(crate) trait Simd: Copy + 'static {
             to[i] = [words[0][i], words[1][i], words[2][i], words[3][i], words[4][i]];
         }
     }
-    /// Where the mask is set, the next elements of `from` in order; else `a`.
+    /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on; the other lanes are those of
+    /// `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
 
     fn splat_u(self, x: u32) -> Self::U;
     fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    /// Loads bytes, each zero-extended to a lane.
     fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
     fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
     fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
-    /// a + b where the mask is set, else `a`.
+    /// a + b, wrapping, where the mask is set, else `a`.
     fn add_where(self, a: Self::U, m: Self::M, b: Self::U) -> Self::U;
     fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
     fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
@@ -106,45 +112,54 @@ pub(crate) trait Simd: Copy + 'static {
     /// a < b, unsigned.
     fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
     fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
+    /// As [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
-    /// Whether [`Self::lookup_f64`] takes but a few instructions.
+    /// Whether [`Self::lookup_f64`] compiles to a few instructions.
     const LOOKS_UP_F64: bool = false;
-    /// Elements `at[i] % 16` of the table; with `FEWEST_OF_GROUP`, only those of its first half are looked up, the others are undefined.
+    /// Elements `at[i] % 16` of the table. With `FIRST_HALF`, elements whose index is not below eight are undefined.
     #[inline(always)]
-    fn lookup_f64<const FEWEST_OF_GROUP: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
-        let (mut place, mut out) = ([0; LANES], [0.0; LANES]);
-        self.store_u(at, &mut place);
+    fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {
+        let (mut index, mut out) = ([0; LANES], [0.0; LANES]);
+        self.store_u(at, &mut index);
         for i in 0..LANES {
-            out[i] = table[place[i] as usize % LANES];
+            out[i] = table[index[i] as usize % LANES];
         }
         out
     }
-    /// Elements of a slice, 0 where the mask is clear. Panics if a lane that is set lies outside.
+    /// Elements of a slice, 0 where the mask is clear.
+    ///
+    /// # Panics
+    /// If an index lies outside of `from` where the mask is set.
     fn gather_u(self, m: Self::M, from: &[u32], at: Self::U) -> Self::U;
-    /// Both halves of elements of a slice: one access each where the machine has it. Undefined where the mask is clear.
+    /// First and second words of elements of a slice, undefined where the mask is clear. AVX-512 loads each pair at once.
+    ///
+    /// # Panics
+    /// As [`Self::gather_u`].
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
+    /// As [`Self::expand`].
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
     /// The bits of f32 lanes.
     fn bits(self, a: Self::F) -> Self::U;
     /// f32 lanes from their bits.
     fn floats(self, a: Self::U) -> Self::F;
-    /// f32 lanes of these values, which are below 2^24.
+    /// Converts values below 2^24 to f32.
     fn numbers(self, a: Self::U) -> Self::F;
 
+    /// The mask of the sixteen lowest bits.
     fn mask(self, bits: u32) -> Self::M;
+    /// The bits of a mask; bits from the sixteenth on are 0.
     fn mask_bits(self, m: Self::M) -> u32;
     fn and(self, a: Self::M, b: Self::M) -> Self::M;
     fn or(self, a: Self::M, b: Self::M) -> Self::M;
     /// a and not b.
     fn and_not(self, a: Self::M, b: Self::M) -> Self::M;
 
-    /// Stores the lanes whose bit is set, in order, from `to[0]`; what follows them in `to` is undefined.
-    /// Returns how many.
+    /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The rest of `to` is undefined.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
     /// As [`Self::compress`].
     fn compress_f(self, bits: u32, a: Self::F, to: &mut [f32; LANES]) -> usize;
-    /// As [`Self::compress`], the greatest key first; the four lowest bits of keys are not compared, and hold the lane where
-    /// keys are stored. Negative keys may come in any order.
+    /// As [`Self::compress`], sorted by descending keys. The four lowest bits of keys are not compared; in the stored keys they
+    /// hold the lane. Negative keys are stored in unspecified order.
     fn compress_far_to_near(
         self,
         bits: u32,
@@ -153,7 +168,8 @@ pub(crate) trait Simd: Copy + 'static {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize;
-    /// As [`Self::compress_far_to_near`], for at least one lane; also returns the lane of the last, the nearest.
+    /// As [`Self::compress_far_to_near`]; also returns the lane of the last entry, the nearest, which is undefined if no bit is
+    /// set.
     #[inline(always)]
     fn sort_far_to_near(
         self,
@@ -166,13 +182,13 @@ pub(crate) trait Simd: Copy + 'static {
         let count = self.compress_far_to_near(bits, key, a, to, keys);
         (count, keys[count.wrapping_sub(1) % LANES].to_bits() as usize % LANES)
     }
-    /// Drops the elements whose key exceeds the limit, keeping the order. Returns how many remain.
+    /// Removes the entries whose key exceeds the limit from `codes` and `keys`, keeping the order, and returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
 
-    /// Row i becomes lane i of every row.
+    /// Transposes: lane k of row i becomes lane i of row k.
     fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
 
-    /// Lane i is the least of row i; none may hold a NaN.
+    /// Lane i of the result is the least lane of row i; no lane may be NaN.
     #[inline(always)]
     fn least_of_each(self, rows: [Self::F; LANES]) -> Self::F {
         let mut columns = self.transpose(rows);
@@ -186,27 +202,26 @@ pub(crate) trait Simd: Copy + 'static {
         columns[0]
     }
 
-    /// Asks for a cache line.
-    fn prefetch<T>(self, place: *const T);
+    /// Prefetches a cache line; any address is allowed.
+    fn prefetch<T>(self, address: *const T);
 }
 
-/// Panics unless all lanes of the mask lie below `len`, and what lies below it fits the signed 32-bit indices of
-/// gathers.
+/// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
 #[inline(always)]
 #[cfg(target_arch = "x86_64")]
-fn assert_within<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
+fn assert_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
     let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
     let outside = s.and_not(m, s.lt_u(at, s.splat_u(len)));
     assert!(s.mask_bits(outside) == 0, "an index of a gather lies outside");
 }
 
-/// The indices of lanes of the mask, which must lie below `len`, and 0 for the others; a slice of that length that
-/// is not empty has them all.
+/// The indices of the lanes of the mask, and 0 for the other lanes, so that every lane has a valid index of a slice of length
+/// `len`. Panics if the slice is empty, and as [`assert_indices`].
 #[inline(always)]
 #[cfg(target_arch = "x86_64")]
-fn within<S: Simd>(s: S, m: S::M, at: S::U, len: usize) -> [u32; LANES] {
+fn valid_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) -> [u32; LANES] {
     assert!(len > 0, "rows of nothing");
-    assert_within(s, m, at, len);
+    assert_indices(s, m, at, len);
     let mut out = [0; LANES];
     s.store_u(s.select_u(m, at, s.splat_u(0)), &mut out);
     out

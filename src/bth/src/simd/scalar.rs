@@ -1,18 +1,19 @@
-//! Sixteen lanes in plain arrays: for machines without vector code, and what the other instruction sets are tested against.
+//! Sixteen lanes in arrays: the implementation for machines without vector code, and the oracle of the tests of the others.
 //!
-//! Each operation is a loop over the lanes, which compilers turn into what vectors the target has at least. Kernels that only
-//! pay with vectors are left out ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part of the library.
+//! Each operation is a loop over the lanes, which the compiler vectorizes with the baseline instructions of the target. Kernels
+//! that are faster only with vectors are not compiled for it ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part
+//! of the library.
 
 use super::{LANES, Simd};
 use std::array::from_fn;
 
-/// Plain code.
+/// The token of scalar code, which runs on every machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scalar;
 
 type F = [f32; LANES];
 type U = [u32; LANES];
-/// All bits of a lane, or none.
+/// All bits of a lane are set, or none.
 type M = [u32; LANES];
 
 #[inline(always)]
@@ -20,7 +21,7 @@ fn all_bits(test: bool) -> u32 {
     if test { u32::MAX } else { 0 }
 }
 
-/// The lanes that are set.
+/// Indices of the set bits, in ascending order.
 #[inline(always)]
 pub(super) fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -58,12 +59,13 @@ fn compress(bits: u32, a: &U, to: &mut U) -> usize {
     count
 }
 
-/// [`Simd::compress_far_to_near`] in plain code: an insertion sort of at most sixteen, usually two or three.
+/// [`Simd::compress_far_to_near`] in scalar code: an insertion sort of at most sixteen entries, usually two or three.
 #[inline(always)]
 pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: &mut F) -> usize {
     let mut count = 0;
     for lane in lanes(bits) {
-        // The lane goes into the lowest bits of its key; as integers, because that makes NaN of an infinity.
+        // The lane is written into the lowest bits of its key. Keys are compared as integers, because an infinity becomes NaN
+        // by this.
         let key = key[lane].to_bits() & !15 | lane as u32;
         let mut at = count % LANES;
         while at > 0 && (keys[at - 1].to_bits() as i32) < key as i32 {
@@ -76,7 +78,7 @@ pub(super) fn compress_far_to_near(bits: u32, key: &F, a: &U, to: &mut U, keys: 
     count
 }
 
-/// [`Simd::transpose`] in plain code.
+/// [`Simd::transpose`] in scalar code.
 #[inline(always)]
 fn transpose(rows: &[F; LANES]) -> [F; LANES] {
     let mut out = [[0.0; LANES]; LANES];
@@ -88,7 +90,7 @@ fn transpose(rows: &[F; LANES]) -> [F; LANES] {
     out
 }
 
-/// [`Simd::keep_up_to`] in plain code.
+/// [`Simd::keep_up_to`] in scalar code.
 #[inline(always)]
 pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize {
     let mut kept = 0;
@@ -99,7 +101,7 @@ pub(super) fn keep_up_to(codes: &mut [u32], keys: &mut [f32], limit: f32) -> usi
     kept
 }
 
-/// Rows by their columns.
+/// [`Simd::rows4`] and [`Simd::rows8`].
 #[inline(always)]
 fn columns<T: Copy + Default, const N: usize>(m: &M, from: &[[T; N]], row: &U) -> [[T; LANES]; N] {
     let mut out = [[T::default(); LANES]; N];
@@ -125,7 +127,7 @@ fn gather_pair(m: &M, from: &[[u32; 2]], at: &U) -> (U, U) {
     (pair.map(|p| p[0]), pair.map(|p| p[1]))
 }
 
-/// Functions of whole vectors, a loop over the lanes each.
+/// Defines functions of whole vectors, each a loop over the lanes.
 macro_rules! loops {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $lane:expr;)*) => { $(
         #[inline(always)]
@@ -138,7 +140,7 @@ macro_rules! loops {
     )* };
 }
 
-/// The same as methods.
+/// Defines methods of the trait that call the functions of the same names.
 macro_rules! methods {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty;)*) => { $(
         #[inline(always)]
@@ -363,5 +365,5 @@ impl Simd for Scalar {
         transpose(&rows)
     }
     #[inline(always)]
-    fn prefetch<T>(self, _place: *const T) {}
+    fn prefetch<T>(self, _address: *const T) {}
 }

@@ -1,4 +1,4 @@
-//! Every instruction set against plain code, on random lanes.
+//! Every instruction set against scalar code, on random lanes.
 
 use super::*;
 use bth_random::Rng;
@@ -17,8 +17,9 @@ fn floats(rng: &mut Rng) -> [f32; LANES] {
     })
 }
 
-/// Everything that the trait does, as bits that can be compared.
-struct Everything<'a> {
+/// Kernel that runs all operations of the trait and returns their results as bits. Its function is long because it is a table
+/// of the operations.
+struct AllOperations<'a> {
     a: &'a [f32; LANES],
     b: &'a [f32; LANES],
     u: &'a [u32; LANES],
@@ -26,14 +27,14 @@ struct Everything<'a> {
     bits: u32,
 }
 
-impl Kernel for Everything<'_> {
+impl Kernel for AllOperations<'_> {
     type Output = Vec<Vec<u32>>;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
         let f = |x: S::F| {
             let mut out = [0.0; LANES];
             s.store(x, &mut out);
-            // The sign of NaN is nobody's business.
+            // Sign and payload of NaN are unspecified.
             out.map(|x| if x.is_nan() { 0x7fc0_0000 } else { x.to_bits() }).to_vec()
         };
         let u = |x: S::U| {
@@ -59,7 +60,7 @@ impl Kernel for Everything<'_> {
         let ordered = self.a.map(|x| if x.is_nan() { 0.5 } else { x.abs() });
         let (mut codes, mut keys) = ([0; LANES], [0.0; LANES]);
         let sorted = s.compress_far_to_near(self.bits, s.load(&ordered), x, &mut codes, &mut keys);
-        // Of equal keys either may come first.
+        // The order of equal keys is unspecified.
         let mut pairs: Vec<(u32, u32)> =
             keys[..sorted].iter().zip(&codes).map(|(k, &c)| (k.to_bits() & !15, c)).collect();
         assert!(pairs.is_sorted_by(|p, q| p.0 >= q.0), "far to near: {pairs:?}");
@@ -67,7 +68,7 @@ impl Kernel for Everything<'_> {
         for key in [ordered, self.a.map(|x| if x.is_nan() { -0.5 } else { x })] {
             let (count, nearest) = s.sort_far_to_near(self.bits, s.load(&key), x, &mut codes, &mut keys);
             assert_eq!(count, sorted);
-            // The one that comes last, whatever the order of negative keys is.
+            // The lane of the last entry is returned, although the order of negative keys is unspecified.
             if let Some(last) = count.checked_sub(1) {
                 assert_eq!(nearest, keys[last].to_bits() as usize % LANES, "of {key:?}");
                 assert_eq!(codes[last], self.u[nearest]);
@@ -152,7 +153,7 @@ impl Kernel for Everything<'_> {
     }
 }
 
-/// Fused or not, within a rounding of the greater of product and sum.
+/// Kernel of `fma` and `fnma`.
 struct Fused<'a>(&'a [f32; LANES], &'a [f32; LANES], &'a [f32; LANES]);
 
 impl Kernel for Fused<'_> {
@@ -168,13 +169,13 @@ impl Kernel for Fused<'_> {
 }
 
 #[test]
-fn every_instruction_set_does_what_plain_code_does() {
+fn every_instruction_set_gives_the_results_of_scalar_code() {
     let mut rng = Rng::new(31);
     for _ in 0..3_000 {
         let (a, b) = (floats(&mut rng), floats(&mut rng));
         let [u, v] = [(); 2].map(|()| std::array::from_fn(|_| rng.below(1 << 32) as u32));
         let bits = rng.below(1 << 16) as u32 & rng.below(1 << 16) as u32;
-        let input = || Everything { a: &a, b: &b, u: &u, v: &v, bits };
+        let input = || AllOperations { a: &a, b: &b, u: &u, v: &v, bits };
         let want = Isa::Scalar.run(input());
         for isa in Isa::ALL {
             for (step, (got, want)) in isa.run(input()).iter().zip(&want).enumerate() {
@@ -185,7 +186,7 @@ fn every_instruction_set_does_what_plain_code_does() {
 }
 
 #[test]
-fn fused_or_not_the_product_sums_agree_to_a_rounding() {
+fn fused_and_unfused_products_and_sums_agree_within_their_rounding() {
     let mut rng = Rng::new(32);
     for _ in 0..3_000 {
         let mut draw = || std::array::from_fn(|_| (rng.below(1 << 24) as f32 - (1 << 23) as f32) / 4096.0);
@@ -205,7 +206,7 @@ fn fused_or_not_the_product_sums_agree_to_a_rounding() {
 #[test]
 #[cfg(panic = "unwind")]
 fn a_gather_outside_of_its_slice_panics_on_every_instruction_set() {
-    /// Which access, an index for lane 7, and a mask.
+    /// Kernel of one kind of access, with an index for lane 7 and a mask.
     #[derive(Clone, Copy)]
     struct Outside(u32, u32, u32);
     impl Kernel for Outside {
@@ -241,7 +242,7 @@ fn a_gather_outside_of_its_slice_panics_on_every_instruction_set() {
 }
 
 #[test]
-fn names_are_read_back_and_nonsense_is_refused() {
+fn names_parse_back_and_unknown_names_are_rejected() {
     for isa in Isa::ALL {
         assert_eq!(isa.to_string().parse(), Ok(isa));
     }

@@ -1,18 +1,18 @@
-//! Along which axes sixteen rays go farthest.
+//! Axes of projection of sixteen rays.
 
 use crate::simd::Simd;
 
-/// The axes along which sixteen rays go farthest, and with them their planes of projection: the next axis and the one
-/// after, in cyclic order. (For rays that go backward f64 takes them the other way round, which no test sees and no bit of an
-/// answer shows.)
+/// The axes of projection of sixteen rays: of each ray the axis z of its direction's greatest |component|, and for the plane of
+/// projection the next axis and the one after it in cyclic order. [`Line`](crate::intersect::line::Line) swaps the plane's axes
+/// of rays with a negative z, to keep the orientation; the conservative tests do not depend on the orientation.
 pub(crate) trait Axes<S: Simd> {
-    /// Coordinates along the plane's axes and along the rays.
+    /// Permutes x, y and z of points to the coordinates along the plane's two axes and along the third axis.
     fn turn(&self, s: S, point: [S::F; 3]) -> [S::F; 3];
-    /// The numbers of the axes.
+    /// Indices of the axes, in the same order.
     fn axes(&self, s: S) -> [S::U; 3];
 }
 
-/// Of rays that differ in this.
+/// Axes of rays whose greatest |components| may lie along different axes. Where neither bit is set, the axis is z.
 #[derive(Clone, Copy)]
 pub(crate) struct Mixed<S: Simd> {
     pub(crate) is_x: S::M,
@@ -27,7 +27,7 @@ impl<S: Simd> Mixed<S> {
         Mixed { is_x, is_y: s.and_not(s.lt(size[2], size[1]), is_x) }
     }
 
-    /// The axis that is the same for all.
+    /// The axes if they are the same for all rays.
     #[inline(always)]
     pub(crate) fn common(&self, s: S) -> Option<Common> {
         match (s.mask_bits(self.is_x), s.mask_bits(self.is_y)) {
@@ -39,12 +39,12 @@ impl<S: Simd> Mixed<S> {
     }
 
     #[inline(always)]
-    fn choose(&self, s: S, [x, y, z]: [S::F; 3]) -> S::F {
+    fn select(&self, s: S, [x, y, z]: [S::F; 3]) -> S::F {
         s.select(self.is_x, x, s.select(self.is_y, y, z))
     }
 
     #[inline(always)]
-    fn choose_u(&self, s: S, [x, y, z]: [u32; 3]) -> S::U {
+    fn select_u(&self, s: S, [x, y, z]: [u32; 3]) -> S::U {
         s.select_u(self.is_x, s.splat_u(x), s.select_u(self.is_y, s.splat_u(y), s.splat_u(z)))
     }
 }
@@ -52,15 +52,15 @@ impl<S: Simd> Mixed<S> {
 impl<S: Simd> Axes<S> for Mixed<S> {
     #[inline(always)]
     fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
-        [self.choose(s, [y, z, x]), self.choose(s, [z, x, y]), self.choose(s, [x, y, z])]
+        [self.select(s, [y, z, x]), self.select(s, [z, x, y]), self.select(s, [x, y, z])]
     }
     #[inline(always)]
     fn axes(&self, s: S) -> [S::U; 3] {
-        [self.choose_u(s, [1, 2, 0]), self.choose_u(s, [2, 0, 1]), self.choose_u(s, [0, 1, 2])]
+        [self.select_u(s, [1, 2, 0]), self.select_u(s, [2, 0, 1]), self.select_u(s, [0, 1, 2])]
     }
 }
 
-/// The axis of rays that all go farthest along the same.
+/// Axes of rays whose greatest |components| all lie along the axis of this index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Common(pub(crate) usize);
 
@@ -68,7 +68,7 @@ impl Common {
     /// The axes in the order of the projection.
     #[inline(always)]
     pub(crate) fn order(self) -> [usize; 3] {
-        // Not a constant, which would be copied for that.
+        // A static, because indexing a constant would copy it first.
         static ORDER: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
         ORDER[self.0]
     }

@@ -1,7 +1,7 @@
-//! Sixteen rays prepared in lanes: what [`PreparedRay`]s say of them, before they are turned into those.
+//! Preparation of sixteen rays in lanes: the fields of [`PreparedRay`], before they are transposed to one record for each ray.
 
 use super::axes::Axes;
-use super::{HitProgress, LARGEST, PreparedRay, SMALLEST, UP};
+use super::{HitProgress, LARGEST, PreparedRay, ROUND_UP, SMALLEST};
 use crate::intersect::boxes;
 use crate::intersect::filter;
 use crate::rays::Ray;
@@ -9,13 +9,13 @@ use crate::simd::{LANES, Simd};
 use bth_format::object::ObjectBounds;
 use std::mem::offset_of;
 
-/// The floats of rays, a row of lanes for each.
+/// The eight floats of the rays at the indices `at` whose mask `m` is set, a vector for each float.
 #[inline(always)]
 pub(crate) fn fields<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8] {
     floats(s, s.rows8(m, Ray::rows(rays), at))
 }
 
-/// The same of sixteen rays that lie one behind the other.
+/// As [`fields`], for sixteen consecutive rays.
 #[inline(always)]
 pub(crate) fn fields_of<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
     floats(s, s.columns8(Ray::rows(rays).first_chunk().expect("sixteen rows")))
@@ -30,28 +30,30 @@ fn floats<S: Simd>(s: S, words: [S::U; 8]) -> [S::F; 8] {
     out
 }
 
-/// What [`PreparedRay`]s say of sixteen rays, a row of lanes for each.
+/// The fields of [`PreparedRay`] for sixteen rays, from which [`Lanes::rows`] computes the records.
 pub(crate) struct Lanes<S: Simd> {
     pub(crate) reciprocal: [S::F; 3],
     pub(crate) near_addend: [S::F; 3],
     pub(crate) far_addend: [S::F; 3],
+    /// Whether the components of the direction are negative.
     pub(crate) negative: [S::M; 3],
     pub(crate) scale: S::F,
-    /// ObjectBounds of the depths that matter,
+    /// Least and greatest depth at which a hit may lie in the ray's range.
     pub(crate) depths: [S::F; 2],
-    /// and of those that certainly do.
+    /// Least and greatest depth at which a hit certainly lies in the ray's range.
     pub(crate) certain: [S::F; 2],
     pub(crate) axis: [S::U; 3],
     pub(crate) origin: [S::F; 2],
     pub(crate) shear: [S::F; 2],
     pub(crate) forward: S::F,
     pub(crate) start: S::F,
+    /// Greatest |coordinate| of the object's box relative to the ray's origin.
     pub(crate) reach: S::F,
-    /// Rays that this is good for.
+    /// Rays that f32 can prepare and whose range of t is not empty.
     pub(crate) usable: S::M,
 }
 
-/// Prepares sixteen rays, given their own floats.
+/// Prepares sixteen rays for an object of these bounds, given the floats of the rays ([`fields`]).
 #[inline(always)]
 pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes: &impl Axes<S>) -> Lanes<S> {
     let [ox, oy, oz, tmin, dx, dy, dz, tmax] = field;
@@ -62,22 +64,22 @@ pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes
 
     let mut reach = zero;
     let mut farthest = zero;
-    // Sums, because the greater of NaN and a number may be the number.
-    let (mut from, mut along) = (zero, zero);
+    // Sums of |coordinates| detect NaN; a maximum would not, because the greater of NaN and a number may be the number.
+    let (mut origin_sum, mut direction_sum) = (zero, zero);
     for k in 0..3 {
         let far =
             s.max(s.abs(s.sub(s.splat(bounds.lower[k]), o[k])), s.abs(s.sub(s.splat(bounds.upper[k]), o[k])));
         reach = s.max(far, reach);
         let coordinate = s.abs(o[k]);
         farthest = s.max(coordinate, farthest);
-        from = s.add(coordinate, from);
-        along = s.add(size[k], along);
+        origin_sum = s.add(coordinate, origin_sum);
+        direction_sum = s.add(size[k], direction_sum);
     }
-    let extent = s.mul(s.add(s.splat(bounds.greatest), farthest), s.splat(UP));
+    let extent = s.mul(s.add(s.splat(bounds.greatest), farthest), s.splat(ROUND_UP));
     let large = s.splat(LARGEST);
     let finite = s.and(
-        s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(along, large)),
-        s.and(s.and(s.lt(s.splat(SMALLEST), extent), s.lt(extent, large)), s.lt(from, large)),
+        s.and(s.lt(s.splat(1.0 / LARGEST), greatest), s.lt(direction_sum, large)),
+        s.and(s.and(s.lt(s.splat(SMALLEST), extent), s.lt(extent, large)), s.lt(origin_sum, large)),
     );
     let pad = s.mul(extent, s.splat(boxes::PAD as f32));
     let least = s.mul(greatest, s.splat(boxes::LEAST_COMPONENT as f32));
@@ -97,7 +99,7 @@ pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes
     let inverse = s.div(s.splat(1.0), greatest);
     let forward = s.select(s.lt(dz, zero), s.splat(-1.0), s.splat(1.0));
 
-    // What rounding and underflow can take from t, as depth.
+    // Bounds of the errors by rounding and underflow of the depths of tmin and tmax.
     let least = s.mul(s.add(greatest, s.splat(1.0)), s.splat(f32::MIN_POSITIVE));
     let ulps = s.splat(4.0 / (1 << 24) as f32);
     let slack = |depth: S::F| s.fma(s.abs(depth), ulps, least);
@@ -122,13 +124,13 @@ pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes
     }
 }
 
-/// Place of a field of [`PreparedRay`] among its floats.
+/// Index of a field of [`PreparedRay`] among its words.
 macro_rules! row {
     ($($field:tt)*) => { offset_of!(PreparedRay, $($field)*) / size_of::<f32>() };
 }
 
 impl<S: Simd> Lanes<S> {
-    /// The floats of [`PreparedRay`]s of the rays at these places.
+    /// The words of sixteen [`PreparedRay`]s, a vector for each word; `at` holds the indices of the rays in the batch.
     #[inline(always)]
     pub(super) fn rows(&self, s: S, at: S::U) -> [S::F; 2 * LANES] {
         let mut rows = [s.splat(0.0); 2 * LANES];

@@ -1,5 +1,5 @@
-//! However a ray is prepared, and on every instruction set, f32 leaves out nothing that exact arithmetic accepts, and is
-//! sure of nothing that it does not.
+//! For every way to prepare a ray and every instruction set, box test and filter exclude nothing that exact arithmetic accepts,
+//! and the filter is sure of nothing that exact arithmetic rejects.
 
 use super::{Prepared, PreparedRay};
 use crate::intersect::boxes::RaySlabs;
@@ -13,15 +13,15 @@ use bth_format::object::ObjectBounds;
 use bth_random::Rng;
 use zerocopy::FromZeros;
 
-/// One triangle: its node, its leaf, and the object whose bounds it has.
-struct Single {
+/// An object of one triangle, with its node and leaf.
+struct OneTriangle {
     node: WideNode,
     leaf: IndexedLeaf,
     object: Object,
 }
 
-impl Single {
-    fn new(corners: [[f32; 3]; 3]) -> Single {
+impl OneTriangle {
+    fn new(corners: [[f32; 3]; 3]) -> OneTriangle {
         let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
         let mut object = Object::new_zeroed();
         let mut leaf = IndexedLeaf::new_zeroed();
@@ -35,26 +35,26 @@ impl Single {
             (leaf.vertex[k][1], leaf.vertex[k][2]) = (corners[1][k], corners[2][k]);
             leaf.corner[k][0] = k as u8;
         }
-        Single { node, leaf, object }
+        OneTriangle { node, leaf, object }
     }
 }
 
-/// What is known of the triangle.
-struct Found {
+/// Result of the filter for the triangle.
+struct FilterResult {
     maybe: u32,
     sure: u32,
-    /// Between which depths it is hit.
+    /// Bounds of the depth of the hit.
     depth: [f32; 2],
 }
 
-/// Children and candidates as a kernel.
-struct Look<'a>(&'a PreparedRay, &'a Single);
+/// Kernel of box test and filter. Its output is the set of children that are hit, as bits, and the result of the filter.
+struct BoxAndFilter<'a>(&'a PreparedRay, &'a OneTriangle);
 
-impl Kernel for Look<'_> {
-    type Output = (u32, Found);
+impl Kernel for BoxAndFilter<'_> {
+    type Output = (u32, FilterResult);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let Look(PreparedRay { slabs, sight, .. }, Single { node, leaf, .. }) = self;
+        let BoxAndFilter(PreparedRay { slabs, sight, .. }, OneTriangle { node, leaf, .. }) = self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
         let candidates = sight.candidates(s, leaf, slabs.first, slabs.last);
@@ -62,15 +62,15 @@ impl Kernel for Look<'_> {
         s.store(candidates.nearest, &mut nearest);
         s.store(candidates.farthest, &mut farthest);
         let found =
-            Found { maybe: candidates.maybe, sure: candidates.sure, depth: [nearest[0], farthest[0]] };
+            FilterResult { maybe: candidates.maybe, sure: candidates.sure, depth: [nearest[0], farthest[0]] };
         (children.fold(0, |m, i| m | 1 << i), found)
     }
 }
 
-/// Sixteen rays prepared together, as a kernel.
-struct PacketKernel<'a>(&'a [Ray; LANES], &'a Object);
+/// Kernel that prepares sixteen rays together.
+struct PrepareKernel<'a>(&'a [Ray; LANES], &'a Object);
 
-impl Kernel for PacketKernel<'_> {
+impl Kernel for PrepareKernel<'_> {
     type Output = Prepared;
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Prepared {
@@ -81,20 +81,20 @@ impl Kernel for PacketKernel<'_> {
     }
 }
 
-/// All ways to prepare a ray: in f64, alone in f32, and with others on every instruction set.
-fn aims(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<PreparedRay> {
+/// The ray prepared in all ways: in f64, alone in f32, and in a lane among others on every instruction set.
+fn all_preparations(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec<PreparedRay> {
     let slabs = RaySlabs::new(ray, line, object);
-    let mut aims = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, object))];
-    aims.extend(PreparedRay::of(&ObjectBounds::new(object), ray));
-    aims.extend(PreparedRay::in_f64(object, ray));
+    let mut all = vec![PreparedRay::new(slabs, TriangleFilter::new(ray, line, &slabs, object))];
+    all.extend(PreparedRay::of(&ObjectBounds::new(object), ray));
+    all.extend(PreparedRay::in_f64(object, ray));
     let mut others = [Ray { origin: [f32::NAN; 3], ..*ray }; LANES];
     others[lane] = *ray;
     for isa in Isa::ALL {
-        let prepared = isa.run(PacketKernel(&others, object));
-        aims.extend(prepared.aim(lane));
+        let prepared = isa.run(PrepareKernel(&others, object));
+        all.extend(prepared.aim(lane));
         assert!(prepared.aim((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
     }
-    aims
+    all
 }
 
 fn in_range(ray: &Ray, crossing: &Option<Intersection>) -> bool {
@@ -105,14 +105,14 @@ fn in_range(ray: &Ray, crossing: &Option<Intersection>) -> bool {
 }
 
 #[test]
-fn nothing_is_lost_that_the_line_crosses_and_sure_hits_are_hits() {
+fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
     let mut rng = Rng::new(3);
     let (mut crossings, mut missed, mut sure, mut prepared) = (0, 0, 0, 0);
     for round in 0..60_000 {
         let unit = |rng: &mut Rng| (rng.below(1 << 24) as f32 / (1 << 23) as f32) - 1.0;
         let scale = [1.0, 1e-30, 1e30, 3e37, 1e-42, 1e-14, 1e-20, 1e12, 1e-36, 3.0][round % 10];
         let away = [0.0, 1.0, 1e3, 1e6][round / 10 % 4] * scale;
-        // Often flat, often on a coarse grid: boxes without volume, rays along their sides.
+        // Every third round lies on a coarse grid, so that many boxes have no volume and rays run along their sides.
         let coarse = round % 3 == 0;
         let mut point = |spread: f32| {
             [(); 3].map(|()| {
@@ -129,10 +129,10 @@ fn nothing_is_lost_that_the_line_crosses_and_sure_hits_are_hits() {
         }
         let endless = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
         let Some(line) = Line::new(&endless) else { continue };
-        let single = Single::new(corners);
+        let object = OneTriangle::new(corners);
         let crossing = line.crossing(corners);
         let t = crossing.map_or(1.0, |c| c.t as f32);
-        // Also with the range cut off right at the crossing, and right before and behind it.
+        // The whole line, and ranges that end or begin at the crossing or directly beside it.
         let ranges = [
             (f32::NEG_INFINITY, f32::INFINITY),
             (t, t),
@@ -145,17 +145,18 @@ fn nothing_is_lost_that_the_line_crosses_and_sure_hits_are_hits() {
                 continue;
             }
             let hit = in_range(&ray, &crossing);
-            let aims = aims(&ray, &line, &single.object, round % LANES);
-            prepared += aims.len() - 1;
-            for aim in &aims {
+            let preparations = all_preparations(&ray, &line, &object.object, round % LANES);
+            prepared += preparations.len() - 1;
+            for preparation in &preparations {
                 for isa in Isa::ALL {
-                    let (children, found) = isa.run(Look(aim, &single));
-                    let context =
-                        || format!("{isa}, round {round}: {ray:?}, {corners:?}, {crossing:?}, {aim:?}");
+                    let (children, found) = isa.run(BoxAndFilter(preparation, &object));
+                    let context = || {
+                        format!("{isa}, round {round}: {ray:?}, {corners:?}, {crossing:?}, {preparation:?}")
+                    };
                     assert!(!hit || children == 1, "the box is lost: {}", context());
                     assert!(!hit || found.maybe == 1, "the triangle is lost: {}", context());
                     assert!(hit || found.sure == 0, "sure of what is no hit: {}", context());
-                    let depth = crossing.map_or(0.0, |c| c.t * f64::from(aim.slabs.scale));
+                    let depth = crossing.map_or(0.0, |c| c.t * f64::from(preparation.slabs.scale));
                     let [near, far] = found.depth.map(f64::from);
                     let within = near <= depth && depth <= far;
                     assert!(

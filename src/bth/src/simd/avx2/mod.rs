@@ -1,15 +1,15 @@
 //! Sixteen lanes in two AVX2 registers.
 //!
-//! Every block below is sound for one reason: an [`Avx2`] exists only where [`Avx2::detect`] found the features that
-//! the intrinsics need, so each may be executed. Blocks that go through pointers say more.
+//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx2`] exists only where [`Avx2::detect`] found the
+//! features that they need. The comments at the blocks prove the accesses through pointers.
 #![allow(unsafe_code)]
 
 mod packing;
 mod rows;
 
 use self::packing::{compression, expansion};
-use self::rows::{ALL, columns8, transpose4, transpose8};
-use super::{Kernel, LANES, Simd, assert_within, scalar, within};
+use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
+use super::{Kernel, LANES, Simd, assert_indices, scalar, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -19,7 +19,7 @@ pub(super) struct Avx2(());
 
 type F = [__m256; 2];
 type U = [__m256i; 2];
-/// All bits of a lane, or none.
+/// All bits of a lane are set, or none.
 type M = [__m256i; 2];
 
 impl Avx2 {
@@ -43,18 +43,21 @@ impl Avx2 {
         unsafe { entry(self, kernel) }
     }
 
+    /// Elements `at[i] % 16` of the table, for half of the lanes.
     #[inline(always)]
     fn lookup_half(self, table: F, at: __m256i) -> __m256 {
-        // SAFETY: registers only. Bit 3 of the index chooses the half: it becomes the sign for the blend.
+        // SAFETY: registers only.
         unsafe {
+            // Bit 3 of the index selects the half of the table. Shifted to the sign bit, it controls the blend.
             let low = _mm256_permutevar8x32_ps(table[0], at);
             let high = _mm256_permutevar8x32_ps(table[1], at);
             _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at)))
         }
     }
 
+    /// The lanes of two vectors as arrays.
     #[inline(always)]
-    fn arrays(self, a: F, b: U) -> ([f32; LANES], [u32; LANES]) {
+    fn to_arrays(self, a: F, b: U) -> ([f32; LANES], [u32; LANES]) {
         let mut out = ([0.0; LANES], [0; LANES]);
         self.store(a, &mut out.0);
         self.store_u(b, &mut out.1);
@@ -67,12 +70,12 @@ fn entry<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
     kernel.run(simd)
 }
 
-/// Methods that are one intrinsic on either half.
+/// Methods that apply the same intrinsics to both halves.
 macro_rules! halves {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
         #[inline(always)]
         fn $name(self, $($arg: $of),*) -> $out {
-            // SAFETY: the features are there (self), and only registers are touched.
+            // SAFETY: self proves the features, and only registers are accessed.
             let low = unsafe {
                 $(let $arg = $arg[0];)*
                 $do
@@ -87,7 +90,7 @@ macro_rules! halves {
     )* };
 }
 
-/// The two halves of an array of sixteen.
+/// Pointers to the two halves of an array of sixteen.
 #[inline(always)]
 fn split<T>(from: &[T; LANES]) -> [*const T; 2] {
     let (low, high) = from.split_at(8);
@@ -209,16 +212,17 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn shl_u<const K: u32>(self, a: U) -> U {
-        // SAFETY: registers only. The count is a register too: an immediate would have to be an i32 constant.
+        // SAFETY: registers only.
         unsafe {
+            // The count is passed in a register, because an immediate would have to be an i32 constant.
             let count = _mm_cvtsi32_si128(K as i32);
             [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
         }
     }
     #[inline(always)]
     fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
-        let row = within(self, m, row, from.len());
-        // SAFETY: `within` gives rows of the slice; unaligned loads.
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice; unaligned loads.
         unsafe {
             macro_rules! halves {
                 ($a:literal $b:literal) => {
@@ -235,19 +239,19 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
-        let row = within(self, m, row, from.len());
-        // SAFETY: `within` gives rows of the slice.
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice.
         unsafe { columns8(self, from.as_ptr(), row) }
     }
     #[inline(always)]
     fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
         // SAFETY: there are sixteen rows.
-        unsafe { columns8(self, rows.as_ptr(), ALL) }
+        unsafe { columns8(self, rows.as_ptr(), IN_ORDER) }
     }
     #[inline(always)]
     fn gather_u(self, m: M, from: &[u32], at: U) -> U {
-        assert_within(self, m, at, from.len());
-        // SAFETY: as `gather`.
+        assert_indices(self, m, at, from.len());
+        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear lanes are not accessed.
         unsafe {
             let (zero, from) = (_mm256_setzero_si256(), from.as_ptr().cast());
             [
@@ -261,15 +265,15 @@ impl Simd for Avx2 {
         let flat = from.as_flattened();
         let even = self.shl_u::<1>(at);
         let odd = self.or_u(even, self.splat_u(1));
-        // Doubling would wrap where the index is too great already.
-        assert_within(self, m, at, from.len());
+        // The indices themselves are checked, because an index that is too great might wrap into the range when it is doubled.
+        assert_indices(self, m, at, from.len());
         (self.gather_u(m, flat, even), self.gather_u(m, flat, odd))
     }
     #[inline(always)]
     fn expand(self, a: F, m: M, from: &[f32; LANES]) -> F {
         let bits = self.mask_bits(m);
         let low = from.as_ptr();
-        // The high half goes on where the low one ends, after at most eight.
+        // The elements of the high half follow those of the low half, of which there are at most eight.
         let high = from[(bits as u8).count_ones() as usize..][..8].as_ptr();
         // SAFETY: eight readable floats each; unaligned loads.
         unsafe {
@@ -288,11 +292,11 @@ impl Simd for Avx2 {
     fn mask(self, bits: u32) -> M {
         // SAFETY: registers only.
         unsafe {
-            let of =
+            let test =
                 |bit: __m256i| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), bit), bit);
             [
-                of(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)),
-                of(_mm256_setr_epi32(1 << 8, 2 << 8, 4 << 8, 8 << 8, 16 << 8, 32 << 8, 64 << 8, 128 << 8)),
+                test(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)),
+                test(_mm256_setr_epi32(1 << 8, 2 << 8, 4 << 8, 8 << 8, 16 << 8, 32 << 8, 64 << 8, 128 << 8)),
             ]
         }
     }
@@ -318,7 +322,8 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn compress_f(self, bits: u32, a: F, to: &mut [f32; LANES]) -> usize {
         let low = (bits as u8).count_ones() as usize;
-        // SAFETY: the first store fills to[..8]; the second begins after the lanes that count, at most eight.
+        // SAFETY: the first store writes to[..8]. The second writes eight elements after the compressed lanes of the low half,
+        // of which there are at most eight; the slices check both.
         unsafe {
             let packed = [
                 _mm256_permutevar8x32_ps(a[0], compression(bits as u8)),
@@ -338,7 +343,7 @@ impl Simd for Avx2 {
         to: &mut [u32; LANES],
         keys: &mut [f32; LANES],
     ) -> usize {
-        let (key, a) = self.arrays(key, a);
+        let (key, a) = self.to_arrays(key, a);
         scalar::compress_far_to_near(bits, &key, &a, to, keys)
     }
     #[inline(always)]
@@ -364,8 +369,8 @@ impl Simd for Avx2 {
         out
     }
     #[inline(always)]
-    fn prefetch<T>(self, place: *const T) {
+    fn prefetch<T>(self, address: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
     }
 }

@@ -1,4 +1,4 @@
-//! Rows of a few words to columns of sixteen lanes, and back.
+//! Transposition of rows of a few words to vectors of sixteen lanes.
 
 use super::{Avx2, U};
 use crate::simd::{LANES, Simd};
@@ -10,7 +10,7 @@ use std::arch::x86_64::*;
 /// The machine must have the features of [`super::Avx2`].
 #[inline(always)]
 pub(super) unsafe fn transpose4([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
-    // SAFETY: see above; registers only.
+    // SAFETY: the caller proves the features; registers only.
     unsafe {
         let (a, b) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
         let (c, d) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
@@ -32,7 +32,7 @@ pub(super) unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     let mut out = rows;
     // SAFETY: see `transpose4`.
     unsafe {
-        // Columns 0 to 3 and 4 to 7 of the first four rows, and of the last.
+        // Columns 0 to 3 of these four rows in the low half, columns 4 to 7 in the high half; `low` are the first four rows.
         let low = transpose4([rows[0], rows[1], rows[2], rows[3]]);
         let high = transpose4([rows[4], rows[5], rows[6], rows[7]]);
         for k in 0..4 {
@@ -43,17 +43,17 @@ pub(super) unsafe fn transpose8(rows: [__m256; 8]) -> [__m256; 8] {
     out
 }
 
-/// All rows in order.
-pub(super) const ALL: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// Row indices of sixteen consecutive rows.
+pub(super) const IN_ORDER: [u32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// These rows by their columns.
+/// Loads the rows with the indices `row` and transposes them, see [`Simd::rows8`].
 ///
 /// # Safety
-/// All of them must be readable.
+/// `from` must point to rows that include all of these indices.
 #[inline(always)]
 pub(super) unsafe fn columns8(simd: Avx2, from: *const [u32; 8], row: [u32; LANES]) -> [U; 8] {
     let mut out = [simd.splat_u(0); 8];
-    // SAFETY: see above; unaligned loads.
+    // SAFETY: the token proves the features, and the caller the rows; unaligned loads.
     unsafe {
         for half in 0..2 {
             let mut rows = [simd.splat(0.0)[0]; 8];

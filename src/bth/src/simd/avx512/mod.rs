@@ -1,15 +1,15 @@
 //! Sixteen lanes in one AVX-512 register.
 //!
-//! Every block below is sound for one reason: an [`Avx512`] exists only where [`Avx512::detect`] found the features
-//! that the intrinsics need, so each may be executed. Blocks that go through pointers say more.
+//! The intrinsics of all `unsafe` blocks below may be executed, because an [`Avx512`] exists only where [`Avx512::detect`]
+//! found the features that they need. The comments at the blocks prove the accesses through pointers.
 #![allow(unsafe_code)]
 
 mod rows;
 mod sort;
 
-use self::rows::{COLUMNS5, ROWS5, columns8, quarters, transpose4};
-use self::sort::{far_to_near, nearest_of_four, with_lanes};
-use super::{Kernel, LANES, Simd, assert_within, within};
+use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters, transpose4};
+use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
+use super::{Kernel, LANES, Simd, assert_indices, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -54,7 +54,7 @@ macro_rules! intrinsics {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
         #[inline(always)]
         fn $name(self, $($arg: $of),*) -> $out {
-            // SAFETY: the features are there (self), and only registers are touched.
+            // SAFETY: self proves the features, and only registers are accessed.
             unsafe { $do }
         }
     )* };
@@ -76,7 +76,7 @@ impl Simd for Avx512 {
         min(a: __m512, b: __m512) -> __m512 = _mm512_min_ps(a, b);
         max(a: __m512, b: __m512) -> __m512 = _mm512_max_ps(a, b);
         abs(a: __m512) -> __m512 = _mm512_abs_ps(a);
-        // The greater in magnitude, without its sign.
+        // Immediate 0b1011: the greater in magnitude, with the sign bit cleared.
         max_abs(a: __m512, b: __m512) -> __m512 = _mm512_range_ps::<0b1011>(a, b);
         lt(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
         le(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
@@ -130,17 +130,17 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn rows4(self, m: u16, from: &[[f32; 4]], row: __m512i) -> [__m512; 4] {
-        let row = within(self, m, row, from.len());
-        // SAFETY: `within` gives rows of the slice; unaligned loads.
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice; unaligned loads.
         unsafe {
             macro_rules! load {
                 ($i:literal) => {
                     _mm_loadu_ps(from.as_ptr().add(row[$i] as usize).cast())
                 };
             }
-            // Four rows, a quarter of the lanes each.
+            // Four rows, each in a quarter of the lanes.
             macro_rules! quarters {
-                ($($i:literal)*) => { quarters(self, [$(load!($i)),*]) };
+                ($($i:literal)*) => { concat_quarters(self, [$(load!($i)),*]) };
             }
             let (a, b) = (quarters!(0 4 8 12), quarters!(1 5 9 13));
             let (c, d) = (quarters!(2 6 10 14), quarters!(3 7 11 15));
@@ -149,8 +149,8 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn rows8(self, m: u16, from: &[[u32; 8]], row: __m512i) -> [__m512i; 8] {
-        let row = within(self, m, row, from.len());
-        // SAFETY: `within` gives rows of the slice.
+        let row = valid_indices(self, m, row, from.len());
+        // SAFETY: `valid_indices` returns indices of rows of the slice.
         unsafe { columns8(self, from.as_ptr(), row) }
     }
     #[inline(always)]
@@ -173,15 +173,15 @@ impl Simd for Avx512 {
     }
     const LOOKS_UP_F64: bool = true;
     #[inline(always)]
-    fn lookup_f64<const FEWEST_OF_GROUP: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
+    fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
         let mut out = [0.0; LANES];
-        // SAFETY: the features are there (the token); eight elements each are read from and written to arrays of sixteen.
+        // SAFETY: self proves the features; the first and the last eight elements of arrays of sixteen are read and written.
         unsafe {
             let (low, high) = (_mm512_loadu_pd(table.as_ptr()), _mm512_loadu_pd(table.as_ptr().add(8)));
             let first = _mm512_cvtepu32_epi64(_mm512_castsi512_si256(at));
             let second = _mm512_cvtepu32_epi64(_mm512_extracti64x4_epi64::<1>(at));
-            // Three bits of an index count, or four.
-            let [first, second] = if FEWEST_OF_GROUP {
+            // A permutation of one register uses three bits of each index, of two registers four.
+            let [first, second] = if FIRST_HALF {
                 [_mm512_permutexvar_pd(first, low), _mm512_permutexvar_pd(second, low)]
             } else {
                 [_mm512_permutex2var_pd(low, first, high), _mm512_permutex2var_pd(low, second, high)]
@@ -193,28 +193,28 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn gather_u(self, m: u16, from: &[u32], at: __m512i) -> __m512i {
-        assert_within(self, m, at, from.len());
-        // SAFETY: as `gather`.
+        assert_indices(self, m, at, from.len());
+        // SAFETY: the indices of set lanes lie in the slice and are not negative as i32; clear lanes are not accessed.
         unsafe { _mm512_mask_i32gather_epi32::<4>(_mm512_setzero_si512(), m, at, from.as_ptr().cast()) }
     }
     #[inline(always)]
     fn gather_pair(self, m: u16, from: &[[u32; 2]], at: __m512i) -> (__m512i, __m512i) {
-        let at = within(self, m, at, from.len());
-        // SAFETY: `within` gives elements of the slice; unaligned loads of eight bytes.
+        let at = valid_indices(self, m, at, from.len());
+        // SAFETY: `valid_indices` returns indices of elements of the slice; unaligned loads of eight bytes.
         unsafe {
             macro_rules! load {
                 ($i:literal) => {
                     from.as_ptr().add(at[$i] as usize).cast()
                 };
             }
-            // Two elements; and two in each quarter of the lanes.
+            // `two` loads two elements to a register of four lanes, and `quarters` two elements to each quarter of the lanes.
             macro_rules! two {
                 ($a:literal $b:literal) => {
                     _mm_castpd_ps(_mm_loadh_pd(_mm_load_sd(load!($a)), load!($b)))
                 };
             }
             macro_rules! quarters {
-                ($($a:literal $b:literal)*) => { quarters(self, [$(two!($a $b)),*]) };
+                ($($a:literal $b:literal)*) => { concat_quarters(self, [$(two!($a $b)),*]) };
             }
             let (low, high) = (quarters!(0 1 4 5 8 9 12 13), quarters!(2 3 6 7 10 11 14 15));
             let first = _mm512_shuffle_ps::<0b10_00_10_00>(low, high);
@@ -224,7 +224,8 @@ impl Simd for Avx512 {
     }
     #[inline(always)]
     fn expand(self, a: __m512, m: u16, from: &[f32; LANES]) -> __m512 {
-        // SAFETY: registers only. (An expanding load is slow on some machines.)
+        // Expanding loads are slow on some machines, so the elements are loaded first.
+        // SAFETY: registers only.
         unsafe { _mm512_mask_expand_ps(a, m, self.load(from)) }
     }
     #[inline(always)]
@@ -256,9 +257,9 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     fn compress(self, bits: u32, a: __m512i, to: &mut [u32; LANES]) -> usize {
-        // SAFETY: `to` has room for all sixteen lanes.
+        // SAFETY: all sixteen lanes are stored to an array of sixteen.
         unsafe {
-            // Compressing to a register and storing it whole is much faster than a compressing store.
+            // Compression to a register and a store of all lanes are much faster than a compressing store.
             _mm512_storeu_si512(to.as_mut_ptr().cast(), _mm512_maskz_compress_epi32(bits as u16, a));
         }
         (bits & 0xffff).count_ones() as usize
@@ -279,7 +280,7 @@ impl Simd for Avx512 {
         keys: &mut [f32; LANES],
     ) -> usize {
         // SAFETY: `self` proves the features.
-        unsafe { far_to_near(bits as u16, with_lanes(key), a, to, keys) }
+        unsafe { store_far_to_near(bits as u16, keys_with_lanes(key), a, to, keys) }
     }
     #[inline(always)]
     fn sort_far_to_near(
@@ -292,9 +293,9 @@ impl Simd for Avx512 {
     ) -> (usize, usize) {
         // SAFETY: `self` proves the features.
         unsafe {
-            let key = with_lanes(key);
-            let count = far_to_near(bits as u16, key, a, to, keys);
-            // A ray alone waits for the nearest.
+            let key = keys_with_lanes(key);
+            let count = store_far_to_near(bits as u16, key, a, to, keys);
+            // The traversal of a single ray depends on the latency of the nearest: a minimum is faster than the sorted keys.
             let nearest =
                 if count <= 4 { nearest_of_four(bits as u16, key) } else { keys[count - 1].to_bits() };
             (count, nearest as usize % LANES)
@@ -307,8 +308,8 @@ impl Simd for Avx512 {
         let limit = self.splat(limit);
         while from < len {
             let valid = if len - from >= LANES { u16::MAX } else { (1 << (len - from)) - 1 };
-            // SAFETY: masked loads read only lanes below len; the compressed lanes, at most as many as were read
-            // so far, are stored by a mask of their number, from kept <= from on.
+            // SAFETY: the masked loads read only elements below len. The masked stores write `count` elements from `kept` on, and
+            // kept + count is at most the number of elements read so far.
             unsafe {
                 let key = _mm512_maskz_loadu_ps(valid, keys.as_ptr().add(from));
                 let code = _mm512_maskz_loadu_epi32(valid, codes.as_ptr().add(from).cast());
@@ -333,12 +334,12 @@ impl Simd for Avx512 {
         let mut r = rows;
         // SAFETY: registers only.
         unsafe {
-            // Within each quarter of the lanes: four by four,
+            // First four by four lanes within each quarter of the lanes.
             for i in (0..LANES).step_by(4) {
                 let four = transpose4([r[i], r[i + 1], r[i + 2], r[i + 3]]);
                 r[i..i + 4].copy_from_slice(&four);
             }
-            // then the quarters: row 4p + i holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
+            // Then the quarters: row 4p + i now holds lane 4q + i of rows 4p to 4p + 3 in its quarter q.
             let mut out = r;
             for i in 0..4 {
                 let (a, b) = (r[i], r[i + 4]);
@@ -364,7 +365,8 @@ impl Simd for Avx512 {
         let mut r = rows;
         // SAFETY: registers only.
         unsafe {
-            // Halves of two vectors in one, over and over: of each quarter of the lanes, then over the quarters.
+            // Each step takes minima of the halves of two vectors and packs them into one vector: two steps within each quarter
+            // of the lanes, then two over the quarters.
             for i in 0..8 {
                 let (a, b) = (r[2 * i], r[2 * i + 1]);
                 r[i] = _mm512_min_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
@@ -384,8 +386,8 @@ impl Simd for Avx512 {
         }
     }
     #[inline(always)]
-    fn prefetch<T>(self, place: *const T) {
+    fn prefetch<T>(self, address: *const T) {
         // SAFETY: a hint that never faults, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(place.cast()) }
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
     }
 }

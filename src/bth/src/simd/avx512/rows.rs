@@ -1,13 +1,13 @@
-//! Rows of a few words to columns of sixteen lanes, and back.
+//! Transposition of rows of a few words to vectors of sixteen lanes, and back.
 
 use super::Avx512;
 use crate::simd::{LANES, Simd};
 use std::arch::x86_64::*;
 
-/// Four times four lanes.
+/// Concatenates four registers of four lanes.
 #[inline(always)]
-pub(super) fn quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
-    // SAFETY: the features are there (the token), and only registers are touched.
+pub(super) fn concat_quarters(_simd: Avx512, [a, b, c, d]: [__m128; 4]) -> __m512 {
+    // SAFETY: the token proves the features, and only registers are accessed.
     unsafe {
         let four = _mm512_insertf32x4::<1>(_mm512_castps128_ps512(a), b);
         _mm512_insertf32x4::<3>(_mm512_insertf32x4::<2>(four, c), d)
@@ -33,13 +33,13 @@ pub(super) unsafe fn transpose4([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
     }
 }
 
-/// These rows by their columns.
+/// Loads the rows with the indices `row` and transposes them, see [`Simd::rows8`].
 ///
 /// # Safety
-/// All of them must be readable.
+/// `from` must point to rows that include all of these indices.
 #[inline(always)]
 pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LANES]) -> [__m512i; 8] {
-    // SAFETY: see above; unaligned loads.
+    // SAFETY: the token proves the features, and the caller the rows; unaligned loads.
     unsafe {
         macro_rules! load {
             ($i:literal) => {
@@ -51,7 +51,7 @@ pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LA
                 _mm512_insertf32x8::<1>(_mm512_castps256_ps512(load!($a)), load!($b))
             };
         }
-        // Quarters 0 and 2 are of columns 0 to 3, quarters 1 and 3 of columns 4 to 7.
+        // After these transpositions, quarters 0 and 2 belong to columns 0 to 3, quarters 1 and 3 to columns 4 to 7.
         let low = transpose4([halves!(0 4), halves!(1 5), halves!(2 6), halves!(3 7)]);
         let high = transpose4([halves!(8 12), halves!(9 13), halves!(10 14), halves!(11 15)]);
         let mut out = [simd.bits(low[0]); 8];
@@ -63,7 +63,7 @@ pub(super) unsafe fn columns8(simd: Avx512, from: *const [u32; 8], row: [u32; LA
     }
 }
 
-/// Of sixteen rows of five words, one after the other: the row of a word,
+/// For the 80 consecutive words of sixteen rows of five words, as five vectors: the index of each word's row.
 pub(super) const ROWS5: [[u32; LANES]; 5] = {
     let mut rows = [[0; LANES]; 5];
     let mut i = 0;
@@ -74,7 +74,7 @@ pub(super) const ROWS5: [[u32; LANES]; 5] = {
     rows
 };
 
-/// and a bit each for the words that are of a column.
+/// For each of the vectors of [`ROWS5`] and each column, the bits of the words that belong to the column.
 pub(super) const COLUMNS5: [[u16; 5]; 5] = {
     let mut columns = [[0; 5]; 5];
     let mut i = 0;

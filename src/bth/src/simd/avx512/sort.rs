@@ -3,7 +3,8 @@
 use crate::simd::LANES;
 use std::arch::x86_64::*;
 
-/// Step of a bitonic sorting network, descending: lanes whose bit is set keep the greater of themselves and partner.
+/// Step of a bitonic sorting network in descending order: lanes whose bit is set in `keep_greater` take the greater of their
+/// own and their partner's value, the other lanes the lesser.
 macro_rules! exchange {
     ($min:ident, $mask_max:ident, $v:expr, $partner:expr, $keep_greater:expr) => {{
         let (v, partner) = ($v, $partner);
@@ -11,13 +12,13 @@ macro_rules! exchange {
     }};
 }
 
-/// Sorts four lanes of i32, the greatest first.
+/// Sorts four i32 lanes in descending order.
 ///
 /// # Safety
-/// The machine must have the features of [`super::Avx512`]. Touches registers only, as the next two.
+/// The machine must have the features of [`super::Avx512`]. Only registers are accessed.
 #[inline(always)]
 pub(super) unsafe fn sort4(v: __m128i) -> __m128i {
-    // SAFETY: see above.
+    // SAFETY: the caller proves the features.
     unsafe {
         let v =
             exchange!(_mm_min_epi32, _mm_mask_max_epi32, v, _mm_shuffle_epi32::<0b10_11_00_01>(v), 0b1001);
@@ -75,25 +76,26 @@ pub(super) unsafe fn sort16(v: __m512i) -> __m512i {
     }
 }
 
-/// Keys with their lanes in the lowest bits, which are sorted with them.
+/// Replaces the four lowest bits of each key by the index of its lane, which thus moves with the key when keys are sorted.
 ///
 /// # Safety
 /// As [`sort4`].
 #[inline(always)]
-pub(super) unsafe fn with_lanes(key: __m512) -> __m512i {
-    // SAFETY: see above.
+pub(super) unsafe fn keys_with_lanes(key: __m512) -> __m512i {
+    // SAFETY: see `sort4`.
     unsafe {
         let lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
         _mm512_or_si512(_mm512_andnot_si512(_mm512_set1_epi32(15), _mm512_castps_si512(key)), lane)
     }
 }
 
-/// Stores the keys of these lanes, and what belongs to them, from the greatest to the least; returns how many.
+/// Stores the keys of `lanes` and their values `a` in descending order of the keys, which come from [`keys_with_lanes`];
+/// returns their number.
 ///
 /// # Safety
 /// The machine must have the features of [`super::Avx512`].
 #[inline(always)]
-pub(super) unsafe fn far_to_near(
+pub(super) unsafe fn store_far_to_near(
     lanes: u16,
     key: __m512i,
     a: __m512i,
@@ -101,7 +103,7 @@ pub(super) unsafe fn far_to_near(
     keys: &mut [f32; LANES],
 ) -> usize {
     let count = lanes.count_ones() as usize;
-    // SAFETY: `to` and `keys` have room for sixteen lanes, of which 4, 8 or 16 are stored.
+    // SAFETY: the caller proves the features, and 4, 8 or 16 lanes are stored to arrays of sixteen.
     unsafe {
         let least = _mm512_set1_epi32(i32::MIN);
         if count <= 4 {
@@ -130,7 +132,7 @@ pub(super) unsafe fn far_to_near(
 /// As [`sort4`].
 #[inline(always)]
 pub(super) unsafe fn nearest_of_four(lanes: u16, key: __m512i) -> u32 {
-    // SAFETY: see above.
+    // SAFETY: see `sort4`.
     unsafe {
         let key = _mm512_mask_compress_epi32(_mm512_set1_epi32(i32::MAX), lanes, key);
         let key = _mm512_castsi512_si128(key);

@@ -202,7 +202,7 @@ fn trace_hinted<Q: Query>(
 }
 
 /// Whether a ray that starts on a known surface may be faster through tetrahedra than through the BVH beside
-/// them, if there is one. By measurement (benchmarks/): long any-hit rays never are, and none are without vectors. Of
+/// them, if there is one. By measurement (docs/notes/tets.md): long any-hit rays never are, and none are without vectors. Of
 /// the others [`choice`] decides. No answer depends on it.
 fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     const SHORT: f32 = 0.3;

@@ -2,7 +2,7 @@
 //!
 //! Whether rays that start on a surface are faster through tetrahedra or through the BVH beside them depends on the
 //! model, the rays, the caches and the gathers of the machine: ratios from 0.5 to 1.3 have been measured
-//! (benchmarks/). Answers are the same bits either way, so the choice can be left to the clock. The slower way is tried
+//! (docs/notes/tets.md). Answers are the same bits either way, so the choice can be left to the clock. The slower way is tried
 //! again now and then, ever more seldom while nothing changes: in the long run it takes one batch in 256.
 
 use std::time::Instant;

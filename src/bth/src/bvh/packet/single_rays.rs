@@ -1,7 +1,7 @@
 //! Few rays of a packet before a node or a leaf: one ray at a time, lanes are children or triangles.
 //!
 //! Half of the leaves that sixteen rays of ambient occlusion enter matter to one of them only
-//! (benchmarks/2026-11-23-few-rays.md): one ray and sixteen triangles at once take far less than sixteen rays and each triangle in turn.
+//! (docs/notes/packets.md): one ray and sixteen triangles at once take far less than sixteen rays and each triangle in turn.
 
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, StackEntry};

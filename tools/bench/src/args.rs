@@ -145,7 +145,7 @@ pub struct Compare {
     /// Vector instructions of both builds; the best that the machine has when absent.
     #[arg(long, value_name = "NAME")]
     pub isa: Option<String>,
-    /// A set is slower when its mean over the models is greater by more than this, such as `1%`.
+    /// A set is slower when its mean over the models is certainly (95 %) greater by more than this, such as `1%`.
     #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]
     pub worse: f64,
     /// Small pictures and one round: whether it works, not what is faster.

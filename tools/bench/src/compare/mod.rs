@@ -2,7 +2,8 @@
 //!
 //! Both builds are loaded into this process and answer the same rays from the same file in turn, so that what else the
 //! machine does falls on both. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
-//! median over the rounds, and the verdict that of the geometric mean over the models.
+//! median over the rounds. The verdict is that of the geometric mean over the models, by the interval in which it lies with 95 %
+//! confidence (bootstrap over the rounds): builds that are the same must not be told apart by noise.
 
 mod library;
 mod report;
@@ -23,6 +24,8 @@ use std::io::Write;
 
 /// Smaller sets are not timed: that would measure the clock.
 const FEWEST: usize = 1024;
+/// Seconds of CPU time that a turn takes at least: short sets are traced several times, as shorter turns measure the clock.
+const TURN_SECONDS: f64 = 0.02;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
 const QUICK_SIZE: (u32, u32) = (128, 72);
@@ -88,30 +91,35 @@ fn compare(set: &RaySet, builds: &[Opened<'_>; 2], arguments: &Compare) -> SetCo
     let mut hits = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
     let mut found = [vec![false; rays.len()], vec![false; rays.len()]];
     let mut seconds = [Vec::new(), Vec::new()];
+    let mut passes = 1;
     for round in 0..=rounds {
         let mut of_round = [0.0; 2];
         // Each build goes first in every other round.
         for turn in 0..2 {
             let which = (turn + round) % 2;
             of_round[which] = Clock::ThreadCpu.time(|| {
-                if set.any {
-                    builds[which].any(rays, &mut found[which], batch);
-                } else {
-                    builds[which].nearest(rays, &mut hits[which], batch);
+                for _ in 0..passes {
+                    if set.any {
+                        builds[which].any(rays, &mut found[which], batch);
+                    } else {
+                        builds[which].nearest(rays, &mut hits[which], batch);
+                    }
                 }
-            });
+            }) / passes as f64;
         }
-        // The first round warms up the caches.
+        // The first round warms up the caches and tells how long a pass takes.
         if round > 0 {
             seconds[0].push(of_round[0]);
             seconds[1].push(of_round[1]);
+        } else if !arguments.quick {
+            passes = (TURN_SECONDS / of_round[0].max(1e-6)).ceil() as usize;
         }
     }
-    let ratios = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
+    let ratios: Vec<f64> = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
     let ns = |seconds: &[f64]| quartiles(seconds.to_vec())[1] * 1e9 / rays.len() as f64;
     let bits =
         |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.surface.instance, h.surface.triangle];
-    let [low, ratio, high] = quartiles(ratios);
+    let [low, ratio, high] = quartiles(ratios.clone());
     SetComparison {
         name: set.name.to_owned(),
         rays: rays.len(),
@@ -120,6 +128,7 @@ fn compare(set: &RaySet, builds: &[Opened<'_>; 2], arguments: &Compare) -> SetCo
         ratio,
         low,
         high,
+        ratios,
         same: found[0] == found[1] && hits[0].iter().zip(&hits[1]).all(|(a, b)| bits(a) == bits(b)),
     }
 }

@@ -1,9 +1,9 @@
 //! What `compare` found, as JSON and as tables.
 
 use crate::markdown::table;
-use crate::rounds::geometric_mean;
+use crate::rounds::{geometric_mean, median};
+use bth_random::Rng;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// A comparison of two builds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,6 +42,9 @@ pub struct SetComparison {
     pub low: f64,
     /// Upper quartile of that.
     pub high: f64,
+    /// The ratio of each round.
+    #[serde(skip)]
+    pub ratios: Vec<f64>,
     /// Whether both builds gave the same answers, to the bit.
     pub same: bool,
 }
@@ -50,22 +53,26 @@ pub struct SetComparison {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// By more than the threshold.
+    /// By more than the threshold, with 95 % confidence.
     Faster,
-    /// Neither.
+    /// By less than the threshold either way, with 95 % confidence.
     Equal,
-    /// By more than the threshold.
+    /// The rounds do not tell: more are needed, or a quieter machine.
+    Undecided,
+    /// By more than the threshold, with 95 % confidence.
     Slower,
 }
 
 impl Verdict {
-    fn of(ratio: f64, worse: f64) -> Verdict {
-        if ratio > 1.0 + worse {
+    fn of([low, high]: [f64; 2], worse: f64) -> Verdict {
+        if low > 1.0 + worse {
             Verdict::Slower
-        } else if ratio < 1.0 - worse {
+        } else if high < 1.0 - worse {
             Verdict::Faster
-        } else {
+        } else if 1.0 - worse <= low && high <= 1.0 + worse {
             Verdict::Equal
+        } else {
+            Verdict::Undecided
         }
     }
 
@@ -73,34 +80,67 @@ impl Verdict {
         match self {
             Verdict::Faster => "faster",
             Verdict::Equal => "equal",
+            Verdict::Undecided => "undecided",
             Verdict::Slower => "slower",
         }
     }
 }
 
+/// A set's mean over the models.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mean {
+    /// Name of the set.
+    pub set: String,
+    /// Geometric mean of the models' median ratios.
+    pub ratio: f64,
+    /// The interval that holds it with 95 % confidence.
+    pub interval: [f64; 2],
+}
+
+/// The interval in which the geometric mean of the medians lies with 95 % confidence, by resampling each model's rounds
+/// (percentile bootstrap, Efron 1979).
+fn interval(models: &[&[f64]]) -> [f64; 2] {
+    const SAMPLES: usize = 1000;
+    let mut rng = Rng::new(1);
+    let mut means: Vec<f64> = (0..SAMPLES)
+        .filter_map(|_| {
+            let medians = models.iter().filter_map(|rounds| {
+                let draw = |_| rounds[rng.below(rounds.len().max(1) as u64) as usize];
+                median((0..rounds.len()).map(draw).collect())
+            });
+            geometric_mean(medians.collect::<Vec<_>>())
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [0.025, 0.975].map(|share| means.get((share * means.len() as f64) as usize).copied().unwrap_or(f64::NAN))
+}
+
 impl Comparison {
     /// Geometric mean over the models of each set's ratio, in the order of the sets.
-    pub fn means(&self) -> Vec<(String, f64)> {
+    pub fn means(&self) -> Vec<Mean> {
         let mut order: Vec<&str> = Vec::new();
-        let mut ratios: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
         for set in self.models.iter().flat_map(|model| &model.sets) {
             if !order.contains(&set.name.as_str()) {
                 order.push(&set.name);
             }
-            ratios.entry(&set.name).or_default().push(set.ratio);
         }
-        let mean = |name: &str| geometric_mean(ratios[name].iter().copied());
-        order.into_iter().filter_map(|name| Some((name.to_owned(), mean(name)?))).collect()
+        let mean = |name: &str| {
+            let of = |model: &'_ ModelComparison| model.sets.iter().position(|set| set.name == name);
+            let sets: Vec<&SetComparison> =
+                self.models.iter().filter_map(|model| Some(&model.sets[of(model)?])).collect();
+            let ratio = geometric_mean(sets.iter().map(|set| set.ratio))?;
+            let rounds: Vec<&[f64]> = sets.iter().map(|set| &set.ratios[..]).collect();
+            Some(Mean { set: name.to_owned(), ratio, interval: interval(&rounds) })
+        };
+        order.into_iter().filter_map(mean).collect()
     }
 
-    /// Slower if any set is, else faster if any set is.
+    /// Slower if any set is, else undecided if any is, else faster if any is.
     pub fn verdict(&self) -> Verdict {
         let verdicts: Vec<Verdict> =
-            self.means().iter().map(|(_, mean)| Verdict::of(*mean, self.worse)).collect();
-        [Verdict::Slower, Verdict::Faster]
-            .into_iter()
-            .find(|v| verdicts.contains(v))
-            .unwrap_or(Verdict::Equal)
+            self.means().iter().map(|mean| Verdict::of(mean.interval, self.worse)).collect();
+        let order = [Verdict::Slower, Verdict::Undecided, Verdict::Faster];
+        order.into_iter().find(|v| verdicts.contains(v)).unwrap_or(Verdict::Equal)
     }
 
     /// Model and set where the builds gave different answers.
@@ -125,17 +165,19 @@ impl Comparison {
                 ]);
             }
         }
-        let means = self.means();
-        let verdicts: Vec<Vec<String>> = means
+        let verdicts: Vec<Vec<String>> = self
+            .means()
             .iter()
-            .map(|(name, mean)| {
-                vec![name.clone(), format!("{mean:.3}"), Verdict::of(*mean, self.worse).name().to_owned()]
+            .map(|Mean { set, ratio, interval }| {
+                let [low, high] = interval;
+                let verdict = Verdict::of(*interval, self.worse).name().to_owned();
+                vec![set.clone(), format!("{ratio:.3}"), format!("{low:.3} to {high:.3}"), verdict]
             })
             .collect();
         format!(
             "{}\n{}",
             table(&cells(&["model and set", "old ns", "new ns", "new / old", "quartiles", "answers"]), &rows),
-            table(&cells(&["mean over models", "new / old", "verdict"]), &verdicts),
+            table(&cells(&["mean over models", "new / old", "95 %", "verdict"]), &verdicts),
         )
     }
 }
@@ -144,41 +186,44 @@ impl Comparison {
 mod tests {
     use super::*;
 
-    fn set(name: &str, ratio: f64, same: bool) -> SetComparison {
-        let (old_ns, new_ns) = (100.0, 100.0 * ratio);
+    /// A set whose rounds scatter by so much around a ratio.
+    fn set(name: &str, ratio: f64, scatter: f64) -> SetComparison {
+        let ratios = (0..21).map(|i| ratio * (1.0 + scatter * (f64::from(i) / 10.0 - 1.0))).collect();
         SetComparison {
             name: name.to_owned(),
             rays: 4096,
-            old_ns,
-            new_ns,
+            old_ns: 100.0,
+            new_ns: 100.0 * ratio,
             ratio,
             low: ratio,
             high: ratio,
-            same,
+            ratios,
+            same: true,
         }
     }
 
-    #[test]
-    fn verdicts_are_those_of_the_means_over_models() {
-        let model = |name: &str, ratio| ModelComparison {
+    fn comparison(ratio: f64, scatter: f64) -> Comparison {
+        let model = |name: &str| ModelComparison {
             name: name.to_owned(),
-            sets: vec![set("primary", ratio, true), set("ao", 1.0, true)],
+            sets: vec![set("primary", ratio, scatter), set("ao", 1.0, 0.001)],
         };
-        let models = vec![model("a", 1.02), model("b", 0.98)];
-        let mut comparison = Comparison { batch: 1024, worse: 0.01, models };
-        assert_eq!(comparison.verdict(), Verdict::Equal);
-        comparison.models[1].sets[0].ratio = 1.02;
-        assert_eq!(comparison.verdict(), Verdict::Slower);
-        for model in &mut comparison.models {
-            model.sets[0].ratio = 0.9;
-        }
-        assert_eq!(comparison.verdict(), Verdict::Faster);
-        assert!(comparison.markdown().contains("| primary | 0.900 | faster |"));
+        Comparison { batch: 1024, worse: 0.01, models: vec![model("a"), model("b")] }
+    }
+
+    #[test]
+    fn verdicts_are_those_of_intervals_of_the_means() {
+        assert_eq!(comparison(1.0, 0.005).verdict(), Verdict::Equal);
+        assert_eq!(comparison(1.05, 0.005).verdict(), Verdict::Slower);
+        assert_eq!(comparison(0.9, 0.005).verdict(), Verdict::Faster);
+        // The mean alone would be slower; so noisy rounds do not show it.
+        assert_eq!(comparison(1.015, 0.2).verdict(), Verdict::Undecided);
+        assert!(comparison(0.9, 0.001).markdown().contains("| primary | 0.900 |"));
     }
 
     #[test]
     fn different_answers_are_named() {
-        let models = vec![ModelComparison { name: "a".to_owned(), sets: vec![set("ao", 1.0, false)] }];
-        assert_eq!(Comparison { batch: 1, worse: 0.01, models }.differing(), ["a ao"]);
+        let mut different = comparison(1.0, 0.0);
+        different.models[1].sets[1].same = false;
+        assert_eq!(different.differing(), ["b ao"]);
     }
 }

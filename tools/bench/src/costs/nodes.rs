@@ -114,7 +114,9 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
         estimates[row] = match *name {
             "face count" => [Estimator::FaceCount.levels(triangles, 0.0); 2],
             "average depth" => [Estimator::AverageDepth.levels(triangles, depth()); 2],
-            "area" => [Start::Outside, Start::Surface].map(|start| bth_compile::comparison::area_steps(tets, start)),
+            "area" => {
+                [Start::Outside, Start::Surface].map(|start| bth_compile::comparison::area_steps(tets, start))
+            }
             _ => {
                 // Rays of other seeds than those that are measured.
                 let outside = costs::outside(root.lower, root.upper, SAMPLES, 23);

@@ -157,7 +157,13 @@ fn compile(source: &Path, structure: Structure) -> Result<Vec<u8>> {
         true => bth_scene::read(source)?,
         false => {
             let name = source.file_name().unwrap_or_default().to_string_lossy();
-            bth_import::gltf::scene::import(source, &name, &bth_import::gltf::scene::ImportOptions::default(), &Silent)?.0
+            bth_import::gltf::scene::import(
+                source,
+                &name,
+                &bth_import::gltf::scene::ImportOptions::default(),
+                &Silent,
+            )?
+            .0
         }
     };
     let folder = source.parent().unwrap_or(Path::new("."));

@@ -1,7 +1,7 @@
 //! The blocks of a wide BVH in other orders than the compiler's, which is depth first with nodes before leaves.
 
 use bth_compile::bvh::Wide;
-use bth_format::layout::{Child, INDEXED_LINES, CacheLine, NODE_LINES, NONE, RAW_LINES, WideNode};
+use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES, WideNode};
 use bth_random::Rng;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, IntoBytes};

@@ -55,6 +55,10 @@ pub struct Bar {
     pub engine: String,
     /// Which ray set or figure.
     pub set: String,
+    /// Of which model, or `mean`; any when absent.
+    pub model: Option<String>,
+    /// With which instruction set of our kernels; any when absent.
+    pub isa: Option<String>,
     /// In which unit; others are not compared.
     pub unit: String,
     /// At least so much.

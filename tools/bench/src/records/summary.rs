@@ -61,7 +61,7 @@ fn sorted(folder: &Path) -> Result<Vec<String>> {
 }
 
 /// The newest row of each figure. Files are named by their day, so later ones replace earlier ones.
-fn newest(folder: &Path) -> Result<BTreeMap<[String; 6], Dated>> {
+fn newest(folder: &Path) -> Result<BTreeMap<[String; 7], Dated>> {
     let mut out = BTreeMap::new();
     for name in sorted(folder)? {
         let path = folder.join(&name);
@@ -72,8 +72,8 @@ fn newest(folder: &Path) -> Result<BTreeMap<[String; 6], Dated>> {
         for (number, line) in lines.enumerate() {
             let row = Row::parse(line).with_context(|| format!("{}:{}", path.display(), number + 2))?;
             let threads = format!("{:04}", row.threads);
-            let key =
-                [&row.benchmark, &row.engine, &row.model, &row.set, &threads, &row.isa].map(String::clone);
+            let key = [&row.benchmark, &row.engine, &row.model, &row.set, &threads, &row.isa, &row.unit]
+                .map(String::clone);
             out.insert(key, (day.clone(), row));
         }
     }
@@ -118,8 +118,11 @@ fn section(page: &mut SummaryPage, cpu: &str, definition: &Definition, rows: &[&
 /// Bars of the figures that have the unit of the first: a group for each model and figure, side by side the engines.
 fn chart(title: &str, rows: &[&Dated]) -> Option<String> {
     let unit = &rows.first()?.1.unit;
-    let rows: Vec<&Row> =
-        rows.iter().map(|(_, row)| row).filter(|r| r.unit == *unit && r.value > 0.0).collect();
+    let rows: Vec<&Row> = rows
+        .iter()
+        .map(|(_, row)| row)
+        .filter(|r| r.unit == *unit && r.threads <= 1 && r.value > 0.0)
+        .collect();
     let group =
         |row: &Row| if row.model == "mean" { row.set.clone() } else { format!("{} {}", row.model, row.set) };
     let unique = |names: Vec<String>| {
@@ -132,9 +135,11 @@ fn chart(title: &str, rows: &[&Dated]) -> Option<String> {
         out
     };
     let groups = unique(rows.iter().map(|row| group(row)).collect());
-    let engines = unique(rows.iter().map(|row| row.engine.clone()).collect());
-    let value = |engine: &str, name: &str| {
-        rows.iter().find(|row| row.engine == engine && group(row) == name).map(|row| row.value)
+    let engine =
+        |row: &Row| if row.isa == "-" { row.engine.clone() } else { format!("{} ({})", row.engine, row.isa) };
+    let engines = unique(rows.iter().map(|row| engine(row)).collect());
+    let value = |wanted: &str, name: &str| {
+        rows.iter().find(|row| engine(row) == wanted && group(row) == name).map(|row| row.value)
     };
     let series = engines.iter().take(MOST_SERIES).map(|engine| Series {
         name: engine.clone(),
@@ -147,7 +152,14 @@ fn chart(title: &str, rows: &[&Dated]) -> Option<String> {
 
 /// Whether a row meets its bar, if it has one.
 fn bar(bars: &[Bar], row: &Row) -> String {
-    let of = |bar: &&Bar| bar.engine == row.engine && bar.set == row.set && bar.unit == row.unit;
+    let of = |bar: &&Bar| {
+        bar.engine == row.engine
+            && bar.set == row.set
+            && bar.unit == row.unit
+            && bar.model.as_ref().is_none_or(|model| *model == row.model)
+            && bar.isa.as_ref().is_none_or(|isa| *isa == row.isa)
+            && row.threads <= 1
+    };
     let Some(bar) = bars.iter().find(of) else { return String::new() };
     match (bar.at_least, bar.at_most) {
         (Some(least), _) if row.value >= least => format!("≥ {least}: met"),

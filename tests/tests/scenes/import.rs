@@ -1,9 +1,9 @@
 //! Which parts of a glTF scene become a manifest, and which are refused.
 
 use crate::support::{animated, compiled};
+use bth_compile::{Error, Silent};
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions, ImportReport};
-use bth_compile::{Error, Silent};
 use bth_scene::{Interpolation, Lens, LightKind, Manifest, Property, Source, Transform};
 use serde_json::{Value, json};
 use std::path::Path;

@@ -6,7 +6,7 @@ use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use bth_format::layout::{Child, INDEXED_LINES, CacheLine, NODE_LINES, NONE, RAW_LINES};
+use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES};
 use bth_import::Mesh;
 use serde::Serialize;
 use std::time::Instant;

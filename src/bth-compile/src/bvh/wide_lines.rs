@@ -1,7 +1,7 @@
 //! Contents of the wide BVH's nodes and leaves.
 
 use super::Node;
-use bth_format::layout::{IndexedLeaf, CacheLine, NONE, RawLeaf, WIDTH, WideNode};
+use bth_format::layout::{CacheLine, IndexedLeaf, NONE, RawLeaf, WIDTH, WideNode};
 use bth_import::Mesh;
 use zerocopy::{Immutable, IntoBytes};
 

@@ -10,7 +10,7 @@ mod records;
 mod view;
 
 pub use bounds::ObjectBounds;
+pub use leaves::Unpacked;
 pub use nodes::NodeBase;
 pub use records::Records;
 pub use view::ObjectView;
-pub use leaves::Unpacked;

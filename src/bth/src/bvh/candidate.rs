@@ -93,13 +93,14 @@ pub(crate) fn settle_one<Q: Query>(
     query: &mut Q,
 ) -> bool {
     let Some((place, corners)) = candidate.read(object, ReadCorners) else { return false };
-    let crossing = match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
+    let intersection = match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
         Estimate::Missed => None,
-        Estimate::Crossed(crossing) => Some(crossing),
+        Estimate::Intersects(intersection) => Some(intersection),
         Estimate::Open(_, t) if !query.may_matter(t) => None,
         Estimate::Open(..) => open_candidate(object, ray, candidate),
     };
-    crossing.is_some_and(|crossing| query.offer(TriangleRef::place(place, object.triangle_ids), crossing))
+    intersection
+        .is_some_and(|intersection| query.offer(TriangleRef::index(place, object.triangle_ids), intersection))
 }
 
 /// What f64 leaves open of a candidate. It is read again, so that what is common needs no corners in memory.
@@ -113,5 +114,5 @@ fn open_candidate(object: &ObjectView<'_>, ray: &Ray, candidate: Candidate) -> O
 #[cold]
 #[inline(never)]
 pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
-    Line::new(ray)?.crossing(corners)
+    Line::new(ray)?.intersection(corners)
 }

@@ -5,7 +5,7 @@ use super::ray_state::RayState;
 use crate::bvh::candidate::{Candidate, Reader, settle};
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::prepare::fields;
+use crate::intersect::prepare::gather_rays;
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
@@ -22,7 +22,7 @@ pub(crate) struct DeferredHits {
     /// In leaf order.
     place: [u32; LANES],
     pairs: Pairs,
-    crossings: Intersections,
+    intersections: Intersections,
 }
 
 /// Notes the corners of a triangle.
@@ -51,7 +51,7 @@ impl DeferredHits {
             candidate: [Candidate::NONE; LANES],
             place: [0; LANES],
             pairs: Pairs::NONE,
-            crossings: Intersections::NONE,
+            intersections: Intersections::NONE,
         }
     }
 
@@ -96,21 +96,21 @@ impl DeferredHits {
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
         // Read here, as a block: word by word, as they add, would take twice as long.
-        let [ox, oy, oz, _, dx, dy, dz, _] = fields(s, s.mask(all), rays, s.load_u(&self.ray));
+        let [ox, oy, oz, _, dx, dy, dz, _] = gather_rays(s, s.mask(all), rays, s.load_u(&self.ray));
         let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         for k in 0..3 {
             s.store(origin[k], &mut self.pairs.origin[k]);
             s.store(direction[k], &mut self.pairs.direction[k]);
         }
-        let crossings = &mut self.crossings;
-        crossings.compute(s, all, &self.pairs);
+        let intersections = &mut self.intersections;
+        intersections.compute(s, all, &self.pairs);
         for lane in 0..LANES {
-            if crossings.certain >> lane & 1 != 0 {
-                let (t, u, v) = (crossings.t[lane], crossings.u[lane], crossings.v[lane]);
+            if intersections.certain >> lane & 1 != 0 {
+                let (t, u, v) = (intersections.t[lane], intersections.u[lane], intersections.v[lane]);
                 to.hit(self.ray[lane] as usize, object.triangle_ids[self.place[lane] as usize], t, u, v);
             }
         }
-        let mut rest = all & !crossings.certain;
+        let mut rest = all & !intersections.certain;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;

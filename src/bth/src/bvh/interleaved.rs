@@ -122,10 +122,10 @@ impl<Q: Query> RaySource<'_, Q> {
             self.used += 1;
             let place = self.ray[lane];
             let query = self.remaining.queries.map(|queries| queries[place as usize]);
-            let aim = self.prepared.aim(lane);
+            let prepared = self.prepared.prepared(lane);
             let state = pool.state(at);
-            if let Some(aim) = aim {
-                state.start(aim, query);
+            if let Some(prepared) = prepared {
+                state.start(prepared, query);
             } else {
                 let ray = (place, &self.rays[place as usize]);
                 if !state.start_unprepared(self.object, ray, query) {
@@ -135,7 +135,7 @@ impl<Q: Query> RaySource<'_, Q> {
             if query.is_some() {
                 state.take_over(&self.rays[place as usize]);
             }
-            if aim.is_some() && self.root & Child::LEAF_BIT == 0 {
+            if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
                 let root = N::node(self.object.node_base(), self.root);
                 pool.start_among(s, at, root, (self.hit_cache[lane], s.load(&self.enter[lane])));
             } else {
@@ -164,8 +164,8 @@ impl<Q: Query> RaySource<'_, Q> {
         let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.node_base(), self.root));
         for lane in 0..count {
             let mut meets = true;
-            if let (Some(aim), Some(root)) = (self.prepared.aim(lane), root) {
-                let (bits, enter) = aim.slabs.children(s, root, aim.slabs.last);
+            if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {
+                let (bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
                 s.store(enter, &mut self.enter[lane % LANES]);
                 self.hit_cache[lane % LANES] = bits;
                 meets = bits != 0;

@@ -28,7 +28,7 @@ pub(crate) enum LeafOutcome {
 
 /// What a traversal keeps of a ray while it goes through leaves.
 pub(crate) trait Progress<Q: Query> {
-    fn aim(&self) -> &PreparedRay;
+    fn prepared(&self) -> &PreparedRay;
     /// The depth beyond which nothing matters any more.
     fn last(&self) -> f32;
     fn set_last(&mut self, last: f32);
@@ -51,8 +51,8 @@ pub(crate) trait Progress<Q: Query> {
             return LeafOutcome::Nothing;
         }
         let (before, query) = (self.last(), *self.query(ray));
-        self.set_last(self.aim().slabs.limit(query.limit()));
-        self.set_nearest(self.aim().slabs.nearest(query.found_between()));
+        self.set_last(self.prepared().slabs.limit(query.limit()));
+        self.set_nearest(self.prepared().slabs.nearest(query.found_bounds()));
         if self.last() < before { LeafOutcome::Nearer } else { LeafOutcome::Nothing }
     }
 }
@@ -66,8 +66,8 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     progress: &mut impl Progress<Q>,
     (block, code): (&B, u32),
 ) -> LeafOutcome {
-    let aim = progress.aim();
-    let found = aim.sight.candidates(s, block, aim.slabs.first, progress.last());
+    let prepared = progress.prepared();
+    let found = prepared.filter.candidates(s, block, prepared.slabs.first, progress.last());
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
     }
@@ -78,7 +78,7 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
         }
         return decide(object, ray(), progress, code, found.maybe);
     }
-    let (maybe, certain) = found.nearest_of_all(s);
+    let (maybe, certain) = found.nearest_candidates(s);
     if let Some(Certain { triangle, near, far }) = certain
         && far < progress.nearest()
     {

@@ -28,7 +28,7 @@ pub(crate) fn key_limit(last: f32) -> f32 {
 #[repr(C)]
 pub(crate) struct RayState<Q> {
     /// Nothing whose depth certainly exceeds its `last` matters any more.
-    aim: PreparedRay,
+    prepared: PreparedRay,
     /// Of rays of which something had to be decided ([`HitProgress::BY_QUERY`]): for most nothing is ever, and they don't touch it.
     query: Q,
 }
@@ -43,38 +43,42 @@ impl<Q: Query> RayState<Q> {
         (place, ray): (u32, &Ray),
         query: Option<Q>,
     ) -> bool {
-        let aim = PreparedRay::of(&object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
-        aim.map(|aim| self.start(&PreparedRay { ray: place, ..aim }, query)).is_some()
+        let prepared =
+            PreparedRay::of(&object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
+        prepared.map(|prepared| self.start(&PreparedRay { ray: place, ..prepared }, query)).is_some()
     }
 
     /// A place for a ray.
     pub(crate) fn vacant(query: Q) -> Self {
-        RayState { aim: PreparedRay { noted: HitProgress::NOTHING, ..PreparedRay::new_zeroed() }, query }
+        RayState {
+            prepared: PreparedRay { progress: HitProgress::NOTHING, ..PreparedRay::new_zeroed() },
+            query,
+        }
     }
 
     /// Takes in a ray that has been prepared, and its query if it has one.
     #[inline(always)]
-    pub(crate) fn start(&mut self, aim: &PreparedRay, query: Option<Q>) {
-        self.aim = *aim;
+    pub(crate) fn start(&mut self, prepared: &PreparedRay, query: Option<Q>) {
+        self.prepared = *prepared;
         if let Some(query) = query {
             self.give(query);
         }
     }
 
     fn give(&mut self, query: Q) {
-        (self.query, self.aim.noted.decided) = (query, HitProgress::BY_QUERY);
+        (self.query, self.prepared.progress.decided) = (query, HitProgress::BY_QUERY);
     }
 
     /// StackPosition of the ray in the batch.
     #[inline(always)]
     pub(crate) fn ray(&self) -> usize {
-        self.aim.ray as usize
+        self.prepared.ray as usize
     }
 
     /// Hands on what has been found, but for what waits to be computed.
     #[inline(always)]
     pub(crate) fn report(&self, to: &mut Sink<'_, Q>) {
-        match self.aim.noted.decided {
+        match self.prepared.progress.decided {
             HitProgress::UNDECIDED => {}
             HitProgress::ACCEPTED => {
                 let mut query = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
@@ -88,7 +92,7 @@ impl<Q: Query> RayState<Q> {
     /// Keys of the stack beyond this are of no interest any more.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
-        key_limit(self.aim.slabs.last)
+        key_limit(self.prepared.slabs.last)
     }
 
     /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
@@ -99,51 +103,52 @@ impl<Q: Query> RayState<Q> {
         node: &B,
         to: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
-        let (bits, enter) = self.aim.slabs.children(s, node, self.aim.slabs.last);
+        let (bits, enter) = self.prepared.slabs.children(s, node, self.prepared.slabs.last);
         write_children::<S, Q, B>(s, node, (bits, enter), to)
     }
 }
 
 impl<Q: Query> Progress<Q> for RayState<Q> {
     #[inline(always)]
-    fn aim(&self) -> &PreparedRay {
-        &self.aim
+    fn prepared(&self) -> &PreparedRay {
+        &self.prepared
     }
     #[inline(always)]
     fn last(&self) -> f32 {
-        self.aim.slabs.last
+        self.prepared.slabs.last
     }
     #[inline(always)]
     fn set_last(&mut self, last: f32) {
-        self.aim.slabs.last = last;
+        self.prepared.slabs.last = last;
     }
     #[inline(always)]
     fn nearest(&self) -> f32 {
-        self.aim.noted.nearest
+        self.prepared.progress.nearest
     }
     #[inline(always)]
     fn set_nearest(&mut self, nearest: f32) {
-        self.aim.noted.nearest = nearest;
+        self.prepared.progress.nearest = nearest;
     }
     #[inline(always)]
     fn pending(&self) -> Candidate {
-        let HitProgress { leaf, triangle, .. } = self.aim.noted;
+        let HitProgress { leaf, triangle, .. } = self.prepared.progress;
         Candidate { leaf, triangle: triangle.into() }
     }
     #[inline(always)]
     fn set_pending(&mut self, pending: Candidate) {
-        (self.aim.noted.leaf, self.aim.noted.triangle) = (pending.leaf, pending.triangle as u16);
+        (self.prepared.progress.leaf, self.prepared.progress.triangle) =
+            (pending.leaf, pending.triangle as u16);
     }
     #[inline(always)]
     fn query(&mut self, ray: &Ray) -> &mut Q {
-        if self.aim.noted.decided == HitProgress::UNDECIDED {
+        if self.prepared.progress.decided == HitProgress::UNDECIDED {
             self.give(Q::new(ray));
         }
         &mut self.query
     }
     #[inline(always)]
     fn accept(&mut self) {
-        self.aim.noted.decided = HitProgress::ACCEPTED;
+        self.prepared.progress.decided = HitProgress::ACCEPTED;
     }
 }
 

@@ -26,7 +26,7 @@ pub(crate) enum TetOutcome {
 
 /// What a ray has come upon, in registers but for its query.
 struct SingleState<'a, Q> {
-    aim: &'a PreparedRay,
+    prepared: &'a PreparedRay,
     query: &'a mut Q,
     /// Nothing whose depth certainly exceeds this matters any more.
     last: f32,
@@ -38,8 +38,8 @@ struct SingleState<'a, Q> {
 
 impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
     #[inline(always)]
-    fn aim(&self) -> &PreparedRay {
-        self.aim
+    fn prepared(&self) -> &PreparedRay {
+        self.prepared
     }
     #[inline(always)]
     fn last(&self) -> f32 {
@@ -83,7 +83,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     s: S,
     nodes: N,
     (object, ray): (&ObjectView<'_>, &Ray),
-    aim: &PreparedRay,
+    prepared: &PreparedRay,
     walked: u32,
     query: &mut Q,
     stack: &mut SingleStack,
@@ -91,9 +91,14 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
     // In memory: compilers would rather make sixteen of each of its numbers before the walk, and store those.
-    let aim = black_box(aim);
-    let mut walk =
-        SingleState { aim, query, last: aim.slabs.last, nearest: f32::INFINITY, pending: Candidate::NONE };
+    let prepared = black_box(prepared);
+    let mut walk = SingleState {
+        prepared,
+        query,
+        last: prepared.slabs.last,
+        nearest: f32::INFINITY,
+        pending: Candidate::NONE,
+    };
     if walked != NONE {
         walk.take_over(ray);
     }
@@ -104,7 +109,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     let mut limit = key_limit(walk.last);
     loop {
         // In registers for as long as no leaf is entered.
-        let planes = RaySlabLanes::new(s, &aim.slabs);
+        let planes = RaySlabLanes::new(s, &prepared.slabs);
         while code & Child::LEAF_BIT == 0 {
             count.node();
             let node = N::node(node_base, code);

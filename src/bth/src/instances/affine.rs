@@ -190,7 +190,7 @@ impl Inverse {
 
     /// As [`Self::ray`], sixteen rays, to the same bits; but lanes that are not `plain` are not what that makes of them.
     #[inline(always)]
-    pub(super) fn turn(&self, lanes: &mut RayLanes) {
+    pub(super) fn transform(&self, lanes: &mut RayLanes) {
         let RayLanes { origin, direction, plain } = lanes;
         let Inverse { linear, origin: place } = *self;
         // Without branches, so that it is compiled to vectors.
@@ -319,7 +319,7 @@ mod tests {
                 }
                 expected.push(inverse.ray(&ray));
             }
-            inverse.turn(&mut lanes);
+            inverse.transform(&mut lanes);
             for (lane, ObjectRay { ray, t_scale }) in expected.into_iter().enumerate() {
                 let finite = ray.direction.iter().all(|x| x.is_finite());
                 assert!(lanes.plain[lane] == 0 || t_scale == 1.0 && finite, "{ray:?}");

@@ -78,7 +78,7 @@ impl<T: Fn(usize) -> f32> Kernel for EnterKernel<'_, T> {
                 s.store(s.floats(words[k]), &mut lanes.origin[k]);
                 s.store(s.floats(words[4 + k]), &mut lanes.direction[k]);
             }
-            round.world.placed_at(instance).inverse.turn(&mut lanes);
+            round.world.placed_at(instance).inverse.transform(&mut lanes);
             for k in 0..3 {
                 rows[k] = s.load(&lanes.origin[k]);
                 rows[4 + k] = s.load(&lanes.direction[k]);

@@ -49,7 +49,7 @@ impl Pose {
         }
     }
 
-    /// Moves to a time; returns how many nodes moved, were hidden or came to sight. With `all` every node counts.
+    /// Moves to a time; returns how many nodes moved, were hidden or became visible. With `all` every node counts.
     pub(crate) fn update(&mut self, view: &SceneView<'_>, seconds: f64, all: bool) -> usize {
         let before = std::mem::replace(&mut self.seconds, seconds);
         let (mut moved, mut parent_rows) = (0, 0);
@@ -77,7 +77,7 @@ impl Pose {
         moved
     }
 
-    /// Whether a node moved, was hidden or came to sight in the last update.
+    /// Whether a node moved, was hidden or became visible in the last update.
     pub(crate) fn moved(&self, node: u32) -> bool {
         self.state[node as usize] & MOVED != 0
     }

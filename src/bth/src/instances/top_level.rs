@@ -4,7 +4,7 @@
 //! or three, whose empty slots cost memory and time.
 
 use super::placement::Placed;
-use bth_format::layout::{Child, CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
 /// Rays whose origin has no greater coordinate than this times that of the world's boxes take the boxes as they

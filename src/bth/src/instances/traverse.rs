@@ -97,8 +97,8 @@ impl RayTraversals {
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
                 let state = &mut self.active_rays[number];
-                match prepared.aim(lane).filter(|_| is_near) {
-                    Some(aim) => state.slabs = aim.slabs,
+                match prepared.prepared(lane).filter(|_| is_near) {
+                    Some(prepared) => state.slabs = prepared.slabs,
                     None => match slabs_from_afar(ray, top) {
                         Some(slabs) => state.slabs = slabs,
                         None => continue,

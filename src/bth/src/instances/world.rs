@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// What an update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Update {
-    /// Nodes that moved, were hidden or came to sight, with all that is below them.
+    /// Nodes that moved, were hidden or became visible, with all that is below them.
     pub nodes: usize,
     /// Instances that were placed anew.
     pub placed: usize,

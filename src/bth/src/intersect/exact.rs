@@ -15,11 +15,9 @@
 //! far from the limits of f64.
 
 use crate::intersect::line::Line;
+pub(crate) use crate::intersect::line::RATIO_ERROR;
 use bth_format::exact::{EDGE_PARTS, Expansion, VOLUME_PARTS};
 
-/// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
-/// t. Where the error may be greater, t, u and v are computed from exact sums.
-pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 /// 128u, more than the 98u above: bounds the error of weights relative to Dm(m+r) and that of the volume relative to rm².
 const WEIGHT_ERROR: f64 = 128.0 / (1u64 << 53) as f64;
 
@@ -60,8 +58,8 @@ pub(crate) enum Estimate {
     /// The line certainly misses the triangle.
     Missed,
     /// The line certainly crosses the triangle, and t, u and v are within [`RATIO_ERROR`].
-    Crossed(Intersection),
-    /// The error bounds leave the crossing, or its t, u and v, uncertain. The array bounds t if the line crosses.
+    Intersects(Intersection),
+    /// The error bounds leave the intersection, or its t, u and v, uncertain. The array bounds t if the line crosses.
     Open(UncertainWeights, [f64; 2]),
 }
 
@@ -189,7 +187,7 @@ impl RoundedIntersection {
         }
     }
 
-    fn crossing(&self) -> Intersection {
+    fn intersection(&self) -> Intersection {
         Intersection { t: self.t, weight: self.weight }
     }
 }
@@ -211,7 +209,7 @@ pub(crate) fn estimate(origin: [f64; 3], direction: [f64; 3], corners: [[f64; 3]
     }
     let inside = least > bound || greatest < -bound;
     if inside && rounded.is_accurate {
-        return Estimate::Crossed(rounded.crossing());
+        return Estimate::Intersects(rounded.intersection());
     }
     let t = if inside {
         t_range(rounded.t, determinant, [bound, error[1]])
@@ -243,10 +241,10 @@ pub(crate) fn wide(v: [f32; 3]) -> [f64; 3] {
 
 impl Line {
     /// The intersection of the line with the closed triangle of these corners (object space), decided exactly.
-    pub(crate) fn crossing(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
+    pub(crate) fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
         match estimate(self.origin, self.direction, corners.map(wide)) {
             Estimate::Missed => None,
-            Estimate::Crossed(crossing) => Some(crossing),
+            Estimate::Intersects(intersection) => Some(intersection),
             Estimate::Open(uncertain, _) => self.decide_exactly(corners, &uncertain),
         }
     }
@@ -268,7 +266,7 @@ impl Line {
         if positive == negative {
             return None; // The line passes outside of the triangle or lies in its plane.
         }
-        Some(if rounded.is_accurate { rounded.crossing() } else { self.exact_crossing(corners) })
+        Some(if rounded.is_accurate { rounded.intersection() } else { self.exact_intersection(corners) })
     }
 
     /// The weight of the corner opposite an edge p→q: det[d, p-o, q-o].
@@ -279,7 +277,7 @@ impl Line {
     }
 
     /// t, u and v from exact sums.
-    fn exact_crossing(&self, [a, b, c]: [[f64; 3]; 3]) -> Intersection {
+    fn exact_intersection(&self, [a, b, c]: [[f64; 3]; 3]) -> Intersection {
         let (second, third) = (self.edge(c, a), self.edge(a, b));
         let mut determinant = Expansion::<{ 3 * EDGE_PARTS }>::new();
         determinant.add_edge(self.origin, self.direction, b, c);
@@ -358,7 +356,7 @@ mod tests {
                 open += 1;
                 continue;
             }
-            let exact = line.exact_crossing(corners);
+            let exact = line.exact_intersection(corners);
             let [low, high] = t_range(rounded.t, determinant, [error[0] * norm, error[1]]);
             assert!(low <= exact.t && exact.t <= high, "round {round}: {} is not {low} to {high}", exact.t);
             bounded += usize::from(high - low < exact.t.abs());

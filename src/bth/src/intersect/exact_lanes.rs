@@ -6,18 +6,18 @@ use crate::intersect::exact::{
 use crate::simd::{LANES, Simd};
 
 /// A number of each of sixteen rays or triangles.
-pub(crate) type Many = [f32; LANES];
+pub(crate) type F32Lanes = [f32; LANES];
 
 /// Sixteen rays, and for each a triangle, in object space.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Pairs {
     /// By axis.
-    pub(crate) origin: [Many; 3],
+    pub(crate) origin: [F32Lanes; 3],
     /// By axis.
-    pub(crate) direction: [Many; 3],
+    pub(crate) direction: [F32Lanes; 3],
     /// `[corner][axis]`.
-    pub(crate) corner: [[Many; 3]; 3],
+    pub(crate) corner: [[F32Lanes; 3]; 3],
 }
 
 impl Pairs {
@@ -40,7 +40,7 @@ impl OriginTermsLanes {
 
     /// Computes the terms of the first `count` triangles, whose corners are `[corner][axis]`, and of those that complete a half.
     #[inline(always)]
-    pub(crate) fn compute(&mut self, origin: [f32; 3], corner: &[[Many; 3]; 3], count: usize) {
+    pub(crate) fn compute(&mut self, origin: [f32; 3], corner: &[[F32Lanes; 3]; 3], count: usize) {
         const HALF: usize = LANES / 2;
         let origin = wide(origin);
         for first in (0..count.min(LANES)).step_by(HALF) {
@@ -73,7 +73,7 @@ fn lane_terms(rows: &[[f64; LANES]; TERMS], i: usize) -> OriginTerms {
 
 /// The vector of lane `i`.
 #[inline(always)]
-fn lane(rows: &[Many; 3], i: usize) -> [f64; 3] {
+fn lane(rows: &[F32Lanes; 3], i: usize) -> [f64; 3] {
     [rows[0][i].into(), rows[1][i].into(), rows[2][i].into()]
 }
 
@@ -83,9 +83,9 @@ fn lane(rows: &[Many; 3], i: usize) -> [f64; 3] {
 pub(crate) struct Intersections {
     /// Ids of the triangles.
     pub(crate) triangle: [u32; LANES],
-    pub(crate) t: Many,
-    pub(crate) u: Many,
-    pub(crate) v: Many,
+    pub(crate) t: F32Lanes,
+    pub(crate) u: F32Lanes,
+    pub(crate) v: F32Lanes,
     /// Lanes whose t, u and v are accurate. Their hits lie in the rays' ranges, because the filter is sure only of such
     /// triangles.
     pub(crate) certain: u32,
@@ -127,8 +127,8 @@ impl Intersections {
         &mut self,
         s: S,
         lanes: u32,
-        direction: &[Many; 3],
-        norm: &Many,
+        direction: &[F32Lanes; 3],
+        norm: &F32Lanes,
         terms: &OriginTermsLanes,
         hit: S::U,
     ) {

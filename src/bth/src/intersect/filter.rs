@@ -1,7 +1,7 @@
 //! Conservative f32 filter of the triangles of a leaf: it excludes those that the ray certainly misses.
 //!
 //! It is the projection of [`crate::intersect::line`] in f32, for sixteen triangles at a time. Every triangle that
-//! `Line::crossing` could accept remains a candidate, and every triangle that is called sure is accepted by `Line::crossing`.
+//! `Line::intersection` could accept remains a candidate, and every triangle that is called sure is accepted by `Line::intersection`.
 //! The other candidates are decided in f64, so the result of a query does not depend on the instruction set.
 //!
 //! **Error of a weight.** Let u = 2^-24. For the corners of one triangle, let M >= |x| + |y| as projected, and let r be their
@@ -87,7 +87,7 @@ pub(crate) struct Certain {
 impl<S: Simd> Candidates<S> {
     /// The triangles that may be the nearest hit, as bits, and the nearest hit if it is certain. `maybe` must not be empty.
     #[inline(always)]
-    pub(crate) fn nearest_of_all(&self, s: S) -> (u32, Option<Certain>) {
+    pub(crate) fn nearest_candidates(&self, s: S) -> (u32, Option<Certain>) {
         let &Candidates { mut maybe, sure, nearest, farthest } = self;
         if maybe & (maybe - 1) != 0 && sure != 0 {
             let least = s.least(s.select(s.mask(sure), farthest, s.splat(f32::MAX)));
@@ -152,7 +152,7 @@ fn greatest_coordinate<S: Simd>(s: S, [a, b, c]: &Corners<S>) -> S::F {
 
 /// |x| + |y| of a projected point.
 #[inline(always)]
-pub(crate) fn size<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
+pub(crate) fn l1_norm<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
     s.add(s.abs(p[0]), s.abs(p[1]))
 }
 
@@ -252,12 +252,12 @@ impl TriangleFilter {
         if valid & !s.mask_bits(sides.missed) == 0 {
             return Candidates { maybe: 0, sure: 0, nearest: error, farthest: error };
         }
-        let weighed = sides.weigh(s, &corners, s.splat(first), s.splat(limit));
-        let maybe = valid & !s.mask_bits(weighed.out);
+        let tested = sides.bound_depths(s, &corners, s.splat(first), s.splat(limit));
+        let maybe = valid & !s.mask_bits(tested.excluded);
         let in_range =
-            s.and(s.le(s.splat(self.first), weighed.nearest), s.le(weighed.farthest, s.splat(self.last)));
-        let sure = maybe & s.mask_bits(s.and(weighed.certain, in_range));
-        Candidates { maybe, sure, nearest: weighed.nearest, farthest: weighed.farthest }
+            s.and(s.le(s.splat(self.first), tested.nearest), s.le(tested.farthest, s.splat(self.last)));
+        let sure = maybe & s.mask_bits(s.and(tested.certain, in_range));
+        Candidates { maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
     }
 }
 
@@ -265,7 +265,7 @@ impl TriangleFilter {
 #[derive(Clone, Copy)]
 pub(crate) struct FilteredTriangles<S: Simd> {
     /// Pairs that certainly miss, or whose hit certainly lies out of the range of depths.
-    pub(crate) out: S::M,
+    pub(crate) excluded: S::M,
     /// Pairs that certainly hit, within the range of depths or outside of it.
     pub(crate) certain: S::M,
     /// Lower bounds of the depths of the hits.
@@ -282,13 +282,13 @@ pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
     [slope, slope * slope + f32::MIN_POSITIVE]
 }
 
-/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`size`) and |depth| of the projected corners.
+/// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`l1_norm`) and |depth| of the projected corners.
 #[inline(always)]
-pub(crate) fn error<S: Simd>(s: S, size: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
-    let reach = s.add(size, greatest_depth);
+pub(crate) fn error<S: Simd>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
+    let reach = s.add(l1_norm, greatest_depth);
     const DELTA: f32 = PROJECTION_ERROR as f32;
     // A little more than 4, to cover the roundings of δ itself.
-    s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), size), floor)
+    s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), l1_norm), floor)
 }
 
 /// Sides on which sixteen lines pass the edges of their triangles.
@@ -307,14 +307,14 @@ struct Sides<S: Simd> {
 /// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of the weights, see the
 /// head of this file.
 #[inline(always)]
-pub(crate) fn weigh<S: Simd>(
+pub(crate) fn test_triangles<S: Simd>(
     s: S,
     corners: Corners<S>,
     error: S::F,
     first: S::F,
     limit: S::F,
 ) -> FilteredTriangles<S> {
-    sides(s, &corners, error).weigh(s, &corners, first, limit)
+    sides(s, &corners, error).bound_depths(s, &corners, first, limit)
 }
 
 #[inline(always)]
@@ -332,7 +332,7 @@ fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
 impl<S: Simd> Sides<S> {
     /// Bounds the depths of the hits and compares them with the range from `first` to `limit`.
     #[inline(always)]
-    fn weigh(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> FilteredTriangles<S> {
+    fn bound_depths(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> FilteredTriangles<S> {
         let Sides { weight, error, missed, certain } = self;
         let least_depth = s.min(s.min(a[2], b[2]), c[2]);
         let greatest_depth = s.max(s.max(a[2], b[2]), c[2]);
@@ -352,6 +352,6 @@ impl<S: Simd> Sides<S> {
         let nearest = s.sub(s.select(certain, s.sub(depth, shift), least_depth), slack);
         let farthest = s.add(s.select(certain, s.add(depth, shift), greatest_depth), slack);
         let out = s.or(s.lt(farthest, first), s.lt(limit, nearest));
-        FilteredTriangles { out: s.or(out, missed), certain, nearest, farthest }
+        FilteredTriangles { excluded: s.or(out, missed), certain, nearest, farthest }
     }
 }

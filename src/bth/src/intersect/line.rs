@@ -5,9 +5,11 @@
 //! [`Sign::Uncertain`]. The intersection of lines with triangles is decided exactly in [`super::exact`]; a line in the plane of a
 //! triangle misses it.
 
-use crate::intersect::exact::RATIO_ERROR;
 use crate::rays::Ray;
 
+/// Error up to which f64 values are taken: 2^-28, an eighth of the rounding of f32, relative to 1 for u and v and to itself for
+/// t. Where the error may be greater, t, u and v are computed from exact sums.
+pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 /// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the greatest |coordinate| of the point relative to
 /// the ray's origin; see [`Line::project`].
 pub(crate) const PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;

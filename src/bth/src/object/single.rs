@@ -112,13 +112,13 @@ impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
         let SingleKernel { object, ray, query, walked, count, stack } = self;
         let (object, ray) = (*object, *ray);
         let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-        let aim = match PreparedRay::of(&object.bounds, ray) {
-            Some(aim) => aim,
+        let prepared = match PreparedRay::of(&object.bounds, ray) {
+            Some(prepared) => prepared,
             None => match PreparedRay::in_f64(object.header, ray) {
-                Some(aim) => aim,
+                Some(prepared) => prepared,
                 None => return,
             },
         };
-        walk(s, nodes, (object, ray), &aim, *walked, *query, stack, *count, tets);
+        walk(s, nodes, (object, ray), &prepared, *walked, *query, stack, *count, tets);
     }
 }

@@ -23,7 +23,7 @@ pub(crate) struct AnswerLanes<'a> {
 pub(crate) struct TriangleRef<'a> {
     /// The id, or the index in `ids`.
     value: u32,
-    is_place: bool,
+    is_index: bool,
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
 }
@@ -32,16 +32,16 @@ impl<'a> TriangleRef<'a> {
     /// The triangle with this id.
     #[inline(always)]
     pub(crate) fn id(id: u32, ids: &'a [u32]) -> Self {
-        TriangleRef { value: id, is_place: false, ids }
+        TriangleRef { value: id, is_index: false, ids }
     }
-    /// The triangle whose id is `ids[place]`.
+    /// The triangle whose id is `ids[index]`.
     #[inline(always)]
-    pub(crate) fn place(place: u32, ids: &'a [u32]) -> Self {
-        TriangleRef { value: place, is_place: true, ids }
+    pub(crate) fn index(index: u32, ids: &'a [u32]) -> Self {
+        TriangleRef { value: index, is_index: true, ids }
     }
     /// The id.
     fn read(&self) -> u32 {
-        if self.is_place { self.ids[self.value as usize] } else { self.value }
+        if self.is_index { self.ids[self.value as usize] } else { self.value }
     }
 }
 
@@ -64,13 +64,13 @@ pub(crate) trait Query: Copy {
     /// A query without hits over the range of `ray`.
     fn new(ray: &Ray) -> Self;
     /// Whether walks through tetrahedra keep track of depths, for queries whose rays are often short and that can be ended by
-    /// [`Self::is_settled_by`].
+    /// [`Self::offer_bounds`].
     const KEEPS_DEPTHS: bool = false;
     /// Offers an intersection with a triangle of the object. Returns whether the query is complete.
-    fn offer(&mut self, triangle: TriangleRef<'_>, crossing: Intersection) -> bool;
+    fn offer(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) -> bool;
     /// Offers a certain intersection of which only bounds of t are known, which include all roundings. Returns whether the
     /// query is complete.
-    fn is_settled_by(&mut self, _t: (f64, f64)) -> bool {
+    fn offer_bounds(&mut self, _t: (f64, f64)) -> bool {
         false
     }
     /// Upper bound of the exact t of intersections that can still change the result.
@@ -82,7 +82,7 @@ pub(crate) trait Query: Copy {
     fn found(&self) -> Option<f64>;
     /// Lower and upper bound of the t of [`Self::found`].
     #[inline(always)]
-    fn found_between(&self) -> Option<[f64; 2]> {
+    fn found_bounds(&self) -> Option<[f64; 2]> {
         let limit = self.limit();
         // The lower bound lies as far below t as the limit lies above it.
         self.found().map(|t| [2.0 * t - limit, limit])
@@ -106,7 +106,7 @@ pub(crate) struct Nearest {
     tmax: f32,
     /// The nearest triangle so far, by its id or by its index in leaf order ([`TriangleRef`]); `NONE` if nothing is hit.
     triangle: u32,
-    is_place: bool,
+    is_index: bool,
     /// The nearest intersection so far. Its t is `tmax` if nothing is hit.
     best: Intersection,
 }
@@ -114,7 +114,7 @@ pub(crate) struct Nearest {
 impl Nearest {
     /// The nearest triangle so far.
     fn best_triangle<'a>(&self, ids: &'a [u32]) -> TriangleRef<'a> {
-        TriangleRef { value: self.triangle, is_place: self.is_place, ids }
+        TriangleRef { value: self.triangle, is_index: self.is_index, ids }
     }
 }
 
@@ -154,16 +154,16 @@ impl Query for Nearest {
     }
     fn new(ray: &Ray) -> Self {
         let best = Intersection { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
-        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_place: false, best }
+        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_index: false, best }
     }
     #[inline(always)]
-    fn offer(&mut self, triangle: TriangleRef<'_>, crossing: Intersection) -> bool {
+    fn offer(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) -> bool {
         let nearer = self.triangle == NONE
-            || crossing.t < self.best.t
-            || (crossing.t == self.best.t && triangle.read() < self.best_triangle(triangle.ids).read());
-        if nearer && in_range(crossing.t as f32, self.tmin, self.tmax) {
-            (self.triangle, self.is_place) = (triangle.value, triangle.is_place);
-            self.best = crossing;
+            || intersection.t < self.best.t
+            || (intersection.t == self.best.t && triangle.read() < self.best_triangle(triangle.ids).read());
+        if nearer && in_range(intersection.t as f32, self.tmin, self.tmax) {
+            (self.triangle, self.is_index) = (triangle.value, triangle.is_index);
+            self.best = intersection;
         }
         false
     }
@@ -236,11 +236,11 @@ impl Query for Any {
     }
     const KEEPS_DEPTHS: bool = true;
     #[inline(always)]
-    fn offer(&mut self, _triangle: TriangleRef<'_>, crossing: Intersection) -> bool {
-        self.found |= in_range(crossing.t as f32, self.tmin, self.tmax);
+    fn offer(&mut self, _triangle: TriangleRef<'_>, intersection: Intersection) -> bool {
+        self.found |= in_range(intersection.t as f32, self.tmin, self.tmax);
         self.found
     }
-    fn is_settled_by(&mut self, t: (f64, f64)) -> bool {
+    fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
         self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
         self.found
     }

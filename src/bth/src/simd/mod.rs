@@ -115,7 +115,7 @@ pub(crate) trait Simd: Copy + 'static {
     /// As [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
     /// Whether [`Self::lookup_f64`] compiles to a few instructions.
-    const LOOKS_UP_F64: bool = false;
+    const HAS_FAST_F64_LOOKUP: bool = false;
     /// Elements `at[i] % 16` of the table. With `FIRST_HALF`, elements whose index is not below eight are undefined.
     #[inline(always)]
     fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: Self::U) -> [f64; LANES] {

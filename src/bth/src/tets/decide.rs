@@ -152,7 +152,7 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         // Depths are off by 2^-24 of themselves; a hit's t is rounded once more.
         let (low, high) =
             (least * (1.0 - SPARE.copysign(least)), greatest * (1.0 + SPARE.copysign(greatest)));
-        if self.queries[slot as usize].is_settled_by((low / f64::from(per_t), high / f64::from(per_t))) {
+        if self.queries[slot as usize].offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
             return self.finish(slot, WalkOutcome::Done);
         }
         self.reached.push(Reached { slot, face: tet & !FACE_BIT });

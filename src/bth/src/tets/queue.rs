@@ -120,7 +120,7 @@ impl<S: Simd> Ready<S> {
     /// Prepares the rays `slot` of the batch, without any place yet.
     #[inline(always)]
     fn of_rays(s: S, m: S::M, rays: &[Ray], slot: S::U) -> Self {
-        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::fields(s, m, rays, slot);
+        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::gather_rays(s, m, rays, slot);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let size = three!(|k| s.abs(d[k]));
         let greatest = s.max(size[0], s.max(size[1], size[2]));
@@ -256,7 +256,7 @@ impl<S: Simd> Ready<S> {
             area = s.add(area, weight);
             volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
         }
-        // volume / area is the depth of the crossing; both are off by their bounds and roundings.
+        // volume / area is the depth of the intersection; both are off by their bounds and roundings.
         let low = ready.tmin_low;
         let mut farthest = s.abs(low);
         for p in &corner {

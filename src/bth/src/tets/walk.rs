@@ -81,8 +81,8 @@ impl<'a> TetSpace<'a> {
     /// Offers a constrained face to the query, by the test that all structures share.
     pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
-        match self.line.crossing(corners) {
-            Some(crossing) => query.offer(TriangleRef::id(face.triangle, self.ids), crossing),
+        match self.line.intersection(corners) {
+            Some(intersection) => query.offer(TriangleRef::id(face.triangle, self.ids), intersection),
             None => false,
         }
     }

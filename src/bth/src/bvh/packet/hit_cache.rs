@@ -4,7 +4,7 @@
 
 use super::leaf_mesh::Leaf;
 use crate::bvh::candidate::Candidate;
-use crate::intersect::exact_lanes::{Many, OriginTermsLanes};
+use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes};
 use crate::intersect::filter::TriangleBlock;
 use crate::simd::{LANES, Simd};
 
@@ -18,7 +18,7 @@ pub(crate) const UNCACHED: u32 = MOST as u32;
 #[repr(C, align(64))]
 pub(crate) struct HitCache {
     /// `[corner][axis]`.
-    pub(crate) corner: [[Many; 3]; 3],
+    pub(crate) corner: [[F32Lanes; 3]; 3],
     /// In leaf order.
     pub(crate) place: [u32; MOST],
     /// As they are reported.
@@ -48,7 +48,7 @@ impl HitCache {
     /// Begins anew.
     #[inline(always)]
     pub(crate) fn clear<S: Simd>(&mut self, _: S, from_point: bool) {
-        self.buffers = if S::LOOKS_UP_F64 && from_point && self.count <= MOST { MOST } else { 0 };
+        self.buffers = if S::HAS_FAST_F64_LOOKUP && from_point && self.count <= MOST { MOST } else { 0 };
         self.count = 0;
         self.is_seen = false;
     }

@@ -12,7 +12,7 @@ use super::ray_group::RayGroup;
 use super::single_rays::{FEWEST_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter;
-use crate::intersect::prepare::{Axes, Common};
+use crate::intersect::prepare::{Axes, CommonAxis};
 use crate::query::Query;
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
@@ -160,7 +160,7 @@ impl<Q: Query> PacketRays<'_, Q> {
     ) -> bool {
         let floor = s.splat(f32::MIN_POSITIVE);
         if let Some(view) = bounds.view() {
-            let along = Common(view.axis());
+            let along = CommonAxis(view.axis());
             debug_assert_eq!(group.common, Some(along), "see `Span::is_from_point`");
             let rows = along.order().map(|axis| relative.row(axis));
             let [size, depth] = spread;
@@ -168,7 +168,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
             return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
         }
-        let order = group.common.map_or([0, 1, 2], Common::order);
+        let order = group.common.map_or([0, 1, 2], CommonAxis::order);
         // Copies, which stay in registers where the group itself would be read for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
         let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
@@ -177,7 +177,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             let i = used.trailing_zeros() as usize % POINTS;
             used &= used - 1;
             let point = [s.splat(B::at(rows[0], i)), s.splat(B::at(rows[1], i)), s.splat(B::at(rows[2], i))];
-            let point = if is_common { point } else { mixed.turn(s, point) };
+            let point = if is_common { point } else { mixed.permute(s, point) };
             let point = projection.of(s, point);
             points.put(s, i, greatest.including(s, point));
         }
@@ -216,21 +216,21 @@ impl<Q: Query> PacketRays<'_, Q> {
             if active & !missed == 0 {
                 continue;
             }
-            let size = s.max(s.max(filter::size(s, a), filter::size(s, b)), filter::size(s, c));
+            let norm = s.max(s.max(filter::l1_norm(s, a), filter::l1_norm(s, b)), filter::l1_norm(s, c));
             let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
-            let error = filter::error(s, size, depth, floor);
-            let weighed = filter::weigh(s, [a, b, c], error, group.first, group.limit);
-            let maybe = active & !s.mask_bits(weighed.out);
+            let error = filter::error(s, norm, depth, floor);
+            let tested = filter::test_triangles(s, [a, b, c], error, group.first, group.limit);
+            let maybe = active & !s.mask_bits(tested.excluded);
             let in_range =
-                s.and(s.le(group.certain[0], weighed.nearest), s.le(weighed.farthest, group.certain[1]));
-            let sure = maybe & s.mask_bits(s.and(weighed.certain, in_range));
+                s.and(s.le(group.certain[0], tested.nearest), s.le(tested.farthest, group.certain[1]));
+            let sure = maybe & s.mask_bits(s.and(tested.certain, in_range));
             let candidate = Candidate { leaf: leaf.code, triangle };
             let clear = if Q::ANY {
                 self.alive &= !(u64::from(sure) << (at * LANES));
                 active &= !sure;
                 sure
             } else {
-                let clear = sure & s.mask_bits(s.lt(weighed.farthest, group.nearest));
+                let clear = sure & s.mask_bits(s.lt(tested.farthest, group.nearest));
                 let m = s.mask(clear);
                 if clear != 0 {
                     let number = &mut numbers[triangle as usize % WIDTH];
@@ -240,7 +240,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                         *number = self.hit_cache.add(leaf, triangle) as u8;
                     }
                     let number = u32::from(*number);
-                    group.accept(s, m, [weighed.nearest, weighed.farthest], number);
+                    group.accept(s, m, [tested.nearest, tested.farthest], number);
                     if number == UNCACHED {
                         group.keep(s, m, leaf, triangle);
                     }
@@ -284,7 +284,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             let pending = apart.candidate(self.hit_cache, waiting[lane], lane);
             if self.settle_one(ray, pending, (candidate.leaf, 1 << candidate.triangle)) {
                 self.alive &= !(1 << ray);
-            } else if let Some(t) = self.queries[ray].found_between() {
+            } else if let Some(t) = self.queries[ray].found_bounds() {
                 let [near, far] = t.map(|t| t * f64::from(scale[lane]));
                 nearest[lane] = (near as f32).next_down();
                 limit[lane] = limit[lane].min((far as f32).next_up());

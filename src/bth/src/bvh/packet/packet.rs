@@ -34,7 +34,7 @@ pub(crate) struct PacketBuffers {
     single_rays: SingleRays,
     pub(crate) hit_cache: HitCache,
     seen: OriginTermsLanes,
-    crossings: [Intersections; GROUPS],
+    intersections: [Intersections; GROUPS],
 }
 
 impl Default for PacketBuffers {
@@ -46,7 +46,7 @@ impl Default for PacketBuffers {
             single_rays: SingleRays::NONE,
             hit_cache: HitCache::NONE,
             seen: OriginTermsLanes::NONE,
-            crossings: [Intersections::NONE; GROUPS],
+            intersections: [Intersections::NONE; GROUPS],
         }
     }
 }
@@ -109,7 +109,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         to: &mut Sink<'_, Q>,
     ) -> PacketOutcome {
         let Packets { groups, queries, buffers } = self;
-        let PacketBuffers { stack, points, relative, single_rays, hit_cache, seen, crossings } =
+        let PacketBuffers { stack, points, relative, single_rays, hit_cache, seen, intersections } =
             &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
@@ -185,7 +185,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
             }
         }
-        finish::<S, H, Q>(s, groups, (seen, crossings), &mut rays, all, to);
+        finish::<S, H, Q>(s, groups, (seen, intersections), &mut rays, all, to);
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
@@ -247,7 +247,7 @@ fn meeting<S: Simd, H: PacketBounds<S>>(
 fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
     s: S,
     groups: &[RayGroup<S>],
-    (seen, crossings): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
+    (seen, intersections): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
     rays: &mut PacketRays<'_, Q>,
     all: u64,
     to: &mut Sink<'_, Q>,
@@ -269,16 +269,16 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         hit_cache: rays.hit_cache,
         seen,
     };
-    for (group, crossings) in groups.iter().zip(&mut *crossings) {
-        group.cross::<H>(s, &mut cached, crossings);
+    for (group, intersections) in groups.iter().zip(&mut *intersections) {
+        group.intersect::<H>(s, &mut cached, intersections);
     }
-    for (i, (group, crossings)) in groups.iter().zip(crossings.iter()).enumerate() {
+    for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {
         let queried = (rays.queried >> (i * LANES)) as u32 & 0xffff;
-        let clear = crossings.certain & !queried;
+        let clear = intersections.certain & !queried;
         if clear != 0 {
-            to.hits(s, i * LANES, clear, crossings);
+            to.hits(s, i * LANES, clear, intersections);
         }
-        let rest = crossings.open | crossings.certain & queried;
+        let rest = intersections.open | intersections.certain & queried;
         if rest != 0 {
             rays.settle_last(s, group, i, rest);
         }

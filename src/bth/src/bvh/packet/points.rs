@@ -2,7 +2,7 @@
 
 use super::bounds::FrustumView;
 use super::projection::Projection;
-use crate::intersect::exact_lanes::Many;
+use crate::intersect::exact_lanes::F32Lanes;
 use crate::simd::{LANES, Simd};
 use bth_format::layout::WIDTH;
 
@@ -12,7 +12,7 @@ pub(crate) const POINTS: usize = 3 * WIDTH;
 /// Projected points of a leaf, x, y and depth of each as sixteen rays see it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Points([[Many; 3]; POINTS]);
+pub(crate) struct Points([[F32Lanes; 3]; POINTS]);
 
 impl Points {
     pub(crate) const NONE: Points = Points([[[0.0; LANES]; 3]; POINTS]);
@@ -34,7 +34,7 @@ impl Points {
 /// Points of a leaf relative to the point at which all rays start, a row for each axis.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Relative([[Many; 3]; 3]);
+pub(crate) struct Relative([[F32Lanes; 3]; 3]);
 
 impl Relative {
     pub(crate) const NONE: Relative = Relative([[[0.0; LANES]; 3]; 3]);

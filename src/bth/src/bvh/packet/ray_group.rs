@@ -9,7 +9,7 @@ use super::leaf_mesh::Leaf;
 use super::projection::Projection;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
-use crate::intersect::prepare::{self, Axes, Common, Mixed};
+use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
 use crate::rays::Ray;
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
@@ -33,9 +33,9 @@ pub(crate) struct RayGroup<S: Simd> {
     pub(crate) limit: S::F,
     /// Greatest coordinate of the object's box, seen from the origin.
     pub(crate) reach: S::F,
-    pub(crate) mixed: Mixed<S>,
+    pub(crate) mixed: MixedAxes<S>,
     /// The axis along the rays, if it is the same for all.
-    pub(crate) common: Option<Common>,
+    pub(crate) common: Option<CommonAxis>,
     pub(crate) projection: Projection<S>,
     /// From which to which depth hits are certainly in range.
     pub(crate) certain: [S::F; 2],
@@ -69,7 +69,7 @@ impl<S: Simd> RayGroup<S> {
             first: zero,
             limit: zero,
             reach: zero,
-            mixed: Mixed { is_x: no, is_y: no },
+            mixed: MixedAxes { is_x: no, is_y: no },
             common: None,
             projection: Projection { origin: [zero; 2], shear: [zero; 2], forward: zero, start: zero },
             certain: [zero; 2],
@@ -110,14 +110,14 @@ impl<S: Simd> RayGroup<S> {
     #[inline(always)]
     pub(crate) fn prepare<H: PacketBounds<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
         let mut field = match rays.first_chunk() {
-            Some(rays) => prepare::fields_of(s, rays),
+            Some(rays) => prepare::load_rays(s, rays),
             None => {
                 let mut all = [rays[rays.len() - 1]; LANES];
                 all[..rays.len()].copy_from_slice(rays);
-                prepare::fields_of(s, &all)
+                prepare::load_rays(s, &all)
             }
         };
-        self.mixed = Mixed::of(s, [field[4], field[5], field[6]]);
+        self.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
         self.common = self.mixed.common(s);
         // Not one store more than there must be: they are what preparing waits for.
         if H::FROM_POINT {
@@ -135,14 +135,14 @@ impl<S: Simd> RayGroup<S> {
         self.waiting = s.splat_u(NONE);
         // Each taken over where it is made: merged first, they would all pass through memory once more.
         match self.common {
-            Some(common) => self.take::<H>(s, prepare::lanes(s, bounds, field, &common)),
-            None => self.take::<H>(s, prepare::lanes(s, bounds, field, &self.mixed)),
+            Some(common) => self.take::<H>(s, prepare::prepare_lanes(s, bounds, field, &common)),
+            None => self.take::<H>(s, prepare::prepare_lanes(s, bounds, field, &self.mixed)),
         }
     }
 
     /// Takes over what rays are prepared to; false if one of them can't be prepared.
     #[inline(always)]
-    fn take<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::Lanes<S>) -> bool {
+    fn take<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::PreparedLanes<S>) -> bool {
         self.reciprocal = lanes.reciprocal;
         if !H::FROM_POINT {
             self.reach = lanes.reach;
@@ -153,7 +153,7 @@ impl<S: Simd> RayGroup<S> {
         self.scale = lanes.scale;
         [self.first, self.limit] = lanes.depths;
         self.certain = lanes.certain;
-        let prepare::Lanes { origin, shear, forward, start, .. } = lanes;
+        let prepare::PreparedLanes { origin, shear, forward, start, .. } = lanes;
         (self.projection.shear, self.projection.forward) = (shear, forward);
         if !H::FROM_POINT {
             (self.projection.origin, self.projection.start) = (origin, start);
@@ -163,8 +163,8 @@ impl<S: Simd> RayGroup<S> {
 
     /// What the rays are prepared to, where they do not start at one point.
     #[inline(always)]
-    pub(crate) fn lanes(&self, s: S) -> prepare::Lanes<S> {
-        prepare::Lanes {
+    pub(crate) fn lanes(&self, s: S) -> prepare::PreparedLanes<S> {
+        prepare::PreparedLanes {
             reciprocal: self.reciprocal,
             near_addend: self.near_addend,
             far_addend: self.far_addend,
@@ -208,20 +208,20 @@ impl<S: Simd> RayGroup<S> {
 
     /// Computes where rays cross the triangles that wait to be computed; if none does, it is only said so.
     #[inline(always)]
-    pub(crate) fn cross<H: PacketBounds<S>>(
+    pub(crate) fn intersect<H: PacketBounds<S>>(
         &self,
         s: S,
         cached: &mut CachedHits<'_>,
-        crossings: &mut Intersections,
+        intersections: &mut Intersections,
     ) {
         let some = s.mask_bits(s.lt_u(self.waiting, s.splat_u(NONE)));
-        (crossings.certain, crossings.open) = (0, 0);
+        (intersections.certain, intersections.open) = (0, 0);
         if some == 0 {
             return;
         }
         let apart = s.eq_u(self.waiting, s.splat_u(UNCACHED));
         // Known where this is compiled, of most.
-        let kept = if H::FROM_POINT && S::LOOKS_UP_F64 { cached.hit_cache.kept() } else { 0 };
+        let kept = if H::FROM_POINT && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
         if kept > 0 && s.mask_bits(apart) == 0 {
             cached.compute();
             let (hit_cache, seen) = (&*cached.hit_cache, &*cached.seen);
@@ -230,12 +230,12 @@ impl<S: Simd> RayGroup<S> {
                 s.store(self.direction[k], &mut direction[k]);
             }
             s.store(self.scale, &mut size);
-            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), self.waiting), &mut crossings.triangle);
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), self.waiting), &mut intersections.triangle);
             let waiting = self.waiting;
             return if hit_cache.are_few() {
-                crossings.compute_from_point::<S, true>(s, some, &direction, &size, seen, waiting)
+                intersections.compute_from_point::<S, true>(s, some, &direction, &size, seen, waiting)
             } else {
-                crossings.compute_from_point::<S, false>(s, some, &direction, &size, seen, waiting)
+                intersections.compute_from_point::<S, false>(s, some, &direction, &size, seen, waiting)
             };
         }
         let (hit_cache, ids) = (&*cached.hit_cache, cached.ids);
@@ -253,7 +253,7 @@ impl<S: Simd> RayGroup<S> {
             }
         }
         let place = s.select_u(apart, self.place, s.lookup_u(s.load_u(&hit_cache.place), self.waiting));
-        s.store_u(s.gather_u(s.mask(some), ids, place), &mut crossings.triangle);
-        crossings.compute(s, some, &pairs);
+        s.store_u(s.gather_u(s.mask(some), ids, place), &mut intersections.triangle);
+        intersections.compute(s, some, &pairs);
     }
 }

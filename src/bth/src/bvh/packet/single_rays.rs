@@ -6,7 +6,7 @@
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, StackEntry};
 use super::ray_group::RayGroup;
-use crate::intersect::exact_lanes::Many;
+use crate::intersect::exact_lanes::F32Lanes;
 use crate::intersect::filter::{Candidates, TriangleBlock};
 use crate::intersect::prepare::{Prepared, PreparedRay};
 use crate::simd::{LANES, Simd};
@@ -22,7 +22,7 @@ pub(crate) const FEWEST_OF_PACKET: u32 = 24;
 pub(crate) struct SingleRays {
     group: [Prepared; GROUPS],
     /// Between which depths hits matter.
-    depths: [[Many; 2]; GROUPS],
+    depths: [[F32Lanes; 2]; GROUPS],
     /// Groups that are there, a bit each.
     ready: u32,
 }
@@ -54,8 +54,8 @@ impl SingleRays {
 
     /// A ray of a group, by the place of the group and its own.
     #[inline(always)]
-    fn aim(&self, at: usize, lane: usize) -> &PreparedRay {
-        self.group[at % GROUPS].aim(lane).expect("packets are made of rays that are prepared")
+    fn prepared(&self, at: usize, lane: usize) -> &PreparedRay {
+        self.group[at % GROUPS].prepared(lane).expect("packets are made of rays that are prepared")
     }
 
     /// The triangles of a leaf that a ray of a group may hit.
@@ -69,7 +69,7 @@ impl SingleRays {
     ) -> Candidates<S> {
         self.want(s, group, at, H::MIXED);
         let [first, last] = &self.depths[at % GROUPS];
-        self.aim(at, lane).sight.candidates(s, block, first[lane % LANES], last[lane % LANES])
+        self.prepared(at, lane).filter.candidates(s, block, first[lane % LANES], last[lane % LANES])
     }
 
     /// Writes the children of a node that any of these rays, a bit each, may meet, and which do; returns how many.
@@ -89,7 +89,7 @@ impl SingleRays {
             rays &= rays - 1;
             let (at, lane) = (ray / LANES, ray % LANES);
             self.want(s, &groups[at % groups.len()], at, true);
-            let slabs = &self.aim(at, lane).slabs;
+            let slabs = &self.prepared(at, lane).slabs;
             let (bits, _) = slabs.children(s, node, slabs.last);
             some |= bits;
             let half = &mut meeting[ray / 32];

@@ -7,7 +7,7 @@ use crate::query::{Any, Nearest, Query};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::{
-    Child, INDEXED_LINES, IndexedLeaf, CacheLine, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
+    CacheLine, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
 };
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;

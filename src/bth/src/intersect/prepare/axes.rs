@@ -7,33 +7,33 @@ use crate::simd::Simd;
 /// of rays with a negative z, to keep the orientation; the conservative tests do not depend on the orientation.
 pub(crate) trait Axes<S: Simd> {
     /// Permutes x, y and z of points to the coordinates along the plane's two axes and along the third axis.
-    fn turn(&self, s: S, point: [S::F; 3]) -> [S::F; 3];
+    fn permute(&self, s: S, point: [S::F; 3]) -> [S::F; 3];
     /// Indices of the axes, in the same order.
     fn axes(&self, s: S) -> [S::U; 3];
 }
 
 /// Axes of rays whose greatest |components| may lie along different axes. Where neither bit is set, the axis is z.
 #[derive(Clone, Copy)]
-pub(crate) struct Mixed<S: Simd> {
+pub(crate) struct MixedAxes<S: Simd> {
     pub(crate) is_x: S::M,
     pub(crate) is_y: S::M,
 }
 
-impl<S: Simd> Mixed<S> {
+impl<S: Simd> MixedAxes<S> {
     #[inline(always)]
     pub(crate) fn of(s: S, [x, y, z]: [S::F; 3]) -> Self {
         let size = [s.abs(x), s.abs(y), s.abs(z)];
         let is_x = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
-        Mixed { is_x, is_y: s.and_not(s.lt(size[2], size[1]), is_x) }
+        MixedAxes { is_x, is_y: s.and_not(s.lt(size[2], size[1]), is_x) }
     }
 
     /// The axes if they are the same for all rays.
     #[inline(always)]
-    pub(crate) fn common(&self, s: S) -> Option<Common> {
+    pub(crate) fn common(&self, s: S) -> Option<CommonAxis> {
         match (s.mask_bits(self.is_x), s.mask_bits(self.is_y)) {
-            (0xffff, _) => Some(Common(0)),
-            (_, 0xffff) => Some(Common(1)),
-            (0, 0) => Some(Common(2)),
+            (0xffff, _) => Some(CommonAxis(0)),
+            (_, 0xffff) => Some(CommonAxis(1)),
+            (0, 0) => Some(CommonAxis(2)),
             _ => None,
         }
     }
@@ -49,9 +49,9 @@ impl<S: Simd> Mixed<S> {
     }
 }
 
-impl<S: Simd> Axes<S> for Mixed<S> {
+impl<S: Simd> Axes<S> for MixedAxes<S> {
     #[inline(always)]
-    fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+    fn permute(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         [self.select(s, [y, z, x]), self.select(s, [z, x, y]), self.select(s, [x, y, z])]
     }
     #[inline(always)]
@@ -62,9 +62,9 @@ impl<S: Simd> Axes<S> for Mixed<S> {
 
 /// Axes of rays whose greatest |components| all lie along the axis of this index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Common(pub(crate) usize);
+pub(crate) struct CommonAxis(pub(crate) usize);
 
-impl Common {
+impl CommonAxis {
     /// The axes in the order of the projection.
     #[inline(always)]
     pub(crate) fn order(self) -> [usize; 3] {
@@ -74,9 +74,9 @@ impl Common {
     }
 }
 
-impl<S: Simd> Axes<S> for Common {
+impl<S: Simd> Axes<S> for CommonAxis {
     #[inline(always)]
-    fn turn(&self, _: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+    fn permute(&self, _: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         match self.0 {
             0 => [y, z, x],
             1 => [z, x, y],

@@ -11,13 +11,13 @@ use std::mem::offset_of;
 
 /// The eight floats of the rays at the indices `at` whose mask `m` is set, a vector for each float.
 #[inline(always)]
-pub(crate) fn fields<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8] {
+pub(crate) fn gather_rays<S: Simd>(s: S, m: S::M, rays: &[Ray], at: S::U) -> [S::F; 8] {
     floats(s, s.rows8(m, Ray::rows(rays), at))
 }
 
-/// As [`fields`], for sixteen consecutive rays.
+/// As [`gather_rays`], for sixteen consecutive rays.
 #[inline(always)]
-pub(crate) fn fields_of<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
+pub(crate) fn load_rays<S: Simd>(s: S, rays: &[Ray; LANES]) -> [S::F; 8] {
     floats(s, s.columns8(Ray::rows(rays).first_chunk().expect("sixteen rows")))
 }
 
@@ -30,8 +30,8 @@ fn floats<S: Simd>(s: S, words: [S::U; 8]) -> [S::F; 8] {
     out
 }
 
-/// The fields of [`PreparedRay`] for sixteen rays, from which [`Lanes::rows`] computes the records.
-pub(crate) struct Lanes<S: Simd> {
+/// The fields of [`PreparedRay`] for sixteen rays, from which [`PreparedLanes::rows`] computes the records.
+pub(crate) struct PreparedLanes<S: Simd> {
     pub(crate) reciprocal: [S::F; 3],
     pub(crate) near_addend: [S::F; 3],
     pub(crate) far_addend: [S::F; 3],
@@ -53,9 +53,14 @@ pub(crate) struct Lanes<S: Simd> {
     pub(crate) usable: S::M,
 }
 
-/// Prepares sixteen rays for an object of these bounds, given the floats of the rays ([`fields`]).
+/// Prepares sixteen rays for an object of these bounds, given the floats of the rays ([`gather_rays`]).
 #[inline(always)]
-pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes: &impl Axes<S>) -> Lanes<S> {
+pub(crate) fn prepare_lanes<S: Simd>(
+    s: S,
+    bounds: &ObjectBounds,
+    field: [S::F; 8],
+    axes: &impl Axes<S>,
+) -> PreparedLanes<S> {
     let [ox, oy, oz, tmin, dx, dy, dz, tmax] = field;
     let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
     let size = [s.abs(dx), s.abs(dy), s.abs(dz)];
@@ -95,7 +100,7 @@ pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes
         negative[k] = s.lt_u(s.splat_u(i32::MAX as u32), sign);
     }
 
-    let ([ox, oy, oz], [dx, dy, dz]) = (axes.turn(s, o), axes.turn(s, d));
+    let ([ox, oy, oz], [dx, dy, dz]) = (axes.permute(s, o), axes.permute(s, d));
     let inverse = s.div(s.splat(1.0), greatest);
     let forward = s.select(s.lt(dz, zero), s.splat(-1.0), s.splat(1.0));
 
@@ -106,7 +111,7 @@ pub(crate) fn lanes<S: Simd>(s: S, bounds: &ObjectBounds, field: [S::F; 8], axes
     let first = s.max(s.mul(tmin, greatest), s.splat(-f32::MAX));
     let limit = s.mul(tmax, greatest);
     let last = s.min(s.mul(s.min(tmax, s.splat(f32::MAX)), greatest), s.splat(f32::MAX));
-    Lanes {
+    PreparedLanes {
         reciprocal,
         near_addend,
         far_addend,
@@ -129,7 +134,7 @@ macro_rules! row {
     ($($field:tt)*) => { offset_of!(PreparedRay, $($field)*) / size_of::<f32>() };
 }
 
-impl<S: Simd> Lanes<S> {
+impl<S: Simd> PreparedLanes<S> {
     /// The words of sixteen [`PreparedRay`]s, a vector for each word; `at` holds the indices of the rays in the batch.
     #[inline(always)]
     pub(super) fn rows(&self, s: S, at: S::U) -> [S::F; 2 * LANES] {
@@ -140,24 +145,24 @@ impl<S: Simd> Lanes<S> {
             rows[row!(slabs.far_addend) + k] = self.far_addend[k];
             let near = s.select_u(self.negative[k], s.splat_u(boxes::FAR), s.splat_u(0));
             rows[row!(slabs.near) + k] = s.floats(near);
-            rows[row!(sight.axis) + k] = s.floats(self.axis[k]);
+            rows[row!(filter.axis) + k] = s.floats(self.axis[k]);
         }
         rows[row!(slabs.scale)] = self.scale;
         [rows[row!(slabs.first)], rows[row!(slabs.last)]] = self.depths;
         rows[row!(ray)] = s.floats(at);
         for k in 0..2 {
-            rows[row!(sight.origin) + k] = self.origin[k];
-            rows[row!(sight.shear) + k] = self.shear[k];
+            rows[row!(filter.origin) + k] = self.origin[k];
+            rows[row!(filter.shear) + k] = self.shear[k];
         }
-        rows[row!(sight.forward)] = self.forward;
-        rows[row!(sight.start)] = self.start;
-        [rows[row!(sight.first)], rows[row!(sight.last)]] = self.certain;
+        rows[row!(filter.forward)] = self.forward;
+        rows[row!(filter.start)] = self.start;
+        [rows[row!(filter.first)], rows[row!(filter.last)]] = self.certain;
         let slope = s.mul(self.reach, s.splat(filter::ERROR_SLOPE));
-        rows[row!(sight.error_slope)] = slope;
-        rows[row!(sight.error_floor)] = s.fma(slope, slope, s.splat(f32::MIN_POSITIVE));
+        rows[row!(filter.error_slope)] = slope;
+        rows[row!(filter.error_floor)] = s.fma(slope, slope, s.splat(f32::MIN_POSITIVE));
         let nothing: [u32; 3] = zerocopy::transmute!(HitProgress::NOTHING);
         for (k, word) in nothing.into_iter().enumerate() {
-            rows[row!(noted) + k] = s.floats(s.splat_u(word));
+            rows[row!(progress) + k] = s.floats(s.splat_u(word));
         }
         rows
     }

@@ -9,8 +9,8 @@ mod lanes;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use self::axes::{Axes, Common, Mixed};
-pub(crate) use self::lanes::{Lanes, fields, fields_of, lanes};
+pub(crate) use self::axes::{Axes, CommonAxis, MixedAxes};
+pub(crate) use self::lanes::{PreparedLanes, gather_rays, load_rays, prepare_lanes};
 use crate::intersect::boxes::{self, RaySlabs};
 use crate::intersect::filter::{self, TriangleFilter};
 use crate::intersect::line::Line;
@@ -52,8 +52,8 @@ pub(crate) struct PreparedRay {
     pub(crate) slabs: RaySlabs,
     /// Index of the ray in the batch.
     pub(crate) ray: u32,
-    pub(crate) sight: TriangleFilter,
-    pub(crate) noted: HitProgress,
+    pub(crate) filter: TriangleFilter,
+    pub(crate) progress: HitProgress,
 }
 
 /// The first cache line of a [`PreparedRay`].
@@ -64,7 +64,7 @@ struct FirstCacheLine {
     _ray: u32,
 }
 
-const _: () = assert!(offset_of!(PreparedRay, sight) == 64 && size_of::<PreparedRay>() == 128);
+const _: () = assert!(offset_of!(PreparedRay, filter) == 64 && size_of::<PreparedRay>() == 128);
 
 /// What the traversal of a ray has found so far.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, KnownLayout, Immutable)]
@@ -94,8 +94,8 @@ impl HitProgress {
 }
 
 impl PreparedRay {
-    pub(crate) fn new(slabs: RaySlabs, sight: TriangleFilter) -> PreparedRay {
-        PreparedRay { slabs, ray: 0, sight, noted: HitProgress::NOTHING }
+    pub(crate) fn new(slabs: RaySlabs, filter: TriangleFilter) -> PreparedRay {
+        PreparedRay { slabs, ray: 0, filter, progress: HitProgress::NOTHING }
     }
 
     /// Prepares a single ray, with the same error bounds as [`Prepared::fill`]. None if f32 cannot prepare it or if its range
@@ -122,7 +122,7 @@ impl PreparedRay {
         let (scaled_origin, pad) = (o * reciprocal, magnitude * (extent * boxes::PAD as f32));
         // Branches here would be mispredicted for rays of varying directions.
         let z = (size.cmpeq(Vec3A::splat(greatest)).bitmask().trailing_zeros() as usize).min(2);
-        let [x, y, _] = Common(z).order();
+        let [x, y, _] = CommonAxis(z).order();
         let (inverse, forward) = (1.0 / greatest, 1f32.copysign(ray.direction[z]));
         // Depths of tmin and tmax: first those that are widened to bound all hits in range, then those that are narrowed so that
         // hits between them are certainly in range.
@@ -144,7 +144,7 @@ impl PreparedRay {
             [row(dx), row(dy), row(dz), 0.0],
         ];
         let FirstCacheLine { slabs, .. } = zerocopy::transmute!(slabs);
-        let sight = TriangleFilter {
+        let filter = TriangleFilter {
             axis: [x as u32, y as u32, z as u32],
             error_floor,
             origin: [ray.origin[x], ray.origin[y]],
@@ -155,7 +155,7 @@ impl PreparedRay {
             last: certain_last,
             error_slope,
         };
-        Some(PreparedRay::new(slabs, sight))
+        Some(PreparedRay::new(slabs, filter))
     }
 
     /// Prepares any ray, in f64. None if the ray cannot hit anything, because it has no line ([`Line::new`]) or an empty range
@@ -165,8 +165,8 @@ impl PreparedRay {
     pub(crate) fn in_f64(object: &Object, ray: &Ray) -> Option<PreparedRay> {
         let line = Line::new(ray)?;
         let slabs = RaySlabs::new(ray, &line, object);
-        let sight = TriangleFilter::new(ray, &line, &slabs, object);
-        (ray.tmin <= ray.tmax).then(|| PreparedRay::new(slabs, sight))
+        let filter = TriangleFilter::new(ray, &line, &slabs, object);
+        (ray.tmin <= ray.tmax).then(|| PreparedRay::new(slabs, filter))
     }
 }
 
@@ -187,7 +187,7 @@ impl Prepared {
 
     /// The prepared ray of a lane, if f32 could prepare it.
     #[inline(always)]
-    pub(crate) fn aim(&self, lane: usize) -> Option<&PreparedRay> {
+    pub(crate) fn prepared(&self, lane: usize) -> Option<&PreparedRay> {
         let ray = PreparedRay::ref_from_bytes(self.rays[lane % LANES].as_bytes()).expect("of this size");
         (self.ready >> (lane % LANES) & 1 != 0).then_some(ray)
     }
@@ -203,8 +203,8 @@ impl Prepared {
         count: usize,
     ) {
         let used = s.mask(((1u64 << count) - 1) as u32);
-        let field = fields(s, used, rays, s.load_u(at));
-        let lanes = lanes(s, bounds, field, &Mixed::of(s, [field[4], field[5], field[6]]));
+        let field = gather_rays(s, used, rays, s.load_u(at));
+        let lanes = prepare_lanes(s, bounds, field, &MixedAxes::of(s, [field[4], field[5], field[6]]));
         self.write(s, &lanes, s.load_u(at), 0..2);
         self.ready &= s.mask_bits(used);
     }
@@ -212,7 +212,7 @@ impl Prepared {
     /// Stores rays that are prepared in lanes; `at` holds their indices in the batch. Only the cache lines in `lines`, a part of
     /// 0..2, are stored.
     #[inline(always)]
-    pub(crate) fn write<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, at: S::U, lines: Range<usize>) {
+    pub(crate) fn write<S: Simd>(&mut self, s: S, lanes: &PreparedLanes<S>, at: S::U, lines: Range<usize>) {
         let words = lanes.rows(s, at);
         for line in lines {
             let mut rows = [s.splat(0.0); LANES];

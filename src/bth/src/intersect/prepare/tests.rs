@@ -54,10 +54,10 @@ impl Kernel for BoxAndFilter<'_> {
     type Output = (u32, FilterResult);
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let BoxAndFilter(PreparedRay { slabs, sight, .. }, OneTriangle { node, leaf, .. }) = self;
+        let BoxAndFilter(PreparedRay { slabs, filter, .. }, OneTriangle { node, leaf, .. }) = self;
         let (bits, _) = slabs.children(s, node, slabs.last);
         let children = (0..WIDTH).filter(|&i| bits >> i & 1 != 0 && node.child[i] != NONE);
-        let candidates = sight.candidates(s, leaf, slabs.first, slabs.last);
+        let candidates = filter.candidates(s, leaf, slabs.first, slabs.last);
         let (mut nearest, mut farthest) = ([0.0; LANES], [0.0; LANES]);
         s.store(candidates.nearest, &mut nearest);
         s.store(candidates.farthest, &mut farthest);
@@ -91,15 +91,15 @@ fn all_preparations(ray: &Ray, line: &Line, object: &Object, lane: usize) -> Vec
     others[lane] = *ray;
     for isa in Isa::ALL {
         let prepared = isa.run(PrepareKernel(&others, object));
-        all.extend(prepared.aim(lane));
-        assert!(prepared.aim((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
+        all.extend(prepared.prepared(lane));
+        assert!(prepared.prepared((lane + 1) % LANES).is_none(), "a ray without a line is not prepared");
     }
     all
 }
 
-fn in_range(ray: &Ray, crossing: &Option<Intersection>) -> bool {
-    crossing.is_some_and(|crossing| {
-        let t = crossing.t as f32;
+fn in_range(ray: &Ray, intersection: &Option<Intersection>) -> bool {
+    intersection.is_some_and(|intersection| {
+        let t = intersection.t as f32;
         ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY
     })
 }
@@ -107,7 +107,7 @@ fn in_range(ray: &Ray, crossing: &Option<Intersection>) -> bool {
 #[test]
 fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
     let mut rng = Rng::new(3);
-    let (mut crossings, mut missed, mut sure, mut prepared) = (0, 0, 0, 0);
+    let (mut intersections, mut missed, mut sure, mut prepared) = (0, 0, 0, 0);
     for round in 0..60_000 {
         let unit = |rng: &mut Rng| (rng.below(1 << 24) as f32 / (1 << 23) as f32) - 1.0;
         let scale = [1.0, 1e-30, 1e30, 3e37, 1e-42, 1e-14, 1e-20, 1e12, 1e-36, 3.0][round % 10];
@@ -130,9 +130,9 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         let endless = Ray { origin, tmin: f32::NEG_INFINITY, direction, tmax: f32::INFINITY };
         let Some(line) = Line::new(&endless) else { continue };
         let object = OneTriangle::new(corners);
-        let crossing = line.crossing(corners);
-        let t = crossing.map_or(1.0, |c| c.t as f32);
-        // The whole line, and ranges that end or begin at the crossing or directly beside it.
+        let intersection = line.intersection(corners);
+        let t = intersection.map_or(1.0, |c| c.t as f32);
+        // The whole line, and ranges that end or begin at the intersection or directly beside it.
         let ranges = [
             (f32::NEG_INFINITY, f32::INFINITY),
             (t, t),
@@ -141,22 +141,24 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
         ];
         for (tmin, tmax) in ranges {
             let ray = Ray { tmin, tmax, ..endless };
-            if tmin > tmax || !in_range(&endless, &crossing) && tmax < f32::INFINITY {
+            if tmin > tmax || !in_range(&endless, &intersection) && tmax < f32::INFINITY {
                 continue;
             }
-            let hit = in_range(&ray, &crossing);
+            let hit = in_range(&ray, &intersection);
             let preparations = all_preparations(&ray, &line, &object.object, round % LANES);
             prepared += preparations.len() - 1;
             for preparation in &preparations {
                 for isa in Isa::ALL {
                     let (children, found) = isa.run(BoxAndFilter(preparation, &object));
                     let context = || {
-                        format!("{isa}, round {round}: {ray:?}, {corners:?}, {crossing:?}, {preparation:?}")
+                        format!(
+                            "{isa}, round {round}: {ray:?}, {corners:?}, {intersection:?}, {preparation:?}"
+                        )
                     };
                     assert!(!hit || children == 1, "the box is lost: {}", context());
                     assert!(!hit || found.maybe == 1, "the triangle is lost: {}", context());
                     assert!(hit || found.sure == 0, "sure of what is no hit: {}", context());
-                    let depth = crossing.map_or(0.0, |c| c.t * f64::from(preparation.slabs.scale));
+                    let depth = intersection.map_or(0.0, |c| c.t * f64::from(preparation.slabs.scale));
                     let [near, far] = found.depth.map(f64::from);
                     let within = near <= depth && depth <= far;
                     assert!(
@@ -170,8 +172,8 @@ fn boxes_and_triangles_that_the_line_crosses_are_kept_and_sure_hits_are_hits() {
                 }
             }
         }
-        crossings += u32::from(crossing.is_some());
+        intersections += u32::from(intersection.is_some());
     }
-    assert!(crossings > 2_000 && missed > 10_000, "{crossings} crossings, {missed} boxes missed");
+    assert!(intersections > 2_000 && missed > 10_000, "{intersections} intersections, {missed} boxes missed");
     assert!(sure > 10_000 && prepared > 100_000, "{sure} sure, {prepared} prepared in f32");
 }

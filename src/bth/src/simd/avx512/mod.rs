@@ -171,7 +171,7 @@ impl Simd for Avx512 {
             self.store_u(words, to);
         }
     }
-    const LOOKS_UP_F64: bool = true;
+    const HAS_FAST_F64_LOOKUP: bool = true;
     #[inline(always)]
     fn lookup_f64<const FIRST_HALF: bool>(self, table: &[f64; LANES], at: __m512i) -> [f64; LANES] {
         let mut out = [0.0; LANES];

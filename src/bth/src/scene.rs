@@ -193,7 +193,7 @@ impl Scene {
     ) {
         object::fill_misses(hits);
         if let Some((object, instance)) = sole {
-            if rays.len() < object::LEAST_BATCH {
+            if rays.len() < object::MIN_BATCH {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
                     *hit = object::nearest(object, ray, hint(surface(from, i), instance), instance);
                 }
@@ -247,7 +247,7 @@ impl Scene {
     ) {
         found.fill(false);
         if let Some((object, instance)) = sole {
-            if rays.len() < object::LEAST_BATCH {
+            if rays.len() < object::MIN_BATCH {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
                     *found = object::any(object, ray, hint(surface(from, i), instance));
                 }

@@ -1,4 +1,4 @@
-//! A triangle that f32 says may be hit, and what f64 and exact arithmetic say of it later.
+//! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
 use crate::intersect::exact::{Estimate, Intersection, estimate, wide};
 use crate::intersect::filter::TriangleBlock;
@@ -11,17 +11,17 @@ use bth_format::object::ObjectView;
 /// A triangle that a ray may hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
-    /// Code of its leaf, or `NONE`.
+    /// Child code of the triangle's leaf; `NONE` for no candidate.
     pub(crate) leaf: u32,
-    /// StackPosition in the leaf.
+    /// Index of the triangle in its leaf.
     pub(crate) triangle: u32,
 }
 
 impl Candidate {
-    /// None at all.
+    /// No candidate.
     pub(crate) const NONE: Candidate = Candidate { leaf: NONE, triangle: 0 };
 
-    /// Its place, and what a reader makes of it.
+    /// The triangle's index in the object's leaf order, and what `reader` reads of it. None without a candidate.
     #[inline(always)]
     pub(crate) fn read<C>(
         &self,
@@ -44,13 +44,13 @@ impl Candidate {
     }
 }
 
-/// What reads a triangle of a leaf.
+/// Reader of a triangle from a leaf of either record format.
 pub(crate) trait Reader {
     type Output;
     fn read<B: TriangleBlock>(self, block: &B, triangle: usize) -> Self::Output;
 }
 
-/// Its corners.
+/// Reads the corners of the triangle.
 struct ReadCorners;
 
 impl Reader for ReadCorners {
@@ -61,8 +61,9 @@ impl Reader for ReadCorners {
     }
 }
 
-/// Offers candidates of a ray to its query: the pending hit, then these triangles of a leaf, a bit each. True if the query has
-/// what it wants. What f32 leaves open is decided here for all kinds of traversal, by f64 and where need be exactly.
+/// Offers candidates of a ray to its query: the pending hit, then the triangles of the leaf with child code `leaf` whose bit is set
+/// in `triangles`. Returns whether the query is complete. All traversals decide here, in f64 and where that is uncertain exactly,
+/// what the f32 filter leaves open.
 #[inline(never)]
 pub(crate) fn settle<Q: Query>(
     object: &ObjectView<'_>,
@@ -84,7 +85,7 @@ pub(crate) fn settle<Q: Query>(
     }
 }
 
-/// Offers a candidate of a ray to its query; true if it has what it wants then.
+/// Offers a candidate of a ray to its query; returns whether the query is complete.
 #[inline(always)]
 pub(crate) fn settle_one<Q: Query>(
     object: &ObjectView<'_>,
@@ -92,27 +93,31 @@ pub(crate) fn settle_one<Q: Query>(
     candidate: Candidate,
     query: &mut Q,
 ) -> bool {
-    let Some((place, corners)) = candidate.read(object, ReadCorners) else { return false };
+    let Some((index, corners)) = candidate.read(object, ReadCorners) else { return false };
     let intersection = match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
         Estimate::Missed => None,
         Estimate::Intersects(intersection) => Some(intersection),
         Estimate::Open(_, t) if !query.may_matter(t) => None,
-        Estimate::Open(..) => open_candidate(object, ray, candidate),
+        Estimate::Open(..) => intersect_candidate_exactly(object, ray, candidate),
     };
     intersection
-        .is_some_and(|intersection| query.offer(TriangleRef::index(place, object.triangle_ids), intersection))
+        .is_some_and(|intersection| query.offer(TriangleRef::index(index, object.triangle_ids), intersection))
 }
 
-/// What f64 leaves open of a candidate. It is read again, so that what is common needs no corners in memory.
+/// Decides exactly a candidate that f64 leaves open. Its corners are read again, so that the common path keeps them in registers.
 #[cold]
 #[inline(never)]
-fn open_candidate(object: &ObjectView<'_>, ray: &Ray, candidate: Candidate) -> Option<Intersection> {
-    open(ray, candidate.read(object, ReadCorners)?.1)
+fn intersect_candidate_exactly(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    candidate: Candidate,
+) -> Option<Intersection> {
+    intersect_exactly(ray, candidate.read(object, ReadCorners)?.1)
 }
 
-/// What f64 leaves open.
+/// Decides exactly whether and where the ray's line meets a triangle.
 #[cold]
 #[inline(never)]
-pub(crate) fn open(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
+pub(crate) fn intersect_exactly(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     Line::new(ray)?.intersection(corners)
 }

@@ -1,4 +1,4 @@
-//! Rays at the end of their way whose nearest hit is certain, and where it is still to be computed: sixteen at a time.
+//! Deferred evaluation of hits: t, u and v of finished rays whose nearest triangle is certain, for sixteen rays at a time.
 
 use super::leaf::Progress;
 use super::ray_state::RayState;
@@ -13,19 +13,19 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
 
-/// Rays that have ended, up to sixteen.
+/// Up to sixteen finished rays whose pending hit is not yet computed.
 pub(crate) struct DeferredHits {
     count: usize,
-    /// Places in the batch.
+    /// Indices of the rays in the batch.
     ray: [u32; LANES],
     candidate: [Candidate; LANES],
-    /// In leaf order.
-    place: [u32; LANES],
+    /// Indices of the hit triangles in the object's leaf order.
+    index: [u32; LANES],
     pairs: Pairs,
     intersections: Intersections,
 }
 
-/// Notes the corners of a triangle.
+/// Stores the corners of a triangle in a lane of the pairs.
 struct StoreCorners<'a> {
     pairs: &'a mut Pairs,
     lane: usize,
@@ -49,13 +49,13 @@ impl DeferredHits {
             count: 0,
             ray: [0; LANES],
             candidate: [Candidate::NONE; LANES],
-            place: [0; LANES],
+            index: [0; LANES],
             pairs: Pairs::NONE,
             intersections: Intersections::NONE,
         }
     }
 
-    /// Takes in a ray at the end of its way, at this place of the batch.
+    /// Adds a finished ray, or stores its answer at once if it has no pending hit.
     #[inline(always)]
     pub(crate) fn add<S: Simd, Q: Query>(
         &mut self,
@@ -63,39 +63,39 @@ impl DeferredHits {
         object: &ObjectView<'_>,
         rays: &[Ray],
         state: &RayState<Q>,
-        to: &mut Sink<'_, Q>,
+        sink: &mut Sink<'_, Q>,
     ) {
-        let (at, candidate) = (state.ray(), state.pending());
+        let (ray, candidate) = (state.ray(), state.pending());
         if Q::ANY || candidate.leaf == NONE {
-            return state.report(to);
+            return state.report(sink);
         }
         let lane = self.count % LANES;
         let reader = StoreCorners { pairs: &mut self.pairs, lane };
-        let Some((place, ())) = candidate.read(object, reader) else { return };
-        self.place[lane] = place;
-        self.ray[lane] = at as u32;
+        let Some((index, ())) = candidate.read(object, reader) else { return };
+        self.index[lane] = index;
+        self.ray[lane] = ray as u32;
         self.candidate[lane] = candidate;
         self.count = lane + 1;
         if self.count == LANES {
-            self.flush(s, object, rays, to);
+            self.flush(s, object, rays, sink);
         }
     }
 
-    /// Computes the hits of all that have landed, and hands them on.
+    /// Computes the pending hits of all rays that were added, and stores their answers.
     #[inline(always)]
     pub(crate) fn flush<S: Simd, Q: Query>(
         &mut self,
         s: S,
         object: &ObjectView<'_>,
         rays: &[Ray],
-        to: &mut Sink<'_, Q>,
+        sink: &mut Sink<'_, Q>,
     ) {
         if self.count == 0 {
             return;
         }
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
-        // Read here, as a block: word by word, as they add, would take twice as long.
+        // Gathering all rays here was measured to take half the time of storing each when it is added.
         let [ox, oy, oz, _, dx, dy, dz, _] = gather_rays(s, s.mask(all), rays, s.load_u(&self.ray));
         let (origin, direction) = ([ox, oy, oz], [dx, dy, dz]);
         for k in 0..3 {
@@ -107,7 +107,7 @@ impl DeferredHits {
         for lane in 0..LANES {
             if intersections.certain >> lane & 1 != 0 {
                 let (t, u, v) = (intersections.t[lane], intersections.u[lane], intersections.v[lane]);
-                to.hit(self.ray[lane] as usize, object.triangle_ids[self.place[lane] as usize], t, u, v);
+                sink.hit(self.ray[lane] as usize, object.triangle_ids[self.index[lane] as usize], t, u, v);
             }
         }
         let mut rest = all & !intersections.certain;
@@ -117,7 +117,7 @@ impl DeferredHits {
             let ray = &rays[self.ray[lane] as usize];
             let mut query = Q::new(ray);
             settle(object, ray, self.candidate[lane], (NONE, 0), &mut query);
-            to.query(self.ray[lane] as usize, &query);
+            sink.query(self.ray[lane] as usize, &query);
         }
     }
 }

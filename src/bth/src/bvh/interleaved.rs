@@ -1,4 +1,5 @@
-//! Rays of a batch through the BVH of an object: taken in sixteen at a time, and handed on as they end.
+//! Traversal of an object's BVH by the rays of a batch, interleaved: rays are prepared sixteen at a time, enter the pool as slots
+//! become free, and their answers are stored as they finish.
 
 use super::deferred::DeferredHits;
 use super::leaf::{LeafOutcome, Progress, decide};
@@ -15,53 +16,53 @@ use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
-/// The rays still to be traced.
+/// The rays of a batch that are to be traced, with what is known of them.
 pub(crate) struct RemainingRays<'a, Q> {
-    /// Places in the batch of those to trace, or all.
+    /// Indices in the batch of the rays to trace, in this order; all rays if absent.
     pub(crate) order: Option<&'a [u32]>,
-    /// Queries of all rays of the batch, if they have been asked elsewhere already.
+    /// Queries of all rays of the batch, if another structure has been traversed before.
     pub(crate) queries: Option<&'a [Q]>,
-    /// Per ray of the batch the tet leaf that it has walked already, or `NONE`.
+    /// For each ray of the batch the row of the tet leaf whose hits its query already holds, or `NONE`.
     pub(crate) walked: Option<&'a [u32]>,
 }
 
-/// A batch on its way.
+/// Parameters of the traversal of a batch.
 pub(crate) struct Interleaved<'a, 's, Q: Query> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
     pub(crate) remaining: RemainingRays<'a, Q>,
     pub(crate) stacks: &'a mut Stacks,
-    /// Where answers go.
-    pub(crate) to: &'a mut Sink<'s, Q>,
+    pub(crate) sink: &'a mut Sink<'s, Q>,
 }
 
-/// The next rays, sixteen at a time: prepared, and tested against the boxes of the root's children.
+/// Supplies rays to the pool. Sixteen at a time are prepared and tested against the boxes of the root's children.
 #[repr(C, align(64))]
 struct RaySource<'a, Q> {
     prepared: Prepared,
-    /// Per lane the depths at which the ray enters the children of the root,
+    /// For each lane the depths at which its ray enters the children of the root.
     enter: [[f32; LANES]; LANES],
-    /// and which of them it may meet, a bit each.
-    hit_cache: [u32; LANES],
-    /// Places in the batch of those prepared.
+    /// For each lane a bit for each child of the root that its ray may meet.
+    children: [u32; LANES],
+    /// For each lane the index of its ray in the batch.
     ray: [u32; LANES],
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a, Q>,
-    /// Where rays start.
+    /// Child code at which rays start.
     root: u32,
     bounds: ObjectBounds,
-    /// Lanes of rays that meet any, and how many of these are gone.
+    /// Lanes whose rays may meet a child of the root; the first `filled` are valid.
     lane: [u8; LANES],
     filled: usize,
+    /// How many of those lanes have been started.
     used: usize,
-    /// Rays taken before.
-    before: usize,
+    /// How many rays of the batch have been prepared.
+    taken: usize,
 }
 
 impl<Q: Query> Interleaved<'_, '_, Q> {
-    /// Traces all rays, and hands on their results. Tet leaves without a subtree are handed to `tets`, which returns whether
-    /// the query has what it wants.
+    /// Traces all rays and stores their answers. `tets` intersects a tet leaf without a subtree, given its row, and returns whether the
+    /// query is complete.
     #[inline(always)]
     pub(crate) fn run<S: Simd, N: Nodes>(
         self,
@@ -69,9 +70,9 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
         nodes: N,
         mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool,
     ) {
-        let Interleaved { object, rays, remaining, stacks, to } = self;
+        let Interleaved { object, rays, remaining, stacks, sink } = self;
         let walked = remaining.walked;
-        let mut supply = RaySource {
+        let mut source = RaySource {
             object,
             rays,
             remaining,
@@ -79,39 +80,39 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             bounds: object.bounds,
             prepared: Prepared::new(),
             ray: [0; LANES],
-            hit_cache: [0; LANES],
+            children: [0; LANES],
             enter: [[0.0; LANES]; LANES],
             lane: [0; LANES],
             filled: 0,
             used: 0,
-            before: 0,
+            taken: 0,
         };
         let mut deferred = DeferredHits::new();
         let mut pool = RayPool::new(object, stacks);
         while !pool.is_empty() {
             pool.inner_steps(s, nodes, object);
-            for i in 0..pool.take_ended() {
-                if let Some(at) = pool.ended(i) {
-                    deferred.add(s, object, rays, pool.state(at), to);
-                    supply.start(s, nodes, at, &mut pool);
+            for i in 0..pool.take_bottom() {
+                if let Some(slot) = pool.finished(i) {
+                    deferred.add(s, object, rays, pool.state(slot), sink);
+                    source.start(s, nodes, slot, &mut pool);
                 }
             }
             pool.leaf_steps(s, nodes, (object, rays), |row, state, top, stacks| {
-                let place = state.ray();
-                if walked.is_some_and(|walked| walked[place] == row) {
+                let ray = state.ray();
+                if walked.is_some_and(|walked| walked[ray] == row) {
                     return LeafOutcome::Nothing;
                 }
-                enter_tets(object, row, &rays[place], (state, top), stacks, &mut tets)
+                enter_tets(object, row, &rays[ray], (state, top), stacks, &mut tets)
             });
         }
-        deferred.flush(s, object, rays, to);
+        deferred.flush(s, object, rays, sink);
     }
 }
 
 impl<Q: Query> RaySource<'_, Q> {
-    /// Puts the next ray that can hit anything into a slot, if there is one.
+    /// Starts the next ray that can hit anything in a slot, if there is one.
     #[inline(always)]
-    fn start<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, at: usize, pool: &mut RayPool<'_, Q>) {
+    fn start<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, slot: usize, pool: &mut RayPool<'_, Q>) {
         loop {
             while self.used == self.filled {
                 if !self.refill(s, nodes) {
@@ -120,42 +121,42 @@ impl<Q: Query> RaySource<'_, Q> {
             }
             let lane = usize::from(self.lane[self.used]) % LANES;
             self.used += 1;
-            let place = self.ray[lane];
-            let query = self.remaining.queries.map(|queries| queries[place as usize]);
+            let index = self.ray[lane];
+            let query = self.remaining.queries.map(|queries| queries[index as usize]);
             let prepared = self.prepared.prepared(lane);
-            let state = pool.state(at);
+            let state = pool.state(slot);
             if let Some(prepared) = prepared {
                 state.start(prepared, query);
             } else {
-                let ray = (place, &self.rays[place as usize]);
+                let ray = (index, &self.rays[index as usize]);
                 if !state.start_unprepared(self.object, ray, query) {
                     continue;
                 }
             }
             if query.is_some() {
-                state.take_over(&self.rays[place as usize]);
+                state.update_from_query(&self.rays[index as usize]);
             }
             if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
                 let root = N::node(self.object.node_base(), self.root);
-                pool.start_among(s, at, root, (self.hit_cache[lane], s.load(&self.enter[lane])));
+                pool.start_among(s, slot, root, (self.children[lane], s.load(&self.enter[lane])));
             } else {
-                pool.start(at, self.root);
+                pool.start(slot, self.root);
             }
             return;
         }
     }
 
-    /// Prepares the next sixteen rays; false if there are none.
+    /// Prepares the next rays, up to sixteen; false if there are none.
     #[inline(always)]
     fn refill<S: Simd, N: Nodes>(&mut self, s: S, _nodes: N) -> bool {
         let order = self.remaining.order;
         let total = order.map_or(self.rays.len(), <[u32]>::len);
-        let count = (total - self.before).min(LANES);
+        let count = (total - self.taken).min(LANES);
         for i in 0..count {
-            let place = self.before + i;
-            self.ray[i] = order.map_or(place as u32, |order| order[place]);
+            let next = self.taken + i;
+            self.ray[i] = order.map_or(next as u32, |order| order[next]);
         }
-        self.before += count;
+        self.taken += count;
         (self.used, self.filled) = (0, 0);
         if count == 0 {
             return false;
@@ -163,22 +164,22 @@ impl<Q: Query> RaySource<'_, Q> {
         self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
         let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.node_base(), self.root));
         for lane in 0..count {
-            let mut meets = true;
+            let mut may_hit = true;
             if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {
                 let (bits, enter) = prepared.slabs.children(s, root, prepared.slabs.last);
                 s.store(enter, &mut self.enter[lane % LANES]);
-                self.hit_cache[lane % LANES] = bits;
-                meets = bits != 0;
+                self.children[lane % LANES] = bits;
+                may_hit = bits != 0;
             }
-            // Without a branch: many rays of a batch may miss all that there is.
+            // There is no branch, because in many batches part of the rays miss the whole object.
             self.lane[self.filled % LANES] = lane as u8;
-            self.filled += usize::from(meets);
+            self.filled += usize::from(may_hit);
         }
         true
     }
 }
 
-/// Where rays start that need not enter tetrahedra.
+/// The child code at which rays start: the root, or its subtree if the root is a tet leaf that has one.
 fn root(object: &ObjectView<'_>) -> u32 {
     match Child::from_code(object.header.root) {
         Some(Child::Tets(row)) if object.tet_leaves[row as usize].subtree != NONE => {
@@ -188,6 +189,7 @@ fn root(object: &ObjectView<'_>) -> u32 {
     }
 }
 
+/// Enters a tet leaf: its stack entry is replaced by its subtree if it has one, otherwise `tets` intersects it.
 #[cold]
 #[inline(never)]
 fn enter_tets<Q: Query>(
@@ -204,5 +206,5 @@ fn enter_tets<Q: Query>(
         return LeafOutcome::Replaced;
     }
     decide(object, ray, state, NONE, 0);
-    if tets(row, ray, state.query(ray)) { LeafOutcome::Done } else { state.take_over(ray) }
+    if tets(row, ray, state.query(ray)) { LeafOutcome::Done } else { state.update_from_query(ray) }
 }

@@ -1,9 +1,10 @@
-//! What the triangles of a leaf mean to one ray, for rays alone and for interleaved ones.
+//! Intersection of one ray with the triangles of a leaf, for single and for interleaved rays.
 //!
-//! f32 lanes leave out the triangles that are certainly missed ([`TriangleFilter::candidates`](crate::intersect::filter::TriangleFilter)). Of the others
-//! one that is certainly hit, and certainly nearer than all before, only becomes the pending hit: it is computed when the ray
-//! has ended, since most rays meet several hits, each nearer than the last. What f32 leaves open is decided at once, in f64 or
-//! exactly ([`settle`]). Packets take the same decisions with a ray in each lane (`packets::leaf`).
+//! The conservative f32 filter ([`TriangleFilter`](crate::intersect::filter::TriangleFilter)) excludes the triangles that are
+//! certainly missed. A triangle that is certainly hit, and certainly nearer than all hits before, becomes the pending hit: its
+//! t, u and v are computed when the traversal has ended, since most rays find several hits, each nearer than the one before.
+//! The other triangles are decided at once, in f64 or exactly ([`settle`]). Packets take the same decisions with one ray in each
+//! lane (`bvh/packet/leaf.rs`), and share [`settle`].
 
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
@@ -13,40 +14,40 @@ use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
 
-/// What a leaf made of a ray.
+/// Result of a leaf for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LeafOutcome {
     /// Nothing nearer than before was found.
     Nothing,
-    /// Another node or leaf stands in the place of the leaf, and is to be entered at once.
+    /// The stack entry of the leaf was replaced by another node or leaf, which is entered next.
     Replaced,
-    /// A nearer hit than before was found: entries of the stack that lie farther off need not be entered.
+    /// A nearer hit than before was found: stack entries beyond it can be dropped.
     Nearer,
-    /// The query has what it wants.
+    /// The query is complete.
     Done,
 }
 
-/// What a traversal keeps of a ray while it goes through leaves.
+/// State of a ray that leaves read and update.
 pub(crate) trait Progress<Q: Query> {
     fn prepared(&self) -> &PreparedRay;
-    /// The depth beyond which nothing matters any more.
+    /// Upper limit of the depths of hits that can still change the result.
     fn last(&self) -> f32;
     fn set_last(&mut self, last: f32);
     /// Lower bound of the depth of the nearest hit so far.
     fn nearest(&self) -> f32;
     fn set_nearest(&mut self, nearest: f32);
-    /// The nearest hit so far, if it is certain and still to be computed, else [`Candidate::NONE`].
+    /// The nearest hit so far if its t, u and v are not yet computed, else [`Candidate::NONE`].
     fn pending(&self) -> Candidate;
     fn set_pending(&mut self, pending: Candidate);
-    /// The query; `ray` is what it is made of if that has not happened yet.
+    /// The query, which is constructed from `ray` at the first call.
     fn query(&mut self, ray: &Ray) -> &mut Q;
-    /// Notes that something is certainly hit, which is all that an any-hit query wants.
+    /// Records that some triangle is certainly hit, which completes an any-hit query.
     fn accept(&mut self);
 
-    /// Takes over what the query has found, and tells whether that is nearer than before.
+    /// Updates the limits of depth from the hits that the query holds: [`LeafOutcome::Nearer`] if they shrank.
     #[inline(always)]
-    fn take_over(&mut self, ray: &Ray) -> LeafOutcome {
-        // Any hit ends the query, and until then nothing changes.
+    fn update_from_query(&mut self, ray: &Ray) -> LeafOutcome {
+        // The limits of an any-hit query do not change before its first hit, which ends it.
         if Q::ANY {
             return LeafOutcome::Nothing;
         }
@@ -57,7 +58,7 @@ pub(crate) trait Progress<Q: Query> {
     }
 }
 
-/// Tests the triangles of a leaf, which has this code. The ray itself is looked up only where f32 does not decide.
+/// Intersects a ray with the triangles of a leaf, given as its record and its child code. `ray` is called only where f32 does not decide.
 #[inline(always)]
 pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     s: S,
@@ -82,8 +83,8 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     if let Some(Certain { triangle, near, far }) = certain
         && far < progress.nearest()
     {
-        let place = (block.first() as usize).wrapping_add(triangle);
-        s.prefetch(object.triangle_ids.as_ptr().wrapping_add(place));
+        let index = (block.first() as usize).wrapping_add(triangle);
+        s.prefetch(object.triangle_ids.as_ptr().wrapping_add(index));
         progress.set_nearest(near);
         progress.set_pending(Candidate { leaf: code, triangle: triangle as u32 });
         let nearer = far < progress.last();
@@ -93,7 +94,7 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     decide(object, ray(), progress, code, maybe)
 }
 
-/// Decides these triangles of a leaf, a bit each, and with them the pending hit.
+/// Decides the triangles of a leaf whose bit is set in `maybe`, and before them the pending hit.
 #[inline(always)]
 pub(crate) fn decide<Q: Query>(
     object: &ObjectView<'_>,
@@ -107,5 +108,5 @@ pub(crate) fn decide<Q: Query>(
     if settle(object, ray, pending, (code, maybe), progress.query(ray)) {
         return LeafOutcome::Done;
     }
-    progress.take_over(ray)
+    progress.update_from_query(ray)
 }

@@ -1,9 +1,11 @@
 //! Rays through the wide BVH.
 //!
-//! Three traversals share nodes ([`nodes`]) and what decides about triangles ([`leaf`], [`candidate`]): one ray alone
-//! ([`single`], with a stack of its own, [`single_stack`]); many interleaved rays ([`interleaved`]: a pool of ray states,
-//! [`ray_pool`] and [`ray_state`], their stacks, [`stack`], and hits that are computed sixteen at a time, [`deferred`]); and
-//! packets of rays that go together ([`packet`]).
+//! Three traversals share the node formats ([`nodes`]) and the decisions about triangles ([`leaf`], [`candidate`]):
+//!
+//! - [`single`]: one ray, with a stack of its own ([`single_stack`]);
+//! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their stacks ([`stack`]) and with hits
+//!   that are computed for sixteen rays at a time ([`deferred`]);
+//! - [`packet`]: coherent rays that enter nodes together.
 
 pub(crate) mod candidate;
 pub(crate) mod deferred;

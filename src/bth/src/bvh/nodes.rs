@@ -1,4 +1,5 @@
-//! Which nodes an object has: kernels are made for each kind, as even a branch that always goes the same way costs some per cent.
+//! The two node formats of objects. Kernels are compiled for each, because even a well predicted branch in every step costs some
+//! per cent.
 
 use crate::intersect::boxes::ChildBoxes;
 use crate::simd::Simd;
@@ -8,13 +9,13 @@ use bth_format::layout::{
 use bth_format::object::Unpacked;
 use bth_format::object::{NodeBase, ObjectView};
 
-/// A kind of nodes.
+/// A node format.
 pub(crate) trait Nodes: Copy {
-    /// A node.
+    /// Record of a node.
     type Node: ChildBoxes;
-    /// Cache lines of one.
+    /// Cache lines of a node.
     const LINES: usize;
-    /// The node that the code of a child leads to.
+    /// The node with this child code.
     fn node(node_base: NodeBase<'_>, code: u32) -> &Self::Node;
 }
 
@@ -44,7 +45,8 @@ impl Nodes for Packed {
     }
 }
 
-/// The indexed leaf that a code leads to, if it is one: as it is stored or, where coordinates lie on a grid, unpacked.
+/// The leaf with this child code if it is an indexed leaf: in place or, for objects with coordinates on a grid, unpacked into
+/// `unpacked`.
 #[inline(always)]
 pub(crate) fn indexed_leaf<'r>(
     object: &'r ObjectView<'_>,
@@ -59,7 +61,7 @@ pub(crate) fn indexed_leaf<'r>(
     }
 }
 
-/// Asks for the lines of a node or of an indexed leaf.
+/// Prefetches the cache lines of a node or of an indexed leaf.
 #[inline(always)]
 pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, node_base: NodeBase<'_>, code: u32) {
     let first = node_base.block_address(code);

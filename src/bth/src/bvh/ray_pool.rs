@@ -1,5 +1,5 @@
-//! Rays on their way through a wide BVH, a step of each in turn, so that cache misses and mispredictions of one overlap
-//! with the work of the others. Where they come from and where they go is not known here.
+//! A pool of rays in the wide BVH that make one step each in turn, so that cache misses and branch mispredictions of one ray overlap
+//! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Nodes, indexed_leaf, prefetch};
@@ -12,34 +12,36 @@ use crate::simd::Simd;
 use bth_format::layout::Child;
 use bth_format::object::ObjectView;
 
-/// Rays on their way at once.
+/// Number of rays in the pool.
 const POOL_SIZE: usize = 32;
-/// While at least this many rays stand before inner nodes, those before leaves wait.
-const ENOUGH: u8 = (POOL_SIZE / 4) as u8;
+/// Steps through inner nodes continue while at least this many rays have one as their next step.
+const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
-/// Slots of rays that wait for the same kind of step: as long as any `u8` reaches, and never fuller than there are rays in
-/// way, and one.
+/// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
+/// POOL_SIZE + 1 entries are used.
 type List = [u8; 256];
 
-/// The rays on their way, by what they do next.
+/// The slots of the pool by the kind of their ray's next step.
 struct StepLists {
+    /// The next step enters an inner node.
     inner: List,
+    /// The next step enters a leaf.
     leaf: List,
-    /// At the bottom of the stack, or before an empty slot of a node.
+    /// The top of the stack is [`BOTTOM`], or the code of an empty child of a node.
     bottom: List,
 }
 
-/// How many rays are in each of the [`StepLists`], a byte each. Loops count in a copy, which stays in a register.
+/// Lengths of the three [`StepLists`], a byte each. Loops work on a copy, which stays in a register.
 #[derive(Clone, Copy, Debug)]
 struct StepCounts(u32);
 
 impl StepCounts {
-    /// Where the counts lie: the lowest bit.
+    /// The lowest bit of each list's count.
     const INNER: u32 = 0;
     const LEAF: u32 = 8;
     const BOTTOM: u32 = 16;
-    /// What a code with these upper three bits adds: nodes are below 4, leaves below 7.
-    const ADDED: [u32; 8] = {
+    /// The increment for a code with the given upper three bits: codes of nodes are below 4, codes of leaves below 7.
+    const INCREMENT: [u32; 8] = {
         let (inner, leaf, bottom) = (1 << Self::INNER, 1 << Self::LEAF, 1 << Self::BOTTOM);
         [inner, inner, inner, inner, leaf, leaf, leaf, bottom]
     };
@@ -56,8 +58,8 @@ impl StepCounts {
     fn bottom(self) -> u8 {
         (self.0 >> Self::BOTTOM) as u8
     }
-    /// Empties the list whose count lies at these bits, and returns how many were in it. They can still be read if at most as
-    /// many are added as were read.
+    /// Empties the list whose count begins at bit `at`, and returns its length. Its entries remain readable as long as not more
+    /// entries are added than have been read.
     #[inline(always)]
     fn take(&mut self, at: u32) -> usize {
         let count = self.0 >> at & 0xff;
@@ -69,35 +71,37 @@ impl StepCounts {
 const _: () = assert!(Child::LEAF_BIT == 4 << 29 && BOTTOM == 7 << 29);
 
 impl StepLists {
-    /// Adds a slot to the list that the code on top of its stack belongs in, without a branch.
+    /// Adds a slot to the list of its next step, given the code on top of its stack. There is no branch: the slot is written to all
+    /// lists, and one count grows.
     #[inline(always)]
-    fn sort(&mut self, counts: &mut StepCounts, slot: usize, code: u32) {
+    fn push(&mut self, counts: &mut StepCounts, slot: usize, code: u32) {
         self.inner[usize::from(counts.inner())] = slot as u8;
         self.leaf[usize::from(counts.leaf())] = slot as u8;
         self.bottom[usize::from(counts.bottom())] = slot as u8;
-        counts.0 += StepCounts::ADDED[(code >> 29) as usize];
+        counts.0 += StepCounts::INCREMENT[(code >> 29) as usize];
     }
 }
 
-/// A ray in the pool, on cache lines of its own.
+/// State of a ray, aligned to cache lines.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Slot<Q>(RayState<Q>);
 
-/// What a step of a ray begins with, apart from the rest of the slots: few cache lines, always at hand.
+/// Position and code of the top of each slot's stack. They are separate from the slots, because every step begins with them and they
+/// fill few cache lines.
 struct StackTops {
-    place: [StackPosition; POOL_SIZE],
+    position: [StackPosition; POOL_SIZE],
     code: [u32; POOL_SIZE],
 }
 
-/// Rays on their way, a slot each.
+/// The pool: a slot for each ray.
 pub(super) struct RayPool<'a, Q> {
     slots: [Slot<Q>; POOL_SIZE],
     tops: StackTops,
     lists: StepLists,
     counts: StepCounts,
     stacks: &'a mut Stacks,
-    /// Of each slot's stack.
+    /// Position of the bottom of each slot's stack.
     bottoms: [StackPosition; POOL_SIZE],
 }
 
@@ -111,14 +115,14 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
             *bottom = stacks.bottom(stack);
         }
-        // All slots are at the bottom of their stacks, as those of rays that have ended: so the first rays come in as all others do.
+        // All slots are at the bottom of their stacks, like those of finished rays, so the first rays start as all others do.
         let mut bottom = [0; 256];
-        for at in 0..POOL_SIZE {
-            bottom[at] = at as u8;
+        for slot in 0..POOL_SIZE {
+            bottom[slot] = slot as u8;
         }
         RayPool {
             slots: [Slot(RayState::vacant(vacant)); POOL_SIZE],
-            tops: StackTops { place: bottoms, code: [BOTTOM; POOL_SIZE] },
+            tops: StackTops { position: bottoms, code: [BOTTOM; POOL_SIZE] },
             lists: StepLists { inner: [0; 256], leaf: [0; 256], bottom },
             counts: StepCounts((POOL_SIZE as u32) << StepCounts::BOTTOM),
             stacks,
@@ -126,7 +130,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         }
     }
 
-    /// Whether no ray is on its way.
+    /// Whether no slot has a ray.
     #[inline(always)]
     pub(super) fn is_empty(&self) -> bool {
         self.counts.0 == 0
@@ -134,84 +138,85 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// The ray of a slot.
     #[inline(always)]
-    pub(super) fn state(&mut self, at: usize) -> &mut RayState<Q> {
-        &mut self.slots[at % POOL_SIZE].0
+    pub(super) fn state(&mut self, slot: usize) -> &mut RayState<Q> {
+        &mut self.slots[slot % POOL_SIZE].0
     }
 
-    /// Sends the ray of a slot on its way from a root.
+    /// Starts the ray of a slot at a root.
     #[inline(always)]
-    pub(super) fn start(&mut self, at: usize, root: u32) {
-        let at = at % POOL_SIZE;
-        let top = self.stacks.start_at(self.bottoms[at]);
-        (self.tops.place[at], self.tops.code[at]) = (top, root);
-        self.lists.sort(&mut self.counts, at, root);
+    pub(super) fn start(&mut self, slot: usize, root: u32) {
+        let slot = slot % POOL_SIZE;
+        let top = self.stacks.start_at(self.bottoms[slot]);
+        (self.tops.position[slot], self.tops.code[slot]) = (top, root);
+        self.lists.push(&mut self.counts, slot, root);
     }
 
-    /// As [`Self::start`], where the ray may meet these children of the root, and enters them at these depths.
+    /// As [`Self::start`] for a root whose children were already tested: `children` holds a bit for each child that the ray may meet,
+    /// and the depths at which it enters them.
     #[inline(always)]
     pub(super) fn start_among<S: Simd, B: ChildBoxes>(
         &mut self,
         s: S,
-        at: usize,
+        slot: usize,
         root: &B,
-        hit_cache: (u32, S::F),
+        children: (u32, S::F),
     ) {
-        let at = at % POOL_SIZE;
-        let top = self.stacks.start_at(self.bottoms[at]);
-        let count = write_children::<S, Q, B>(s, root, hit_cache, self.stacks.room(top));
+        let slot = slot % POOL_SIZE;
+        let top = self.stacks.start_at(self.bottoms[slot]);
+        let count = write_children::<S, Q, B>(s, root, children, self.stacks.free_entries(top));
         let top = self.stacks.replaced(top, count);
         let code = self.stacks.code(top);
-        (self.tops.place[at], self.tops.code[at]) = (top, code);
-        self.lists.sort(&mut self.counts, at, code);
+        (self.tops.position[slot], self.tops.code[slot]) = (top, code);
+        self.lists.push(&mut self.counts, slot, code);
     }
 
-    /// How many rays have come to the bottom of their stacks, or before an empty slot of a node. They are to be asked for one
-    /// after the other, and at most one ray started for each.
+    /// Empties the list of slots whose top is [`BOTTOM`] or an empty child, and returns its length. The caller passes each index below
+    /// it to [`Self::finished`] in order, and starts at most one ray after each.
     #[inline(always)]
-    pub(super) fn take_ended(&mut self) -> usize {
+    pub(super) fn take_bottom(&mut self) -> usize {
         self.counts.take(StepCounts::BOTTOM)
     }
 
-    /// The slot of one of those, if it has come to the bottom; else it goes on.
+    /// The slot with index i in that list, if its ray is finished. Otherwise the empty child is popped, and the ray continues.
     #[inline(always)]
-    pub(super) fn ended(&mut self, i: usize) -> Option<usize> {
-        let at = usize::from(self.lists.bottom[i]) % POOL_SIZE;
-        let top = self.tops.place[at];
-        if top <= self.bottoms[at] {
-            return Some(at);
+    pub(super) fn finished(&mut self, i: usize) -> Option<usize> {
+        let slot = usize::from(self.lists.bottom[i]) % POOL_SIZE;
+        let top = self.tops.position[slot];
+        if top <= self.bottoms[slot] {
+            return Some(slot);
         }
         let below = top.below();
         let code = self.stacks.code(below);
-        (self.tops.place[at], self.tops.code[at]) = (below, code);
-        self.lists.sort(&mut self.counts, at, code);
+        (self.tops.position[slot], self.tops.code[slot]) = (below, code);
+        self.lists.push(&mut self.counts, slot, code);
         None
     }
 
-    /// Steps through inner nodes until few rays stand before one.
+    /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
     pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, object: &ObjectView<'_>) {
         let RayPool { slots, tops, lists, stacks, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
             for i in 0..counts.take(StepCounts::INNER) {
-                let at = usize::from(lists.inner[i]) % POOL_SIZE;
-                let (top, node) = (tops.place[at], N::node(node_base, tops.code[at]));
-                let count = slots[at].0.enter_node(s, node, stacks.room(top));
+                let slot = usize::from(lists.inner[i]) % POOL_SIZE;
+                let (top, node) = (tops.position[slot], N::node(node_base, tops.code[slot]));
+                let count = slots[slot].0.enter_node(s, node, stacks.free_entries(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
-                (tops.place[at], tops.code[at]) = (top, code);
+                (tops.position[slot], tops.code[slot]) = (top, code);
                 prefetch(s, nodes, node_base, code);
-                lists.sort(&mut counts, at, code);
+                lists.push(&mut counts, slot, code);
             }
-            if counts.inner() < ENOUGH && counts.leaf() | counts.bottom() > 0 {
+            if counts.inner() < MIN_INNER && counts.leaf() | counts.bottom() > 0 {
                 break;
             }
         }
         self.counts = counts;
     }
 
-    /// Takes each ray that stands before a leaf through it. Tet leaves are handed to `tets`, with the ray and its place on the
-    /// stack.
+    /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf, given its row, the ray and the position
+    /// of the leaf on the ray's stack.
     #[inline(always)]
     pub(super) fn leaf_steps<S: Simd, N: Nodes>(
         &mut self,
@@ -223,18 +228,18 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         let RayPool { slots, tops, lists, stacks, bottoms, .. } = self;
         let (mut counts, node_base) = (self.counts, object.node_base());
         for i in 0..counts.take(StepCounts::LEAF) {
-            let at = usize::from(lists.leaf[i]) % POOL_SIZE;
-            let state = &mut slots[at].0;
-            let (code, top) = (tops.code[at], tops.place[at]);
-            let (place, mut unpacked) = (state.ray(), None);
+            let slot = usize::from(lists.leaf[i]) % POOL_SIZE;
+            let state = &mut slots[slot].0;
+            let (code, top) = (tops.code[slot], tops.position[slot]);
+            let (ray, mut unpacked) = (state.ray(), None);
             let found = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
-                enter_leaf(s, object, || &rays[place], state, (leaf, code))
+                enter_leaf(s, object, || &rays[ray], state, (leaf, code))
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
                     Some(Child::Raw(index)) => {
                         let leaf = object.raw(index, &mut unpacked);
-                        enter_leaf(s, object, || &rays[place], state, (leaf, code))
+                        enter_leaf(s, object, || &rays[ray], state, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, state, top, stacks),
                     _ => LeafOutcome::Nothing,
@@ -242,17 +247,17 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             };
             let below = top.below();
             let top = match found {
-                // Any-hit queries keep no keys, so nothing can be told of what waits.
+                // Any-hit queries store no keys by which entries could be dropped.
                 LeafOutcome::Nearer if Q::ANY => below,
                 LeafOutcome::Nothing => below,
                 LeafOutcome::Replaced => top,
-                LeafOutcome::Nearer => stacks.keep_up_to(s, bottoms[at], below, state.key_limit()),
-                LeafOutcome::Done => bottoms[at],
+                LeafOutcome::Nearer => stacks.keep_up_to(s, bottoms[slot], below, state.key_limit()),
+                LeafOutcome::Done => bottoms[slot],
             };
             let code = stacks.code(top);
-            (tops.place[at], tops.code[at]) = (top, code);
+            (tops.position[slot], tops.code[slot]) = (top, code);
             prefetch(s, nodes, node_base, code);
-            lists.sort(&mut counts, at, code);
+            lists.push(&mut counts, slot, code);
         }
         self.counts = counts;
     }

@@ -1,5 +1,5 @@
-//! A ray on its way through the wide BVH: what it has found, and the two steps it takes, through a node and
-//! through a leaf. How many rays are on their way at once, and in which order they step, is not known here.
+//! State of one of several interleaved rays in the wide BVH, with the step through a node. The step through a leaf is
+//! [`enter_leaf`](super::leaf::enter_leaf); the order in which rays step is decided by [`ray_pool`](super::ray_pool).
 
 use super::leaf::Progress;
 use crate::bvh::candidate::Candidate;
@@ -13,42 +13,43 @@ use bth_format::layout::WIDTH;
 use bth_format::object::ObjectView;
 use zerocopy::FromZeros;
 
-/// What keys of the stack may exceed the true depth by, relative: the four lowest bits of f32. Of denormal numbers less
-/// than the least normal one.
+/// Relative amount by which a key of the stack may exceed the depth at which the ray enters the child: sorting replaces the four
+/// lowest bits of the f32 by the index of the child. A denormal key exceeds the depth by less than the least normal number.
 pub(crate) const KEY_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
-/// Keys of the stack beyond this are of no interest where nothing beyond a depth is.
+/// The greatest key of stack entries that can hold hits up to the depth `last`.
 #[inline(always)]
 pub(crate) fn key_limit(last: f32) -> f32 {
     last + (last.abs() * KEY_SLACK + f32::MIN_POSITIVE)
 }
 
-/// A ray on its way.
+/// State of a ray that is being traced.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct RayState<Q> {
-    /// Nothing whose depth certainly exceeds its `last` matters any more.
+    /// The prepared ray, with the hits found so far in `progress` and the limit of depth in `slabs.last`.
     prepared: PreparedRay,
-    /// Of rays of which something had to be decided ([`HitProgress::BY_QUERY`]): for most nothing is ever, and they don't touch it.
+    /// Valid if [`HitProgress::BY_QUERY`] is set. Most rays never need a decision in f64, and their query is never written.
     query: Q,
 }
 
 impl<Q: Query> RayState<Q> {
-    /// As [`Self::start`], for a ray that was not prepared; false if it hits nothing whatever there is ([`PreparedRay::in_f64`]).
+    /// As [`Self::start`], for a ray with index `index` that f32 lanes could not prepare. Returns false if the ray cannot hit anything
+    /// ([`PreparedRay::in_f64`]).
     #[cold]
     #[inline(never)]
     pub(crate) fn start_unprepared(
         &mut self,
         object: &ObjectView<'_>,
-        (place, ray): (u32, &Ray),
+        (index, ray): (u32, &Ray),
         query: Option<Q>,
     ) -> bool {
         let prepared =
             PreparedRay::of(&object.bounds, ray).or_else(|| PreparedRay::in_f64(object.header, ray));
-        prepared.map(|prepared| self.start(&PreparedRay { ray: place, ..prepared }, query)).is_some()
+        prepared.map(|prepared| self.start(&PreparedRay { ray: index, ..prepared }, query)).is_some()
     }
 
-    /// A place for a ray.
+    /// State without a ray.
     pub(crate) fn vacant(query: Q) -> Self {
         RayState {
             prepared: PreparedRay { progress: HitProgress::NOTHING, ..PreparedRay::new_zeroed() },
@@ -56,55 +57,55 @@ impl<Q: Query> RayState<Q> {
         }
     }
 
-    /// Takes in a ray that has been prepared, and its query if it has one.
+    /// Begins a prepared ray, with its query if that was constructed before.
     #[inline(always)]
     pub(crate) fn start(&mut self, prepared: &PreparedRay, query: Option<Q>) {
         self.prepared = *prepared;
         if let Some(query) = query {
-            self.give(query);
+            self.set_query(query);
         }
     }
 
-    fn give(&mut self, query: Q) {
+    fn set_query(&mut self, query: Q) {
         (self.query, self.prepared.progress.decided) = (query, HitProgress::BY_QUERY);
     }
 
-    /// StackPosition of the ray in the batch.
+    /// Index of the ray in the batch.
     #[inline(always)]
     pub(crate) fn ray(&self) -> usize {
         self.prepared.ray as usize
     }
 
-    /// Hands on what has been found, but for what waits to be computed.
+    /// Stores the answer of the ray, which must have no pending hit.
     #[inline(always)]
-    pub(crate) fn report(&self, to: &mut Sink<'_, Q>) {
+    pub(crate) fn report(&self, sink: &mut Sink<'_, Q>) {
         match self.prepared.progress.decided {
             HitProgress::UNDECIDED => {}
             HitProgress::ACCEPTED => {
                 let mut query = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
                 query.accept();
-                to.query(self.ray(), &query);
+                sink.query(self.ray(), &query);
             }
-            _ => to.query(self.ray(), &self.query),
+            _ => sink.query(self.ray(), &self.query),
         }
     }
 
-    /// Keys of the stack beyond this are of no interest any more.
+    /// The greatest key of stack entries that can still change the result.
     #[inline(always)]
     pub(crate) fn key_limit(&self) -> f32 {
         key_limit(self.prepared.slabs.last)
     }
 
-    /// Writes the children of a node that the ray may meet, the nearest last, and returns how many.
+    /// Writes codes and keys of the children whose box the ray may meet, the nearest last; returns their number.
     #[inline(always)]
     pub(crate) fn enter_node<S: Simd, B: ChildBoxes>(
         &self,
         s: S,
         node: &B,
-        to: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
+        entries: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.prepared.slabs.children(s, node, self.prepared.slabs.last);
-        write_children::<S, Q, B>(s, node, (bits, enter), to)
+        write_children::<S, Q, B>(s, node, (bits, enter), entries)
     }
 }
 
@@ -142,7 +143,7 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
     #[inline(always)]
     fn query(&mut self, ray: &Ray) -> &mut Q {
         if self.prepared.progress.decided == HitProgress::UNDECIDED {
-            self.give(Q::new(ray));
+            self.set_query(Q::new(ray));
         }
         &mut self.query
     }
@@ -152,7 +153,8 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
     }
 }
 
-/// Writes the children of a node whose bits are set, the nearest last; returns how many.
+/// Writes codes and keys of the children whose bit is set, the nearest last, given the depths at which the ray enters all children;
+/// returns their number. Any-hit queries write no keys.
 #[inline(always)]
 pub(crate) fn write_children<S: Simd, Q: Query, B: ChildBoxes>(
     s: S,

@@ -1,5 +1,8 @@
-//! The walk of one ray through the wide BVH. There is nothing to overlap with, so what matters is how long one step waits for
-//! the one before: hits are noted as f32 bounds them, and computed in f64 only when the walk has ended.
+//! Traversal of the wide BVH by a single ray.
+//!
+//! There are no other rays whose work could hide latencies, so the length of the dependency chain from step to step decides the
+//! speed. The nearest certain hit is therefore kept with f32 bounds of its depth, and its t, u and v are computed in f64 once, at
+//! the end.
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
 use super::nodes::{Nodes, indexed_leaf, prefetch};
@@ -15,24 +18,24 @@ use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::ObjectView;
 use std::hint::black_box;
 
-/// What a tet leaf made of a ray.
+/// Result of a tet leaf for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TetOutcome {
-    /// The query has what it wants.
+    /// The query is complete.
     Done,
-    /// The walk goes on with the other children.
-    GoOn,
+    /// The traversal continues with the stack.
+    Continue,
 }
 
-/// What a ray has come upon, in registers but for its query.
+/// State of the ray. All fields but the query stay in registers.
 struct SingleState<'a, Q> {
     prepared: &'a PreparedRay,
     query: &'a mut Q,
-    /// Nothing whose depth certainly exceeds this matters any more.
+    /// Upper limit of the depths of hits that can still change the result.
     last: f32,
     /// Lower bound of the depth of the nearest hit so far.
     nearest: f32,
-    /// That hit, if it has still to be computed.
+    /// The nearest hit so far if its t, u and v are not yet computed, else [`Candidate::NONE`].
     pending: Candidate,
 }
 
@@ -75,11 +78,14 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
     }
 }
 
-/// Walks from the root. Tet leaves without a subtree are handed to `tets` with their row; `walked`, from which the query has what
-/// it knows, is left out.
+/// Traverses the BVH of an object from its root. `tets` intersects a tet leaf without a subtree, given its row. `walked` is the row
+/// of a tet leaf that is skipped, because the query already holds the ray's hits in it, or `NONE`.
+///
+/// This is one kernel, longer than other functions and with more parameters: its variables must stay in registers across all steps,
+/// and a function boundary or a struct of parameters between the steps was measured to be slower.
 #[inline(always)]
 #[expect(clippy::too_many_arguments)]
-pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
+pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
     s: S,
     nodes: N,
     (object, ray): (&ObjectView<'_>, &Ray),
@@ -90,9 +96,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
     count: &mut C,
     mut tets: impl FnMut(u32, &mut Q, &mut C) -> TetOutcome,
 ) {
-    // In memory: compilers would rather make sixteen of each of its numbers before the walk, and store those.
+    // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before the loop and spill the vectors.
     let prepared = black_box(prepared);
-    let mut walk = SingleState {
+    let mut state = SingleState {
         prepared,
         query,
         last: prepared.slabs.last,
@@ -100,20 +106,20 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         pending: Candidate::NONE,
     };
     if walked != NONE {
-        walk.take_over(ray);
+        state.update_from_query(ray);
     }
     let node_base = object.node_base();
     let mut code = object.header.root;
     let mut stack = stack.start(code);
-    // Keys of the stack beyond this are of no interest any more.
-    let mut limit = key_limit(walk.last);
+    // Stack entries with a greater key are dropped.
+    let mut limit = key_limit(state.last);
     loop {
-        // In registers for as long as no leaf is entered.
+        // These broadcasts stay in registers until a leaf is entered.
         let planes = RaySlabLanes::new(s, &prepared.slabs);
         while code & Child::LEAF_BIT == 0 {
             count.node();
             let node = N::node(node_base, code);
-            let (bits, enter) = planes.children(s, node, walk.last);
+            let (bits, enter) = planes.children(s, node, state.last);
             if bits & bits.wrapping_sub(1) == 0 {
                 if bits != 0 {
                     code = node.child()[bits.trailing_zeros() as usize % WIDTH];
@@ -122,25 +128,25 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                 }
                 continue;
             }
-            let room = stack.room();
+            let free = stack.free_entries();
             let children = s.load_u(node.child());
             if Q::ANY {
                 code = node.child()[bits.trailing_zeros() as usize % WIDTH];
-                let others = s.compress(bits & (bits - 1), children, room.codes);
-                room.keep(others + 1);
+                let others = s.compress(bits & (bits - 1), children, free.codes);
+                free.push(others + 1);
             } else {
-                let (count, nearest) = s.sort_far_to_near(bits, enter, children, room.codes, room.keys);
+                let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
                 code = node.child()[nearest % WIDTH];
-                room.keep(count);
+                free.push(count);
             }
-            // A ray alone has nothing to do while it waits for that one.
+            // The entry below the new top is most often needed next.
             prefetch(s, nodes, node_base, stack.below());
         }
         let mut unpacked = None;
         let done = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
             count.leaf();
             count.triangles(leaf.triangles);
-            enter_leaf(s, object, || ray, &mut walk, (leaf, code)) == LeafOutcome::Done
+            enter_leaf(s, object, || ray, &mut state, (leaf, code)) == LeafOutcome::Done
         } else {
             let mut unpacked = None;
             match Child::from_code(code) {
@@ -148,7 +154,7 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                     let leaf = object.raw(at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
-                    enter_leaf(s, object, || ray, &mut walk, (leaf, code)) == LeafOutcome::Done
+                    enter_leaf(s, object, || ray, &mut state, (leaf, code)) == LeafOutcome::Done
                 }
                 Some(Child::Tets(row)) if row != walked => {
                     let subtree = object.tet_leaves[row as usize].subtree;
@@ -157,9 +163,9 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
                         continue;
                     }
                     count.leaf();
-                    decide(object, ray, &mut walk, NONE, 0);
-                    let done = tets(row, walk.query, count) == TetOutcome::Done;
-                    walk.take_over(ray);
+                    decide(object, ray, &mut state, NONE, 0);
+                    let done = tets(row, state.query, count) == TetOutcome::Done;
+                    state.update_from_query(ray);
                     done
                 }
                 _ => stack.is_empty(),
@@ -168,10 +174,10 @@ pub(crate) fn walk<S: Simd, N: Nodes, Q: Query, C: Count>(
         if done {
             break;
         }
-        limit = key_limit(walk.last);
+        limit = key_limit(state.last);
         code = stack.pop::<Q>(limit);
     }
-    if walk.pending.leaf != NONE {
-        settle_one(object, ray, walk.pending, walk.query);
+    if state.pending.leaf != NONE {
+        settle_one(object, ray, state.pending, state.query);
     }
 }

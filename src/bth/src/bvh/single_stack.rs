@@ -1,5 +1,5 @@
-//! The stack of a ray that is traced alone.
-#![allow(unsafe_code)] // Clearing it would cost more than most rays.
+//! The traversal stack of a single ray.
+#![allow(unsafe_code)] // Initializing the whole stack would take longer than the traversal of most rays.
 
 use super::stack::BOTTOM;
 use crate::query::Query;
@@ -8,10 +8,10 @@ use bth_format::layout::WIDTH;
 use bth_format::limits::MAX_DEPTH;
 use std::mem::MaybeUninit;
 
-/// Entries: at every level all children but the one entered wait, and whole vectors are written at the top.
+/// Greatest number of entries: at every level all children but the entered one are stacked, and whole vectors are stored at the top.
 const SIZE: usize = 2 + MAX_DEPTH * (WIDTH - 1) + LANES;
 
-/// Memory for the stack of one ray, in the deepest BVH that there may be.
+/// Memory for the stack of one ray, for the deepest BVH that a file may hold.
 pub(crate) struct SingleStack {
     codes: [MaybeUninit<u32>; SIZE],
     keys: [MaybeUninit<f32>; SIZE],
@@ -26,7 +26,7 @@ impl SingleStack {
         }
     }
 
-    /// A stack with a root on top that is entered at once. Below it lies [`BOTTOM`].
+    /// Empties the stack and pushes [`BOTTOM`] and the root.
     #[inline(always)]
     pub(crate) fn start(&mut self, root: u32) -> OpenSingleStack<'_> {
         for (i, code) in [BOTTOM, root].into_iter().enumerate() {
@@ -37,7 +37,7 @@ impl SingleStack {
     }
 }
 
-/// Children that wait to be entered, as in [`Stacks`](super::stack::Stacks). The entries up to the top have been written.
+/// Stack of child codes with keys, as in [`Stacks`](super::stack::Stacks). All entries up to `top` are initialized.
 pub(crate) struct OpenSingleStack<'a> {
     codes: &'a mut [MaybeUninit<u32>; SIZE],
     keys: &'a mut [MaybeUninit<f32>; SIZE],
@@ -45,7 +45,7 @@ pub(crate) struct OpenSingleStack<'a> {
 }
 
 impl OpenSingleStack<'_> {
-    /// Whether nothing is left above [`BOTTOM`].
+    /// Whether [`BOTTOM`] is the top.
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.top == 0
@@ -54,30 +54,31 @@ impl OpenSingleStack<'_> {
     #[inline(always)]
     fn code(&self, at: usize) -> u32 {
         debug_assert!(at <= self.top);
-        // SAFETY: called for places up to the top only. Those have been written: the first two by `SingleStack::start`, the others by
-        // `Self::room`, which clears all it lends, and a top is the first two's or lies among what was lent; so it is within.
+        // SAFETY: `at` is at most `top`, as all callers pass `top` or less. `SingleStack::start` initializes the entries 0 and 1 and
+        // sets `top` to 1. `top` grows only in `FreeEntries::push`, by less than LANES, into entries that `free_entries` has
+        // initialized before. So `at` lies within the arrays, and its entry is initialized.
         unsafe { self.codes.get_unchecked(at).assume_init() }
     }
 
     #[inline(always)]
     fn key(&self, at: usize) -> f32 {
         debug_assert!(at <= self.top);
-        // SAFETY: as above.
+        // SAFETY: as in `code`; both arrays are initialized together.
         unsafe { self.keys.get_unchecked(at).assume_init() }
     }
 
-    /// Room for the children of a node in place of the top.
+    /// The entries from the top on, which the children of the entered node replace.
     #[inline(always)]
-    pub(crate) fn room(&mut self) -> Room<'_> {
+    pub(crate) fn free_entries(&mut self) -> FreeEntries<'_> {
         assert!(self.top <= SIZE - LANES, "the BVH is deeper than its header says");
-        // SAFETY: as many entries as are LANES begin at the top of both arrays, which are borrowed mutably together. They are
-        // cleared, so that all are initialized.
+        // SAFETY: by the assertion, LANES entries begin at `top` in both arrays, which are borrowed mutably for as long as the result
+        // lives. They are initialized before references to them are made.
         unsafe {
             let codes = self.codes.as_mut_ptr().add(self.top).cast::<[u32; LANES]>();
             let keys = self.keys.as_mut_ptr().add(self.top).cast::<[f32; LANES]>();
             codes.write([0; LANES]);
             keys.write([0.0; LANES]);
-            Room { codes: &mut *codes, keys: &mut *keys, top: &mut self.top }
+            FreeEntries { codes: &mut *codes, keys: &mut *keys, top: &mut self.top }
         }
     }
 
@@ -87,11 +88,11 @@ impl OpenSingleStack<'_> {
         self.code(self.top.saturating_sub(1))
     }
 
-    /// Drops the top, and what lies below it as far as the keys exceed the limit; returns the code on top then.
+    /// Pops the top, and the entries below it whose key exceeds `limit` up to the first that does not; returns the new top's code.
     #[inline(always)]
     pub(crate) fn pop<Q: Query>(&mut self, limit: f32) -> u32 {
         self.top = self.top.saturating_sub(1);
-        // Any-hit queries keep no keys. The key of BOTTOM exceeds no limit.
+        // Any-hit queries store no keys. The key of BOTTOM, negative infinity, exceeds no limit.
         while !Q::ANY && limit < self.key(self.top) {
             self.top = self.top.saturating_sub(1);
         }
@@ -99,17 +100,17 @@ impl OpenSingleStack<'_> {
     }
 }
 
-/// Entries of [`OpenSingleStack`] to be written, from the top on.
-pub(crate) struct Room<'a> {
+/// Entries of an [`OpenSingleStack`] from the top on, to be overwritten.
+pub(crate) struct FreeEntries<'a> {
     pub(crate) codes: &'a mut [u32; LANES],
     pub(crate) keys: &'a mut [f32; LANES],
     top: &'a mut usize,
 }
 
-impl Room<'_> {
-    /// Says how many were written, at least one: the last is the new top.
+impl FreeEntries<'_> {
+    /// Completes the push of the first `count` entries, 1 to [`LANES`]: the last of them is the new top.
     #[inline(always)]
-    pub(crate) fn keep(self, count: usize) {
+    pub(crate) fn push(self, count: usize) {
         *self.top += count.wrapping_sub(1) % LANES;
     }
 }
@@ -120,7 +121,7 @@ mod tests {
     use crate::query::{Any, Nearest};
     use bth_random::Rng;
 
-    /// Random steps, against a vector of codes and keys.
+    /// Random pushes and pops, compared with a vector of codes and keys.
     fn steps<Q: Query>(rng: &mut Rng) {
         let mut stack = SingleStack::new();
         let mut stack = stack.start(7);
@@ -131,14 +132,14 @@ mod tests {
             }
             if step < 100 && rng.below(5) < 3 && expected.len() + LANES <= SIZE {
                 let count = 1 + rng.below(LANES as u64) as usize;
-                let room = stack.room();
+                let free = stack.free_entries();
                 expected.pop();
                 for i in 0..count {
                     let entry = (rng.below(1 << 20) as u32, rng.below(100) as f32);
-                    (room.codes[i], room.keys[i]) = entry;
+                    (free.codes[i], free.keys[i]) = entry;
                     expected.push(entry);
                 }
-                room.keep(count);
+                free.push(count);
                 assert_eq!(stack.below(), expected[expected.len() - 2].0);
             } else {
                 let limit = rng.below(100) as f32;
@@ -154,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_comes_back_in_order_but_for_what_lies_beyond_the_limit() {
+    fn pops_return_entries_in_order_and_skip_those_beyond_the_limit() {
         let mut rng = Rng::new(3);
         for _ in 0..if cfg!(miri) { 3 } else { 200 } {
             steps::<Any>(&mut rng);
@@ -164,11 +165,11 @@ mod tests {
 
     #[test]
     #[should_panic = "deeper than its header says"]
-    fn a_deeper_tree_panics_and_writes_nothing_outside() {
+    fn a_tree_deeper_than_the_limit_panics_before_a_write_outside() {
         let mut stack = SingleStack::new();
         let mut stack = stack.start(1);
         for _ in 0..SIZE {
-            stack.room().keep(LANES);
+            stack.free_entries().push(LANES);
         }
     }
 }

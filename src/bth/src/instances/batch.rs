@@ -208,7 +208,7 @@ impl SceneQuery for SceneNearest<'_> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
-        if visits.len() < object::LEAST_BATCH {
+        if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
                 let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
@@ -238,7 +238,7 @@ impl SceneQuery for SceneAny<'_> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
     fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
-        if visits.len() < object::LEAST_BATCH {
+        if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
                 let (ray, from) = (round.object_ray(visit, self.rays[i].tmax), round.hint(i, visit.instance));

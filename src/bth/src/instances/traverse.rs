@@ -187,7 +187,7 @@ impl RayTraversals {
         let child = s.load_u(&node.child);
         // Where coordinates are too great for f32 all boxes are met, those of no child too. What it passes by it need not meet.
         let wanted = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(state.skip)));
-        let (codes, keys) = self.stacks.room(state.top);
+        let (codes, keys) = self.stacks.free_entries(state.top);
         let count = s.compress_far_to_near(bits & s.mask_bits(wanted), enter, child, codes, keys);
         state.top = self.stacks.replaced(state.top, count);
         self.stacks.code(state.top)

@@ -1,10 +1,10 @@
-//! Batches of rays through one object: those that start on a known surface walk its tetrahedra first, all together;
-//! the rest goes through the BVH.
+//! Batches of rays through one object. Rays that start on a known triangle may walk through its tetrahedra first; coherent rays are
+//! traced in packets, and the others interleaved through the BVH.
 
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{self, FEWEST_MEASURED_RAYS, Strategy};
+use super::strategy::{self, MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::packet;
@@ -14,20 +14,19 @@ use crate::query::sink::Sink;
 use crate::query::{AnswerLanes, Any, Nearest, Query};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use crate::tets;
-use crate::tets::batch::WalkState;
+use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
 use crate::tets::records::LaneRecords;
 use crate::tets::{enter_tets, leaf_of_face};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
-/// Fewer rays than these are traced one after the other.
-pub(crate) const LEAST_BATCH: usize = 4;
-/// Rays that walk tetrahedra together: enough that the last ones, which walk in lanes half empty, are few.
+/// Batches of fewer rays are traced one ray after the other.
+pub(crate) const MIN_BATCH: usize = 4;
+/// Number of rays that walk through tetrahedra together. It is large, because towards the end of each part lanes are idle.
 const RAYS_PER_PART: usize = 2048;
 
-/// Nearest hits of rays in object space that start on the triangles `from` of the object, or on none (`NONE`). A hint
-/// changes where the search begins, never what is found.
+/// Computes the nearest hits of rays in object space. `from` holds for each ray the triangle on which it starts, or `NONE`; it
+/// affects where the search begins, never the result.
 pub(crate) fn nearest_batch(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -40,7 +39,7 @@ pub(crate) fn nearest_batch(
     trace_batch(object, rays, from, scratch, &mut sink);
 }
 
-/// Whether rays in object space hit anything; `from` as for [`nearest_batch`].
+/// Computes whether rays in object space hit anything; `from` as for [`nearest_batch`].
 pub(crate) fn any_batch(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -52,18 +51,18 @@ pub(crate) fn any_batch(
     trace_batch(object, rays, from, scratch, &mut sink);
 }
 
-/// Says of all rays that they hit nothing.
+/// Fills `hits` with [`Hit::MISS`].
 #[inline]
 pub(crate) fn fill_misses(hits: &mut [Hit]) {
-    // One ray alone need not pay for a kernel.
-    if hits.len() < LEAST_BATCH {
+    // For few hits the call of a kernel would take longer.
+    if hits.len() < MIN_BATCH {
         hits.fill(Hit::MISS);
     } else {
         Isa::chosen().run(MissKernel(hits));
     }
 }
 
-/// [`fill_misses`] as a kernel: whole vectors are stored, not hits.
+/// The kernel of [`fill_misses`], which stores whole vectors.
 struct MissKernel<'a>(&'a mut [Hit]);
 
 impl Kernel for MissKernel<'_> {
@@ -79,13 +78,13 @@ impl Kernel for MissKernel<'_> {
     }
 }
 
-/// Hands on what rays in object space hit, of those that hit anything; `from` as for [`nearest_batch`].
+/// Stores in `sink` the answers of those rays in object space that hit anything; `from` as for [`nearest_batch`].
 pub(crate) fn trace_batch<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
     if object.header.root == NONE {
         return;
@@ -93,81 +92,81 @@ pub(crate) fn trace_batch<Q: Query>(
     let from = from.filter(|from| {
         let mut starts = rays.iter().zip(*from);
         !object.tet_leaves.is_empty()
-            && starts.any(|(ray, &triangle)| triangle != NONE && is_worth_a_walk::<Q>(object, ray))
+            && starts.any(|(ray, &triangle)| triangle != NONE && may_gain_by_walk::<Q>(object, ray))
     });
-    // Where there is no BVH beside the tetrahedra there is no choice.
+    // Without a BVH over the triangles of tet leaves there is no choice of strategy.
     if from.is_none() || !has_subtrees(object) {
-        return trace_with(object, rays, from, scratch, to);
+        return trace_with(object, rays, from, scratch, sink);
     }
     let hinted = Hinted::chosen();
-    let at = std::ptr::from_ref(object.header).addr();
-    let choice = scratch.choices.of(at, usize::from(Q::ANY));
-    let measured = rays.len() >= FEWEST_MEASURED_RAYS && hinted == Hinted::Measured;
-    let way = match hinted {
+    let address = std::ptr::from_ref(object.header).addr();
+    let choice = scratch.choices.of(address, usize::from(Q::ANY));
+    let measured = rays.len() >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
+    let strategy = match hinted {
         Hinted::Bvh => Strategy::Bvh,
         Hinted::Tets => Strategy::Tets,
         Hinted::Measured if measured => choice.next(),
         Hinted::Measured => choice.best(),
     };
     let start = if measured { strategy::now() } else { None };
-    trace_with(object, rays, from.filter(|_| way == Strategy::Tets), scratch, to);
+    trace_with(object, rays, from.filter(|_| strategy == Strategy::Tets), scratch, sink);
     if let Some(start) = start {
-        let seconds_a_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
-        scratch.choices.of(at, usize::from(Q::ANY)).learn(way, seconds_a_ray);
+        let seconds_per_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
+        scratch.choices.of(address, usize::from(Q::ANY)).record(strategy, seconds_per_ray);
     }
 }
 
-/// Traces rays that start on surfaces of which tetrahedra are known through those; others through packets and the BVH.
+/// Traces rays with the hints `from` if they are given, else through packets and the BVH.
 fn trace_with<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
-    if from.is_some() || whole(object) != NONE {
+    if from.is_some() || sole_tet_leaf(object) != NONE {
         for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
             let first = part * RAYS_PER_PART;
             let from = from.map(|from| &from[first..][..rays.len()]);
-            trace_hinted(object, rays, from, scratch, &mut to.part(first));
+            trace_hinted(object, rays, from, scratch, &mut sink.part(first));
         }
         return;
     }
-    let packed = in_packets(object, rays, scratch, to);
+    let packed = in_packets(object, rays, scratch, sink);
     if packed < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
         let order = (packed > 0).then_some(&rest[..]);
         let remaining = RemainingRays { order, queries: None, walked: None };
-        through_bvh(object, rays, remaining, scratch, to);
+        through_bvh(object, rays, remaining, scratch, sink);
         scratch.packets.rest = rest;
     }
 }
 
-/// Whether there is a BVH beside the tetrahedra.
+/// Whether the triangles of tet leaves are in a BVH, too.
 fn has_subtrees(object: &ObjectView<'_>) -> bool {
     object.tet_leaves.first().is_some_and(|leaf| leaf.subtree != NONE)
 }
 
-/// The tet leaf that is the whole object, without another structure for rays that come from outside; or `NONE`.
-fn whole(object: &ObjectView<'_>) -> u32 {
+/// The tet leaf that is the whole object, if rays from outside have no BVH to go through; else `NONE`.
+fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
     match Child::from_code(object.header.root) {
         Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
         _ => NONE,
     }
 }
 
-/// Traces at most [`RAYS_PER_PART`] rays, some of which start on known surfaces, or all of which enter the same tetrahedra.
+/// Traces at most [`RAYS_PER_PART`] rays, some of which start on known triangles, or all of which enter the same tet leaf.
 fn trace_hinted<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: Option<&[u32]>,
     scratch: &mut Scratch,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
-    // Packets of rays that go together beat all else, where they serve enough of their rays.
-    let packed = in_packets(object, rays, scratch, to);
+    // Packets are the fastest for coherent rays, whether these have hints or not.
+    let packed = in_packets(object, rays, scratch, sink);
     let mut faces = vec![NONE; rays.len()];
-    let home = |ray: usize| {
+    let face_of = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
         object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE)
     };
@@ -176,12 +175,12 @@ fn trace_hinted<Q: Query>(
         _ => scratch.packets.rest.clone(),
     };
     for &ray in &order {
-        if is_worth_a_walk::<Q>(object, &rays[ray as usize]) {
-            faces[ray as usize] = home(ray as usize);
+        if may_gain_by_walk::<Q>(object, &rays[ray as usize]) {
+            faces[ray as usize] = face_of(ray as usize);
         }
     }
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
-    let mut walks = vec![WalkState::Not; rays.len()];
+    let mut walks = vec![WalkState::NotWalked; rays.len()];
     walk_tets(object, rays, &faces, &mut queries, &mut walks);
     let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
     let mut walked = vec![NONE; rays.len()];
@@ -189,7 +188,7 @@ fn trace_hinted<Q: Query>(
         let ray = ray as usize;
         let done = walks[ray] == WalkState::Done || walks[ray] == WalkState::Left && is_all;
         if done {
-            to.query(ray, &queries[ray]);
+            sink.query(ray, &queries[ray]);
         } else if walks[ray] == WalkState::Left {
             walked[ray] = leaf_of_face(object, faces[ray]);
         }
@@ -197,14 +196,14 @@ fn trace_hinted<Q: Query>(
     });
     if !order.is_empty() {
         let remaining = RemainingRays { order: Some(&order), queries: Some(&queries), walked: Some(&walked) };
-        through_bvh(object, rays, remaining, scratch, to);
+        through_bvh(object, rays, remaining, scratch, sink);
     }
 }
 
-/// Whether a ray that starts on a known surface may be faster through tetrahedra than through the BVH beside
-/// them, if there is one. By measurement (docs/notes/tets.md): long any-hit rays never are, and none are without vectors. Of
-/// the others [`choice`] decides. No answer depends on it.
-fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
+/// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
+/// Measurements (docs/notes/tets.md) exclude long any-hit rays and all rays in scalar code; for the others
+/// [`strategy`] chooses by time. No answer depends on this.
+fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     const SHORT: f32 = 0.3;
     if !has_subtrees(object) {
         return true;
@@ -220,6 +219,8 @@ fn is_worth_a_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     d[0].abs().max(d[1].abs()).max(d[2].abs()) * ray.tmax <= SHORT * size
 }
 
+/// Walks through tetrahedra with the rays that start on a face in `faces`, or with all rays if a tet leaf is the whole object. `walks`
+/// receives what became of each ray; all slices have one element per ray.
 fn walk_tets<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -227,36 +228,35 @@ fn walk_tets<Q: Query>(
     queries: &mut [Q],
     walks: &mut [WalkState],
 ) {
-    let whole = whole(object);
-    let any = whole != NONE || faces.iter().any(|&face| face != NONE);
-    let records =
-        LaneRecords::new(object.records).filter(|_| any && tets::batch::WalkBatch::<Q>::fits(object));
+    let sole_leaf = sole_tet_leaf(object);
+    let any = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
+    let records = LaneRecords::new(object.records).filter(|_| any && WalkBatch::<Q>::fits(object));
     if let Some(records) = records {
-        let leaves = vec![whole; rays.len()];
-        let mut batch = tets::batch::WalkBatch::new(object, records, rays, faces, &leaves, queries, walks);
-        // Without vectors the BVH is faster, and a hint of no use to it.
+        let leaves = vec![sole_leaf; rays.len()];
+        let mut batch =
+            WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
+        // In scalar code nothing is walked here: rays through a BVH are faster, and the BVH does not use hints.
         let _ = Isa::chosen().run_wide(&mut batch);
     }
 }
 
-/// Traces rays that go together in packets; returns how many rays went in them. If any did, the others are in the scratch's
-/// `rest`. None do in plain code, which has no vectors to fill.
+/// Traces coherent rays in packets, and returns their number. If it is not 0, the indices of the other rays are left in
+/// `scratch.packets.rest`. Scalar code has no packets.
 fn in_packets<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     scratch: &mut Scratch,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) -> usize {
-    Isa::chosen().run_wide(PacketKernel { object, rays, scratch, to }).unwrap_or(0)
+    Isa::chosen().run_wide(PacketKernel { object, rays, scratch, sink }).unwrap_or(0)
 }
 
-/// Packets of rays that go together, as a kernel; returns how many rays went in them. If any did, the others are in the
-/// scratch's rest.
+/// The kernel of [`in_packets`].
 struct PacketKernel<'a, 's, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut Scratch,
-    to: &'a mut Sink<'s, Q>,
+    sink: &'a mut Sink<'s, Q>,
 }
 
 impl<Q: Query> Kernel for PacketKernel<'_, '_, Q> {
@@ -264,69 +264,75 @@ impl<Q: Query> Kernel for PacketKernel<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
         let packets = &mut self.scratch.packets;
-        packet::trace(s, self.object, self.rays, packets, packet::MINIMUM_USE, self.to).rays
+        packet::trace(s, self.object, self.rays, packets, packet::MINIMUM_USE, self.sink).rays
     }
 }
 
-/// Rays through the BVH, each on its own.
+/// Traces rays through the BVH: interleaved, or in scalar code one after the other.
 fn through_bvh<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     remaining: RemainingRays<'_, Q>,
     scratch: &mut Scratch,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
     if Isa::chosen() == Isa::Scalar {
-        return one_by_one(object, rays, &remaining, to);
+        return one_by_one(object, rays, &remaining, sink);
     }
-    // Without vectors neither runs, and the branch above was taken.
+    // `run_wide` runs nothing in scalar code, which has returned above.
     if object.has_packed_nodes() {
-        let _ =
-            Isa::chosen().run_wide(InterleavedKernel { nodes: Packed, object, rays, remaining, scratch, to });
+        let _ = Isa::chosen().run_wide(InterleavedKernel {
+            nodes: Packed,
+            object,
+            rays,
+            remaining,
+            scratch,
+            sink,
+        });
     } else {
         let _ =
-            Isa::chosen().run_wide(InterleavedKernel { nodes: Wide, object, rays, remaining, scratch, to });
+            Isa::chosen().run_wide(InterleavedKernel { nodes: Wide, object, rays, remaining, scratch, sink });
     }
 }
 
-/// As [`through_bvh`] in plain code: one ray after the other, as there are no cache misses of vectors to overlap with and the
-/// kernels of many rays would be the largest part of the library.
+/// As [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar code, where
+/// they would be the largest part of the library.
 fn one_by_one<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     remaining: &RemainingRays<'_, Q>,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
-    let trace = |place: usize, to: &mut Sink<'_, Q>| {
-        let ray = &rays[place];
-        let mut query = remaining.queries.map_or_else(|| Q::new(ray), |queries| queries[place]);
-        let walked = remaining.walked.map_or(NONE, |walked| walked[place]);
+    let trace = |index: usize, sink: &mut Sink<'_, Q>| {
+        let ray = &rays[index];
+        let mut query = remaining.queries.map_or_else(|| Q::new(ray), |queries| queries[index]);
+        let walked = remaining.walked.map_or(NONE, |walked| walked[index]);
         single::through_bvh(object, ray, &mut query, walked, &mut ());
-        to.query(place, &query);
+        sink.query(index, &query);
     };
     match remaining.order {
-        Some(order) => order.iter().for_each(|&place| trace(place as usize, to)),
-        None => (0..rays.len()).for_each(|place| trace(place, to)),
+        Some(order) => order.iter().for_each(|&index| trace(index as usize, sink)),
+        None => (0..rays.len()).for_each(|index| trace(index, sink)),
     }
 }
 
-/// As [`through_bvh`], as a kernel.
+/// The kernel of [`through_bvh`].
 struct InterleavedKernel<'a, 's, N, Q: Query> {
     nodes: N,
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a, Q>,
     scratch: &'a mut Scratch,
-    to: &'a mut Sink<'s, Q>,
+    sink: &'a mut Sink<'s, Q>,
 }
 
 impl<N: Nodes, Q: Query> Kernel for InterleavedKernel<'_, '_, N, Q> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let InterleavedKernel { nodes, object, rays, remaining, scratch, to } = self;
-        let walk = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, to };
-        walk.run(s, nodes, |leaf, ray, query| {
+        let InterleavedKernel { nodes, object, rays, remaining, scratch, sink } = self;
+        let traversal = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, sink };
+        traversal.run(s, nodes, |leaf, ray, query| {
             enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
         });
     }

@@ -1,44 +1,44 @@
-//! How rays that start on known surfaces are traced: told, or left to measurement.
+//! How rays that start on known triangles are traced: as set by the caller or the environment, or by measurement.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Names what to do: `measured`, `bvh` or `tets`.
+/// Environment variable with the default: `measured`, `bvh` or `tets`.
 const VARIABLE: &str = "BTH_HINTS";
 
-/// What batches do with hints where a file has tetrahedra and a BVH beside them. Answers are the same bits always; this is
-/// for measurements and tests.
+/// How batches use hints where a file has tetrahedra and a BVH over the same triangles. Answers have the same bits in all cases; this
+/// is for measurements and tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Hinted {
-    /// Whichever way has proved the faster for such rays through the object, on this thread.
+    /// The strategy that has proved faster for such rays through the object on this thread.
     #[default]
     Measured,
-    /// Nothing: all rays go through the BVH.
+    /// Hints are not used: all rays go through the BVH.
     Bvh,
-    /// Rays that may gain by it go through tetrahedra first.
+    /// Rays that may gain by it walk through tetrahedra first.
     Tets,
 }
 
-/// 0: not chosen yet; else the place in `ALL`, plus one.
+/// 0 if nothing is chosen yet, else the index in `ALL` plus one.
 static CHOSEN: AtomicU8 = AtomicU8::new(0);
 
 impl Hinted {
     const ALL: [(Hinted, &str); 3] =
         [(Hinted::Measured, "measured"), (Hinted::Bvh, "bvh"), (Hinted::Tets, "tets")];
 
-    /// What all tracing in this process does from now on.
+    /// Sets how all later batches of this process use hints.
     pub fn choose(self) {
         CHOSEN.store(self as u8 + 1, Ordering::Relaxed);
     }
 
-    /// What tracing does: what [`Self::choose`] said, else what the environment variable `BTH_HINTS` says if that is known,
-    /// else [`Hinted::Measured`].
+    /// The value set by [`Self::choose`], else the one that the environment variable `BTH_HINTS` names, else
+    /// [`Hinted::Measured`].
     pub fn chosen() -> Hinted {
         match CHOSEN.load(Ordering::Relaxed) {
             0 => {
                 let named = std::env::var(VARIABLE).ok().and_then(|name| name.parse().ok());
                 let hinted: Hinted = named.unwrap_or_default();
-                // Two threads that get here at once store the same.
+                // Two threads that arrive here at once store the same value.
                 hinted.choose();
                 hinted
             }
@@ -50,6 +50,6 @@ impl Hinted {
 impl FromStr for Hinted {
     type Err = ();
     fn from_str(name: &str) -> Result<Self, ()> {
-        Hinted::ALL.iter().find(|(_, own)| *own == name).map(|(hinted, _)| *hinted).ok_or(())
+        Hinted::ALL.iter().find(|(_, spelling)| *spelling == name).map(|(hinted, _)| *hinted).ok_or(())
     }
 }

@@ -1,4 +1,4 @@
-//! One object: rays in its space through its BVH and its tetrahedra, one ray or a batch.
+//! Tracing of one object by rays in its space, through its BVH and its tetrahedra: one ray or a batch.
 
 mod batch;
 pub(crate) mod hints;
@@ -6,7 +6,7 @@ mod scratch;
 pub(crate) mod single;
 mod strategy;
 
-pub(crate) use batch::{LEAST_BATCH, any_batch, fill_misses, nearest_batch, trace_batch};
+pub(crate) use batch::{MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_batch};
 pub use hints::Hinted;
 pub(crate) use scratch::{Scratch, with_scratch};
 
@@ -15,7 +15,7 @@ use crate::query::{Any, Nearest, Steps};
 use crate::rays::{Hit, Ray};
 use bth_format::object::ObjectView;
 
-/// Nearest hit of a ray in object space; `from` is the triangle it starts on, or `NONE`.
+/// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a hit.
 #[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
@@ -23,20 +23,20 @@ pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u
     hit
 }
 
-/// As [`nearest`], written to `to`.
+/// As [`nearest`], stored in `hit`, which avoids a copy.
 #[inline(always)]
-pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, to: &mut Hit) {
-    trace::<Nearest, ()>(object, ray, from, instance, &mut (), to);
+pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
+    trace::<Nearest, ()>(object, ray, from, instance, &mut (), hit);
 }
 
-/// As [`nearest`], with a count of the work.
+/// As [`nearest`], with the statistics of the traversal.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
     trace::<Nearest, Steps>(object, ray, from, instance, &mut steps, &mut hit);
     (hit, steps)
 }
 
-/// Whether a ray in object space hits anything.
+/// Whether a ray in object space hits anything; `from` as for [`nearest`].
 #[inline(always)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;

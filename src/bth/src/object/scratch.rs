@@ -1,11 +1,11 @@
-//! Memory of a thread that batches use, kept from one to the next.
+//! Scratch memory of a thread, which is kept from one batch to the next.
 
 use super::strategy::StrategyTable;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
 use std::cell::Cell;
 
-/// Memory that traversals need, kept from one batch to the next.
+/// Memory that the traversals of batches need.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
@@ -13,13 +13,13 @@ pub(crate) struct Scratch {
     pub(super) choices: StrategyTable,
 }
 
-/// Lends the thread's scratch memory.
+/// Calls `work` with the thread's scratch memory.
 #[inline(always)]
 pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
     thread_local! {
         static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
     }
-    // Taken out while it is in use, so that a panic leaves nothing half done behind.
+    // It is taken out while it is in use, so that after a panic the next batch begins with new memory.
     SCRATCH.with(|lent| {
         let mut scratch = lent.take().unwrap_or_default();
         let result = work(&mut scratch);

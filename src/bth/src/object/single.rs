@@ -1,7 +1,7 @@
-//! One ray through an object.
+//! Tracing of one object by a single ray.
 
 use crate::bvh::nodes::{Nodes, Packed, Wide};
-use crate::bvh::single::walk;
+use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Query};
@@ -11,8 +11,8 @@ use crate::tets::{TetStart, enter_tets, start_in_tets};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
-/// Traces one ray; `from` is the triangle it starts on, or `NONE`, and `instance` is what a hit is reported with. The answer goes
-/// into `to`.
+/// Traces one ray and stores its answer. `from` is the triangle on which the ray starts, or `NONE`; `instance` is reported with a
+/// hit.
 #[inline(always)]
 pub(crate) fn trace<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -20,18 +20,18 @@ pub(crate) fn trace<Q: Query, C: Count>(
     from: u32,
     instance: u32,
     count: &mut C,
-    to: &mut Q::Answer,
+    answer: &mut Q::Answer,
 ) {
     if from == NONE || object.tet_leaves.is_empty() {
         let mut query = Q::new(ray);
         through_bvh(object, ray, &mut query, NONE, count);
-        *to = query.answer(object.triangle_ids, instance);
+        *answer = query.answer(object.triangle_ids, instance);
         return;
     }
-    trace_from::<Q, C>(object, ray, from, instance, count, to);
+    trace_from::<Q, C>(object, ray, from, instance, count, answer);
 }
 
-/// As [`trace`], from a triangle that may lie on tetrahedra.
+/// As [`trace`], from a triangle that may be a face of tetrahedra.
 #[inline(never)]
 fn trace_from<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -39,7 +39,7 @@ fn trace_from<Q: Query, C: Count>(
     from: u32,
     instance: u32,
     count: &mut C,
-    to: &mut Q::Answer,
+    answer: &mut Q::Answer,
 ) {
     let mut query = Q::new(ray);
     match start_in_tets(object, ray, from, &mut query, count) {
@@ -47,10 +47,11 @@ fn trace_from<Q: Query, C: Count>(
         TetStart::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}
         TetStart::Walked(leaf) => through_bvh(object, ray, &mut query, leaf, count),
     }
-    *to = query.answer(object.triangle_ids, instance);
+    *answer = query.answer(object.triangle_ids, instance);
 }
 
-/// Traces a ray through the BVH; `walked` is the tet leaf from which the query has what it knows, which is left out, or `NONE`.
+/// Traces a ray through the BVH. `walked` is a tet leaf that is skipped, because the query already holds the ray's hits in it, or
+/// `NONE`.
 #[inline(always)]
 pub(crate) fn through_bvh<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -65,18 +66,17 @@ pub(crate) fn through_bvh<Q: Query, C: Count>(
     }
 }
 
-/// A ray and its query, which says afterwards what was found.
+/// The kernel of [`through_bvh`]; the result is left in the query.
 struct SingleKernel<'a, Q: Query, C> {
     object: &'a ObjectView<'a>,
     ray: &'a Ray,
     query: &'a mut Q,
-    /// The tet leaf from which the query has what it knows, which is to be left out; or `NONE`.
     walked: u32,
     count: &'a mut C,
     stack: &'a mut SingleStack,
 }
 
-// By reference: copies of what was just written word by word stall.
+// The kernel is passed by reference: copies of fields that were just written stall.
 impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     type Output = ();
     #[inline(always)]
@@ -84,31 +84,31 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
         if self.object.has_packed_nodes() {
             return through_packed_nodes(self);
         }
-        self.walk(s, Wide);
+        self.traverse(s, Wide);
     }
 }
 
-/// UncachedHits, so that the common kernel stays short.
+/// A separate kernel for the less common node format, so that the other stays short.
 #[cold]
 #[inline(never)]
 fn through_packed_nodes<Q: Query, C: Count>(single: &mut SingleKernel<'_, Q, C>) {
     Isa::chosen().run(SinglePackedKernel(single));
 }
 
-/// A ray among packed nodes, as a kernel.
+/// The kernel of [`through_packed_nodes`].
 struct SinglePackedKernel<'a, T>(&'a mut T);
 
 impl<Q: Query, C: Count> Kernel for SinglePackedKernel<'_, SingleKernel<'_, Q, C>> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        self.0.walk(s, Packed);
+        self.0.traverse(s, Packed);
     }
 }
 
 impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
     #[inline(always)]
-    fn walk<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
+    fn traverse<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
         let SingleKernel { object, ray, query, walked, count, stack } = self;
         let (object, ray) = (*object, *ray);
         let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
@@ -119,6 +119,6 @@ impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
                 None => return,
             },
         };
-        walk(s, nodes, (object, ray), &prepared, *walked, *query, stack, *count, tets);
+        trace_single(s, nodes, (object, ray), &prepared, *walked, *query, stack, *count, tets);
     }
 }

@@ -1,45 +1,48 @@
-//! Which of two ways to trace is the faster: found out by trying both on the caller's own batches.
+//! Choice between two strategies of tracing, by measuring both on the caller's own batches.
 //!
-//! Whether rays that start on a surface are faster through tetrahedra or through the BVH beside them depends on the
-//! model, the rays, the caches and the gathers of the machine: ratios from 0.5 to 1.3 have been measured
-//! (docs/notes/tets.md). Answers are the same bits either way, so the choice can be left to the clock. The slower way is tried
-//! again now and then, ever more seldom while nothing changes: in the long run it takes one batch in 256.
+//! Whether rays that start on a known triangle are faster through tetrahedra or through the BVH depends on the model, the rays, the
+//! caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers have
+//! the same bits either strategy, so the choice can depend on time. The slower strategy is measured again at intervals that grow
+//! while the order stays the same; in the long run it gets one batch in 256.
 
 use std::time::Instant;
 
-/// A way to trace rays that start on known surfaces.
+/// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Strategy {
     Bvh,
     Tets,
 }
 
-/// Batches of fewer rays are too short for the clock: they take the way that is thought the faster, and teach nothing.
-pub(crate) const FEWEST_MEASURED_RAYS: usize = 256;
-/// Batches by which both ways are tried in turn before any choice. The first two warm the caches, and do not count.
+/// Smaller batches are neither measured nor used to measure: they take the strategy that is faster as far as is known.
+pub(crate) const MIN_MEASURED_RAYS: usize = 256;
+/// Number of batches in which both strategies are measured in turn before the first choice.
 const TRIALS: u32 = 8;
+/// The first of those, which warm the caches and are not counted.
 const WARM_UP: u32 = 2;
-/// Batches until the slower way is tried again, at first and at last.
-const FIRST_WAIT: u32 = 32;
-const LAST_WAIT: u32 = 256;
+/// Batches until the slower strategy is measured again, after the first choice or a change of order.
+const FIRST_INTERVAL: u32 = 32;
+/// The greatest number of such batches.
+const LAST_INTERVAL: u32 = 256;
 
-/// What has been measured so far.
+/// The measurements for one kind of rays through one object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyChoice {
-    /// Seconds a ray, of either way.
+    /// Seconds per ray of each strategy, once measured.
     cost: [Option<f64>; 2],
     batches: u32,
-    /// Batches until the slower way is tried again, and how many there will be the next time.
-    left: u32,
-    wait: u32,
+    /// Batches until the slower strategy is measured again.
+    remaining: u32,
+    /// Batches from then until the next time.
+    interval: u32,
 }
 
 impl StrategyChoice {
     pub(crate) fn new() -> StrategyChoice {
-        StrategyChoice { cost: [None; 2], batches: 0, left: FIRST_WAIT, wait: FIRST_WAIT }
+        StrategyChoice { cost: [None; 2], batches: 0, remaining: FIRST_INTERVAL, interval: FIRST_INTERVAL }
     }
 
-    /// The way that is thought the faster.
+    /// The faster strategy as far as is known.
     pub(crate) fn best(&self) -> Strategy {
         match self.cost {
             [Some(bvh), Some(tets)] if tets < bvh => Strategy::Tets,
@@ -47,53 +50,53 @@ impl StrategyChoice {
         }
     }
 
-    /// The way that the next batch is to take.
+    /// The strategy for the next batch.
     pub(crate) fn next(&mut self) -> Strategy {
         let best = self.best();
         if self.batches < TRIALS {
             return if self.batches.is_multiple_of(2) { Strategy::Bvh } else { Strategy::Tets };
         }
-        if self.left > 0 {
-            self.left -= 1;
+        if self.remaining > 0 {
+            self.remaining -= 1;
             return best;
         }
-        self.left = self.wait;
+        self.remaining = self.interval;
         if best == Strategy::Bvh { Strategy::Tets } else { Strategy::Bvh }
     }
 
-    /// Learns what a batch took.
-    pub(crate) fn learn(&mut self, way: Strategy, seconds_a_ray: f64) {
+    /// Records the time of a batch.
+    pub(crate) fn record(&mut self, strategy: Strategy, seconds_per_ray: f64) {
         self.batches = self.batches.saturating_add(1);
         if self.batches <= WARM_UP {
             return;
         }
         let before = self.best();
-        let cost = &mut self.cost[way as usize];
-        // The thread may have been interrupted: of the first trials the least counts, later nothing as more than twice
-        // what was expected, and less than that more readily.
+        let cost = &mut self.cost[strategy as usize];
+        // The thread may have been interrupted. Therefore the least of the first measurements counts; later ones count as at most
+        // twice the expected time, and change it less when they are greater than when they are smaller.
         *cost = Some(match *cost {
-            None => seconds_a_ray,
-            Some(cost) if self.batches <= TRIALS => cost.min(seconds_a_ray),
-            Some(cost) if seconds_a_ray < cost => (cost + seconds_a_ray) / 2.0,
-            Some(cost) => cost + (seconds_a_ray.min(2.0 * cost) - cost) / 8.0,
+            None => seconds_per_ray,
+            Some(cost) if self.batches <= TRIALS => cost.min(seconds_per_ray),
+            Some(cost) if seconds_per_ray < cost => (cost + seconds_per_ray) / 2.0,
+            Some(cost) => cost + (seconds_per_ray.min(2.0 * cost) - cost) / 8.0,
         });
         if self.batches > TRIALS && self.best() != before {
-            (self.left, self.wait) = (FIRST_WAIT, FIRST_WAIT);
-        } else if way != before {
-            self.wait = (self.wait * 2).min(LAST_WAIT);
+            (self.remaining, self.interval) = (FIRST_INTERVAL, FIRST_INTERVAL);
+        } else if strategy != before {
+            self.interval = (self.interval * 2).min(LAST_INTERVAL);
         }
     }
 }
 
-/// StrategyTable by what is traced: a thread's own.
+/// The choices of one thread, by object and kind of rays.
 #[derive(Debug)]
 pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 
 impl StrategyTable {
     const ROWS: usize = 32;
 
-    /// The choice for rays of a kind through an object, told from others by a number that is most often unique. If it is
-    /// not, or was another object's before, a few batches take the slower way.
+    /// The choice for a kind of rays through an object, which is identified by its address. If the address belonged to another object
+    /// before, a few batches may take the slower strategy.
     pub(crate) fn of(&mut self, object: usize, kind: usize) -> &mut StrategyChoice {
         let name = (object / 8).wrapping_mul(2).wrapping_add(kind);
         let row = (name.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
@@ -111,9 +114,9 @@ impl Default for StrategyTable {
     }
 }
 
-/// A clock, where the machine has one.
+/// The current time; None on targets without a clock.
 pub(crate) fn now() -> Option<Instant> {
-    // There, asking panics.
+    // `Instant::now` panics there.
     if cfg!(all(target_family = "wasm", target_os = "unknown")) { None } else { Some(Instant::now()) }
 }
 
@@ -122,29 +125,29 @@ mod tests {
     use super::*;
     use bth_random::Rng;
 
-    /// Batches that took tets, of so many, at such costs; every twentieth is interrupted.
+    /// Number of batches that are traced by tets, of `batches` with the given seconds per ray; one in twenty is interrupted.
     fn tets_taken(choice: &mut StrategyChoice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
         let mut taken = 0;
         for _ in 0..batches {
-            let way = choice.next();
-            taken += u32::from(way == Strategy::Tets);
+            let strategy = choice.next();
+            taken += u32::from(strategy == Strategy::Tets);
             let noise = 0.95 + 0.1 * f64::from(rng.below(1000) as u32) / 1000.0;
             let interruption = if rng.below(20) == 0 { 30.0 } else { 1.0 };
-            choice.learn(way, cost[way as usize] * noise * interruption);
+            choice.record(strategy, cost[strategy as usize] * noise * interruption);
         }
         taken
     }
 
     #[test]
-    fn the_faster_way_is_taken_whatever_interrupts() {
+    fn the_faster_strategy_is_chosen_despite_interruptions() {
         for seed in 0..50 {
             let mut rng = Rng::new(seed);
             let mut choice = StrategyChoice::new();
             let taken = tets_taken(&mut choice, &mut rng, 4000, [100e-9, 200e-9]);
-            assert!((4..160).contains(&taken), "the slower way takes {taken} of 4000");
+            assert!((4..160).contains(&taken), "the slower strategy takes {taken} of 4000");
             let mut choice = StrategyChoice::new();
             let taken = tets_taken(&mut choice, &mut rng, 4000, [200e-9, 100e-9]);
-            assert!((3840..3996).contains(&taken), "the faster way takes {taken} of 4000");
+            assert!((3840..3996).contains(&taken), "the faster strategy takes {taken} of 4000");
         }
     }
 
@@ -159,11 +162,11 @@ mod tests {
     }
 
     #[test]
-    fn choices_of_different_objects_and_kinds_are_apart() {
+    fn objects_and_kinds_of_rays_have_separate_choices() {
         let mut choices = StrategyTable::default();
         for _ in 0..TRIALS {
-            choices.of(4096, 0).learn(Strategy::Bvh, 2.0);
-            choices.of(4096, 0).learn(Strategy::Tets, 1.0);
+            choices.of(4096, 0).record(Strategy::Bvh, 2.0);
+            choices.of(4096, 0).record(Strategy::Tets, 1.0);
         }
         assert_eq!(choices.of(4096, 0).best(), Strategy::Tets);
         assert_eq!(choices.of(4096, 1).best(), Strategy::Bvh);

@@ -1,6 +1,6 @@
-//! Tet walks of a whole batch, across rays and tet leaves: what waits to be walked, and where it begins.
+//! Tet walks of a batch of rays, in one or several tet leaves: the state of the batch, and the preparation of rays for lanes.
 //!
-//! `tet_rounds` walks; what its lanes cannot tell, `tet_decide` does.
+//! The kernel is in [`super::rounds`]; decisions that its f32 lanes leave open are made in [`super::decide`].
 
 use super::lanes::{three, word};
 use super::queue::{Ready, ReadyQueue};
@@ -14,65 +14,76 @@ use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Hits that wait to be looked at in f64 together.
+/// Number of reached faces that are tested in f64 together.
 const PENDING: usize = 64;
 
-/// What has become of a ray.
+/// State of a ray's walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WalkState {
-    /// It was not walked.
-    Not,
-    /// Its line was followed to where it leaves the tet leaf, or nothing nearer can follow.
+    /// The ray was not walked.
+    NotWalked,
+    /// The query holds all hits of the ray in the tet leaf that can change its result.
     Left,
-    /// Its query has what it wants.
+    /// The query is complete.
     Done,
 }
 
-/// A tetrahedron where a ray is, or is to begin.
+/// The tetrahedron in which a ray's walk begins or continues.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WalkStart {
+    /// Index of the ray in the batch.
     pub(super) slot: u32,
     pub(super) tet: u32,
-    /// Entered through a face that the line crosses for certain, counterclockwise.
+    /// The entered face is certainly crossed by the line, and counterclockwise as seen along the ray.
     pub(super) entered: Entered,
 }
 
-/// A constrained face that a ray certainly crosses.
+/// A constrained face that a ray's line certainly crosses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reached {
+    /// Index of the ray in the batch.
     pub(super) slot: u32,
     pub(super) face: u32,
 }
 
-/// The batch: rays, where they begin, and what is known of them.
+/// The rays of a batch and where their walks begin; see the fields of [`WalkBatch`].
+pub(crate) struct WalkRays<'a> {
+    pub(crate) rays: &'a [Ray],
+    pub(crate) faces: &'a [u32],
+    pub(crate) leaves: &'a [u32],
+}
+
+/// The batch: its rays, where their walks begin, and their state.
 pub(crate) struct WalkBatch<'a, Q> {
     pub(super) object: &'a ObjectView<'a>,
     pub(super) records: LaneRecords<'a>,
     pub(super) rays: &'a [Ray],
-    /// For each ray the constrained face that it starts about, or [`NONE`].
+    /// For each ray the constrained face near which it starts, or [`NONE`].
     pub(super) faces: &'a [u32],
-    /// For each ray the tet leaf that it is to enter from outside if it does not start about a face; or [`NONE`].
+    /// For each ray the tet leaf that it enters from outside if it does not start near a face, or [`NONE`].
     pub(super) leaves: &'a [u32],
     pub(super) queries: &'a mut [Q],
     pub(super) walks: &'a mut [WalkState],
+    /// Index of the first ray that is not yet prepared.
     next: usize,
+    /// Walks that begin or continue within a leaf.
     pub(super) starts: Vec<WalkStart>,
+    /// Faces that lanes have reached and that are not yet tested.
     pub(super) reached: Vec<Reached>,
+    /// For each ray how often it has returned to the lanes.
     pub(super) returns: Vec<u8>,
 }
 
 impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
-    /// None of the rays has been walked yet. All slices have one element a ray.
+    /// A batch of which no ray has been walked. All slices have one element per ray.
     pub(crate) fn new(
         object: &'a ObjectView<'a>,
         records: LaneRecords<'a>,
-        rays: &'a [Ray],
-        faces: &'a [u32],
-        leaves: &'a [u32],
+        WalkRays { rays, faces, leaves }: WalkRays<'a>,
         queries: &'a mut [Q],
         walks: &'a mut [WalkState],
     ) -> Self {
-        walks.fill(WalkState::Not);
+        walks.fill(WalkState::NotWalked);
         WalkBatch {
             object,
             records,
@@ -88,25 +99,25 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         }
     }
 
-    /// Whether lanes can address all parts of an object: their words by less than 2^31.
+    /// Whether lanes can address all parts of an object: gathers need indices of words below 2^31.
     pub(crate) fn fits(object: &ObjectView<'_>) -> bool {
-        const MOST: usize = 1 << 31;
-        object.records.len() < MOST / 8
-            && object.tet_vertices.len() < MOST / 4
-            && object.tet_faces.len() < MOST / 8
+        const MAX_WORDS: usize = 1 << 31;
+        object.records.len() < MAX_WORDS / 8
+            && object.tet_vertices.len() < MAX_WORDS / 4
+            && object.tet_faces.len() < MAX_WORDS / 8
     }
 
-    /// Gets sixteen rays ready, if there are as many.
+    /// Fills the empty queue with prepared rays, as far as there are any.
     #[inline(always)]
     pub(super) fn fill<S: Simd>(&mut self, s: S, queue: &mut ReadyQueue) {
         if self.reached.len() >= PENDING {
-            self.look_at_all();
+            self.test_reached_faces();
         }
         queue.rewind();
-        while queue.has_room() {
+        while queue.has_space() {
             if self.starts.len() >= LANES || self.next >= self.faces.len() {
                 if self.starts.is_empty() {
-                    self.look_at_all();
+                    self.test_reached_faces();
                 }
                 if self.starts.is_empty() {
                     return;
@@ -118,10 +129,11 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         }
     }
 
+    /// Prepares the last sixteen of `starts`. Rays that f32 cannot represent are walked in f64.
     #[inline(always)]
     fn fill_from_starts<S: Simd>(&mut self, s: S, queue: &mut ReadyQueue) {
-        let some = self.starts.len().saturating_sub(LANES);
-        let starts = &self.starts[some..];
+        let first = self.starts.len().saturating_sub(LANES);
+        let starts = &self.starts[first..];
         let valid = (1u32 << starts.len()) - 1;
         let mut columns = [[0; LANES]; 7];
         for (i, start) in starts.iter().enumerate() {
@@ -142,9 +154,9 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         queue.push(s, able, &ready.lanes);
         let mut rest = valid & !able;
         if rest == 0 {
-            return self.starts.truncate(some);
+            return self.starts.truncate(first);
         }
-        let starts = self.starts.split_off(some);
+        let starts = self.starts.split_off(first);
         while rest != 0 {
             let start = starts[rest.trailing_zeros() as usize];
             rest &= rest - 1;
@@ -155,6 +167,7 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         }
     }
 
+    /// Prepares the next sixteen rays of the batch.
     #[inline(always)]
     fn fill_from_faces<S: Simd>(&mut self, s: S, queue: &mut ReadyQueue) {
         let first = self.next;
@@ -181,7 +194,7 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         self.locate_all(first as u32, rest);
     }
 
-    /// Gets rays ready that all enter one tet leaf; returns those that f32 cannot tell.
+    /// Prepares rays that all enter the same tet leaf from outside; returns the bits of those that f32 does not decide.
     #[inline(always)]
     fn fill_from_outside<S: Simd>(
         &mut self,
@@ -206,7 +219,7 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         rest
     }
 
-    /// CachedHits in f64 for the places where rays begin: those from `first` on whose bit is set.
+    /// Locates in f64 the starts of the rays from `first` on whose bit is set.
     fn locate_all(&mut self, first: u32, mut bits: u32) {
         while bits != 0 {
             let slot = first + bits.trailing_zeros();
@@ -217,28 +230,31 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
         }
     }
 
+    /// Locates in f64 the start of a ray: near its face, or where it enters its leaf.
     #[inline(never)]
     fn locate(&mut self, slot: u32) {
         let ray = &self.rays[slot as usize];
         let Some(line) = Line::new(ray) else { return };
         let space = self.space(slot, &line);
         let face = self.faces[slot as usize];
-        // A walk from the origin sees only what lies ahead of it.
+        // A walk from the origin finds hits with t >= 0 only.
         let located = if face != NONE && ray.tmin >= 0.0 { space.locate(face) } else { None };
-        let place = match located {
-            Some(place) => Ok(place),
+        let position = match located {
+            Some(position) => Ok(position),
             None if self.leaves[slot as usize] == NONE => return,
             None => space.enter_hull(),
         };
-        match place {
-            Ok(place) => self.starts.push(WalkStart { slot, tet: place.tet, entered: place.entered }),
+        match position {
+            Ok(position) => {
+                self.starts.push(WalkStart { slot, tet: position.tet, entered: position.entered });
+            }
             Err(WalkOutcome::Uncertain) => self.flood(slot),
             Err(outcome) => self.finish(slot, outcome),
         }
     }
 }
 
-/// Vertices as words: x, y, z and one that is unused.
+/// Vertices as rows of four words: x, y, z and one that is unused.
 pub(super) fn vertices<'a>(object: &ObjectView<'a>) -> &'a [[f32; 4]] {
     <[[f32; 4]]>::ref_from_bytes(object.tet_vertices.as_bytes()).expect("a vertex is four words")
 }

@@ -1,10 +1,8 @@
-//! What a tet walk falls back to when the line meets an edge or a vertex: a flood over all tetrahedra
-//! that the line touches.
+//! Fallback of a tet walk for lines that pass through an edge or a vertex: a flood fill over all tetrahedra that the line may touch.
 //!
-//! From the hull faces that the line may touch it spreads over every face that the line may
-//! touch, rounding counted in. The tetrahedra around a vertex or an edge hang together by faces that
-//! hold it, so nothing that the line touches is left out, and each is visited once: it
-//! ends, and it finds every constrained face that the exact test can accept.
+//! It starts at the hull faces that the line may touch, rounding errors included, and crosses every such face. All tetrahedra at a
+//! vertex or an edge are connected through faces that contain it, so the flood reaches every tetrahedron that the line touches, and
+//! with them every constrained face that the exact test can accept. Each tetrahedron is visited once, so the flood ends.
 
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetSpace, WalkOutcome};
@@ -13,27 +11,29 @@ use crate::query::{Count, Query};
 use bth_format::layout::{FACE_BIT, NONE};
 use std::collections::HashSet;
 
-/// Tetrahedra that a flood has been in: mostly some ten around a vertex, but all of a fan where that is the vertex.
-struct OriginTerms {
-    few: [u32; 48],
+/// The tetrahedra that a flood has visited: about ten around most vertices, but as many as a leaf holds around the center of a fan.
+struct VisitedSet {
+    /// The first ones, in an array, which needs no allocation.
+    first: [u32; 48],
     len: usize,
-    many: HashSet<u32>,
+    /// The others.
+    more: HashSet<u32>,
 }
 
-impl OriginTerms {
+impl VisitedSet {
     fn new() -> Self {
-        OriginTerms { few: [0; 48], len: 0, many: HashSet::new() }
+        VisitedSet { first: [0; 48], len: 0, more: HashSet::new() }
     }
 
-    /// Adds one; false if it was there.
+    /// Adds a tetrahedron; returns false if it was in the set.
     fn insert(&mut self, tet: u32) -> bool {
-        if self.few[..self.len].contains(&tet) {
+        if self.first[..self.len].contains(&tet) {
             return false;
         }
-        if self.len == self.few.len() {
-            return self.many.insert(tet);
+        if self.len == self.first.len() {
+            return self.more.insert(tet);
         }
-        self.few[self.len] = tet;
+        self.first[self.len] = tet;
         self.len += 1;
         true
     }
@@ -44,10 +44,10 @@ impl TetSpace<'_> {
     #[inline(never)]
     pub(crate) fn flood<Q: Query, C: Count>(&self, query: &mut Q, count: &mut C) -> WalkOutcome {
         count.flood();
-        let mut seen = OriginTerms::new();
+        let mut visited = VisitedSet::new();
         let mut open: Vec<(u32, Entered)> = Vec::new();
         for face in self.hull {
-            if self.touches(&face.vertex.map(|v| self.project(v))) && seen.insert(face.tet) {
+            if self.touches(&face.vertex.map(|v| self.project(v))) && visited.insert(face.tet) {
                 open.push((face.tet, Entered { face: face.vertex, apex: face.opposite, behind: NONE }));
             }
         }
@@ -71,7 +71,7 @@ impl TetSpace<'_> {
                     continue;
                 }
                 if let Some((next, apex, behind)) = self.beyond(tet, link, face)
-                    && seen.insert(next)
+                    && visited.insert(next)
                 {
                     open.push((next, Entered { face, apex, behind }));
                 }
@@ -80,7 +80,7 @@ impl TetSpace<'_> {
         WalkOutcome::Left
     }
 
-    /// Whether the line may meet the closed face: false only if it certainly does not.
+    /// Whether the line may meet the closed face; false only if it certainly does not.
     fn touches(&self, corner: &[Projected; 3]) -> bool {
         let sides = self.sides(corner);
         !(sides.contains(&Sign::Positive) && sides.contains(&Sign::Negative))

@@ -1,18 +1,18 @@
-//! Sixteen tet walks side by side: the step from one tetrahedron to the next, in f32.
+//! The step of sixteen tet walks, one in each lane, from a tetrahedron to the next, in f32.
 //!
-//! As [`super::walk`], but a sign counts only where f32 makes it certain. With u = 2^-24, the computed projection
+//! The method is that of [`super::walk`]; a sign is used only if it is certain in f32. With u = 2^-24, the computed projection
 //! (x, y, z) of a point, z its depth, and W = |x| + |y| + |z|: the differences from the origin are off by a factor of
 //! 1 + u, the shear, at most 1, too, and with the roundings of the product and the last difference x and y are off by
 //! u (2|x| + 4|z|), less than δ = 4.1 u W. For two points a and b with S = |x| + |y| the cross product is then off
 //! by δa Sb + δb Sa + 2 δa δb, and by 2 u Sa Sb for its own roundings; where B is at least the W of both, that is
 //! less than 5.1 u B (Sa + Sb) + 34 u² B². What is computed is a bound of E = 6 u B (Sa + T + 8 u B).
 //!
-//! B and T are the greatest W and S that the lane has met, and B at least 2^-38: so E exceeds 2^-119 and with it
-//! whatever underflow does. From 2^61 on, where products might overflow, B makes E infinite and nothing is certain.
-//! One E for a step is all it takes: of the rays that bounce about a scan it leaves fewer than one in 500 in doubt.
+//! B and T are the greatest W and S of the points that the lane has projected so far, and B is at least 2^-38, so E exceeds 2^-119
+//! and with it the effect of underflow. From 2^61 on, where products might overflow, B makes E infinite and nothing is certain.
+//! One E serves all three products of a step. Of the diffuse rays in a scanned model it leaves fewer than one in 500 uncertain.
 //!
-//! The two signs that name the exit of the line are all that a step needs: the face left behind was crossed with certain
-//! signs, so those of the face ahead are certain too.
+//! The two signs that select the exit are all that a step needs: the entered face was crossed with certain signs, so those of the face
+//! of exit are certain, too.
 
 use super::records::{EnteredLanes, LaneRecords};
 use crate::simd::Simd;
@@ -20,12 +20,12 @@ use bth_format::layout::{FACE_BIT, NONE};
 
 /// 2^-24.
 const U: f32 = 1.0 / (1 << 24) as f32;
-/// Least B; see above.
+/// The least B; see the head of this file.
 const LEAST_REACH: f32 = 1.0 / (1u64 << 38) as f32;
-/// Turns a B of 2^61 into infinity.
+/// A factor that makes a B of 2^61 infinite.
 const TO_INFINITY: f32 = (1u128 << 67) as f32;
 
-/// An array of three, without the closure that keeps `array::map` from being compiled for the instruction set.
+/// An array of three elements. `array::map` would call a closure that is not compiled for the kernel's instruction set.
 macro_rules! three {
     (|$i:ident| $element:expr) => {
         [
@@ -46,43 +46,46 @@ macro_rules! three {
 }
 pub(super) use three;
 
-/// Added to the tetrahedron of a lane that is in doubt; with [`FACE_BIT`] it makes a lane stop.
+/// Set in the `TET` word of a lane that stops because a sign is uncertain; the lower bits hold the tetrahedron.
 pub(super) const DOUBT: u32 = FACE_BIT | 1 << 30;
 
-/// Names of the u32 of a lane.
+/// Indices of the u32 values of a lane.
 pub(super) mod word {
-    /// The tetrahedron; once the lane has stopped, what lies behind the face that stopped it, as in a link, or
-    /// the tetrahedron and [`super::DOUBT`].
+    /// The tetrahedron. After the lane has stopped: the link behind the face at which it stopped, or the tetrahedron with
+    /// [`super::DOUBT`].
     pub(crate) const TET: usize = 0;
-    /// The vertex that the link hither named.
+    /// Opposite vertex stored in the link that was followed; of use in the format `Link32` only.
     pub(crate) const APEX: usize = 1;
-    /// What lies behind the face entered, as the record of the tetrahedron stores it.
+    /// The link behind the entered face, as the record of the tetrahedron stores it.
     pub(crate) const BEHIND: usize = 2;
-    /// The first of three vertices of the face entered.
+    /// The first of the three vertices of the entered face.
     pub(crate) const FACE: usize = 3;
     /// The axis of the depth.
     pub(crate) const AXIS: usize = 6;
-    /// Sign bit of the direction along the depth.
+    /// Sign bit of the direction along the axis of the depth.
     pub(crate) const SIGN: usize = 7;
-    /// Which of the batch's rays it is.
+    /// Index of the ray in the batch.
     pub(crate) const SLOT: usize = 8;
     pub(crate) const COUNT: usize = 9;
 }
 
-/// Names of the f32 of a lane. What has three elements is named by the first.
+/// Indices of the f32 values of a lane; for arrays the index of the first element.
 pub(super) mod float {
-    /// The ray's origin along the three axes.
+    /// Three elements: the ray's origin along the axes of the lane.
     pub(crate) const ORIGIN: usize = 0;
-    /// Two: the direction over the absolute of its depth.
+    /// Two elements: the direction in the plane of projection, divided by its |component| along the axis of the depth.
     pub(crate) const SHEAR: usize = 3;
-    /// The projected face: x, y, depth in the ray's direction.
+    /// Three elements: x of the projected corners of the entered face.
     pub(crate) const X: usize = 5;
+    /// Three elements: y of these corners.
     pub(crate) const Y: usize = 8;
+    /// Three elements: the depths of these corners, increasing along the ray.
     pub(crate) const DEPTH: usize = 11;
-    /// B and T.
+    /// B of the error bound.
     pub(crate) const REACH: usize = 14;
+    /// T of the error bound.
     pub(crate) const SIZE: usize = 15;
-    /// Depth beyond which nothing is of interest.
+    /// Upper bound of the depth of tmax.
     pub(crate) const LIMIT: usize = 16;
     pub(crate) const COUNT: usize = 17;
 }
@@ -94,7 +97,7 @@ pub(super) struct Lanes<S: Simd> {
     pub(super) floats: [S::F; float::COUNT],
 }
 
-/// Points as seen along the rays of the lanes.
+/// Points projected along the rays of the lanes.
 #[derive(Clone, Copy)]
 pub(super) struct ProjectedLanes<S: Simd> {
     pub(super) x: S::F,
@@ -102,7 +105,7 @@ pub(super) struct ProjectedLanes<S: Simd> {
     pub(super) depth: S::F,
 }
 
-/// B and T.
+/// B and T of the error bound.
 #[derive(Clone, Copy)]
 pub(super) struct Extent<S: Simd> {
     pub(super) reach: S::F,
@@ -110,19 +113,19 @@ pub(super) struct Extent<S: Simd> {
 }
 
 impl<S: Simd> Extent<S> {
-    /// Before any point was met.
+    /// The extent of no points.
     #[inline(always)]
     pub(super) fn least(s: S) -> Self {
         Extent { reach: s.splat(LEAST_REACH), size: s.splat(0.0) }
     }
-    /// With one more point; also its S.
+    /// The extent with one more point, and the point's S.
     #[inline(always)]
     pub(super) fn with(self, s: S, p: &ProjectedLanes<S>) -> (Self, S::F) {
         let size = s.add(s.abs(p.x), s.abs(p.y));
         let reach = s.add(size, s.abs(p.depth));
         (Extent { reach: s.max(reach, self.reach), size: s.max(size, self.size) }, size)
     }
-    /// E for a point of size S with any of the points met.
+    /// E for the cross product of a point with the given S and any of the points of the extent.
     #[inline(always)]
     pub(super) fn bound(&self, s: S, size: S::F) -> S::F {
         let factor = s.mul(s.mul(self.reach, s.splat(TO_INFINITY)), s.splat(6.0 * U / TO_INFINITY));
@@ -130,14 +133,14 @@ impl<S: Simd> Extent<S> {
     }
 }
 
-/// Twice the area of the triangle (ray, a, b), to within E.
+/// Twice the signed area of the triangle (line, a, b) in the plane of projection, with an error below E.
 #[inline(always)]
 pub(super) fn cross<S: Simd>(s: S, a: &ProjectedLanes<S>, b: &ProjectedLanes<S>) -> S::F {
     s.fnma(a.y, b.x, s.mul(a.x, b.y))
 }
 
 impl<S: Simd> Lanes<S> {
-    /// No walk at all.
+    /// Lanes without walks.
     #[inline(always)]
     pub(super) fn idle(s: S) -> Self {
         let mut lanes = Lanes { words: [s.splat_u(0); word::COUNT], floats: [s.splat(0.0); float::COUNT] };
@@ -145,30 +148,31 @@ impl<S: Simd> Lanes<S> {
         lanes
     }
 
-    /// Walks under way.
+    /// The lanes whose walks have not stopped.
     #[inline(always)]
     pub(super) fn active(&self, s: S) -> S::M {
         s.lt_u(self.words[word::TET], s.splat_u(FACE_BIT))
     }
 
+    /// A projected corner of the entered face.
     #[inline(always)]
     pub(super) fn corner(&self, i: usize) -> ProjectedLanes<S> {
         let f = &self.floats;
         ProjectedLanes { x: f[float::X + i], y: f[float::Y + i], depth: f[float::DEPTH + i] }
     }
 
-    /// Vertices seen from the rays' origins, given as rows of x, y, z and one more.
+    /// Vertices relative to the rays' origins, along the axes of the lanes. `vertices` are rows of x, y, z and an unused word.
     #[inline(always)]
     pub(super) fn gather(&self, s: S, m: S::M, vertices: &[[f32; 4]], vertex: S::U) -> [S::F; 3] {
         let [x, y, z, _] = s.rows4(m, vertices, vertex);
-        let along = self.turn(s, [x, y, z]);
+        let along = self.permute(s, [x, y, z]);
         three!(|k| s.sub(along[k], self.floats[float::ORIGIN + k]))
     }
 
-    /// Coordinates along the axes of the lanes: the two of the plane, which follow the one of the depth in turn, swapped for
-    /// rays that go down; and the depth.
+    /// Permutes coordinates to the axes of the lanes: the two axes of the plane, which follow the axis of the depth cyclically and are
+    /// swapped for rays with a negative direction along it, then the axis of the depth.
     #[inline(always)]
-    pub(super) fn turn(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+    pub(super) fn permute(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         let axis = self.words[word::AXIS];
         let (is_x, is_y) = (s.eq_u(axis, s.splat_u(0)), s.eq_u(axis, s.splat_u(1)));
         let down = s.lt_u(s.splat_u(0), self.words[word::SIGN]);
@@ -178,6 +182,7 @@ impl<S: Simd> Lanes<S> {
         [s.select(down, last, next), s.select(down, next, last), depth]
     }
 
+    /// Projects points that are relative to the origins, along the axes of the lanes.
     #[inline(always)]
     pub(super) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> ProjectedLanes<S> {
         let depth = s.floats(s.xor_u(s.bits(z), self.words[word::SIGN]));
@@ -187,13 +192,16 @@ impl<S: Simd> Lanes<S> {
     }
 }
 
-/// A step that is under way: so that the gathers of several groups of lanes can overlap, it is made in three parts.
+/// Intermediate results of a step. A step has three parts, so that the gathers of several groups of lanes can overlap.
 #[derive(Clone, Copy)]
 pub(super) struct Step<S: Simd> {
     apex: S::U,
     position: [S::F; 3],
-    go: S::M,
+    /// The lanes whose signs are certain.
+    certain: S::M,
+    /// The vertex opposite to the face of exit.
     left: S::U,
+    /// The vertices of the entered face.
     face: [S::U; 3],
 }
 
@@ -201,11 +209,12 @@ impl<S: Simd> Step<S> {
     #[inline(always)]
     pub(super) fn none(s: S) -> Self {
         let (u, f) = (s.splat_u(0), s.splat(0.0));
-        Step { apex: u, position: [f; 3], go: s.mask(0), left: u, face: [u; 3] }
+        Step { apex: u, position: [f; 3], certain: s.mask(0), left: u, face: [u; 3] }
     }
 }
 
 impl<S: Simd> Lanes<S> {
+    /// How the walks entered their tetrahedra; `one` is [`EnteredLanes::one`].
     #[inline(always)]
     fn entered(&self, one: S::U) -> EnteredLanes<S> {
         let w = &self.words;
@@ -218,7 +227,7 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// First part of a step, which takes every active walk one tetrahedron on: fetches the fourth vertex.
+    /// First part of a step: fetches the fourth vertex of each active lane's tetrahedron.
     #[inline(always)]
     pub(super) fn fetch(
         &self,
@@ -233,7 +242,8 @@ impl<S: Simd> Lanes<S> {
         step.position = self.gather(s, active, vertices, step.apex);
     }
 
-    /// Second part: finds the face through which the line leaves. Depths are kept only if asked for.
+    /// Second part of a step: finds the face through which the line leaves, and makes it the entered face. With `DEPTHS` the depths of
+    /// its corners are kept.
     #[inline(always)]
     pub(super) fn choose<const DEPTHS: bool>(&mut self, s: S, step: &mut Step<S>) {
         let apex = self.project(s, step.position);
@@ -250,7 +260,7 @@ impl<S: Simd> Lanes<S> {
             s.and(active, s.and(positive[2], negative[0])),
             s.and(active, s.and(positive[0], negative[1])),
         ];
-        step.go = s.or(out[0], s.or(out[1], out[2]));
+        step.certain = s.or(out[0], s.or(out[1], out[2]));
         step.face = three!(|i| self.words[word::FACE + i]);
         step.left = s.select_u(out[2], step.face[2], s.select_u(out[1], step.face[1], step.face[0]));
         self.floats[float::REACH] = extent.reach;
@@ -267,9 +277,9 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// Third part: goes through that face. Walks that come to a constrained face, leave the hull or, if depths are kept,
-    /// pass their limit stop with a link of [`FACE_BIT`] in `TET`, those in doubt with the tetrahedron where they are, all else as
-    /// it was.
+    /// Third part of a step: moves to the tetrahedron behind that face. A walk stops with a link that has [`FACE_BIT`] in `TET` where it
+    /// reaches a constrained face, leaves the hull or, with `DEPTHS`, passes its limit. A walk with an uncertain sign stops with
+    /// [`DOUBT`] in `TET` and is otherwise unchanged.
     #[inline(always)]
     pub(super) fn follow<const DEPTHS: bool>(
         &mut self,
@@ -280,18 +290,18 @@ impl<S: Simd> Lanes<S> {
     ) {
         let (tet, behind) = (self.words[word::TET], self.words[word::BEHIND]);
         let at = EnteredLanes { tet, face: step.face, apex: step.apex, behind, one };
-        let (mut next, opposite) = records.link(s, step.go, &at, step.left);
+        let (mut next, opposite) = records.link(s, step.certain, &at, step.left);
         if DEPTHS {
             let f = &self.floats;
             let nearest = s.min(s.min(f[float::DEPTH], f[float::DEPTH + 1]), f[float::DEPTH + 2]);
             next = s.select_u(s.lt(f[float::LIMIT], nearest), s.splat_u(NONE), next);
         }
-        if records.knows_behind() {
-            self.words[word::BEHIND] = s.select_u(step.go, tet, behind);
+        if records.needs_behind() {
+            self.words[word::BEHIND] = s.select_u(step.certain, tet, behind);
         }
-        let next = s.select_u(step.go, next, s.or_u(tet, s.splat_u(DOUBT)));
+        let next = s.select_u(step.certain, next, s.or_u(tet, s.splat_u(DOUBT)));
         self.words[word::TET] = s.select_u(self.active(s), next, tet);
-        self.words[word::APEX] = s.select_u(step.go, opposite, self.words[word::APEX]);
+        self.words[word::APEX] = s.select_u(step.certain, opposite, self.words[word::APEX]);
     }
 }
 
@@ -304,7 +314,7 @@ mod tests {
     use crate::tets::queue::Ready;
     use bth_random::Rng;
 
-    /// For each of sixteen rays: cross products of three points in turn, their bound, and which rays lanes can take.
+    /// For each of sixteen rays the cross products of its three points in cyclic order, their bound, and the bits of usable rays.
     struct Crosses<'a>(&'a [Ray], &'a [[f32; 4]]);
 
     impl Kernel for Crosses<'_> {
@@ -340,7 +350,7 @@ mod tests {
                 direction: [(); 3].map(|()| unit(&mut rng)),
                 tmax: f32::INFINITY,
             });
-            // Triangles about points of the rays' lines.
+            // Triangles near points of the rays' lines.
             let vertices: Vec<[f32; 4]> = (0..3 * LANES)
                 .map(|i| {
                     let (ray, t) = (&rays[i / 3], unit(&mut rng) * scale);

@@ -1,18 +1,17 @@
-//! Where a ray that starts on a known surface is among the tetrahedra: a walk from the surface's
-//! own tetrahedron towards the origin, usually of no step or one.
+//! Location of a ray's origin among the tetrahedra, given a constrained face near it: a walk from the tetrahedron at the face towards
+//! the origin, most often of no step or one.
 
 use super::records::{Entered, ReadRecords};
 use super::walk::{TetPosition, TetSpace};
 use crate::intersect::line::{Line, Projected, Sign};
 use bth_format::layout::{FACE_BIT, TetFace};
 
-/// Steps after which the surface counts as a bad hint and the ray is traced without it.
-const MOST_STEPS: u32 = 64;
-/// Bound on the error of [`side_of_plane`] in units of the sum of the absolute products: 8 roundings of
-/// 2^-53, doubled.
+/// Greatest number of steps; after it the ray is traced without the hint.
+const MAX_STEPS: u32 = 64;
+/// Bound of the error of [`side_of_plane`] relative to the sum of the absolute products: 8 roundings of 2^-53, doubled.
 const PLANE_ERROR: f64 = 16.0 / (1u64 << 53) as f64;
 
-/// On which side of the plane through a, b, c the point is; positive where (b-a)×(c-a) points.
+/// The side of the plane through a, b and c on which the point lies; positive in the direction of (b-a)×(c-a).
 fn side_of_plane([a, b, c]: [[f32; 3]; 3], point: [f64; 3]) -> Sign {
     let from = |p: [f32; 3]| [0, 1, 2].map(|k| f64::from(p[k]) - point[k]);
     let (a, b, c) = (from(a), from(b), from(c));
@@ -32,13 +31,13 @@ fn side_of_plane([a, b, c]: [[f32; 3]; 3], point: [f64; 3]) -> Sign {
     }
 }
 
-/// Faces opposite to each vertex of a positively oriented tetrahedron, oriented to that vertex.
+/// For each vertex of a positively oriented tetrahedron the opposite face, with its normal towards the vertex.
 const FACES: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
 
 impl TetSpace<'_> {
-    /// The place from which to walk for a ray that starts near a constrained face: in the tetrahedron that
-    /// holds its origin, at the face through which the line came in. `None` if any sign on the way is
-    /// uncertain, the origin lies outside the leaf, or it is too far off.
+    /// The position from which a ray walks that starts near the constrained face `row`: the tetrahedron that holds its origin, and the
+    /// face through which its line enters that. `None` if a sign is uncertain, if the origin lies outside of the leaf, or if it is
+    /// more than MAX_STEPS tetrahedra away.
     pub(crate) fn locate(&self, row: u32) -> Option<TetPosition> {
         let start: &TetFace = &self.faces[row as usize];
         let [a, b, c] = start.vertex;
@@ -53,7 +52,7 @@ impl TetSpace<'_> {
         let mut vertex = if side == 0 { [a, b, c, apex] } else { [a, c, b, apex] };
         // The apex of `entered` is always vertex[3].
         let mut entered = Entered { face: [vertex[0], vertex[1], vertex[2]], apex, behind: FACE_BIT | row };
-        'steps: for _ in 0..MOST_STEPS {
+        'steps: for _ in 0..MAX_STEPS {
             for out in 0..3 {
                 let face = FACES[out].map(|i| vertex[i]);
                 match side_of_plane(face.map(|v| self.position(v)), self.line.origin) {
@@ -63,19 +62,19 @@ impl TetSpace<'_> {
                 }
                 let link = self.records.link(tet, &entered, vertex[out]);
                 let (next, apex, behind) = self.beyond(tet, link, face)?;
-                // OriginTerms from the other side the face turns around.
+                // Seen from the next tetrahedron the orientation of the face is reversed.
                 vertex = [face[0], face[2], face[1], apex];
                 entered = Entered { face: [vertex[0], vertex[1], vertex[2]], apex, behind };
                 tet = next;
                 continue 'steps;
             }
-            return self.face_behind(tet, vertex, &entered);
+            return self.entry_of_line(tet, vertex, &entered);
         }
         None
     }
 
-    /// The place in `tet` at the face through which the line enters it.
-    fn face_behind(&self, tet: u32, vertex: [u32; 4], entered: &Entered) -> Option<TetPosition> {
+    /// The position in `tet` at the face through which the line enters it.
+    fn entry_of_line(&self, tet: u32, vertex: [u32; 4], entered: &Entered) -> Option<TetPosition> {
         let projected: [Projected; 4] = vertex.map(|v| self.project(v));
         for (apex, indices) in FACES.iter().enumerate() {
             let corner = indices.map(|i| projected[i]);

@@ -1,4 +1,5 @@
-//! One ray through the tetrahedra of a leaf, whichever record they have.
+//! Walks through the tetrahedra of tet leaves, in any of the four record formats: one ray at a time ([`walk`], [`flood`], [`locate`])
+//! or a batch in lanes ([`batch`], [`queue`], [`lanes`], [`rounds`], [`decide`]).
 
 pub(crate) mod batch;
 pub(crate) mod decide;
@@ -18,15 +19,16 @@ use crate::rays::Ray;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 
-/// What became of a ray where it starts.
+/// Result of the walk of a ray from the face on which it starts.
 pub(crate) enum TetStart {
+    /// The query is complete.
     Done,
-    /// Goes on without this tet leaf, if any.
+    /// The query holds the hits in this tet leaf, or the value is `NONE` and nothing was walked. The ray continues through the BVH.
     Walked(u32),
 }
 
-/// A hint changes where the search begins, never what is found: the tet leaf of the surface is walked first, from
-/// the surface, and left out later.
+/// Walks through the tet leaf of the face on which a ray starts, from that face. The BVH then skips the leaf, so the hint affects
+/// where the search begins, never the result.
 pub(crate) fn start_in_tets<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
@@ -35,11 +37,12 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
     count: &mut C,
 ) -> TetStart {
     let row = object.triangle_faces.get(from as usize).copied().unwrap_or(NONE);
-    // Such a walk sees only what lies ahead of the origin. One ray alone is faster through the BVH, if there is one.
+    // The walk finds hits with t >= 0 only.
     if row == NONE || ray.tmin < 0.0 {
         return TetStart::Walked(NONE);
     }
     let leaf = leaf_of_face(object, row);
+    // A single ray is faster through the BVH over the leaf's triangles, if there is one.
     if object.tet_leaves[leaf as usize].subtree != NONE {
         return TetStart::Walked(NONE);
     }
@@ -52,6 +55,7 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
     }
 }
 
+/// Walks from a constrained face; None if the tetrahedron that holds the origin was not found.
 fn start<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
@@ -61,15 +65,15 @@ fn start<Q: Query, C: Count>(
     count: &mut C,
 ) -> Option<WalkOutcome> {
     let space = space(object, leaf, line);
-    let place = space.locate(row)?;
+    let position = space.locate(row)?;
     count.leaf();
-    Some(match space.walk(place, query, count) {
+    Some(match space.walk(position, query, count) {
         WalkOutcome::Uncertain => space.flood(query, count),
         outcome => outcome,
     })
 }
 
-/// Walks through a tet leaf that has no subtree, from its hull.
+/// Walks through a tet leaf that has no subtree, from the face of its hull through which the line enters.
 #[inline(never)]
 pub(crate) fn enter_tets<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -81,14 +85,14 @@ pub(crate) fn enter_tets<Q: Query, C: Count>(
     let Some(line) = Line::new(ray) else { return TetOutcome::Done };
     let space = space(object, leaf, &line);
     let outcome = match space.enter_hull() {
-        Ok(place) => space.walk(place, query, count),
+        Ok(position) => space.walk(position, query, count),
         Err(outcome) => outcome,
     };
     let outcome = match outcome {
         WalkOutcome::Uncertain => space.flood(query, count),
         outcome => outcome,
     };
-    if outcome == WalkOutcome::Done { TetOutcome::Done } else { TetOutcome::GoOn }
+    if outcome == WalkOutcome::Done { TetOutcome::Done } else { TetOutcome::Continue }
 }
 
 /// The tet leaf that a constrained face belongs to.
@@ -96,6 +100,7 @@ pub(crate) fn leaf_of_face(object: &ObjectView<'_>, row: u32) -> u32 {
     object.tet_leaves.partition_point(|leaf| leaf.first_face <= row) as u32 - 1
 }
 
+/// The parts of a tet leaf, prepared for a line.
 pub(crate) fn space<'a>(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> TetSpace<'a> {
     TetSpace::new(object, leaf, line)
 }

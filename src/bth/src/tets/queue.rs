@@ -1,4 +1,4 @@
-//! Rays made ready to walk, in wait for lanes that are free.
+//! Rays that are prepared for tet walks, and the queue from which lanes are filled.
 
 use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::intersect::prepare;
@@ -7,24 +7,26 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{HullFace, NONE, TetFace};
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Origins beyond this (2^59) and directions out of 2^±40 are left to f64: products of theirs could overflow f32 or
-/// underflow. Depths are then t times between 2^-40 and 2^40.
+/// Greatest |coordinate| of an origin, 2^59. Rays beyond these limits are walked in f64, because products could overflow or underflow
+/// in f32.
 const GREATEST_ORIGIN: f32 = (1u64 << 59) as f32;
+/// Greatest |component| of a direction. A depth is t times a factor between 2^-40 and 2^40.
 const GREATEST_DIRECTION: f32 = (1u64 << 40) as f32;
+/// Least value of a direction's greatest |component|.
 const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
-/// Depths and bounds of t are compared with this much to spare, relative to them, and that absolutely: all
-/// roundings together are smaller, and so is the least f32 times the least direction.
-const SPARE: f32 = 1.0 / (1 << 20) as f32;
-const LEAST_SPARE: f32 = 1.0 / (1u128 << 100) as f32;
-/// Products of three lengths from within this reach (2^40) do not overflow; and what underflows of them is less than
-/// 2^-120.
+/// Slack of comparisons of depths with bounds of t, relative to the depth: more than all roundings together.
+const SLACK: f32 = 1.0 / (1 << 20) as f32;
+/// The slack of depths near 0: more than the least positive f32 times the greatest direction.
+const LEAST_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
+/// Products of three lengths up to this value, 2^40, do not overflow.
 const GREATEST_REACH: f32 = GREATEST_DIRECTION;
+/// Bound of the amount that underflow removes from such products, 2^-120.
 const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
 
-/// Most rays that wait.
+/// Greatest number of queued rays.
 const CAPACITY: usize = 4 * LANES;
 
-/// Rows of rays that wait, one a field of [`Lanes`]; lanes are taken from the front and packed to the back.
+/// Queue of prepared rays: a row for each field of [`Lanes`], read at `first` and written at `end`.
 pub(super) struct ReadyQueue {
     words: [[u32; CAPACITY + LANES]; word::COUNT],
     floats: [[f32; CAPACITY + LANES]; float::COUNT],
@@ -32,12 +34,13 @@ pub(super) struct ReadyQueue {
     end: usize,
 }
 
-/// Sixteen elements of a row.
+/// The sixteen elements of a row from `at` on.
 #[inline(always)]
 fn sixteen<T>(row: &[T; CAPACITY + LANES], at: usize) -> &[T; LANES] {
     row[at..].first_chunk().expect("rows have sixteen elements to spare")
 }
 
+/// The sixteen elements of a row from `at` on.
 #[inline(always)]
 fn sixteen_mut<T>(row: &mut [T; CAPACITY + LANES], at: usize) -> &mut [T; LANES] {
     row[at..].first_chunk_mut().expect("rows have sixteen elements to spare")
@@ -57,18 +60,18 @@ impl ReadyQueue {
         self.end - self.first
     }
 
-    /// Starts over; nothing may wait.
+    /// Makes the whole capacity available; the queue must be empty.
     pub(super) fn rewind(&mut self) {
         debug_assert_eq!(self.len(), 0);
         (self.first, self.end) = (0, 0);
     }
 
-    /// Whether sixteen more have room.
-    pub(super) fn has_room(&self) -> bool {
+    /// Whether sixteen more rays can be pushed.
+    pub(super) fn has_space(&self) -> bool {
         self.end + LANES <= CAPACITY
     }
 
-    /// Adds the lanes whose bit is set.
+    /// Appends the lanes whose bit is set.
     #[inline(always)]
     pub(super) fn push<S: Simd>(&mut self, s: S, bits: u32, lanes: &Lanes<S>) {
         macro_rules! push {
@@ -81,7 +84,7 @@ impl ReadyQueue {
         self.end += bits.count_ones() as usize;
     }
 
-    /// Fills as many of the lanes as there are rays; returns which.
+    /// Fills lanes whose bit is set in `idle`, as many as there are rays; returns the bits of the filled lanes.
     #[inline(always)]
     pub(super) fn pop<S: Simd>(&mut self, s: S, idle: u32, lanes: &mut Lanes<S>) -> u32 {
         let mut taken = idle;
@@ -89,7 +92,7 @@ impl ReadyQueue {
             taken &= taken - 1;
         }
         let m = s.mask(taken);
-        // Written out, so that the lanes can stay in registers.
+        // The indices are literals, so that the lanes can stay in registers.
         macro_rules! pop {
             ($values:ident $expand:ident $($i:literal)*) => { $(
                 lanes.$values[$i] = s.$expand(lanes.$values[$i], m, sixteen(&self.$values[$i], self.first));
@@ -102,22 +105,23 @@ impl ReadyQueue {
     }
 }
 
+/// The slack of a depth.
 #[inline(always)]
-fn spare<S: Simd>(s: S, depth: S::F) -> S::F {
-    s.fma(s.abs(depth), s.splat(SPARE), s.splat(LEAST_SPARE))
+fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
+    s.fma(s.abs(depth), s.splat(SLACK), s.splat(LEAST_SLACK))
 }
 
-/// Rays set up for projection, and their faces projected.
+/// Sixteen rays, prepared for projection, and the projections of the faces that they enter through.
 pub(super) struct Ready<S: Simd> {
     pub(super) lanes: Lanes<S>,
-    /// tmin as a depth, less a little.
+    /// Lower bound of the depth of tmin.
     tmin_low: S::F,
-    /// The lanes whose rays f32 can take.
+    /// The lanes whose rays f32 can represent.
     pub(super) able: S::M,
 }
 
 impl<S: Simd> Ready<S> {
-    /// Prepares the rays `slot` of the batch, without any place yet.
+    /// Prepares the rays with indices `slot`, without a face.
     #[inline(always)]
     fn of_rays(s: S, m: S::M, rays: &[Ray], slot: S::U) -> Self {
         let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::gather_rays(s, m, rays, slot);
@@ -131,27 +135,27 @@ impl<S: Simd> Ready<S> {
             able = s.and(able, s.le(s.abs(o[k]), s.splat(GREATEST_ORIGIN)));
             able = s.and(able, s.le(size[k], s.splat(GREATEST_DIRECTION)));
         }
-        // The axis of the depth; the two that follow it in turn, swapped where the ray goes down.
+        // The axis of the depth is that of the direction's greatest |component|.
         let along0 = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
         let along1 = s.and_not(s.lt(size[2], size[1]), along0);
         let axis = s.select_u(along0, s.splat_u(0), s.select_u(along1, s.splat_u(1), s.splat_u(2)));
         let mut lanes = Lanes::idle(s);
         lanes.words[word::AXIS] = axis;
-        let depth = lanes.turn(s, d)[2];
+        let depth = lanes.permute(s, d)[2];
         let down = s.lt(depth, s.splat(0.0));
         let per_t = s.abs(depth);
         lanes.words[word::SIGN] = s.select_u(down, s.splat_u(1 << 31), s.splat_u(0));
-        let (origin, direction) = (lanes.turn(s, o), lanes.turn(s, d));
+        let (origin, direction) = (lanes.permute(s, o), lanes.permute(s, d));
         lanes.floats[float::ORIGIN..float::ORIGIN + 3].copy_from_slice(&origin);
         lanes.floats[float::SHEAR] = s.div(direction[0], per_t);
         lanes.floats[float::SHEAR + 1] = s.div(direction[1], per_t);
         lanes.words[word::SLOT] = slot;
         let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
-        lanes.floats[float::LIMIT] = s.add(high, spare(s, high));
-        Ready { lanes, tmin_low: s.sub(low, spare(s, low)), able }
+        lanes.floats[float::LIMIT] = s.add(high, slack(s, high));
+        Ready { lanes, tmin_low: s.sub(low, slack(s, low)), able }
     }
 
-    /// Projects the faces.
+    /// Sets and projects the faces.
     #[inline(always)]
     fn set_face(&mut self, s: S, m: S::M, vertices: &[[f32; 4]], face: [S::U; 3]) {
         let lanes = &mut self.lanes;
@@ -168,7 +172,7 @@ impl<S: Simd> Ready<S> {
         lanes.floats[float::SIZE] = extent.size;
     }
 
-    /// Prepares the rays `slot` of the batch, to the projection of their faces.
+    /// Prepares the rays with indices `slot`, which enter through the faces with these vertices.
     #[inline(always)]
     pub(super) fn new(
         s: S,
@@ -183,8 +187,8 @@ impl<S: Simd> Ready<S> {
         ready
     }
 
-    /// Prepares rays to walk from where their lines enter a hull. Returns also which certainly do, and which
-    /// certainly miss it.
+    /// Prepares rays at the hull faces through which their lines enter a leaf. Also returns the lanes whose line certainly enters, and
+    /// those whose line certainly misses the hull.
     #[inline(always)]
     pub(super) fn from_hull(
         s: S,
@@ -224,9 +228,9 @@ impl<S: Simd> Ready<S> {
         (ready, entered, s.and_not(certain, entered))
     }
 
-    /// Prepares rays that start about constrained faces to walk from these, and returns which can: those whose lines
-    /// certainly cross the face, certainly before the ray begins. All that a line meets afterwards in the leaf
-    /// comes in order, so wherever the origin is in between, nothing is left out.
+    /// Prepares rays to walk from the constrained faces near which they start. Also returns the lanes for which this is right: those
+    /// whose line certainly crosses the face, at a depth certainly before tmin. The walk then passes all tetrahedra of the leaf behind
+    /// the face in order, and finds every hit in the ray's range.
     #[inline(always)]
     pub(super) fn from_faces(
         s: S,
@@ -256,17 +260,17 @@ impl<S: Simd> Ready<S> {
             area = s.add(area, weight);
             volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
         }
-        // volume / area is the depth of the intersection; both are off by their bounds and roundings.
+        // volume / area is the depth of the intersection; `doubt` times a depth bounds the errors of both.
         let low = ready.tmin_low;
         let mut farthest = s.abs(low);
         for p in &corner {
             farthest = s.max(s.abs(p.depth), farthest);
         }
-        let doubt = s.fma(area, s.splat(SPARE), s.mul(bound, s.splat(6.0)));
+        let doubt = s.fma(area, s.splat(SLACK), s.mul(bound, s.splat(6.0)));
         let behind = s.lt(s.fma(doubt, farthest, s.add(volume, s.splat(LEAST_VOLUME))), s.mul(low, area));
         let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
         let able = s.and(s.or(up, down), s.and(behind, near));
-        // The face turns around for those that go against its normal.
+        // For rays against the normal the orientation of the face is reversed.
         lanes.words[word::TET] = s.select_u(up, above, below);
         lanes.words[word::APEX] = s.select_u(up, apex_above, apex_below);
         lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(bth_format::layout::FACE_BIT));

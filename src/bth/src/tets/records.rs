@@ -1,26 +1,28 @@
-//! The four tetrahedron records behind one interface, so that one walk serves all.
+//! The four record formats of tetrahedra behind one interface, for one tetrahedron and for sixteen.
 //!
-//! Records are reached through a face: its three vertices are known, and what lies behind it.
-//! The rest follows: the fourth vertex, and what lies behind the other faces.
+//! A record is always read after the walk has entered through a face, so the face's three vertices and the link behind it are known.
+//! The record yields the fourth vertex and the links behind the other faces. `Tet32`, `Tet20` and `Tet16` are the formats of Aman,
+//! Demirci and Güdükbay ("Compact tetrahedralization-based acceleration structures for ray tracing", 2021), named by their bytes;
+//! `Link32` stores for each face a link and the vertex beyond.
 
 use crate::simd::Simd;
 use bth_format::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
 use bth_format::object::Records;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// A tetrahedron as entered through a face.
+/// How a walk entered a tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entered {
-    /// Vertices of the face.
+    /// Vertices of the entered face.
     pub(crate) face: [u32; 3],
     /// The fourth vertex.
     pub(crate) apex: u32,
-    /// The link behind the face, as the record stores it (where the walk came from).
+    /// The link behind the entered face, as the record stores it: the tetrahedron or face from which the walk came.
     pub(crate) behind: u32,
 }
 
 impl Entered {
-    /// TetPosition of a vertex among the four in ascending order.
+    /// Rank of a vertex among the four in ascending order.
     #[inline(always)]
     fn rank(&self, vertex: u32) -> usize {
         let below = |v: u32| (v < vertex) as usize;
@@ -28,10 +30,11 @@ impl Entered {
     }
 }
 
+/// A record format.
 pub(crate) trait Record: Copy {
-    /// The vertex that is not of the face; `carried` is what the link hither said.
+    /// The vertex that is not on `face`. `carried` is the `opposite` of the link that was followed.
     fn apex(&self, face: [u32; 3], carried: u32) -> u32;
-    /// The link behind the face opposite to `vertex`; its `opposite` may be `NONE`, then [`Self::apex`] finds it.
+    /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in formats whose [`Self::apex`] does not need it.
     fn link(&self, at: &Entered, vertex: u32) -> Link;
 }
 
@@ -46,6 +49,7 @@ impl Record for Link32 {
     }
 }
 
+/// The fourth vertex from the exclusive or of all four.
 #[inline(always)]
 fn fourth(xor: u32, face: [u32; 3]) -> u32 {
     xor ^ face[0] ^ face[1] ^ face[2]
@@ -78,7 +82,7 @@ impl Record for Tet16 {
     fn apex(&self, face: [u32; 3], _carried: u32) -> u32 {
         fourth(self.xor, face)
     }
-    /// Each stored link is combined with the fourth; the one behind us unlocks them.
+    /// Each of the three stored words is the exclusive or of a link and the fourth link, so one known link yields the others.
     #[inline(always)]
     fn link(&self, at: &Entered, vertex: u32) -> Link {
         let combined = |rank: usize| self.next.get(rank).copied().unwrap_or(0);
@@ -87,7 +91,7 @@ impl Record for Tet16 {
     }
 }
 
-/// Reads tetrahedra of an object, whichever record it keeps.
+/// Reads tetrahedra of an object in its record format.
 pub(crate) trait ReadRecords {
     /// [`Record::apex`] of a tetrahedron.
     fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32;
@@ -119,19 +123,19 @@ impl ReadRecords for Records<'_> {
     }
 }
 
-/// Sixteen tetrahedra as entered through faces, one a lane.
+/// How sixteen walks entered their tetrahedra, one in each lane; see [`Entered`].
 #[derive(Clone, Copy)]
 pub(crate) struct EnteredLanes<S: Simd> {
     pub(crate) tet: S::U,
     pub(crate) face: [S::U; 3],
     pub(crate) apex: S::U,
     pub(crate) behind: S::U,
-    /// 1 in every lane: not a constant, since compilers make more of adding that where a mask is set than it is.
+    /// 1 in every lane. It is a variable, because for a constant the compiler replaces the masked addition by slower code.
     pub(crate) one: S::U,
 }
 
 impl<S: Simd> EnteredLanes<S> {
-    /// TetPosition of a vertex among the four in ascending order.
+    /// Rank of a vertex among the four in ascending order.
     #[inline(always)]
     fn rank(&self, s: S, vertex: S::U) -> S::U {
         let mut rank = s.splat_u(0);
@@ -142,15 +146,15 @@ impl<S: Simd> EnteredLanes<S> {
     }
 }
 
-/// The fourth vertices from the words that hold the exclusive or of all.
+/// The fourth vertices. `xor` holds the indices of the words that store the exclusive or of all four.
 #[inline(always)]
 fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor: S::U) -> S::U {
     let [a, b, c] = at.face;
     s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
 }
 
-/// [`Records`] for sixteen at a time: the same answers by gathers from the records as plain words. Which kind they are
-/// is asked at every step: always with the same answer, which costs next to nothing, and there is one walk for all.
+/// [`Records`] as words, for gathers of sixteen lanes. The format is tested at every step: the branch is well predicted, and one
+/// kernel serves all formats.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LaneRecords<'a> {
     Link32(&'a [[u32; 2]]),
@@ -159,6 +163,7 @@ pub(crate) enum LaneRecords<'a> {
     Tet16(&'a [u32]),
 }
 
+/// Records as a slice of words.
 fn words<T: FromBytes + zerocopy::Immutable>(
     records: &(impl IntoBytes + zerocopy::Immutable + ?Sized),
 ) -> &[T] {
@@ -177,9 +182,9 @@ impl<'a> LaneRecords<'a> {
         })
     }
 
-    /// Whether [`EnteredLanes::behind`] is of use.
+    /// Whether the format needs [`EnteredLanes::behind`].
     #[inline(always)]
-    pub(crate) fn knows_behind(&self) -> bool {
+    pub(crate) fn needs_behind(&self) -> bool {
         matches!(self, LaneRecords::Tet16(_))
     }
 
@@ -213,10 +218,11 @@ impl<'a> LaneRecords<'a> {
     }
 }
 
+/// [`Record::link`] of [`Tet16`].
 #[inline(always)]
 fn link_of_tet16<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> S::U {
     let first = s.add_u(s.shl_u::<2>(at.tet), s.splat_u(1));
-    // The link behind us, and with it the fourth; then the one that is wanted.
+    // The link behind the entered face yields the fourth link, and that the requested one.
     let mut link = at.behind;
     for v in [at.apex, vertex] {
         let rank = at.rank(s, v);

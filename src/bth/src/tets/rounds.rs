@@ -1,7 +1,6 @@
-//! The rounds of a batch of tet walks: three groups of sixteen lanes, all a step in every round.
+//! The kernel of a batch of tet walks: three groups of sixteen lanes that make one step each in turn.
 //!
-//! A lane that stops makes room for the next ray: when several of a group have, what they found is taken and they
-//! are filled from the queue.
+//! When several lanes of a group have stopped, their results are taken and the lanes are refilled from the queue.
 
 use super::batch::{WalkBatch, WalkStart, vertices};
 use super::lanes::{Lanes, Step, float, word};
@@ -11,32 +10,35 @@ use crate::query::Query;
 use crate::simd::{Kernel, LANES, Simd};
 use bth_format::layout::NONE;
 
-/// Idle lanes of a group that are worth a refill.
-const WORTH_A_REFILL: u32 = 6;
+/// A group is refilled when at least this many of its lanes are idle.
+const MIN_IDLE_LANES: u32 = 6;
 
-/// A group of lanes, those of them that hold a ray, and when they got it.
+/// A group of sixteen lanes.
 #[derive(Clone, Copy)]
 struct LaneGroup<S: Simd> {
     lanes: Lanes<S>,
     step: Step<S>,
+    /// Bits of the lanes that hold a ray, which may have stopped.
     held: u32,
+    /// For each lane the round in which it received its ray.
     since: S::U,
 }
 
-/// What the groups go by.
+/// State that the groups share.
 struct Clock {
-    /// Rounds, in units of as many as there are tetrahedra.
+    /// Number of rounds; in a round each lane makes as many steps as the object has tetrahedra.
     round: u32,
-    /// Whether there may be more rays to take.
+    /// Whether the queue may yield more rays.
     more: bool,
 }
 
 impl<Q: Query + Copy> WalkBatch<'_, Q> {
+    /// Takes the results of stopped lanes and fills idle lanes from the queue.
     #[inline(always)]
     fn refill<S: Simd>(&mut self, s: S, queue: &mut ReadyQueue, group: &mut LaneGroup<S>, clock: &mut Clock) {
         let active = s.mask_bits(group.lanes.active(s));
         let idle = LANES as u32 - active.count_ones();
-        if idle < WORTH_A_REFILL || !(clock.more || (active == 0 && group.held != 0)) {
+        if idle < MIN_IDLE_LANES || !(clock.more || (active == 0 && group.held != 0)) {
             return;
         }
         let stopped = group.held & !active;
@@ -60,9 +62,10 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         }
     }
 
-    /// Stops walks that began two rounds ago, in each of which every lane made as many steps as there are tetrahedra.
+    /// Stops walks that began two rounds ago, and repeats them by a flood. A line passes each tetrahedron at most once, so such a walk
+    /// has made more steps than it can need, which happens only with inconsistent data.
     #[inline(always)]
-    fn give_up<S: Simd>(&mut self, s: S, group: &mut LaneGroup<S>, round: u32) {
+    fn stop_endless<S: Simd>(&mut self, s: S, group: &mut LaneGroup<S>, round: u32) {
         let old = s.and(group.lanes.active(s), s.lt_u(group.since, s.splat_u(round.saturating_sub(1))));
         let mut bits = s.mask_bits(old);
         let mut slot = [0; LANES];
@@ -76,7 +79,7 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         }
     }
 
-    /// Hands over the lanes of a group that have stopped.
+    /// Evaluates the lanes whose bit is set in `stopped`.
     #[inline(always)]
     fn take_stopped<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, mut stopped: u32) {
         let (mut words, mut slot, mut depth) = ([[0; LANES]; word::AXIS], [0; LANES], [[0.0; LANES]; 3]);
@@ -100,7 +103,7 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
                 behind: word(word::BEHIND),
             };
             let start = WalkStart { slot: slot[lane], tet: word(word::TET), entered };
-            self.stopped(start, depth.map(|row| row[lane]));
+            self.evaluate(start, depth.map(|row| row[lane]));
         }
     }
 }
@@ -116,13 +119,13 @@ impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
         let mut queue = ReadyQueue::new();
         let idle = LaneGroup { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
         let mut groups = [idle; 3];
-        // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
+        // A line passes each tetrahedron at most once.
         let most = self.object.records.len();
         let mut clock = Clock { round: 0, more: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));
         loop {
-            // In a loop, and compiled once: lanes are in memory here whatever is done.
+            // This is a loop, so that `refill` is compiled once; the lanes are in memory at this point in any case.
             let mut held = 0;
             for group in &mut groups {
                 self.refill(s, &mut queue, group, &mut clock);
@@ -150,7 +153,7 @@ impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
             if steps == most {
                 (clock.round, steps) = (clock.round + 1, 0);
                 for group in &mut groups {
-                    self.give_up(s, group, clock.round);
+                    self.stop_endless(s, group, clock.round);
                 }
             }
         }

@@ -1,10 +1,9 @@
-//! The walk from tetrahedron to tetrahedron along a ray's line.
+//! The walk of one ray from tetrahedron to tetrahedron along its line, in f64.
 //!
-//! As the paper's traversal (Aman et al. 2021): the three vertices of the face entered stay
-//! projected, the fourth is projected, and the signs of three cross products name the exit. A
-//! walk whose signs are all certain follows the real line through the interiors of real faces. Where
-//! rounding hides a sign (the line meets an edge or vertex, within rounding) the walk gives up, and
-//! `tet_flood` visits everything that the line can touch instead.
+//! As in the traversal of Aman et al. (2021), the projections of the entered face's three vertices are kept, the fourth vertex is
+//! projected, and the signs of three cross products select the face of exit. While all signs are certain, the walk follows the
+//! real line through the interiors of faces. Where a sign is uncertain, because the line passes within rounding of an edge or a
+//! vertex, the walk ends, and [`TetSpace::flood`] visits every tetrahedron that the line may touch.
 
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
@@ -12,10 +11,10 @@ use crate::query::{Count, Query, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
 
-/// The parts of a tet leaf that a walk reads, and what it knows about the ray.
+/// The parts of a tet leaf that a walk reads, and the line of the ray.
 pub(crate) struct TetSpace<'a> {
     pub(crate) leaf: &'a TetLeaf,
-    /// All records, vertices and faces of the object: rows are object-wide.
+    /// Records, vertices and faces are those of the whole object, and indices refer to them.
     pub(crate) records: Records<'a>,
     pub(crate) vertices: &'a [TetVertex],
     pub(crate) faces: &'a [TetFace],
@@ -23,27 +22,28 @@ pub(crate) struct TetSpace<'a> {
     pub(crate) line: &'a Line,
     /// Bound on the error of projected coordinates within the leaf's box.
     pub(crate) error: f64,
-    /// Of the object's triangles, in leaf order.
+    /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
 }
 
 /// How a walk ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum WalkOutcome {
-    /// The query has what it wants.
+    /// The query is complete.
     Done,
-    /// The line has left the leaf, or nothing nearer can follow.
+    /// The line has left the leaf, or no later face can change the result.
     Left,
-    /// A sign was uncertain: what was offered so far is right, but the rest is not known.
+    /// A sign was uncertain. The hits offered before are right, but others may be missing.
     Uncertain,
 }
 
-/// Where a walk stands: in tetrahedron `tet`, entered through a face that the line crosses with
-/// all signs certain, its corners counterclockwise as seen along the ray.
+/// Position of a walk: the tetrahedron `tet`, entered through a face that the line crosses with certain signs and whose corners are
+/// counterclockwise as seen along the ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TetPosition {
     pub(crate) tet: u32,
     pub(crate) entered: Entered,
+    /// The corners of that face, projected.
     pub(crate) corner: [Projected; 3],
 }
 
@@ -78,7 +78,7 @@ impl<'a> TetSpace<'a> {
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Line::side(&p[i], &p[j], self.error))
     }
 
-    /// Offers a constrained face to the query, by the test that all structures share.
+    /// Offers a constrained face to the query, by the exact test that all structures share; returns whether the query is complete.
     pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         match self.line.intersection(corners) {
@@ -87,8 +87,8 @@ impl<'a> TetSpace<'a> {
         }
     }
 
-    /// The tetrahedron on the other side of a link, with its fourth vertex, and how that one's
-    /// record stores the face between; `None` outside the hull.
+    /// The tetrahedron behind a link from tetrahedron `from` through `face`, its fourth vertex, and the link with which its record
+    /// refers back; `None` outside of the hull.
     #[inline(always)]
     pub(crate) fn beyond(&self, from: u32, link: Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
         if link.next == NONE {
@@ -103,8 +103,8 @@ impl<'a> TetSpace<'a> {
         Some((link.next, apex, from))
     }
 
-    /// Moves a place's face to the one through which the line leaves the tetrahedron, and says what lies behind
-    /// that; `None` if a sign is uncertain, and nothing has changed then.
+    /// Replaces the position's face by the one through which the line leaves the tetrahedron, and returns the link behind it. `None`
+    /// if a sign is uncertain; the position is then unchanged.
     #[inline(always)]
     pub(crate) fn exit(&self, at: &mut TetPosition) -> Option<Link> {
         use Sign::{Negative, Positive};
@@ -122,14 +122,14 @@ impl<'a> TetSpace<'a> {
         Some(link)
     }
 
-    /// Walks on from a place until the query is done, the hull, the query's limit or an uncertain sign.
+    /// Walks from a position until the query is complete, the line leaves the hull or passes the query's limit, or a sign is uncertain.
     pub(crate) fn walk<Q: Query, C: Count>(
         &self,
         mut at: TetPosition,
         query: &mut Q,
         count: &mut C,
     ) -> WalkOutcome {
-        // A line meets a tetrahedron once; more steps than there are tetrahedra mean bad data.
+        // A line passes each tetrahedron at most once, so more steps occur only with inconsistent data.
         for _ in 0..self.leaf.tets {
             count.tet();
             let Some(link) = self.exit(&mut at) else { return WalkOutcome::Uncertain };
@@ -153,16 +153,16 @@ impl<'a> TetSpace<'a> {
         WalkOutcome::Uncertain
     }
 
-    /// The place where the line enters the hull. `Err` tells why there is none: the line misses the
-    /// hull (`Left`) or meets it too close to an edge to tell (`Uncertain`).
+    /// The position at which the line enters the hull. `Err` is `Left` if the line misses the hull, and `Uncertain` if it passes too
+    /// close to an edge of it.
     pub(crate) fn enter_hull(&self) -> Result<TetPosition, WalkOutcome> {
-        let mut place = Err(WalkOutcome::Left);
+        let mut position = Err(WalkOutcome::Left);
         for face in self.hull {
             let corner = face.vertex.map(|v| self.project(v));
             let sides = self.sides(&corner);
             if sides.contains(&Sign::Negative) {
                 if !sides.contains(&Sign::Positive) && sides.contains(&Sign::Uncertain) {
-                    // An exit, or the rim: the entry may be as close to the same edge.
+                    // The line leaves the hull here or passes its silhouette; it may enter close to the same edge.
                     return Err(WalkOutcome::Uncertain);
                 }
                 continue;
@@ -171,8 +171,8 @@ impl<'a> TetSpace<'a> {
                 return Err(WalkOutcome::Uncertain);
             }
             let entered = Entered { face: face.vertex, apex: face.opposite, behind: NONE };
-            place = Ok(TetPosition { tet: face.tet, entered, corner });
+            position = Ok(TetPosition { tet: face.tet, entered, corner });
         }
-        place
+        position
     }
 }

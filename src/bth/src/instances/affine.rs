@@ -4,14 +4,14 @@ use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;
 
-/// Transforms whose condition number (in the maximum norm) exceeds this count as singular: the rounding of
-/// rays to f32 in object space, 2^-24, would then be as large as the object.
+/// Greatest condition number, in the maximum norm, of transforms that are not treated as singular. Beyond it the rounding of rays to
+/// f32 in object space, 2^-24, would be as large as the object.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
 
-/// `linear * p + translation`.
+/// An affine transform: a point p is mapped to `linear * p + translation`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Affine {
-    /// Rows.
+    /// Rows of the linear part.
     pub(crate) linear: [[f64; 3]; 3],
     pub(crate) translation: [f64; 3],
 }
@@ -24,7 +24,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Greatest sum of absolute values of a row.
+/// Maximum norm of a matrix: the greatest sum of the absolute values of a row.
 fn norm(rows: &[[f64; 3]; 3]) -> f64 {
     rows.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0, f64::max)
 }
@@ -33,11 +33,11 @@ impl Affine {
     pub(crate) const IDENTITY: Affine =
         Affine { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// Scales, then rotates by a quaternion (normalized here), then moves. Not finite when the quaternion has
-    /// no length.
+    /// The transform that scales, then rotates by a quaternion, which is normalized here, then translates. It is not finite if the
+    /// quaternion is zero. `parts` are translation, quaternion (x, y, z, w) and scale.
     pub(crate) fn from_parts(parts: &[f64; 10]) -> Affine {
         let [t0, t1, t2, x, y, z, w, sx, sy, sz] = *parts;
-        // Scaled first, so that squares neither overflow nor underflow.
+        // The division by the greatest component keeps squares from overflow and underflow.
         let greatest = [x, y, z, w].iter().fold(0.0f64, |m, c| m.max(c.abs()));
         let [x, y, z, w] = [x, y, z, w].map(|c| c / greatest);
         let length = (x * x + y * y + z * z + w * w).sqrt();
@@ -57,7 +57,7 @@ impl Affine {
         Affine { linear: [row(0), row(1), row(2)], translation: [t[3], t[7], t[11]] }
     }
 
-    /// `inner` first, then `self`.
+    /// The product: `inner` is applied first, then `self`.
     pub(crate) fn times(&self, inner: &Affine) -> Affine {
         let column = |k: usize| [0, 1, 2].map(|row| inner.linear[row][k]);
         Affine {
@@ -74,12 +74,12 @@ impl Affine {
         self.linear.iter().flatten().chain(&self.translation).all(|x| x.is_finite())
     }
 
-    /// Whether it shrinks everything to a point.
+    /// Whether the linear part is zero.
     pub(crate) fn is_zero(&self) -> bool {
         self.linear.iter().flatten().all(|x| *x == 0.0)
     }
 
-    /// Rows of four, applied to columns (x, y, z, 1).
+    /// Rows of the matrix that is applied to columns (x, y, z, 1).
     pub(crate) fn rows(&self) -> [[f64; 4]; 3] {
         [0, 1, 2].map(|k| {
             let [a, b, c] = self.linear[k];
@@ -87,13 +87,12 @@ impl Affine {
         })
     }
 
-    /// The inverse with the condition number of the linear part; `None` for what is not finite or counts as
-    /// singular.
+    /// The inverse, and the condition number of the linear part. `None` if the transform is not finite or treated as singular.
     pub(crate) fn inverse(&self) -> Option<(Inverse, f64)> {
         if !self.is_finite() {
             return None;
         }
-        // By a power of two near 1, so that no product overflows or underflows.
+        // Scaling by a power of two brings the greatest element near 1, so that no product overflows or underflows.
         let greatest = self.linear.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
         let exponent = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
         let scale = 1.0 / exponent;
@@ -113,61 +112,60 @@ impl Affine {
         (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, condition))
     }
 
-    /// Greatest sum of absolute values of a row of the linear part.
+    /// Maximum norm of the linear part.
     pub(crate) fn norm(&self) -> f64 {
         norm(&self.linear)
     }
 }
 
-/// `linear * (p - origin)`: from the world to an object.
+/// The inverse transform of an instance: a point p in world space is mapped to `linear * (p - origin)` in object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inverse {
-    /// Rows.
+    /// Rows of the linear part.
     pub(crate) linear: [[f64; 3]; 3],
-    /// Where the object's origin stands in the world.
+    /// The origin of object space, in world space.
     pub(crate) origin: [f64; 3],
 }
 
-/// Directions in object space whose greatest component has an exponent within this of 0 are taken as they are.
-const PLAIN_EXPONENTS: i32 = 64;
+/// Greatest |binary exponent| of a direction's greatest component in object space with which it is used without scaling.
+const MAX_EXPONENT: i32 = 64;
 
-/// The least number with such an exponent, and the least with a greater one.
-const LEAST_PLAIN: f64 = 1.0 / (1u128 << PLAIN_EXPONENTS) as f64;
-const MOST_PLAIN: f64 = (1u128 << (PLAIN_EXPONENTS + 1)) as f64;
+/// The least number with such an exponent.
+const LEAST_UNSCALED: f64 = 1.0 / (1u128 << MAX_EXPONENT) as f64;
+/// The least number with a greater exponent.
+const LEAST_SCALED: f64 = (1u128 << (MAX_EXPONENT + 1)) as f64;
 
-/// Sixteen rays, a lane each.
+/// Sixteen rays, one in each lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RayLanes {
     pub(super) origin: [[f32; LANES]; 3],
     pub(super) direction: [[f32; LANES]; 3],
-    /// Not 0 for rays whose t in the object is that in the world.
-    pub(super) plain: [u32; LANES],
+    /// Not 0 for rays whose direction is not scaled: their t in object space is t in world space.
+    pub(super) unscaled: [u32; LANES],
 }
 
 impl RayLanes {
     pub(super) const NONE: RayLanes =
-        RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], plain: [0; LANES] };
+        RayLanes { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], unscaled: [0; LANES] };
 }
 
 /// A ray in an object's space.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ObjectRay {
     pub(crate) ray: Ray,
-    /// t of the world's ray is t here times this, a power of two: 1 unless the direction would leave the
-    /// range of f32.
+    /// Factor from t in object space to t in world space, a power of two: 1 unless the direction would leave the range of f32.
     pub(crate) t_scale: f32,
 }
 
 impl Inverse {
-    /// Whether an object's space is the world's.
+    /// Whether object space is world space.
     pub(crate) fn is_identity(&self) -> bool {
         self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
     }
 
-    /// The ray in object space: the same points at the same t, but for one rounding to f32 of each
-    /// component of origin and direction (relative 2^-24). All triangles of the object see the same rounded ray, so
-    /// nothing leaks within an object; where objects meet, answers may differ from those of one
-    /// object by that rounding.
+    /// Transforms a ray to object space, with the same points at the same t except for one rounding to f32 of each component of origin
+    /// and direction (relative 2^-24). All triangles of an object are tested with the same rounded ray, so there are no leaks within
+    /// an object. Where two objects touch, answers may differ by that rounding from those for one joined object.
     pub(crate) fn ray(&self, ray: &Ray) -> ObjectRay {
         let from = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - self.origin[k]);
         let direction = ray.direction.map(f64::from);
@@ -175,43 +173,43 @@ impl Inverse {
         let direction = self.linear.map(|row| dot(row, direction));
         let greatest = direction.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let exponent = (greatest.to_bits() >> 52) as i32 - 1023;
-        if exponent.abs() <= PLAIN_EXPONENTS {
+        if exponent.abs() <= MAX_EXPONENT {
             let direction = direction.map(|x| x as f32);
             return ObjectRay { ray: Ray { origin, direction, ..*ray }, t_scale: 1.0 };
         }
-        // Beyond 100 the scale itself could leave f32; such directions are at the end of what t can tell.
+        // The clamp keeps the scale itself in the range of f32.
         let exponent = exponent.clamp(-100, 100);
-        let up = f64::from_bits(((1023 + exponent) as u64) << 52);
-        let direction = direction.map(|x| (x / up) as f32);
-        let t = |t: f32| (f64::from(t) * up) as f32;
+        let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
+        let direction = direction.map(|x| (x / scale) as f32);
+        let t = |t: f32| (f64::from(t) * scale) as f32;
         let ray = Ray { origin, direction, tmin: t(ray.tmin), tmax: t(ray.tmax) };
-        ObjectRay { ray, t_scale: (1.0 / up) as f32 }
+        ObjectRay { ray, t_scale: (1.0 / scale) as f32 }
     }
 
-    /// As [`Self::ray`], sixteen rays, to the same bits; but lanes that are not `plain` are not what that makes of them.
+    /// As [`Self::ray`] for sixteen rays, with the same bits. The results of lanes that are not `unscaled` are not valid.
     #[inline(always)]
     pub(super) fn transform(&self, lanes: &mut RayLanes) {
-        let RayLanes { origin, direction, plain } = lanes;
-        let Inverse { linear, origin: place } = *self;
-        // Without branches, so that it is compiled to vectors.
+        let RayLanes { origin, direction, unscaled } = lanes;
+        let Inverse { linear, origin: object_origin } = *self;
+        // There are no branches, so that the loop is vectorized.
         for i in 0..LANES {
             let (mut from, mut along) = ([0.0; 3], [0.0; 3]);
             for k in 0..3 {
-                from[k] = f64::from(origin[k][i]) - place[k];
+                from[k] = f64::from(origin[k][i]) - object_origin[k];
                 along[k] = f64::from(direction[k][i]);
             }
             let mut greatest = 0.0;
             for k in 0..3 {
-                let turned = dot(linear[k], along);
+                let component = dot(linear[k], along);
                 origin[k][i] = dot(linear[k], from) as f32;
-                direction[k][i] = turned as f32;
-                greatest = if turned.abs() > greatest { turned.abs() } else { greatest };
+                direction[k][i] = component as f32;
+                greatest = if component.abs() > greatest { component.abs() } else { greatest };
             }
-            plain[i] = u32::from(greatest >= LEAST_PLAIN) & u32::from(greatest < MOST_PLAIN);
+            unscaled[i] = u32::from(greatest >= LEAST_UNSCALED) & u32::from(greatest < LEAST_SCALED);
         }
     }
 
-    /// A normal of the object in the world: by the transpose of this; its length has no meaning.
+    /// Transforms a normal of the object to world space, by the transpose of this transform. Its length has no meaning.
     pub(crate) fn normal(&self, n: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.linear[0][k] * n[0] + self.linear[1][k] * n[1] + self.linear[2][k] * n[2])
     }
@@ -304,7 +302,7 @@ mod tests {
     #[test]
     fn sixteen_rays_at_once_are_the_same_to_the_bit() {
         let mut rng = Rng::new(9);
-        let mut plain = 0;
+        let mut unscaled = 0;
         for round in 0..500 {
             let scale = [1.0, 1e-12, 1e12, 1e25, 1e-25, 3.0][rng.below(6) as usize];
             let Some((inverse, _)) = random(&mut rng, scale).inverse() else { continue };
@@ -322,18 +320,18 @@ mod tests {
             inverse.transform(&mut lanes);
             for (lane, ObjectRay { ray, t_scale }) in expected.into_iter().enumerate() {
                 let finite = ray.direction.iter().all(|x| x.is_finite());
-                assert!(lanes.plain[lane] == 0 || t_scale == 1.0 && finite, "{ray:?}");
-                if lanes.plain[lane] == 0 {
+                assert!(lanes.unscaled[lane] == 0 || t_scale == 1.0 && finite, "{ray:?}");
+                if lanes.unscaled[lane] == 0 {
                     continue;
                 }
-                plain += 1;
+                unscaled += 1;
                 for k in 0..3 {
                     assert_eq!(lanes.origin[k][lane].to_bits(), ray.origin[k].to_bits());
                     assert_eq!(lanes.direction[k][lane].to_bits(), ray.direction[k].to_bits());
                 }
             }
         }
-        assert!(plain > 2000, "{plain}");
+        assert!(unscaled > 2000, "{unscaled}");
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! Batches of rays through the instances: in rounds, sorted by object, so that each object gets many
-//! rays at once.
+//! Batches of rays through the instances. All rays of a chunk advance to their next instance; then their visits are sorted by
+//! instance, so that each object receives many rays at once.
 
 use super::World;
 use super::enter_object::ObjectRays;
 use super::packets::Packets;
 use super::placement::Placed;
-use super::round::Round;
+use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::object::{self, Scratch};
@@ -17,29 +17,30 @@ use bth_format::file::File;
 use bth_format::object::ObjectView;
 use std::cell::RefCell;
 
-/// Rays that are under way together.
+/// Number of rays that advance together.
 const CHUNK: usize = 2048;
-/// Rays through one instance from which on they are traced apart from those through others: so many, four packets if they go
-/// together, that a small batch more is no loss.
-const FEWEST_RAYS_APART: usize = 256;
+/// From this number of rays on, the rays through one instance are a batch of their own: they are as many as four packets hold, so the
+/// cost of a further batch is small. Fewer rays are joined with those through other instances of the same object.
+const MIN_RAYS_PER_INSTANCE: usize = 256;
 
-/// What a query makes of rays in an object.
+/// A query over the rays of a batch.
 trait SceneQuery {
-    /// The greatest t of a ray that is still of interest; `None` when nothing is.
+    /// The greatest t of hits that can still change the result of a ray; `None` if its query is complete.
     fn tmax(&self, ray: usize) -> Option<f32>;
     /// Traces the visits of one object.
-    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]);
+    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]);
 }
 
-/// Rays under way, whose memory a thread keeps.
+/// The rays of a chunk. A thread keeps their memory from one batch to the next.
 #[derive(Default)]
 struct ActiveRays {
-    /// Of the rays of a chunk that go together,
+    /// The coherent rays.
     packets: Packets,
-    /// and of the others.
-    walks: RayTraversals,
-    /// The others that go on, by number within the chunk.
+    /// The other rays.
+    traversals: RayTraversals,
+    /// Indices within the chunk of the other rays that have not ended.
     active: Vec<u32>,
+    /// The visits of this round.
     visits: VisitQueue,
 }
 
@@ -47,11 +48,12 @@ thread_local! {
     static ACTIVE_RAYS: RefCell<ActiveRays> = RefCell::default();
 }
 
-/// Starts the rays of a chunk.
+/// Kernel that starts the rays of a chunk.
 struct StartKernel<'a> {
-    round: &'a Round<'a>,
-    /// The rays of the chunk: from this one on, so many.
+    batch: &'a SceneBatch<'a>,
+    /// Index of the first ray of the chunk.
     first: usize,
+    /// Number of its rays.
     count: usize,
     active_rays: &'a mut ActiveRays,
 }
@@ -61,33 +63,37 @@ impl Kernel for StartKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let StartKernel { round, first, count, active_rays: ActiveRays { packets, walks, active, visits } } =
-            self;
-        let (world, rays) = (round.world, &round.rays[first..first + count]);
+        let StartKernel {
+            batch,
+            first,
+            count,
+            active_rays: ActiveRays { packets, traversals, active, visits },
+        } = self;
+        let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
-        // The instance that a ray starts on comes first: its answer shortens the ray at little cost.
-        let start = |number: usize| world.start_of(round.from, first + number);
-        if round.from.is_some() {
+        // A ray visits the instance on which it starts first, because a hit there shortens it at little cost.
+        let start = |number: usize| world.start_of(batch.from, first + number);
+        if batch.from.is_some() {
             let starts = active.iter().filter_map(|&number| Some((number, start(number as usize)?)));
             visits
                 .all
                 .extend(starts.map(|(number, instance)| Visit { ray: first as u32 + number, instance }));
-            // Where there is no other that is all.
+            // If no other instance is visible, such a ray needs no traversal.
             if world.is_alone() {
                 active.retain(|&number| start(number as usize).is_none());
             }
         }
-        // Where it starts it will have been.
-        walks.start(s, top, rays, active, start);
+        // The traversal skips the instance that has been visited first.
+        traversals.start(s, top, rays, active, start);
     }
 }
 
-/// Takes each ray that is under way to its next instance; those that have come to their end are under way no more.
+/// Kernel that advances each active ray to its next instance, and removes the rays that have ended.
 struct AdvanceKernel<'a, Q> {
-    round: &'a Round<'a>,
+    batch: &'a SceneBatch<'a>,
     query: &'a Q,
-    /// The first ray of the chunk.
+    /// Index of the first ray of the chunk.
     first: usize,
     active_rays: &'a mut ActiveRays,
 }
@@ -97,37 +103,41 @@ impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let AdvanceKernel { round, query, first, active_rays: ActiveRays { packets, walks, active, visits } } =
-            self;
-        let world = round.world;
+        let AdvanceKernel {
+            batch,
+            query,
+            first,
+            active_rays: ActiveRays { packets, traversals, active, visits },
+        } = self;
+        let world = batch.world;
         let tmax = |number: usize| query.tmax(first + number);
-        packets.advance(&round.rays[first..], tmax, |number, instance| {
+        packets.advance(&batch.rays[first..], tmax, |number, instance| {
             visits.all.push(Visit { ray: (first + number) as u32, instance });
         });
-        walks.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
+        traversals.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
     }
 }
 
 impl World {
-    /// Nearest hits; of equal t the instance of least number is reported.
+    /// Computes the nearest hits; among hits of equal t that in the instance of least index.
     pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
         hits.fill(Hit::MISS);
         object::with_scratch(|scratch| {
-            let mut query = SceneNearest { rays, hits, scratch, batch: ObjectRays::default() };
+            let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
             self.run(file, rays, from, &mut query);
         });
     }
 
-    /// Whether anything is hit.
+    /// Computes whether rays hit anything.
     pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
         found.fill(false);
         object::with_scratch(|scratch| {
-            let mut query = SceneAny { rays, found, scratch, batch: ObjectRays::default() };
+            let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
             self.run(file, rays, from, &mut query);
         });
     }
 
-    /// As [`Self::nearest`] for one ray, with a count of the work within objects.
+    /// As [`Self::nearest`] for one ray, with the statistics of the traversal of objects.
     pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: Surface) -> (Hit, Steps) {
         let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
         self.run(file, std::slice::from_ref(ray), Some(&[from]), &mut query);
@@ -135,49 +145,50 @@ impl World {
     }
 
     fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl SceneQuery) {
-        let round = Round { world: self, file, rays, from };
-        // Taken out while they are in use, so that a panic leaves nothing half done behind.
+        let batch = SceneBatch { world: self, file, rays, from };
+        // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
         let mut active_rays = ACTIVE_RAYS.take();
         let isa = Isa::chosen();
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.all.clear();
-            isa.run(StartKernel { round: &round, first, count: end - first, active_rays: &mut active_rays });
-            self.trace(&round, query, &mut active_rays.visits);
+            isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
+            self.trace(&batch, query, &mut active_rays.visits);
             while !active_rays.active.is_empty() || !active_rays.packets.is_empty() {
-                isa.run(AdvanceKernel { round: &round, query, first, active_rays: &mut active_rays });
-                self.trace(&round, query, &mut active_rays.visits);
+                isa.run(AdvanceKernel { batch: &batch, query, first, active_rays: &mut active_rays });
+                self.trace(&batch, query, &mut active_rays.visits);
             }
         }
         ACTIVE_RAYS.set(active_rays);
     }
 
-    /// The instance that a ray is said to start on, if it can be seen.
+    /// The instance on which a ray starts, if it is given and visible.
     fn start_of(&self, from: Option<&[Surface]>, ray: usize) -> Option<u32> {
         let instance = from?[ray].instance;
         self.placed.get(instance as usize)?.is_some().then_some(instance)
     }
 
-    /// The place of an instance that the top level holds.
+    /// The placement of an instance that is in the top level.
     #[inline]
     pub(super) fn placed_at(&self, instance: u32) -> &Placed {
-        self.placed[instance as usize].as_ref().expect("the top level holds instances with a place")
+        self.placed[instance as usize].as_ref().expect("the top level holds visible instances")
     }
 
-    fn trace(&self, round: &Round<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
-        // In the space of one instance neighbours stay neighbours, and take the same way.
+    /// Traces all queued visits, object by object, and empties the queue.
+    fn trace(&self, batch: &SceneBatch<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
+        // Neighbouring rays through one instance remain coherent in its space.
         visits.sort(self.placed.len());
         let mut trace = |object: u32, visits: &[Visit]| {
             self.touch(object);
-            let object = round.file.view(object).expect("checked when opened");
-            query.trace(round, object, visits);
+            let object = batch.file.view(object).expect("checked when opened");
+            query.trace(batch, object, visits);
         };
         let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;
         short_runs.clear();
         let mut first = 0;
         for same in sorted.chunk_by(|a, b| a.instance == b.instance) {
             let (object, end) = (self.placed_at(same[0].instance).object(), first + same.len());
-            if same.len() >= FEWEST_RAYS_APART {
+            if same.len() >= MIN_RAYS_PER_INSTANCE {
                 trace(object, same);
             } else {
                 short_runs.push([object, first as u32, end as u32]);
@@ -200,29 +211,35 @@ struct SceneNearest<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
     scratch: &'a mut Scratch,
-    batch: ObjectRays,
+    object_rays: ObjectRays,
 }
 
 impl SceneQuery for SceneNearest<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         Some(self.rays[ray].tmax.min(self.hits[ray].t))
     }
-    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
-                let ray = round.object_ray(visit, round.rays[i].tmax.min(self.hits[i].t));
-                let from = round.hint(i, visit.instance);
+                let ray = batch.object_ray(visit, batch.rays[i].tmax.min(self.hits[i].t));
+                let from = batch.hint(i, visit.instance);
                 let hit = object::nearest(object, &ray.ray, from, visit.instance);
                 self.hits[i] =
-                    better(&round.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
+                    better(&batch.rays[i], &self.hits[i], &hit, ray.t_scale).unwrap_or(self.hits[i]);
             }
             return;
         }
-        self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax.min(self.hits[ray].t));
-        let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
-        let mut to = Sink::<query::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
-        object::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
+        self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax.min(self.hits[ray].t));
+        let scene = SceneRays { rays: batch.rays, visits, t_scale: &self.object_rays.t_scale };
+        let mut sink = Sink::<query::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
+        object::trace_batch(
+            object,
+            &self.object_rays.rays,
+            self.object_rays.hints(),
+            self.scratch,
+            &mut sink,
+        );
     }
 }
 
@@ -230,26 +247,32 @@ struct SceneAny<'a> {
     rays: &'a [Ray],
     found: &'a mut [bool],
     scratch: &'a mut Scratch,
-    batch: ObjectRays,
+    object_rays: ObjectRays,
 }
 
 impl SceneQuery for SceneAny<'_> {
     fn tmax(&self, ray: usize) -> Option<f32> {
         (!self.found[ray]).then(|| self.rays[ray].tmax)
     }
-    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
         if visits.len() < object::MIN_BATCH {
             for &visit in visits {
                 let i = visit.ray as usize;
-                let (ray, from) = (round.object_ray(visit, self.rays[i].tmax), round.hint(i, visit.instance));
+                let (ray, from) = (batch.object_ray(visit, self.rays[i].tmax), batch.hint(i, visit.instance));
                 self.found[i] |= object::any(object, &ray.ray, from);
             }
             return;
         }
-        self.batch.fill(round, object, visits, |ray| round.rays[ray].tmax);
-        let scene = SceneRays { rays: round.rays, visits, t_scale: &self.batch.t_scale };
-        let mut to = Sink::<query::Any>::of_scene(object.triangle_ids, self.found, scene);
-        object::trace_batch(object, &self.batch.rays, self.batch.hints(), self.scratch, &mut to);
+        self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax);
+        let scene = SceneRays { rays: batch.rays, visits, t_scale: &self.object_rays.t_scale };
+        let mut sink = Sink::<query::Any>::of_scene(object.triangle_ids, self.found, scene);
+        object::trace_batch(
+            object,
+            &self.object_rays.rays,
+            self.object_rays.hints(),
+            self.scratch,
+            &mut sink,
+        );
     }
 }
 
@@ -263,10 +286,10 @@ impl SceneQuery for SceneCounted<'_> {
     fn tmax(&self, _: usize) -> Option<f32> {
         Some(self.ray.tmax.min(self.best.t))
     }
-    fn trace(&mut self, round: &Round<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
+    fn trace(&mut self, batch: &SceneBatch<'_>, object: &ObjectView<'_>, visits: &[Visit]) {
         for &visit in visits {
-            let object_ray = round.object_ray(visit, self.ray.tmax.min(self.best.t));
-            let from = round.hint(visit.ray as usize, visit.instance);
+            let object_ray = batch.object_ray(visit, self.ray.tmax.min(self.best.t));
+            let from = batch.hint(visit.ray as usize, visit.instance);
             let (hit, more) = object::nearest_counted(object, &object_ray.ray, from, visit.instance);
             self.steps += more;
             self.best = better(self.ray, &self.best, &hit, object_ray.t_scale).unwrap_or(self.best);

@@ -1,4 +1,4 @@
-//! Batches through instances against all instances one after another.
+//! Tests of batches through instances, against a loop over all instances.
 
 use super::super::affine::Affine;
 use super::super::placement::Parts;
@@ -179,9 +179,9 @@ fn packets_through_the_top_level_change_no_answer() {
             hits_seen += usize::from(expected.is_hit());
         }
         let mut active_rays = ActiveRays::default();
-        let start = Round { world: &world, file: &file, rays: &rays, from: None };
+        let batch = SceneBatch { world: &world, file: &file, rays: &rays, from: None };
         Isa::chosen().run(StartKernel {
-            round: &start,
+            batch: &batch,
             first: 0,
             count: rays.len(),
             active_rays: &mut active_rays,
@@ -204,7 +204,7 @@ fn the_only_instance_is_traced_as_one_of_many() {
         let number = rng.below(u64::from(file.object_count())) as u32;
         let parts = Parts::whole(file.object_header(number));
         let placed = Placed::new(&identity, number, file.object_header(number), &parts).unwrap();
-        // Among others that cannot be seen.
+        // The other instances are not visible.
         let (row, count) = (round % 5, [1, 3, 40, 64][round % 4]);
         let mut places = vec![None; 5];
         places[row] = Some(placed);

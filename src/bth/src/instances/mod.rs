@@ -1,8 +1,10 @@
-//! Scenes of instances that move: per time the tracks and the hierarchy (`pose`), the instances' inverses
-//! and boxes (`placed`), a BVH over these (`top_level`), and batches of rays through it (`batch`: rays that go together, `packets`, and others, `walk`)
-//! and into objects (`entry`).
+//! Instances of a scene at a time, and rays through them.
 //!
-//! A ray is transformed into the space of each object that it may meet and traced there, with t unchanged.
+//! An update of the time ([`world`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`pose`]), computes the inverse
+//! transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the boxes
+//! ([`top_level`]). A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others one by one
+//! ([`traverse`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into
+//! its space ([`enter_object`]) and traced there together, with t unchanged.
 
 mod affine;
 mod batch;
@@ -10,7 +12,7 @@ mod enter_object;
 mod packets;
 mod placement;
 mod pose;
-mod round;
+mod scene_batch;
 mod top_level;
 mod tracks;
 mod traverse;

@@ -1,7 +1,7 @@
-//! Rays that go together through the top level: one way for up to 64 of them.
+//! Packets of up to 64 coherent rays in the top level.
 //!
-//! A packet lists at once all instances whose boxes any of its rays may meet, nearest first, and visits them one after the
-//! other. In scenes where it would meet many, most are hidden by others, and its rays go alone.
+//! A packet is traversed once: all instances whose boxes any of its rays may meet are listed, nearest first, and then visited one
+//! after the other. If the list grows too long, most of its instances are hidden by others, and the rays are traversed singly.
 
 use super::top_level::{INSTANCE, TopLevel};
 use super::traverse::limit;
@@ -18,60 +18,61 @@ use bth_format::object::ObjectBounds;
 
 /// Groups of sixteen rays in a packet.
 const GROUPS: usize = PACKET / LANES;
-/// Fewer rays make no packet.
-const FEWEST: usize = 2 * LANES;
-/// Instances that a packet lists at most.
-const MOST_INSTANCES: usize = 64;
-/// Nodes that wait at most; a packet that needs more is none.
-const MOST_NODES: usize = 64;
+/// Least number of rays of a packet.
+const MIN_RAYS: usize = 2 * LANES;
+/// Greatest number of instances that a packet lists.
+const MAX_INSTANCES: usize = 64;
+/// Entries of the stack of nodes; rays that need more are not traced as a packet.
+const MAX_STACKED_NODES: usize = 64;
 
-/// An instance that rays of a packet may meet.
+/// An instance whose box rays of a packet may meet.
 #[derive(Clone, Copy, Debug)]
 struct Item {
-    /// Lower bound of the depth at which any of them enters its box: t in units of the greatest component of the direction.
+    /// Lower bound of the depth at which any of the rays enters the box; a depth is t times the greatest |component| of the direction.
     depth: f32,
     instance: u32,
-    /// Which of them, a bit each.
+    /// A bit for each of these rays.
     rays: u64,
 }
 
-/// A packet on its way.
+/// A packet with its range of the listed instances.
 #[derive(Clone, Copy, Debug)]
 struct Packet {
-    /// Number of its first ray.
+    /// Index of its first ray in the chunk.
     first: u32,
-    /// The items still to be visited.
+    /// The next instance to be visited, as an index of `items`.
     next: u32,
+    /// The end of its instances in `items`.
     end: u32,
 }
 
-/// Packets on their way.
+/// The packets of a chunk.
 #[derive(Debug, Default)]
 pub(super) struct Packets {
     items: Vec<Item>,
     packets: Vec<Packet>,
-    /// After a packet that met too many instances, the next few runs of rays are not tried.
+    /// After a packet with too many instances, the next few groups of rays are not tried as packets.
     guard: Guard,
 }
 
-/// What became of a run of rays.
+/// Result of listing the instances of up to 64 rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Listed {
-    /// All instances that it may meet are listed.
+    /// All instances that the rays may meet are listed.
     All,
-    /// The rays do not go together.
-    UncachedHits,
-    /// There are too many.
+    /// The rays are not coherent.
+    Incoherent,
+    /// The rays may meet too many instances.
     TooMany,
 }
 
 impl Packets {
-    /// Whether none is on its way.
+    /// Whether there are no packets.
     pub(super) fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
 
-    /// Starts packets of those rays that go together, and puts the numbers of the others into `rest`.
+    /// Makes packets of coherent rays, and stores the indices of the other rays in `rest`.
     #[inline(always)]
     pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], rest: &mut Vec<u32>) {
         self.items.clear();
@@ -79,18 +80,18 @@ impl Packets {
         rest.clear();
         let bounds = ObjectBounds::around(top.farthest());
         let mut groups = None;
-        for (i, own) in rays.chunks(PACKET).enumerate() {
+        for (i, rays) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;
             let begin = self.items.len() as u32;
-            let mut listed = Listed::UncachedHits;
+            let mut listed = Listed::Incoherent;
             if S::HAS_VECTORS
-                && own.len() >= FEWEST
-                && is_same_octant(&own[0], &own[own.len() - 1])
+                && rays.len() >= MIN_RAYS
+                && is_same_octant(&rays[0], &rays[rays.len() - 1])
                 && self.guard.is_open()
             {
                 let groups = groups.get_or_insert_with(|| [RayGroup::vacant(s); GROUPS]);
-                listed = self.list(s, top, &bounds, groups, own);
-                if listed != Listed::UncachedHits {
+                listed = self.list(s, top, &bounds, groups, rays);
+                if listed != Listed::Incoherent {
                     self.guard.learn(listed == Listed::All);
                 }
             }
@@ -98,12 +99,12 @@ impl Packets {
                 self.packets.push(Packet { first, next: begin, end: self.items.len() as u32 });
             } else {
                 self.items.truncate(begin as usize);
-                rest.extend(first..first + own.len() as u32);
+                rest.extend(first..first + rays.len() as u32);
             }
         }
     }
 
-    /// Lists the instances that rays may meet.
+    /// Lists the instances that up to 64 rays may meet.
     #[inline(always)]
     fn list<S: Simd>(
         &mut self,
@@ -115,23 +116,23 @@ impl Packets {
     ) -> Listed {
         let span = Span::of(s, rays);
         if top.is_empty() || !span.is_coherent() || span.farthest_origin() > top.reach {
-            return Listed::UncachedHits;
+            return Listed::Incoherent;
         }
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
             if !group.prepare::<Frustum<S, false>>(s, bounds, &rays[i * LANES..end]) {
-                return Listed::UncachedHits;
+                return Listed::Incoherent;
             }
         }
         let frustum = Frustum::<S, false>::new(s, bounds, &span, groups);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
-        let mut waiting = [0; MOST_NODES];
+        let mut stack = [0; MAX_STACKED_NODES];
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let node = top.node(waiting[count]);
+            let node = top.node(stack[count]);
             let (mut bits, depth) = frustum.children(s, node, f32::INFINITY);
             let mut depths = [0.0; WIDTH];
             s.store(depth, &mut depths);
@@ -143,24 +144,24 @@ impl Packets {
                     continue;
                 }
                 let corners = frustum.corners(node, slot);
-                let mut hit_cache = 0;
+                let mut met = 0;
                 for (i, group) in groups.iter().enumerate() {
-                    hit_cache |= u64::from(group.meets::<Frustum<S, false>>(s, corners)) << (i * LANES);
+                    met |= u64::from(group.meets::<Frustum<S, false>>(s, corners)) << (i * LANES);
                 }
-                let rays = hit_cache & all;
+                let rays = met & all;
                 if rays == 0 {
                     continue;
                 }
                 if code & INSTANCE != 0 {
-                    if self.items.len() - begin == MOST_INSTANCES {
+                    if self.items.len() - begin == MAX_INSTANCES {
                         return Listed::TooMany;
                     }
                     self.items.push(Item { depth: depths[slot], instance: code & !INSTANCE, rays });
                 } else {
-                    if count == MOST_NODES {
+                    if count == MAX_STACKED_NODES {
                         return Listed::TooMany;
                     }
-                    waiting[count] = code;
+                    stack[count] = code;
                     count += 1;
                 }
             }
@@ -169,14 +170,15 @@ impl Packets {
         Listed::All
     }
 
-    /// Takes packets on to the next instance that any of their rays may meet at a t that, rounded to f32, is at most that
-    /// which `tmax` gives for its number, if it gives one. `arrive` takes numbers and instances.
+    /// Advances each packet to the next instance that any of its rays may meet, and calls `visit` with the index of each such ray and
+    /// the instance. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance). Packets without a further
+    /// instance are removed.
     #[inline(always)]
     pub(super) fn advance(
         &mut self,
         rays: &[Ray],
         tmax: impl Fn(usize) -> Option<f32>,
-        mut arrive: impl FnMut(usize, u32),
+        mut visit: impl FnMut(usize, u32),
     ) {
         let items = &self.items;
         self.packets.retain_mut(|packet| {
@@ -191,7 +193,7 @@ impl Packets {
                     let Some(tmax) = tmax(number) else { continue };
                     let [x, y, z] = rays[number].direction;
                     if item.depth <= limit(x.abs().max(y.abs()).max(z.abs()), tmax) {
-                        arrive(number, item.instance);
+                        visit(number, item.instance);
                         any = true;
                     }
                 }

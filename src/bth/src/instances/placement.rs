@@ -1,46 +1,46 @@
-//! An instance in the world: its inverse and a conservative box.
+//! An instance in the world: its inverse transform and a conservative world box.
 
 use super::affine::{Affine, Inverse};
 use bth_format::layout::{NONE, Object, WIDTH};
 use bth_format::object::ObjectView;
 use std::num::NonZeroU32;
 
-/// How far rounding may move a ray against the instance that it is traced in, relative to what is in play:
-/// 2^-24 for each component of origin and direction, and the error of the inverse, below
-/// 2^-53 times ten times the greatest condition number of 2^24; four times their sum and more.
+/// Bound of the distance by which rounding may move a ray relative to the instance, in units of the magnitudes given at
+/// [`Placed::new`]: 2^-24 for each component of origin and direction, and the error of the inverse, below 2^-53 times ten times the
+/// greatest condition number of 2^24. The constant is more than four times their sum.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
-/// An instance that can be seen.
+/// A visible instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
     pub(crate) inverse: Inverse,
-    /// World box, with the part of the rounding that does not depend on the ray.
+    /// Lower end of the world box, which includes the part of the rounding that does not depend on the ray.
     pub(crate) lower: [f32; 3],
     /// Upper end of the box.
     pub(crate) upper: [f32; 3],
-    /// One more than the number of the object, so that an absent place needs no memory of its own.
+    /// One more than the index of the object, so that `Option<Placed>` needs no further memory.
     object: NonZeroU32,
-    /// The rest of the rounding: by this times the greatest coordinate of the ray's origin a ray may
-    /// pass by the box and still hit.
+    /// The part of the rounding that depends on the ray: this times the greatest |coordinate| of the ray's origin must be added to the
+    /// box.
     pub(crate) looseness: f32,
 }
 
-/// ChildBoxes that hold all of an object that can be hit.
+/// Boxes that contain all triangles of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parts {
     count: usize,
-    /// Per axis the lower and the upper ends; what is beyond the count is repeated.
+    /// For each axis the lower and the upper ends of the boxes. Elements beyond the count are not used.
     ends: [[[f32; WIDTH]; 2]; 3],
 }
 
 impl Parts {
-    /// The object's own box.
+    /// The box of the whole object.
     pub(crate) fn whole(object: &Object) -> Parts {
         let ends = [0, 1, 2].map(|k| [[object.lower[k]; WIDTH], [object.upper[k]; WIDTH]]);
         Parts { count: 1, ends }
     }
 
-    /// Those of the children of the root, where there are some.
+    /// The boxes of the root's children if the object has a root node, else its box.
     pub(crate) fn of(object: &ObjectView<'_>) -> Parts {
         let mut parts = Parts::whole(object.header);
         let Some(node) = object.root() else { return parts };
@@ -52,10 +52,10 @@ impl Parts {
         parts
     }
 
-    /// How far they reach along a row of a transform.
+    /// The least and the greatest scalar product of `row` with a point of the boxes.
     fn reach(&self, row: [f64; 3]) -> [f64; 2] {
         let mut reach = [f64::INFINITY, f64::NEG_INFINITY];
-        // Which end of a box is the lower one along the row depends on its signs only.
+        // The signs of the row decide which corner of a box is the lowest along it.
         let ends = [0, 1, 2].map(|k| {
             let [low, high] = &self.ends[k];
             if row[k] < 0.0 { [high, low] } else { [low, high] }
@@ -70,27 +70,27 @@ impl Parts {
     }
 }
 
-/// Why an instance has no place.
+/// Why an instance cannot be placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Misplaced {
-    /// It has no inverse that is good enough for rays.
+    /// Its transform has no inverse that is accurate enough for rays.
     Singular,
-    /// Its transform or its box is beyond the range of numbers.
+    /// Its transform or its box is not finite.
     NotFinite,
 }
 
 impl Placed {
-    /// Places an object with a root; objects number less than 2^32 - 1.
+    /// Places an object that has a root, given its index, by a transform from its space to the world.
     ///
     /// A hit at t of the traced ray lies in the object's box. Let o be the ray's origin in the world, T that of the
     /// object, M the transform and A its inverse, b the greatest coordinate of the object's box. Rounding moves
     /// origin and direction such that the point at t moves in object space by at most 2^-24 (2 |A (o - T)| + b), in the
     /// world by at most |M| times that, with norms: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|.
     ///
-    /// `parts` are boxes that hold all that can be hit: the closer they fit, the closer does the world box.
+    /// `parts` are boxes that contain all triangles of the object: the tighter they are, the tighter is the world box.
     pub(crate) fn new(
         world: &Affine,
-        number: u32,
+        index: u32,
         object: &Object,
         parts: &Parts,
     ) -> Result<Placed, Misplaced> {
@@ -105,7 +105,7 @@ impl Placed {
             inverse,
             lower: [0.0; 3],
             upper: [0.0; 3],
-            object: NonZeroU32::MIN.saturating_add(number),
+            object: NonZeroU32::MIN.saturating_add(index),
             looseness: ((ROUNDING * condition) as f32).next_up(),
         };
         for k in 0..3 {
@@ -117,7 +117,7 @@ impl Placed {
         if finite { Ok(placed) } else { Err(Misplaced::NotFinite) }
     }
 
-    /// The object that stands here.
+    /// Index of the object.
     pub(crate) fn object(&self) -> u32 {
         self.object.get() - 1
     }
@@ -132,7 +132,7 @@ mod tests {
     use zerocopy::FromZeros;
 
     #[test]
-    fn world_boxes_hold_all_parts_and_fit_no_worse_than_the_whole() {
+    fn world_boxes_contain_all_parts_and_are_no_larger_than_that_of_the_whole() {
         let mut rng = Rng::new(7);
         let mut tighter = 0;
         for round in 0..500 {

@@ -1,34 +1,34 @@
-//! Where the nodes are at a time: tracks, then the hierarchy from the top, only what moved.
+//! The transforms of the nodes at a time. An update evaluates the tracks and then the hierarchy from the roots, only where nodes moved.
 //!
-//! Values of tracks are not kept: what moved is found by the keys around both times, and only that is evaluated.
+//! Values of tracks are not stored. Whether a node moved follows from the keys around the old and the new time.
 
 use super::affine::Affine;
 use super::tracks;
 use bth_format::SceneView;
 use bth_format::layout::*;
 
-/// State of a node: it moved in the last update.
+/// Bit of a node's state: it moved, was hidden or became visible in the last update.
 const MOVED: u8 = 1;
-/// State of a node: it or a node above it is hidden.
+/// Bit of a node's state: it or an ancestor is hidden.
 const HIDDEN: u8 = 2;
 
-/// The hierarchy at a time.
+/// The hierarchy of nodes at a time.
 #[derive(Debug)]
 pub(crate) struct Pose {
-    /// Of the last update; NaN before the first.
+    /// Time of the last update; NaN before the first.
     seconds: f64,
-    /// Per node [`MOVED`] and [`HIDDEN`].
+    /// For each node [`MOVED`] and [`HIDDEN`].
     state: Vec<u8>,
-    /// The nodes with children, ascending: only these keep their transform.
+    /// The nodes with children, ascending. Only their transforms are stored.
     parents: Vec<u32>,
-    /// Per node of `parents` its transform to the world.
+    /// For each node of `parents` its transform to world space.
     world: Vec<Affine>,
-    /// Per node its first track; one more at the end.
+    /// For each node the index of its first track, with a further element at the end; empty without tracks.
     first_track: Vec<u32>,
 }
 
 impl Pose {
-    /// Of a checked scene; nothing is placed before the first update.
+    /// The hierarchy of a checked scene, before the first update.
     pub(crate) fn new(view: &SceneView<'_>) -> Pose {
         let mut parents: Vec<u32> = view.nodes.iter().map(|n| n.parent).filter(|p| *p != NONE).collect();
         parents.sort_unstable();
@@ -68,7 +68,7 @@ impl Pose {
                 continue;
             }
             moved += 1;
-            let hidden = above & HIDDEN != 0 || !self.is_seen(view, row as u32);
+            let hidden = above & HIDDEN != 0 || !self.is_visible(view, row as u32);
             self.state[row] = MOVED | if hidden { HIDDEN } else { 0 };
             if is_parent {
                 self.world[world_row] = self.below(view, node.parent, &self.local(view, row as u32));
@@ -82,12 +82,12 @@ impl Pose {
         self.state[node as usize] & MOVED != 0
     }
 
-    /// Whether a node or one above it is hidden.
+    /// Whether a node or an ancestor is hidden.
     pub(crate) fn hidden(&self, node: u32) -> bool {
         self.state[node as usize] & HIDDEN != 0
     }
 
-    /// From a node's space to the world.
+    /// The transform from a node's space to world space.
     pub(crate) fn world(&self, view: &SceneView<'_>, node: u32) -> Affine {
         match self.parents.binary_search(&node) {
             Ok(row) => self.world[row],
@@ -103,10 +103,12 @@ impl Pose {
             + size_of_val(self.first_track.as_slice())
     }
 
+    /// The transform to world space of a child of `parent`, given its transform to the parent's space.
     fn below(&self, view: &SceneView<'_>, parent: u32, local: &Affine) -> Affine {
         if parent == NONE { *local } else { self.world(view, parent).times(local) }
     }
 
+    /// Indices of the tracks of a node.
     fn tracks_of(&self, node: usize) -> std::ops::Range<usize> {
         match self.first_track.get(node..node + 2) {
             Some(ends) => ends[0] as usize..ends[1] as usize,
@@ -114,12 +116,12 @@ impl Pose {
         }
     }
 
-    /// Whether a track of a node has another value than at another time.
+    /// Whether a track of a node may have another value than at the time `before`.
     fn differs(&self, view: &SceneView<'_>, node: usize, before: f64) -> bool {
         self.tracks_of(node).any(|i| tracks::differs(view, &view.tracks[i], before, self.seconds))
     }
 
-    /// From a node's space to its parent's, with the values of its tracks.
+    /// The transform from a node's space to its parent's, with the values of the node's tracks.
     fn local(&self, view: &SceneView<'_>, row: u32) -> Affine {
         let node = &view.nodes[row as usize];
         if node.flags & NODE_MATRIX != 0 {
@@ -129,6 +131,7 @@ impl Pose {
         }
     }
 
+    /// Translation, rotation and scale of a node, with the values of its tracks.
     fn parts(&self, view: &SceneView<'_>, row: u32) -> [f64; 10] {
         let node = &view.nodes[row as usize];
         let mut parts: [f64; 10] = std::array::from_fn(|i| node.transform[i]);
@@ -144,24 +147,25 @@ impl Pose {
         parts
     }
 
-    /// Whether a node's own flag, its track of visibility and its scale let it be seen.
-    fn is_seen(&self, view: &SceneView<'_>, row: u32) -> bool {
+    /// Whether a node is visible by its flag or its track of visibility, and its scale is not zero.
+    fn is_visible(&self, view: &SceneView<'_>, row: u32) -> bool {
         let node = &view.nodes[row as usize];
         let of = |property: Property| {
             let mut tracks = self.tracks_of(row as usize).map(|i| &view.tracks[i]);
             let track = tracks.find(|track| track.property == property as u32)?;
             Some(tracks::value(view, track, self.seconds))
         };
-        let seen = match of(Property::Visible) {
+        let visible = match of(Property::Visible) {
             Some(value) => value[0] != 0.0,
             None => node.flags & NODE_HIDDEN == 0,
         };
-        seen && if node.flags & NODE_MATRIX != 0 {
-            !Affine::of_matrix(node).is_zero()
-        } else {
-            let own = [node.transform[7], node.transform[8], node.transform[9]];
-            let scale = of(Property::Scale).map_or(own, |value| [value[0], value[1], value[2]]);
-            !scale.contains(&0.0)
-        }
+        visible
+            && if node.flags & NODE_MATRIX != 0 {
+                !Affine::of_matrix(node).is_zero()
+            } else {
+                let scale = [node.transform[7], node.transform[8], node.transform[9]];
+                let scale = of(Property::Scale).map_or(scale, |value| [value[0], value[1], value[2]]);
+                !scale.contains(&0.0)
+            }
     }
 }

@@ -1,43 +1,43 @@
-//! The BVH over the instances of a frame: 16 children a node, midpoint splits, rebuilt for each frame.
+//! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits whenever instances move.
 //!
-//! Sixteen instances or fewer are the children of one node: splitting them further would make nodes of two
-//! or three, whose empty slots cost memory and time.
+//! Sixteen instances or fewer become the children of one node. Splitting them further would give nodes with two or three children,
+//! whose empty slots cost memory and time.
 
 use super::placement::Placed;
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Rays whose origin has no greater coordinate than this times that of the world's boxes take the boxes as they
-/// are built; others widen them (see [`TopLevel::looseness`]).
+/// Rays whose origin has no greater |coordinate| than this factor times that of the instances' boxes use the boxes as they are built.
+/// For other rays the boxes are widened (see [`TopLevel::looseness`]).
 const REACH: f32 = 4.0;
 
-/// Set in child codes of instances; the other bits are its row.
+/// Bit of the child codes of instances; the other bits are the index of the instance.
 pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 
-/// The BVH.
+/// The top-level BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// Its nodes, the root first, on lines of their own as those of objects are: rows that cross lines take twice as long to
-    /// read. Children are codes: the line of a node, or [`INSTANCE`] and a row of the instances.
+    /// The nodes, the root first, aligned to cache lines like those of objects. The child code of a node is the index of its first
+    /// line, that of an instance is [`INSTANCE`] and its index.
     lines: Vec<CacheLine>,
-    /// Greatest coordinate of the boxes.
+    /// Greatest |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
-    /// Rays that start farther than this from the world's origin widen the boxes by `looseness` times their own
-    /// greatest coordinate.
+    /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by `looseness` times that |coordinate|.
     pub(crate) reach: f32,
-    /// Greatest of the instances'.
+    /// Greatest [`Placed::looseness`] of the instances.
     pub(crate) looseness: f32,
-    /// Levels of nodes.
+    /// Number of levels of nodes.
     pub(crate) depth: u32,
 }
 
-/// An instance while building. ChildBoxes are stored with the lower end negated: the union is then a maximum.
+/// An instance during the build.
 #[derive(Clone, Copy, Debug)]
 struct Item {
     bounds: Bounds,
     row: u32,
 }
 
+/// A box: the three lower ends, negated so that a union is a maximum of all six values, and the three upper ends.
 #[derive(Clone, Copy, Debug)]
 struct Bounds([f32; 6]);
 
@@ -53,26 +53,27 @@ impl Bounds {
     fn center(&self, axis: usize) -> f32 {
         self.0[3 + axis] - self.0[axis]
     }
-    /// Half the surface, in f64 as f32 overflows early.
+    /// Half the surface area, in f64 because f32 could overflow.
     fn area(&self) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.0[3 + k]) + f64::from(self.0[k]));
         x * y + y * z + z * x
     }
 }
 
-/// A run of the order that becomes a node.
+/// A range of the items that becomes a node.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     first: u32,
     end: u32,
     bounds: Bounds,
-    /// Twice the least and the greatest centre per axis.
+    /// For each axis twice the least coordinate of the items' centres.
     least: [f32; 3],
+    /// For each axis twice the greatest coordinate of the items' centres.
     most: [f32; 3],
 }
 
 impl Run {
-    /// Without items yet, from `first`.
+    /// A range without items that begins at `first`.
     fn empty(first: u32) -> Run {
         let (least, most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         Run { first, end: first, bounds: Bounds::EMPTY, least, most }
@@ -100,19 +101,19 @@ impl Run {
     }
 }
 
-/// A node to be filled.
+/// A node whose children are not yet determined.
 #[derive(Clone, Copy, Debug)]
 struct Task {
     node: u32,
-    /// 1 for the root.
+    /// Level in the BVH; 1 for the root.
     level: u32,
     run: Run,
 }
 
 impl TopLevel {
-    /// Builds over the instances that have a place.
+    /// Builds the BVH over the visible instances.
     pub(crate) fn build(&mut self, placed: &[Option<Placed>]) {
-        // Rarely more than one node for seven instances.
+        // There is rarely more than one node for seven instances.
         self.lines.clear();
         self.lines.reserve_exact((placed.len() / 7 + 1) * NODE_LINES);
         (self.extent, self.looseness, self.depth) = (0.0, 0.0, 0);
@@ -164,14 +165,14 @@ impl TopLevel {
         code as u32
     }
 
-    /// The node with a code.
+    /// The node with a child code.
     #[inline(always)]
     pub(crate) fn node(&self, code: u32) -> &WideNode {
         let lines = &self.lines[code as usize..][..NODE_LINES];
         WideNode::ref_from_bytes(lines.as_bytes()).expect("a node is as long as its lines")
     }
 
-    /// Whether no instance can be seen.
+    /// Whether no instance is visible.
     pub(crate) fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
@@ -186,7 +187,7 @@ impl TopLevel {
         }
     }
 
-    /// Greatest coordinate of the boxes as they are built.
+    /// Greatest |coordinate| of the boxes as they are built.
     pub(crate) fn farthest(&self) -> f32 {
         (self.extent + self.looseness * self.reach).next_up().next_up()
     }
@@ -197,12 +198,12 @@ impl TopLevel {
     }
 }
 
-/// Splits the first of these runs into up to 16: always the one of greatest area of those that are too large
-/// for one node. Returns how many there are then.
+/// Splits the first run into up to 16, always the one of greatest area among those with more items than a node has children. Returns
+/// the number of runs.
 fn split_into(items: &mut [Item], runs: &mut [Run; WIDTH]) -> usize {
-    let worth = |run: &Run| if run.len() > WIDTH as u32 { run.bounds.area() } else { f64::NEG_INFINITY };
+    let priority = |run: &Run| if run.len() > WIDTH as u32 { run.bounds.area() } else { f64::NEG_INFINITY };
     let mut areas = [f64::NEG_INFINITY; WIDTH];
-    areas[0] = worth(&runs[0]);
+    areas[0] = priority(&runs[0]);
     let mut count = 1;
     while count < WIDTH {
         let widest = (0..count).fold(0, |best, i| if areas[i] > areas[best] { i } else { best });
@@ -210,18 +211,18 @@ fn split_into(items: &mut [Item], runs: &mut [Run; WIDTH]) -> usize {
             break;
         }
         let (left, right) = split(items, runs[widest]);
-        (runs[widest], areas[widest]) = (left, worth(&left));
-        (runs[count], areas[count]) = (right, worth(&right));
+        (runs[widest], areas[widest]) = (left, priority(&left));
+        (runs[count], areas[count]) = (right, priority(&right));
         count += 1;
     }
     count
 }
 
-/// Splits a run of two or more at the middle of the centres along the axis on which they lie
-/// farthest apart; where all lie on one side, into halves.
+/// Splits a run of at least two items at the middle of their centres, along the axis on which the centres have the greatest extent. If
+/// all lie on one side, the run is halved.
 fn split(items: &mut [Item], run: Run) -> (Run, Run) {
     let items = &mut items[run.first as usize..run.end as usize];
-    // Differences of f32 may overflow, and infinity is as good a greatest as any.
+    // Differences may overflow to infinity, which is then the greatest extent.
     let spread = [0, 1, 2].map(|k| run.most[k] - run.least[k]);
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
     let middle = run.least[axis] / 2.0 + run.most[axis] / 2.0;

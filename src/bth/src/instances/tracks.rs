@@ -3,15 +3,14 @@
 use bth_format::SceneView;
 use bth_format::layout::*;
 
-/// The value of a checked track; of its four numbers as many count as the property is wide. A quaternion is not
-/// normalized.
+/// The value of a checked track. As many of the four numbers are valid as the property has components; a quaternion is not normalized.
 pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 4] {
     let property = Property::from_code(track.property).unwrap_or(Property::Visible);
     let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
     let width = property.width();
     let per_key = width * interpolation.values_per_key();
     let (times, values) = view.keys(track, per_key);
-    // Numbers of row 0, 1 or 2 of a key: with tangents the value is row 1.
+    // Row 0, 1 or 2 of a key. Keys with tangents have three rows: in-tangent, value and out-tangent.
     let row = |key: usize, row: usize| -> [f64; 4] {
         std::array::from_fn(|i| if i < width { values[key * per_key + row * width + i] } else { 0.0 })
     };
@@ -30,8 +29,8 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
     if property == Property::Rotation { great_circle(a, b, part) } else { mix(a, b, part) }
 }
 
-/// Whether the value of a checked track may differ between two times: if not, it is the same. Evaluates it only where the
-/// times lie between other keys.
+/// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do not
+/// decide.
 pub(crate) fn differs(view: &SceneView<'_>, track: &Track, a: f64, b: f64) -> bool {
     let (times, _) = view.keys(track, 0);
     let after = |seconds: f64| times.partition_point(|t| *t <= seconds);
@@ -45,10 +44,12 @@ pub(crate) fn differs(view: &SceneView<'_>, track: &Track, a: f64, b: f64) -> bo
     value(view, track, a) != value(view, track, b)
 }
 
+/// Linear interpolation.
 fn mix(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
 }
 
+/// Cubic Hermite spline with tangents in units of the value per second.
 fn hermite(a: [f64; 4], a_out: [f64; 4], b: [f64; 4], b_in: [f64; 4], part: f64, duration: f64) -> [f64; 4] {
     let (square, cube) = (part * part, part * part * part);
     let weights = [
@@ -62,6 +63,7 @@ fn hermite(a: [f64; 4], a_out: [f64; 4], b: [f64; 4], b_in: [f64; 4], part: f64,
     })
 }
 
+/// The quaternion with unit length. It is first divided by its greatest component, so that squares do not overflow.
 fn unit(q: [f64; 4]) -> [f64; 4] {
     let greatest = q.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let q = q.map(|x| x / greatest);
@@ -69,7 +71,7 @@ fn unit(q: [f64; 4]) -> [f64; 4] {
     q.map(|x| x / length)
 }
 
-/// Spherical linear interpolation the shorter way (Shoemake 1985).
+/// Spherical linear interpolation along the shorter arc (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
 fn great_circle(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     let (a, mut b) = (unit(a), unit(b));
     let mut cosine: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
@@ -121,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_hold_and_steps_keep_the_key_before() {
+    fn values_are_constant_beyond_the_keys_and_steps_keep_the_last_key() {
         let keys: &[f64] = &[0.0, 0.0, 0.0, 4.0, 8.0, 2.0];
         let at = |i, t| sample(Property::Translation, i, &[1.0, 3.0], keys, t);
         for interpolation in [Interpolation::Step, Interpolation::Linear] {
@@ -135,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn values_differ_where_they_are_others() {
+    fn differs_is_true_exactly_where_values_differ() {
         let values: Vec<f64> = [0.0, 1.0, 1.0, 3.0].iter().flat_map(|x| [*x; 3]).collect();
         for (interpolation, a, b, differ) in [
             (Interpolation::Linear, 0.1, 0.2, true),

@@ -1,6 +1,6 @@
-//! The ways of many rays through the top level: instance by instance, nearest boxes first.
+//! Traversal of the top level by single rays, from one instance to the next, nearest boxes first.
 //!
-//! All rays take a step each in turn, so that none waits for another's, and rest where they come to an instance.
+//! Rays make one step each in turn, so that their latencies overlap. A ray pauses at each instance until it has been traced there.
 
 use super::top_level::{INSTANCE, TopLevel};
 use crate::bvh::ray_state::KEY_SLACK;
@@ -13,53 +13,52 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 
-/// Rays that take turns: few enough that what they need stays in the innermost cache.
+/// Number of rays that step in turn: few enough that their states stay in the first-level cache.
 const BLOCK: usize = 64;
 
-/// Rays on their way, by number.
+/// Rays in the top level, by their index in the chunk.
 #[derive(Debug, Default)]
 pub(super) struct RayTraversals {
-    active_rays: Vec<TopLevelRay>,
-    /// A stack each.
+    states: Vec<TopLevelRay>,
+    /// One stack for each ray.
     stacks: Stacks,
 }
 
-/// A ray on its way.
+/// State of a ray in the top level.
 #[derive(Clone, Copy, Debug)]
 struct TopLevelRay {
-    /// Its slopes. Depths are t in units of the greatest component of the direction.
+    /// The ray's constants for box tests. A depth is t times the greatest |component| of the direction.
     slabs: RaySlabs,
-    /// Nothing beyond this t matters,
+    /// Greatest t of hits that can still change the result.
     tmax: f32,
-    /// and so nothing beyond this depth.
+    /// Greatest depth of such hits.
     limit: f32,
-    /// Code of the instance that it passes by, or `NONE`.
+    /// Code of an instance that the ray does not enter, or `NONE`.
     skip: u32,
-    /// The top of its stack.
+    /// The top of the ray's stack.
     top: StackPosition,
 }
 
-/// The slopes of a ray, prepared in f64; for rays from so far away that boxes must be widened for them.
+/// The constants for box tests of a ray, computed in f64. For rays from far away the boxes are widened.
 fn slabs_from_afar(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     RaySlabs::widened(ray, top.farthest(), |start| {
         if start > f64::from(top.reach) { f64::from(top.looseness) * start } else { 0.0 }
     })
 }
 
-/// The depth beyond which nothing matters where no t matters that, rounded to f32, exceeds `tmax`; `scale` is the depth
-/// of t = 1.
+/// Upper bound of the depths of hits whose t, rounded to f32, is at most `tmax`; `scale` is the depth of t = 1.
 #[inline(always)]
 pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
     const SLACK: f64 = 1.0 / (1 << 22) as f64;
     let tmax = f64::from(tmax);
     let limit = ((tmax + tmax.abs() * SLACK + f64::from(f32::from_bits(1))) * f64::from(scale)) as f32;
-    // At least the next number, without a branch: rays with and without an end are mixed.
+    // This adds at least one unit in the last place. There is no branch, because a batch may mix finite and infinite values.
     limit + (limit.abs() * f32::EPSILON + f32::MIN_POSITIVE)
 }
 
 impl RayTraversals {
-    /// Starts the rays of these numbers; those remain that may hit something. A ray will pass by the instance that `skip` gives
-    /// for its number.
+    /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of a ray
+    /// an instance that it is not to enter.
     #[inline(always)]
     pub(super) fn start<S: Simd>(
         &mut self,
@@ -73,30 +72,30 @@ impl RayTraversals {
             return active.clear();
         }
         self.stacks.reserve_for(top.depth as usize, rays.len());
-        let nowhere = TopLevelRay {
+        let vacant = TopLevelRay {
             slabs: RaySlabs::NONE,
             tmax: 0.0,
             limit: 0.0,
             skip: NONE,
             top: StackPosition::FIRST,
         };
-        if self.active_rays.len() < rays.len() {
-            self.active_rays.resize(rays.len(), nowhere);
+        if self.states.len() < rays.len() {
+            self.states.resize(rays.len(), vacant);
         }
         let bounds = ObjectBounds::around(top.farthest());
         let mut prepared = Prepared::new();
-        let mut at = [0; LANES];
+        let mut index = [0; LANES];
         let mut kept = 0;
         for first in (0..active.len()).step_by(LANES) {
             let count = LANES.min(active.len() - first);
-            at[..count].copy_from_slice(&active[first..first + count]);
-            prepared.fill(s, &bounds, rays, &at, count);
-            for (lane, &number) in at[..count].iter().enumerate() {
+            index[..count].copy_from_slice(&active[first..first + count]);
+            prepared.fill(s, &bounds, rays, &index, count);
+            for (lane, &number) in index[..count].iter().enumerate() {
                 let number = number as usize;
                 let ray = &rays[number];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
-                let state = &mut self.active_rays[number];
+                let state = &mut self.states[number];
                 match prepared.prepared(lane).filter(|_| is_near) {
                     Some(prepared) => state.slabs = prepared.slabs,
                     None => match slabs_from_afar(ray, top) {
@@ -107,16 +106,17 @@ impl RayTraversals {
                 (state.tmax, state.limit) = (ray.tmax, limit(state.slabs.scale, ray.tmax));
                 state.skip = skip(number).map_or(NONE, |instance| INSTANCE | instance);
                 state.top = self.stacks.start(number, 0);
-                active[kept] = at[lane];
+                active[kept] = index[lane];
                 kept += 1;
             }
         }
         active.truncate(kept);
     }
 
-    /// Takes rays on to the next instance whose box they may meet at a t that, rounded to f32, is at most that which
-    /// `tmax` gives for their number; those for which it gives none, and those at the end of their way, leave `active`. The
-    /// visits are added to these, in the order of `active`; rays are numbered from the first.
+    /// Advances each ray of `active` to the next instance whose box it may meet, and appends the visit to `visits` in the order of
+    /// `active`. `tmax` returns for the index of a ray the greatest t, rounded to f32, of hits that can change its result, or None if
+    /// its query is complete. Rays that are complete or meet no further instance are removed from `active`. `first_ray` is added to
+    /// the index of the ray of a visit.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
@@ -131,29 +131,29 @@ impl RayTraversals {
         for first in (0..active.len()).step_by(BLOCK) {
             let end = (first + BLOCK).min(active.len());
             block.inner.len = 0;
-            for (place, &number) in active[first..end].iter().enumerate() {
+            for (slot, &number) in active[first..end].iter().enumerate() {
                 let ray = number as usize;
                 let code = match tmax(ray) {
                     Some(tmax) => self.resume(s, ray, tmax),
                     None => BOTTOM,
                 };
-                block.sort(place, code);
+                block.push(slot, code);
             }
             let numbers = &active[first..end];
             while block.inner.len > 0 {
                 for i in 0..block.inner.take() {
-                    let place = block.inner.get(i);
-                    let ray = numbers[place] as usize;
-                    let code = self.step(s, top, ray, block.code[place]);
-                    block.sort(place, code);
+                    let slot = block.inner.get(i);
+                    let ray = numbers[slot] as usize;
+                    let code = self.step(s, top, ray, block.code[slot]);
+                    block.push(slot, code);
                 }
             }
-            // Without branches: which rays go on can't be foretold.
+            // There are no branches, because which rays continue is not predictable.
             let mut count = visits.len();
             visits.resize(count + end - first, Visit { ray: NONE, instance: NONE });
-            for place in 0..end - first {
-                let (code, number) = (block.code[place % BLOCK], active[first + place]);
-                let state = &mut self.active_rays[number as usize];
+            for slot in 0..end - first {
+                let (code, number) = (block.code[slot % BLOCK], active[first + slot]);
+                let state = &mut self.states[number as usize];
                 state.top = state.top.below();
                 visits[count] = Visit { ray: first_ray + number, instance: code & !INSTANCE };
                 active[kept] = number;
@@ -165,10 +165,10 @@ impl RayTraversals {
         active.truncate(kept);
     }
 
-    /// Drops what a ray need not visit any more; returns the code on top of its stack.
+    /// Drops stack entries beyond a ray's new `tmax`; returns the code on top of its stack.
     #[inline(always)]
     fn resume<S: Simd>(&mut self, s: S, ray: usize, tmax: f32) -> u32 {
-        let state = &mut self.active_rays[ray];
+        let state = &mut self.states[ray];
         if tmax < state.tmax {
             let limit = limit(state.slabs.scale, tmax);
             (state.tmax, state.limit) = (tmax, limit);
@@ -178,42 +178,42 @@ impl RayTraversals {
         self.stacks.code(state.top)
     }
 
-    /// Takes the node on top of a ray's stack off it, and puts its children on it; returns the code on top then.
+    /// Replaces the node on top of a ray's stack by those of its children that the ray may meet; returns the new top's code.
     #[inline(always)]
     fn step<S: Simd>(&mut self, s: S, top: &TopLevel, ray: usize, code: u32) -> u32 {
-        let state = &mut self.active_rays[ray];
+        let state = &mut self.states[ray];
         let node = top.node(code);
         let (bits, enter) = state.slabs.children(s, node, state.limit);
         let child = s.load_u(&node.child);
-        // Where coordinates are too great for f32 all boxes are met, those of no child too. What it passes by it need not meet.
-        let wanted = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(state.skip)));
+        // With coordinates near the limit of f32 the test accepts all boxes, also of empty children, so these are excluded here.
+        let allowed = s.and_not(s.lt_u(child, s.splat_u(BOTTOM)), s.eq_u(child, s.splat_u(state.skip)));
         let (codes, keys) = self.stacks.free_entries(state.top);
-        let count = s.compress_far_to_near(bits & s.mask_bits(wanted), enter, child, codes, keys);
+        let count = s.compress_far_to_near(bits & s.mask_bits(allowed), enter, child, codes, keys);
         state.top = self.stacks.replaced(state.top, count);
         self.stacks.code(state.top)
     }
 }
 
-/// Rays of a block, by place within.
+/// Rays that step in turn, by their slot in the block.
 struct RayBlock {
-    /// Those that are not yet where they rest.
+    /// Slots of the rays that have an inner node on top of their stack.
     inner: List,
-    /// Code on top of a ray's stack; where it rests, of an instance, or [`BOTTOM`].
+    /// For each slot the code on top of the stack. A ray pauses at the code of an instance or at [`BOTTOM`].
     code: [u32; BLOCK],
 }
 
-/// Places within a block.
+/// A list of slots.
 struct List {
-    place: [u8; 2 * BLOCK],
+    slot: [u8; 2 * BLOCK],
     len: u8,
 }
 
 impl List {
     #[inline(always)]
     fn get(&self, i: u8) -> usize {
-        usize::from(self.place[usize::from(i) % (2 * BLOCK)]) % BLOCK
+        usize::from(self.slot[usize::from(i) % (2 * BLOCK)]) % BLOCK
     }
-    /// Empties the list, whose entries can still be read if at most as many are added as were read.
+    /// Empties the list. Its entries remain readable as long as not more entries are added than have been read.
     #[inline(always)]
     fn take(&mut self) -> u8 {
         std::mem::replace(&mut self.len, 0)
@@ -222,15 +222,15 @@ impl List {
 
 impl RayBlock {
     fn new() -> Self {
-        let inner = List { place: [0; 2 * BLOCK], len: 0 };
+        let inner = List { slot: [0; 2 * BLOCK], len: 0 };
         RayBlock { inner, code: [BOTTOM; BLOCK] }
     }
 
-    /// Notes the code on top of the stack of a ray. Without a branch.
+    /// Stores the code on top of a ray's stack, and adds the slot to `inner` if it is the code of a node, without a branch.
     #[inline(always)]
-    fn sort(&mut self, place: usize, code: u32) {
-        self.code[place] = code;
-        self.inner.place[usize::from(self.inner.len) % (2 * BLOCK)] = place as u8;
+    fn push(&mut self, slot: usize, code: u32) {
+        self.code[slot] = code;
+        self.inner.slot[usize::from(self.inner.len) % (2 * BLOCK)] = slot as u8;
         self.inner.len += u8::from(code & INSTANCE == 0);
     }
 }

@@ -1,46 +1,46 @@
-//! Which ray goes through which instance next.
+//! The visits of instances by rays that are to be traced next, sorted by instance.
 
 use crate::query::sink::Visit;
 
-/// What rays are to be traced through.
+/// Visits, and their order by instance and by object.
 #[derive(Default)]
 pub(super) struct VisitQueue {
-    /// In order of the rays.
+    /// Visits in the order of the rays.
     pub(super) all: Vec<Visit>,
-    /// By instance.
+    /// The same visits in the order of the instances.
     pub(super) sorted: Vec<Visit>,
-    /// Runs of `sorted` through instances that few rays visit, with the object: that, first, end.
+    /// Runs of `sorted` through instances that few rays visit: the object, the first visit and the end.
     pub(super) short_runs: Vec<[u32; 3]>,
-    /// Those runs, one after the other.
+    /// The visits of several such runs with the same object.
     pub(super) gathered: Vec<Visit>,
-    /// Where those of each instance go.
-    place: Vec<u32>,
+    /// For each instance the index in `sorted` of its next visit.
+    next: Vec<u32>,
 }
 
 impl VisitQueue {
-    /// Fills `sorted`: by instance, of one in order of the rays.
+    /// Fills `sorted` with all visits, by instance and then by ray: a counting sort, or for few visits a comparison sort.
     pub(super) fn sort(&mut self, instances: usize) {
-        let VisitQueue { all, sorted, place, .. } = self;
+        let VisitQueue { all, sorted, next, .. } = self;
         sorted.clear();
         if instances > 4 * all.len() {
             sorted.extend_from_slice(all);
             sorted.sort_unstable_by_key(|v| (v.instance, v.ray));
             return;
         }
-        place.clear();
-        place.resize(instances, 0);
+        next.clear();
+        next.resize(instances, 0);
         for visit in &*all {
-            place[visit.instance as usize] += 1;
+            next[visit.instance as usize] += 1;
         }
-        let mut next = 0;
-        for count in &mut *place {
-            next += std::mem::replace(count, next);
+        let mut total = 0;
+        for count in &mut *next {
+            total += std::mem::replace(count, total);
         }
         sorted.resize(all.len(), Visit { ray: 0, instance: 0 });
         for visit in all {
-            let at = &mut place[visit.instance as usize];
-            sorted[*at as usize] = *visit;
-            *at += 1;
+            let index = &mut next[visit.instance as usize];
+            sorted[*index as usize] = *visit;
+            *index += 1;
         }
     }
 }

@@ -11,38 +11,38 @@ use bth_format::layout::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// What an update did.
+/// Statistics of an update of a scene's time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Update {
-    /// Nodes that moved, were hidden or became visible, with all that is below them.
+    /// Nodes that moved, were hidden or became visible, including all their descendants.
     pub nodes: usize,
-    /// Instances that were placed anew.
+    /// Instances of these nodes, which were placed again.
     pub placed: usize,
-    /// Instances that can be seen.
+    /// Visible instances of the whole scene.
     pub visible: usize,
-    /// Time that the rebuilding of the top level took.
+    /// Time to rebuild the top level.
     pub top_level: Duration,
 }
 
-/// The instances of a file with scene sections, placed for a time. Its sections have been checked.
+/// The instances of a file with scene sections at a time. The sections have been checked.
 #[derive(Debug)]
 pub(crate) struct World {
     pub(crate) seconds: f64,
     pose: Pose,
-    /// Per instance its place; `None` for those that cannot be seen.
+    /// For each instance its placement; `None` if it is not visible.
     pub(crate) placed: Vec<Option<Placed>>,
     pub(crate) top: TopLevel,
-    /// The only instance that can be seen.
+    /// The only visible instance, if there is exactly one.
     alone: Option<u32>,
-    /// Per object whether a ray was traced in it.
+    /// For each object whether a ray has been traced in it.
     touched: Vec<AtomicBool>,
 }
 
 impl World {
-    /// The scene of a file at a time; `None` when the file has none.
+    /// The instances of a file at the first frame of its scene; `None` if the file has no scene.
     ///
     /// # Errors
-    /// Those of the check of the scene sections and of [`Self::update`].
+    /// Those of [`File::check_scene`] and of [`Self::update`].
     pub(crate) fn new(file: &File) -> Result<Option<World>> {
         let Some(view) = file.check_scene()? else { return Ok(None) };
         let scene = &view.scene[0];
@@ -58,7 +58,7 @@ impl World {
         Ok(Some(world))
     }
 
-    /// Instances at given places, without a hierarchy.
+    /// Instances with given placements, without a hierarchy.
     #[cfg(test)]
     pub(crate) fn of_places(placed: Vec<Option<Placed>>, objects: u32) -> World {
         let nothing = SceneView {
@@ -79,7 +79,7 @@ impl World {
         World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, alone, touched }
     }
 
-    /// Moves to a time. After an error all is as it was.
+    /// Moves to a time. After an error the instances are as before.
     ///
     /// # Errors
     /// `BTH-S001` and `BTH-S002` with the node.
@@ -87,12 +87,13 @@ impl World {
         let result = self.place(file, seconds, false);
         match &result {
             Ok(_) => self.seconds = seconds,
-            // What it was has been placed before, so it can be placed again.
+            // The instances of the former time have been placed before, so placing them again succeeds.
             Err(_) => drop(self.place(file, self.seconds, true)),
         }
         result
     }
 
+    /// Places the instances that moved, or with `all` every instance, and rebuilds the top level.
     fn place(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
         let view = file.scene().expect("checked when the scene was opened");
         let mut update = Update { nodes: self.pose.update(&view, seconds, all), ..Update::default() };
@@ -110,7 +111,8 @@ impl World {
                 continue;
             }
             let world = self.pose.world(&view, instance.node);
-            // Only what is in memory already: to read the root of every object would cost more than it brings.
+            // The boxes of the root's children give a tighter world box. They are used only if they are in memory already: reading
+            // the root of every mapped object would take longer than the tighter boxes save.
             let touched = self.touched[instance.object as usize].load(Ordering::Relaxed);
             let parts = match file.view(instance.object) {
                 Ok(view) if touched || !file.is_mapped() => Parts::of(view),
@@ -142,8 +144,8 @@ impl World {
         Ok(update)
     }
 
-    /// World box of an instance, from its object's own box: whatever rays have touched, it is the same. `None` when it cannot be
-    /// seen.
+    /// World box of an instance, computed from the object's box, so it does not depend on which objects have been traced. `None` if the
+    /// instance is not visible.
     pub(crate) fn bounds(&self, file: &File, instance: u32) -> Option<([f32; 3], [f32; 3])> {
         self.placed[instance as usize].as_ref()?;
         let view = file.scene().expect("checked when the scene was opened");
@@ -153,26 +155,26 @@ impl World {
         Some((placed.lower, placed.upper))
     }
 
-    /// From a node's space to the world, rows of four; whether the node can be seen.
+    /// The transform from a node's space to world space, as rows of four, and whether the node is visible.
     pub(crate) fn node(&self, file: &File, node: u32) -> ([[f64; 4]; 3], bool) {
         let view = file.scene().expect("checked when the scene was opened");
         (self.pose.world(&view, node).rows(), !self.pose.hidden(node))
     }
 
-    /// The only instance that can be seen, and its object, if the object's space is the world's: models that came as a scene,
-    /// mostly.
+    /// The only visible instance and its object, if there is exactly one and the object's space is world space. Most such scenes are
+    /// models that were exported as scenes.
     pub(crate) fn sole(&self) -> Option<(u32, u32)> {
         let instance = self.alone?;
         let place = self.placed[instance as usize].as_ref()?;
         place.inverse.is_identity().then(|| (instance, place.object()))
     }
 
-    /// Whether only one instance can be seen.
+    /// Whether exactly one instance is visible.
     pub(crate) fn is_alone(&self) -> bool {
         self.alone.is_some()
     }
 
-    /// Notes that a ray is traced in an object.
+    /// Records that a ray is traced in an object.
     pub(crate) fn touch(&self, object: u32) {
         let touched = &self.touched[object as usize];
         if !touched.load(Ordering::Relaxed) {
@@ -180,7 +182,7 @@ impl World {
         }
     }
 
-    /// Objects that rays were traced in.
+    /// Number of objects in which rays have been traced.
     pub(crate) fn touched(&self) -> usize {
         self.touched.iter().filter(|t| t.load(Ordering::Relaxed)).count()
     }
@@ -191,7 +193,7 @@ impl World {
     }
 }
 
-/// The only instance that has a place.
+/// The only visible instance, if there is exactly one.
 fn alone(placed: &[Option<Placed>]) -> Option<u32> {
     let mut seen = placed.iter().enumerate().filter(|(_, place)| place.is_some());
     let (row, _) = seen.next()?;

@@ -1,4 +1,4 @@
-//! A round of a batch through the instances: what all visits of the round share.
+//! The parameters of a batch of rays through the instances of a scene.
 
 use super::World;
 use super::affine::ObjectRay;
@@ -7,20 +7,22 @@ use crate::rays::{Ray, Surface};
 use bth_format::File;
 use bth_format::layout::NONE;
 
-/// What the visits of a round share.
-pub(super) struct Round<'a> {
+/// A batch of rays in world space, and the scene that they go through.
+pub(super) struct SceneBatch<'a> {
     pub(super) world: &'a World,
     pub(super) file: &'a File,
     pub(super) rays: &'a [Ray],
+    /// For each ray the triangle on which it starts; see [`Scene::nearest_batch`](crate::Scene::nearest_batch).
     pub(super) from: Option<&'a [Surface]>,
 }
 
-impl Round<'_> {
-    /// The ray of a visit in the object's space.
+impl SceneBatch<'_> {
+    /// The ray of a visit in the space of the object, ended at `tmax`.
     pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
         self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
     }
 
+    /// The triangle of an instance's object on which a ray starts, or `NONE`.
     pub(super) fn hint(&self, ray: usize, instance: u32) -> u32 {
         let from = self.from.map_or(Surface::NONE, |f| f[ray]);
         if from.instance == instance { from.triangle } else { NONE }

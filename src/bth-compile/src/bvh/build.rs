@@ -8,7 +8,6 @@ use crate::monitor::Monitor;
 use bth_import::{Mesh, is_zero_area};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
 
 /// Edges on the longest path of a binary BVH that [`build`] makes; below `bth_format::limits::MAX_DEPTH`,
 /// since a wide node takes at least one level of the binary tree.
@@ -77,7 +76,7 @@ pub struct Report {
     pub visits: Vec<f64>,
     /// Subtrees that each pass of reinsertion moved.
     pub moved: Vec<u64>,
-    /// Wall-clock time of the whole stage, seconds.
+    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
 }
 
@@ -96,7 +95,6 @@ pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(B
 /// # Errors
 /// As [`build`].
 pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
-    let start = Instant::now();
     check_mesh(mesh)?;
     let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
         .into_par_iter()
@@ -111,7 +109,6 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
         ..Report::default()
     };
     if references.is_empty() {
-        report.seconds = start.elapsed().as_secs_f64();
         return Ok((BinaryBvh::default(), report));
     }
 
@@ -128,7 +125,6 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
     bvh = reinsert(bvh, &effort.reinsertion, &mut report, monitor)?;
     report.nodes = bvh.nodes.len() as u64;
     report.levels = levels(&bvh);
-    report.seconds = start.elapsed().as_secs_f64();
     Ok((bvh, report))
 }
 

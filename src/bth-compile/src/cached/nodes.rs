@@ -3,7 +3,7 @@
 use super::{Cache, decode, encode, keys};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh};
+use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh, TimedNodes};
 
 /// Takes results of nodes from the cache. A result that does not depend on clocks and machines is kept, failures too.
 pub(super) struct CachedNodes<'a> {
@@ -14,10 +14,10 @@ pub(super) struct CachedNodes<'a> {
 impl NodeRunner for CachedNodes<'_> {
     fn run(&self, job: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult> {
         if self.cache.store().is_none() || job.options.planted.is_some() {
-            return build();
+            return TimedNodes.run(job, build);
         }
         // The key has the triangles alone: the box around them follows from the options.
-        let Some(input) = job.input() else { return build() };
+        let Some(input) = job.input() else { return TimedNodes.run(job, build) };
         let key = keys::tets_of_node(&input.vertices, &input.triangles, job.options, job.tetgen);
         if let Some((record, bytes)) = self.cache.fetch(&key, "", self.monitor)
             && let Ok(mut report) = serde_json::from_value::<NodeReport>(record.report)
@@ -26,7 +26,7 @@ impl NodeRunner for CachedNodes<'_> {
             report.node = job.node;
             return Ok(NodeResult { built, report, no_worker: false, reproducible: true });
         }
-        let result = build()?;
+        let result = TimedNodes.run(job, build)?;
         if result.reproducible {
             let encoded = |mesh| encode(&with_ids_of_node(mesh, &input));
             let bytes = result.built.as_ref().map_or(Vec::new(), encoded);

@@ -7,7 +7,7 @@ use super::{Cache, decode, encode, keys};
 use crate::coordinates::{self, OnGrid};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::pipeline::{Direct, Stages};
+use crate::pipeline::{Direct, Stages, timed};
 use crate::source::Model;
 use crate::{bvh, marks, tets};
 use bth_files::Digest;
@@ -122,6 +122,6 @@ impl Stages for CachedStages<'_> {
         monitor: &dyn Monitor,
     ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
         let nodes = CachedNodes { cache: self.cache, monitor };
-        tets::build_through(mesh, tree, chosen, options, &nodes, monitor)
+        timed(|| tets::build_through(mesh, tree, chosen, options, &nodes, monitor))
     }
 }

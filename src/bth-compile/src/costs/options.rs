@@ -208,6 +208,6 @@ pub struct Report {
     pub cost_bvh: f64,
     /// The same with the chosen nodes tetrahedralized.
     pub cost_with_tets: f64,
-    /// Wall time, seconds.
+    /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
 }

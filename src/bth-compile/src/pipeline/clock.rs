@@ -1,5 +1,8 @@
-//! Wall-clock times of the stages.
+//! Wall-clock times of the stages. Only the pipeline reads clocks; the stages themselves are functions of their input and their
+//! options.
 
+use crate::error::Result;
+use crate::{bvh, costs, marks, tets};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -10,6 +13,54 @@ pub struct StageTime {
     pub name: &'static str,
     /// Seconds on the wall clock.
     pub seconds: f64,
+}
+
+/// The report of a stage, with the stage's wall-clock time.
+pub(crate) trait StageReport {
+    /// Where the time of the stage is stored, in seconds.
+    fn seconds(&mut self) -> &mut f64;
+}
+
+impl StageReport for bvh::Report {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+impl StageReport for marks::Report {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+impl StageReport for costs::Report {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+impl StageReport for tets::Report {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+impl StageReport for bvh::CollapseReport {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+/// Runs a stage and stores its wall-clock time in its report. A result that comes from the cache keeps the time of the run
+/// that made it.
+///
+/// # Errors
+/// Those of the stage.
+pub(crate) fn timed<T, R: StageReport>(stage: impl FnOnce() -> Result<(T, R)>) -> Result<(T, R)> {
+    let start = Instant::now();
+    let (output, mut report) = stage()?;
+    *report.seconds() = start.elapsed().as_secs_f64();
+    Ok((output, report))
 }
 
 /// Sums up the time of each stage, in order of first use.

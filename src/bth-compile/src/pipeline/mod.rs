@@ -12,8 +12,8 @@ mod select;
 mod stages;
 
 pub use crate::options::{Options, Structure};
-pub(crate) use clock::Clock;
 pub use clock::StageTime;
+pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
 pub use object::{Compiled, assemble};

@@ -1,5 +1,6 @@
 //! An object from the results of the stages, and the file with one object.
 
+use super::clock::timed;
 use super::{FileReport, Options};
 use crate::coordinates::{Boxes, OnGrid};
 use crate::error::Result;
@@ -83,7 +84,8 @@ pub(super) fn collapse(
     monitor: &dyn Monitor,
 ) -> Result<(PackedWide, bvh::CollapseReport)> {
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
-    let (mut wide, mut report) = bvh::collapse(traced.mesh, traced.tree, cut, &collapse_options, monitor)?;
+    let collapse = || bvh::collapse(traced.mesh, traced.tree, cut, &collapse_options, monitor);
+    let (mut wide, mut report) = timed(collapse)?;
     let grid = traced.on_grid.map(|on_grid| &on_grid.grid);
     let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
     report.measure(&wide);

@@ -1,5 +1,6 @@
 //! Selection of the nodes to tetrahedralize, by structure: none, those that pay, or the root.
 
+use super::clock::timed;
 use super::limit;
 use super::object::TracedMesh;
 use super::{Options, Structure};
@@ -37,7 +38,8 @@ pub(super) fn choose(
         }
         (Structure::Bth, _) => {
             let storage = limit::storage_of(traced.by_ref(), options, monitor)?;
-            let (choice, report) = costs::choose(mesh, tree, marks, &options.costs, storage, monitor)?;
+            let choose = || costs::choose(mesh, tree, marks, &options.costs, storage, monitor);
+            let (choice, report) = timed(choose)?;
             Ok((choice, Some(report)))
         }
     }

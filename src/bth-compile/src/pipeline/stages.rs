@@ -1,5 +1,6 @@
-//! The stages that a decorator may wrap.
+//! The stages that a decorator may wrap, timed.
 
+use super::clock::timed;
 use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -8,8 +9,9 @@ use crate::{bvh, coordinates, marks, tets};
 use bth_import::{self as mesh, Keep, Mesh};
 use std::path::Path;
 
-/// The stages of the pipeline whose results may come from elsewhere. The provided methods call the stages; a decorator
-/// overrides them, returns an earlier result where it has one, and calls [`Direct`] otherwise.
+/// The stages of the pipeline whose results may come from elsewhere. The provided methods call the stages
+/// and store their times in the reports; a decorator overrides them, returns an earlier result where it has one, and calls
+/// [`Direct`] otherwise.
 pub(crate) trait Stages {
     /// Reads the mesh of a model whose files have been hashed.
     ///
@@ -49,7 +51,7 @@ pub(crate) trait Stages {
         options: &bvh::Options,
         monitor: &dyn Monitor,
     ) -> Result<(bvh::BinaryBvh, bvh::Report)> {
-        bvh::build(mesh, options, monitor)
+        timed(|| bvh::build(mesh, options, monitor))
     }
 
     /// Marks the nodes of a BVH, built with `_options`, that can be tetrahedralized.
@@ -63,7 +65,7 @@ pub(crate) trait Stages {
         _options: &bvh::Options,
         monitor: &dyn Monitor,
     ) -> Result<(marks::Marks, marks::Report)> {
-        marks::mark(mesh, tree, monitor)
+        timed(|| marks::mark(mesh, tree, monitor))
     }
 
     /// Tetrahedralizes the chosen nodes.
@@ -78,7 +80,7 @@ pub(crate) trait Stages {
         options: &tets::Options,
         monitor: &dyn Monitor,
     ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
-        tets::build(mesh, tree, chosen, options, monitor)
+        timed(|| tets::build(mesh, tree, chosen, options, monitor))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::{Condvar, Mutex, PoisonError};
-use std::time::Instant;
 
 use crate::bvh::BinaryBvh;
 use crate::error::{Error, Result};
@@ -31,7 +30,7 @@ pub fn build(
     options: &Options,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Leaf>, Report)> {
-    build_through(mesh, bvh, chosen, options, &BuildAll, monitor)
+    build_through(mesh, bvh, chosen, options, &TimedNodes, monitor)
 }
 
 /// As [`build`], with every node run by `runner`.
@@ -46,7 +45,6 @@ pub(crate) fn build_through(
     runner: &dyn NodeRunner,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Leaf>, Report)> {
-    let start = Instant::now();
     if !chosen.is_sorted_by(|a, b| a < b) || chosen.last().is_some_and(|&n| n as usize >= bvh.nodes.len()) {
         let message = format!("chosen nodes are not ascending below {}", bvh.nodes.len());
         return Err(Error::Internal { code: "BTH-X020", message });
@@ -107,7 +105,7 @@ pub(crate) fn build_through(
         }
         work(first);
     });
-    finish(results.into_inner().unwrap_or_else(PoisonError::into_inner), report, start)
+    finish(results.into_inner().unwrap_or_else(PoisonError::into_inner), report)
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
@@ -120,7 +118,7 @@ fn none_built(mut report: Report) -> Report {
     report
 }
 
-fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<Leaf>, Report)> {
+fn finish(results: Results, mut report: Report) -> Result<(Vec<Leaf>, Report)> {
     if let Some(error) = results.error {
         return Err(error);
     }
@@ -141,7 +139,6 @@ fn finish(results: Results, mut report: Report, start: Instant) -> Result<(Vec<L
     report.failures = results.failures;
     report.workers_started = results.workers_started;
     report.nodes = results.nodes.into_values().collect();
-    report.seconds = start.elapsed().as_secs_f64();
     let limit = u64::from(bth_format::limits::MAX_TETS);
     if report.tets > limit || report.vertices > limit {
         let message =

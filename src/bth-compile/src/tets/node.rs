@@ -43,12 +43,15 @@ pub(crate) trait NodeRunner: Sync {
     fn run(&self, job: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult>;
 }
 
-/// Builds every node.
-pub(super) struct BuildAll;
+/// Builds every node and stores the wall-clock time of its attempts in its report.
+pub(crate) struct TimedNodes;
 
-impl NodeRunner for BuildAll {
+impl NodeRunner for TimedNodes {
     fn run(&self, _: &NodeJob<'_>, build: &mut dyn FnMut() -> Result<NodeResult>) -> Result<NodeResult> {
-        build()
+        let start = Instant::now();
+        let mut result = build()?;
+        result.report.seconds = start.elapsed().as_secs_f64();
+        Ok(result)
     }
 }
 
@@ -104,7 +107,6 @@ pub(super) fn tetrahedralize(
     monitor: &dyn Monitor,
 ) -> Result<NodeResult> {
     let NodeJob { mesh, bvh, node, options, .. } = *job;
-    let start = Instant::now();
     let triangles = bvh.nodes[node as usize].count;
     let mut report = NodeReport {
         node,
@@ -149,7 +151,6 @@ pub(super) fn tetrahedralize(
         }
     }
     report.failures = errors.iter().map(AttemptError::to_string).collect();
-    report.seconds = start.elapsed().as_secs_f64();
     let no_worker = errors.iter().any(|t| matches!(t, AttemptError::Start(_)));
     let reproducible = errors.iter().all(AttemptError::is_reproducible);
     Ok(NodeResult { built, report, no_worker, reproducible })

@@ -92,7 +92,7 @@ impl Packets {
                 let groups = groups.get_or_insert_with(|| [RayGroup::vacant(s); GROUPS]);
                 listed = self.list(s, top, &bounds, groups, rays);
                 if listed != Listed::Incoherent {
-                    self.guard.learn(listed == Listed::All);
+                    self.guard.record(listed == Listed::All);
                 }
             }
             if listed == Listed::All {

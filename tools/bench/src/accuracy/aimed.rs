@@ -28,21 +28,21 @@ impl Target {
 
 /// A set of such rays. Each passes through its target at t = 1 without any rounding.
 pub fn set(model: &Model, target: Target, count: usize) -> RaySet {
-    let mut random = Random(11 + target as u64);
+    let mut rng = Rng::new(11 + target as u64);
     let diagonal = model.bounds().diagonal();
     let mut rays = Vec::with_capacity(count);
     while rays.len() < count {
         // A model without a single usable edge has a shorter set.
-        let Some(point) = (0..TRIES).find_map(|_| point(model, target, &mut random)) else { break };
-        rays.extend(through(point, diagonal, &mut random));
+        let Some(point) = (0..TRIES).find_map(|_| point(model, target, &mut rng)) else { break };
+        rays.extend(through(point, diagonal, &mut rng));
     }
     RaySet { name: target.name(), any: false, coherent: false, rays, from: None }
 }
 
-fn point(model: &Model, target: Target, random: &mut Random) -> Option<[f32; 3]> {
-    let below = |n: usize, random: &mut Random| ((random.unit() * n as f64) as usize).min(n - 1);
-    let corners = model.mesh.corners(below(model.triangles(), random) as u32);
-    let first = below(3, random);
+fn point(model: &Model, target: Target, rng: &mut Rng) -> Option<[f32; 3]> {
+    let below = |n: usize, rng: &mut Rng| ((rng.unit_f64() * n as f64) as usize).min(n - 1);
+    let corners = model.mesh.corners(below(model.triangles(), rng) as u32);
+    let first = below(3, rng);
     let (a, b) = (corners[first], corners[(first + 1) % 3]);
     match target {
         Target::Vertices => Some(a),
@@ -56,12 +56,12 @@ fn point(model: &Model, target: Target, random: &mut Random) -> Option<[f32; 3]>
 
 /// A ray that meets a point at t = 1 exactly: origin and direction are multiples of the least bit of the
 /// point's coordinate, and few enough of them to be f32. So it starts no farther than about the coordinate itself.
-fn through(point: [f32; 3], diagonal: f64, random: &mut Random) -> Option<Ray> {
+fn through(point: [f32; 3], diagonal: f64, rng: &mut Rng) -> Option<Ray> {
     let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
     for k in 0..3 {
         let unit = least_bit(point[k]).unwrap_or(diagonal / f64::from(1 << 20));
         let most = (diagonal / unit).min(f64::from(1 << 23));
-        let step = ((2.0 * random.unit() - 1.0) * most).round() * unit;
+        let step = ((2.0 * rng.unit_f64() - 1.0) * most).round() * unit;
         let start = f64::from(point[k]) - step;
         (origin[k], direction[k]) = (start as f32, step as f32);
         if f64::from(origin[k]) != start || f64::from(direction[k]) != step {

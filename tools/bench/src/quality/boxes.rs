@@ -52,6 +52,22 @@ impl Box3 {
     }
 }
 
+/// A triangle, or the part of a triangle that lies in a box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reference {
+    /// Around the triangle or its part.
+    pub(super) bounds: Box3,
+    /// Id of the triangle.
+    pub(super) id: u32,
+}
+
+/// The box around all references.
+pub(super) fn bounds(references: &[Reference]) -> Box3 {
+    let mut all = Box3::EMPTY;
+    references.iter().for_each(|r| all.grow(&r.bounds));
+    all
+}
+
 /// Boxes around the parts of a triangle within a box at or below and at or above a plane across an axis;
 /// one is empty where there is no such part.
 pub(super) fn parts(corners: &[[f32; 3]; 3], within: &Box3, axis: usize, plane: f32) -> [Box3; 2] {

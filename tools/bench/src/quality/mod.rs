@@ -1,15 +1,16 @@
 //! What each step of the BVH builder is worth: binning, sweep, reinsertion, collapse, the order of blocks, and
 //! what files are not made with because it does not pay: spatial splits, narrower nodes, smaller leaves.
 
-mod bins;
+mod block_order;
 mod boxes;
-mod greedy;
-mod order;
+mod greedy_collapse;
 pub mod record;
-mod spatial;
+mod spatial_splits;
+mod split_plane;
 mod tables;
 mod variations;
 
+use record::STEPS_OF;
 pub use record::{ModelRecord, QualityRecord, Row};
 pub use tables::markdown;
 
@@ -33,8 +34,7 @@ const FEWEST: usize = 1024;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
 const QUICK_SIZE: (u32, u32) = (128, 72);
-/// Sets of which steps are counted, and rays of them, at most.
-const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
+/// Rays of a set whose steps are counted, at most.
 const COUNTED: usize = 10_000;
 
 /// Measures, prints and writes the record.

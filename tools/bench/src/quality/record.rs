@@ -6,6 +6,9 @@ use crate::rounds::geometric_mean;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+/// Ray sets of which the visited nodes and leaves are counted.
+pub(super) const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
+
 /// Everything.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QualityRecord {

@@ -1,7 +1,6 @@
 //! The page of `quality`.
 
-use super::STEPS_OF;
-use super::record::{ModelRecord, QualityRecord};
+use super::record::{ModelRecord, QualityRecord, STEPS_OF};
 use crate::markdown::{count, table, two_decimals};
 
 fn row(cells: &[&str]) -> Vec<String> {

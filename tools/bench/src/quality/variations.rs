@@ -1,7 +1,7 @@
 //! What is varied, one step of the builder at a time.
 
-use super::order::{Order, reordered};
-use super::{greedy, spatial};
+use super::block_order::{Order, reordered};
+use super::{greedy_collapse, spatial_splits};
 use crate::clock::Clock;
 use anyhow::Result;
 use bth_compile::Silent;
@@ -128,14 +128,14 @@ impl Variation {
         let tree = match &self.tree {
             Tree::Built(effort) => bvh::build_with(mesh, effort, &Silent)?.0,
             Tree::Spatial(exponent) => {
-                let tree = spatial::build(mesh, *exponent);
+                let tree = spatial_splits::build(mesh, *exponent);
                 let passes = Quality::Balanced.effort().reinsertion;
                 bvh::reinsert(tree, &passes, &mut bvh::Report::default(), &Silent)?
             }
         };
         let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };
         let (wide, report) = match self.greedy {
-            true => collapse_by(mesh, &tree, &[], &options, &greedy::decide, &Silent)?,
+            true => collapse_by(mesh, &tree, &[], &options, &greedy_collapse::decide, &Silent)?,
             false => bvh::collapse(mesh, &tree, &[], &options, &Silent)?,
         };
         Ok((tree, wide, report))

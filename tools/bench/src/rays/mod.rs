@@ -100,8 +100,8 @@ pub fn sets(finder: &Finder<'_>, options: &Options) -> (View, Vec<RaySet>) {
     let count = shot.rays.len();
     let closeup = view::close_up(finder, diagonal, &shot).rays();
     let [diffuse, ao, shadow] = secondary(finder, &shot, diagonal, light);
-    let chords = chords(&bounds, count, &mut Random(3));
-    let miss = misses(finder, &bounds, count, &mut Random(4));
+    let chords = chords(&bounds, count, &mut Rng::new(3));
+    let miss = misses(finder, &bounds, count, &mut Rng::new(4));
 
     let set = |name, any, coherent, rays, from| RaySet { name, any, coherent, rays, from };
     let sets = vec![
@@ -149,7 +149,7 @@ type Started = (Vec<Ray>, Vec<Surface>);
 
 /// Bounces, ambient occlusion and shadow rays from what the camera sees.
 fn secondary(finder: &Finder<'_>, shot: &Shot, diagonal: f64, light: DVec3) -> [Started; 3] {
-    let (mut bounces, mut occlusion) = (Random(1), Random(2));
+    let (mut bounces, mut occlusion) = (Rng::new(1), Rng::new(2));
     let mut sets = [const { (Vec::new(), Vec::new()) }; 3];
     let mut push = |set: usize, surface: Surface, ray: Ray| {
         sets[set].0.push(ray);
@@ -157,9 +157,9 @@ fn secondary(finder: &Finder<'_>, shot: &Shot, diagonal: f64, light: DVec3) -> [
     };
     for (ray_in, hit) in shot.rays.iter().zip(&shot.hits).filter(|(_, h)| h.is_hit()) {
         let (point, normal) = finder.start(ray_in, hit);
-        push(0, hit.surface, ray(point, bounces.cosine(normal), f64::INFINITY));
+        push(0, hit.surface, ray(point, cosine_weighted(&mut bounces, normal), f64::INFINITY));
         for _ in 0..AO_RAYS {
-            push(1, hit.surface, ray(point, occlusion.cosine(normal), AO_REACH * diagonal));
+            push(1, hit.surface, ray(point, cosine_weighted(&mut occlusion, normal), AO_REACH * diagonal));
         }
         let to_light = light - point;
         if to_light.dot(normal) > 0.0 {
@@ -171,10 +171,10 @@ fn secondary(finder: &Finder<'_>, shot: &Shot, diagonal: f64, light: DVec3) -> [
 }
 
 /// Chords between random points of a sphere around the model.
-fn chords(bounds: &Bounds, count: usize, random: &mut Random) -> Vec<Ray> {
+fn chords(bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
     let (middle, radius) = (bounds.center(), 0.55 * bounds.diagonal());
     let mut chord = || {
-        let (p, q) = (middle + random.sphere() * radius, middle + random.sphere() * radius);
+        let (p, q) = (middle + on_sphere(rng) * radius, middle + on_sphere(rng) * radius);
         ray(p, (q - p).normalize(), f64::INFINITY)
     };
     (0..count).map(|_| chord()).collect()
@@ -182,11 +182,11 @@ fn chords(bounds: &Bounds, count: usize, random: &mut Random) -> Vec<Ray> {
 
 /// Chords that cross the bounding box and hit nothing. A closed room has hardly any, and the set is
 /// small then.
-fn misses(finder: &Finder<'_>, bounds: &Bounds, count: usize, random: &mut Random) -> Vec<Ray> {
+fn misses(finder: &Finder<'_>, bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
     const TRIES: usize = 64;
     let mut found = Vec::new();
     for _ in 0..TRIES {
-        let rays = chords(bounds, count, random);
+        let rays = chords(bounds, count, rng);
         let hits = finder.nearest(&rays);
         let crosses =
             |r: &Ray| bounds.meets(crate::model::position(r.origin), crate::model::position(r.direction));

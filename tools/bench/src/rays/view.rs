@@ -64,12 +64,12 @@ pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) ->
 pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> Shot {
     const POINTS: usize = 64;
     const DIRECTIONS: usize = 256;
-    let mut random = Random(6);
+    let mut rng = Rng::new(6);
     let extent = bounds.upper - bounds.lower;
-    let mut inner = || 0.1 + 0.8 * random.unit();
+    let mut inner = || 0.1 + 0.8 * rng.unit_f64();
     let eyes: Vec<DVec3> =
         (0..POINTS).map(|_| bounds.lower + extent * DVec3::new(inner(), inner(), inner())).collect();
-    let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| random.sphere()).collect();
+    let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| on_sphere(rng)).collect();
 
     let mut best = (f64::NEG_INFINITY, DVec3::ZERO, DVec3::Z);
     for eye in eyes {
@@ -118,16 +118,16 @@ pub(super) fn automatic(finder: &Finder<'_>, diagonal: f64) -> View {
 
 /// Share of cosine-weighted rays from the fronts of seeded triangles that hit nothing.
 fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
-    let mut random = Random(7);
+    let mut rng = Rng::new(7);
     let count = finder.model.triangles();
     let mut rays = Vec::with_capacity(SAMPLES);
     for _ in 0..SAMPLES {
-        let triangle = ((random.unit() * count as f64) as usize).min(count - 1) as u32;
+        let triangle = ((rng.unit_f64() * count as f64) as usize).min(count - 1) as u32;
         let normal = finder.model.normal(triangle);
         if normal != DVec3::ZERO {
             let [a, b, c] = finder.model.corners(triangle);
             let point = (a + b + c) / 3.0 + normal * (super::LIFT * diagonal);
-            rays.push(ray(point, random.cosine(normal), f64::INFINITY));
+            rays.push(ray(point, cosine_weighted(rng, normal), f64::INFINITY));
         }
     }
     let open = finder.nearest(&rays).iter().filter(|h| !h.is_hit()).count();

@@ -53,14 +53,14 @@ impl Shots {
     pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<Shots> {
         let (camera, diagonal) = camera(scene, size)?;
         let first = Set::of(scene, camera.rays(), None, true);
-        let mut random = Random(1);
+        let mut rng = Rng::new(1);
         let lift = LIFT * diagonal;
-        let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut random);
+        let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut rng);
         let second = Set::of(scene, rays, Some(from), false);
         let (mut later, mut from): (Vec<Ray>, Vec<Surface>) = Default::default();
         let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
         for _ in 1..BOUNCES {
-            let (next, starts) = onward(scene, &rays, &hits, lift, &mut random);
+            let (next, starts) = onward(scene, &rays, &hits, lift, &mut rng);
             let set = Set::of(scene, next, None, false);
             later.extend(&set.rays);
             from.extend(starts);
@@ -102,7 +102,7 @@ fn onward(
     rays: &[Ray],
     hits: &[Hit],
     lift: f64,
-    random: &mut Random,
+    rng: &mut Rng,
 ) -> (Vec<Ray>, Vec<Surface>) {
     let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
         let direction = position(from.direction);
@@ -113,7 +113,7 @@ fn onward(
         let normal = DVec3::from_array(normal).normalize();
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let point = position(from.origin) + direction * f64::from(hit.t) + normal * lift;
-        (ray(point, random.cosine(normal), f64::INFINITY), hit.surface)
+        (ray(point, cosine_weighted(rng, normal), f64::INFINITY), hit.surface)
     });
     onward.unzip()
 }

@@ -1,50 +1,53 @@
-//! What bounds all rays of a packet together: tested before the single rays are.
+//! Bounds of all rays of a packet, which boxes and triangles are tested against before the single rays are.
 
 use crate::simd::Simd;
 use bth_format::layout::WideNode;
 
 /// A set that contains every point at which rays of a packet can hit something.
 pub(crate) trait PacketBounds<S: Simd> {
-    /// Whether the rays go into different octants.
-    const MIXED: bool;
-    /// Whether they start at one point, and corners of boxes are given relative to that.
-    const FROM_POINT: bool;
-    /// How they look from there, if they do.
+    /// Whether the directions of the rays may lie in different octants.
+    const MIXED_OCTANTS: bool;
+    /// Whether all rays start at one point. The corners of boxes ([`Self::corners`]) are then relative to it.
+    const COMMON_ORIGIN: bool;
+    /// Origin and slopes of the rays, with [`Self::COMMON_ORIGIN`].
     fn view(&self) -> Option<&FrustumView>;
-    /// The children of a node that it may meet before a depth, a bit each, and lower bounds of the depth at
-    /// which any of the rays enters them.
+    /// The children of a node whose boxes rays may enter before the depth `limit`, as bits, and lower bounds of the depths at
+    /// which any ray enters them.
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
-    /// For sixteen points, given as rows of x, y and z, the sides on which they lie outside, a bit each. A
-    /// triangle whose corners all have a bit in common is missed by all rays.
-    fn sides(&self, s: S, rows: [S::F; 3]) -> S::U;
-    /// The corners of a child's box, as [`RayGroup::meets`] wants them.
+    /// Outcodes of sixteen points, given as rows of x, y and z: a bit for each side of the bounds beyond which the point lies. A
+    /// triangle whose corners have a bit in common is missed by all rays.
+    fn outcodes(&self, s: S, rows: [S::F; 3]) -> S::U;
+    /// The two corners of a child's box, as [`RayGroup::meets`](super::ray_group::RayGroup::meets) expects them.
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
 }
 
-/// What coherent rays have in common, seen from where they start.
+/// The center of a frustum, and the interval of the slopes of its rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrustumView {
-    /// Where they start, or the middle of that.
+    /// The rays' common origin, or the middle of the interval of their origins.
     pub(crate) origin: [f32; 3],
-    /// Two axes, and the one along which they go.
+    /// The two axes of the plane of projection, and the main axis ([`Span::main_axis`](super::coherence::Span::main_axis)).
     pub(super) axis: [usize; 3],
-    /// The middle of the interval of their slopes along those two, and half its width.
+    /// Middle of the interval of the slopes: change of the two coordinates in the plane per unit of the third.
     pub(super) shear: [f32; 2],
+    /// Half the width of that interval.
     pub(super) shear_width: [f32; 2],
 }
 
 impl FrustumView {
-    /// The axis along which the rays go.
+    /// The axis along which the rays advance most.
     #[inline(always)]
-    pub(crate) fn axis(&self) -> usize {
+    pub(crate) fn main_axis(&self) -> usize {
         self.axis[2]
     }
 
-    /// Of sixteen points relative to the origin, given as rows of x, y and z: bounds of |x| and |y| as any ray sees them, and
-    /// |depth|. Coordinates sheared by the middle of the slopes' interval, and half its width times the depth; 2^-20 of the
-    /// depth, and of the sum, is more than the roundings here and in the rays' own slopes.
+    /// Bounds of sixteen points relative to the origin, given as rows of x, y and z: the greatest |x| or |y| to which any ray
+    /// projects each point, and its |depth|.
+    ///
+    /// The first is the coordinate sheared by the middle of the interval of slopes plus half the interval's width times |depth|. An
+    /// addition of 2^-20 of the depth and a factor of 1 + 2^-20 exceed the roundings here and in the rays' own slopes.
     #[inline(always)]
-    pub(crate) fn spread<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
+    pub(crate) fn projected_bounds<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
         const UP: f32 = 1.0 / (1 << 20) as f32;
         let depth = rows[self.axis[2]];
         let far = s.abs(depth);

@@ -4,17 +4,20 @@ use crate::simd::LANES;
 
 /// Groups of sixteen rays in a packet.
 pub(crate) const GROUPS: usize = 4;
-/// Rays in a packet at most.
+/// Greatest number of rays in a packet.
 pub(crate) const PACKET: usize = GROUPS * LANES;
 
-/// A child that waits to be entered.
+/// A child node or leaf that is still to be entered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StackEntry {
-    /// Rays that entered the parent; of those that go into different octants, and are asked at once, which meet the box.
+    /// The rays that entered the parent, as bits; where directions lie in different octants
+    /// ([`PacketBounds::MIXED_OCTANTS`](super::bounds::PacketBounds::MIXED_OCTANTS)), those of them that may enter the child's box.
     pub(crate) rays: u64,
-    /// Line of the parent, and the slot there.
+    /// Index of the cache line at which the parent begins.
     pub(crate) parent: u32,
+    /// Index of the child in its parent.
     pub(crate) slot: u32,
-    /// Lower bound of the depth at which any ray enters it.
+    /// Lower bound of the depth at which any ray enters the child, but for
+    /// [`KEY_SLACK`](crate::bvh::ray_state::KEY_SLACK); not set for any-hit queries.
     pub(crate) key: f32,
 }

@@ -1,4 +1,4 @@
-//! The frustum of coherent rays, by interval arithmetic.
+//! Packet bounds of coherent rays: a frustum, by interval arithmetic.
 
 use super::bounds::{FrustumView, PacketBounds};
 use super::coherence::Span;
@@ -9,10 +9,10 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 
-/// Rays into one octant: interval arithmetic over their origins and directions (Wald, Boulos and Shirley, "Ray Tracing
-/// Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007, cull boxes in this way).
+/// Bounds of rays whose directions lie in one octant, by interval arithmetic over their origins and directions, as for the boxes of
+/// Wald, Boulos and Shirley, "Ray Tracing Deformable Scenes Using Dynamic Bounding Volume Hierarchies", TOG 2007.
 ///
-/// **ChildBoxes.** The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
+/// **Boxes.** The depth at which ray l meets a plane is (plane - o)·r: an interval of o, widened by a pad on both sides, and
 /// one of r bound it. As all operations round monotonically, only roundings need the pad. With u = 2^-24 and E the sum of the
 /// greatest coordinate of the object and that of all origins, they come to at most uE|r| for the reciprocal, 2uE|r| for the
 /// padded end, uE|r| for the difference and uE|r| for the product: with the half [`PAD`] = 8uE|r| of [`crate::intersect::boxes`] for
@@ -22,25 +22,28 @@ use bth_format::object::ObjectBounds;
 /// (x - c_x) - s₀(z - c_z) + (s₀ - s)(z - c_z) + a with a = (c_x - o_x) - s(c_z - o_z): the middle of the interval of s,
 /// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
 /// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
-/// Where all rays start at one point (`POINT`), the intervals of origins, widened by their pads, serve for the single rays, too
-/// ([`RayGroup::meets`]), and those of a are zero.
+/// Where all rays have the same origin (`POINT`), the intervals of origins, widened by their pads, are also used for the single rays
+/// ([`RayGroup::meets`]), and the interval of a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     view: FrustumView,
-    /// The end of the origins' interval that is nearest to the planes that are met first, and that nearest to the others.
+    /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
     near_origin: [f32; 3],
+    /// For each axis the end that is nearest to the planes at which rays leave boxes.
     far_origin: [f32; 3],
-    /// Least and greatest reciprocal.
+    /// For each axis the least and the greatest reciprocal of the directions' components.
     reciprocal: [[S::F; 2]; 3],
-    /// Row of the ends that are met first.
+    /// For each axis the offset of the row of a node with the planes at which rays enter boxes.
     near: [u32; 3],
+    /// Least depth of the rays' ranges.
     first: S::F,
-    /// What keeps points on the upper side, and on the lower.
+    /// Padded bound of the sheared coordinates of points within the upper sides.
     upper: [f32; 2],
+    /// The same for the lower sides, negated.
     lower: [f32; 2],
 }
 
 impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
-    /// Of a coherent run ([`Span::is_coherent`]).
+    /// The frustum of coherent rays ([`Span::is_coherent`]) that are prepared in `groups`.
     #[inline(always)]
     pub(crate) fn new(s: S, bounds: &ObjectBounds, span: &Span, groups: &[RayGroup<S>]) -> Self {
         let zero = s.splat(0.0);
@@ -52,7 +55,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
             let [least, greatest] = span.origin[k];
             center[k] = if POINT { least } else { 0.5 * least + 0.5 * greatest };
         }
-        // Of the reciprocals, the slopes and what is added to sheared coordinates; and of the first depth.
+        // The ranges of three reciprocals, two slopes and two terms a of sheared coordinates, and the least depth.
         let (mut least, mut greatest) = ([s.splat(f32::INFINITY); 8], [s.splat(f32::NEG_INFINITY); 7]);
         for group in groups {
             for k in 0..3 {
@@ -61,7 +64,7 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
             }
             for j in 0..2 {
                 let slope = match group.common {
-                    // As good as the quotient, and there already.
+                    // This is the same slope, computed when the rays were prepared.
                     Some(common) if common.0 == main => {
                         s.mul(group.projection.shear[j], group.projection.forward)
                     }

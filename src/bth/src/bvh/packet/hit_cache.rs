@@ -1,6 +1,8 @@
-//! Triangles that rays of a packet certainly hit, each nearer than all before: kept once for all rays that start at one point.
+//! The packet hit cache: triangles that rays of a packet certainly hit, nearer than all before, each stored once for all rays if
+//! these start at one point.
 //!
-//! f64 then does for a triangle what does not depend on the direction ([`crate::intersect::exact::OriginTerms`]), and for a ray only the rest.
+//! The f64 terms of a triangle that do not depend on the direction ([`crate::intersect::exact::OriginTerms`]) are then computed once,
+//! and only the others for each ray.
 
 use super::leaf_mesh::Leaf;
 use crate::bvh::candidate::Candidate;
@@ -8,109 +10,114 @@ use crate::intersect::exact_lanes::{F32Lanes, OriginTermsLanes};
 use crate::intersect::filter::TriangleBlock;
 use crate::simd::{LANES, Simd};
 
-/// Triangles that are kept.
-pub(crate) const MOST: usize = LANES;
-/// In place of the number of a triangle that is not: it is kept for each ray that hits it.
-pub(crate) const UNCACHED: u32 = MOST as u32;
+/// Number of slots.
+pub(crate) const SLOTS: usize = LANES;
+/// Stands for the slot of a triangle that is not cached and is stored for each ray that hits it.
+pub(crate) const UNCACHED: u32 = SLOTS as u32;
 
-/// The triangles of a packet.
+/// Triangles that rays of a packet hit.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct HitCache {
-    /// `[corner][axis]`.
+    /// `[corner][axis][slot]`, object space.
     pub(crate) corner: [[F32Lanes; 3]; 3],
-    /// In leaf order.
-    pub(crate) place: [u32; MOST],
-    /// As they are reported.
-    pub(crate) id: [u32; MOST],
-    leaf: [u32; MOST],
-    triangle: [u32; MOST],
-    /// How many there are, kept or not.
+    /// Indices in the object's leaf order.
+    pub(crate) index: [u32; SLOTS],
+    /// Ids; set by [`CachedHits::compute_terms`].
+    pub(crate) id: [u32; SLOTS],
+    /// Child codes of the leaves.
+    leaf: [u32; SLOTS],
+    /// Indices in the leaves.
+    triangle: [u32; SLOTS],
+    /// Number of triangles of the packet, whether cached or not.
     count: usize,
-    /// How many are kept: none, if the rays do not start at one point, or if there were too many the last time.
-    buffers: usize,
-    /// Whether they have been looked at ([`CachedHits`]).
-    is_seen: bool,
+    /// Number of slots in use: 0 if the rays do not start at one point, or if the packet before had too many triangles.
+    capacity: usize,
+    /// Whether [`CachedHits::compute_terms`] has been called for the packet.
+    has_terms: bool,
 }
 
 impl HitCache {
     pub(crate) const NONE: HitCache = HitCache {
-        corner: [[[0.0; MOST]; 3]; 3],
-        place: [0; MOST],
-        id: [0; MOST],
-        leaf: [0; MOST],
-        triangle: [0; MOST],
+        corner: [[[0.0; SLOTS]; 3]; 3],
+        index: [0; SLOTS],
+        id: [0; SLOTS],
+        leaf: [0; SLOTS],
+        triangle: [0; SLOTS],
         count: 0,
-        buffers: 0,
-        is_seen: false,
+        capacity: 0,
+        has_terms: false,
     };
 
-    /// Begins anew.
+    /// Empties the cache for the next packet. `common_origin` is whether the rays of the packet start at one point.
     #[inline(always)]
-    pub(crate) fn clear<S: Simd>(&mut self, _: S, from_point: bool) {
-        self.buffers = if S::HAS_FAST_F64_LOOKUP && from_point && self.count <= MOST { MOST } else { 0 };
+    pub(crate) fn reset<S: Simd>(&mut self, _: S, common_origin: bool) {
+        self.capacity =
+            if S::HAS_FAST_F64_LOOKUP && common_origin && self.count <= SLOTS { SLOTS } else { 0 };
         self.count = 0;
-        self.is_seen = false;
+        self.has_terms = false;
     }
 
-    /// How many are kept.
+    /// Number of cached triangles.
     #[inline(always)]
-    pub(crate) fn kept(&self) -> usize {
-        self.count.min(self.buffers)
+    pub(crate) fn cached(&self) -> usize {
+        self.count.min(self.capacity)
     }
 
-    /// Whether the first half of the room was enough.
+    /// Whether all triangles of the packet have slots of the first half.
     #[inline(always)]
-    pub(crate) fn are_few(&self) -> bool {
-        self.count <= MOST / 2
+    pub(crate) fn fits_first_half(&self) -> bool {
+        self.count <= SLOTS / 2
     }
 
-    /// Takes in a triangle of a leaf, and returns its number: [`UNCACHED`] if there is no room.
+    /// Adds a triangle of a leaf, and returns its slot, or [`UNCACHED`] if the cache is full.
     #[inline(always)]
     pub(crate) fn add<B: TriangleBlock>(&mut self, leaf: &Leaf<'_, B>, triangle: u32) -> u32 {
-        let at = self.count;
+        let slot = self.count;
         self.count += 1;
-        if at >= self.buffers.min(MOST) {
+        if slot >= self.capacity.min(SLOTS) {
             return UNCACHED;
         }
         for c in 0..3 {
             for k in 0..3 {
-                self.corner[c][k][at] = leaf.block.coordinate(triangle as usize, c, k);
+                self.corner[c][k][slot] = leaf.block.coordinate(triangle as usize, c, k);
             }
         }
-        self.place[at] = leaf.block.first() + triangle;
-        (self.leaf[at], self.triangle[at]) = (leaf.code, triangle);
-        at as u32
+        self.index[slot] = leaf.block.first() + triangle;
+        (self.leaf[slot], self.triangle[slot]) = (leaf.code, triangle);
+        slot as u32
     }
 
-    /// A triangle as what is still to be decided.
+    /// The triangle in a slot, as a candidate.
     #[inline(always)]
-    pub(crate) fn candidate(&self, number: u32) -> Candidate {
-        let at = number as usize % MOST;
-        Candidate { leaf: self.leaf[at], triangle: self.triangle[at] }
+    pub(crate) fn candidate(&self, slot: u32) -> Candidate {
+        let slot = slot as usize % SLOTS;
+        Candidate { leaf: self.leaf[slot], triangle: self.triangle[slot] }
     }
 }
 
-/// The triangles of a packet, and how they look from the point at which its rays start.
+/// The hit cache of a packet, with the terms that its triangles share for all rays.
 pub(crate) struct CachedHits<'a> {
+    /// The common origin of the rays, object space.
     pub(crate) origin: [f32; 3],
-    /// In leaf order.
+    /// Ids of the object's triangles, in leaf order.
     pub(crate) ids: &'a [u32],
     pub(crate) hit_cache: &'a mut HitCache,
-    pub(crate) seen: &'a mut OriginTermsLanes,
+    /// Terms of the cached triangles for `origin`; valid after [`Self::compute_terms`].
+    pub(crate) terms: &'a mut OriginTermsLanes,
 }
 
 impl CachedHits<'_> {
-    /// CachedHits at all of them, the first time.
+    /// Computes terms and reads ids of the cached triangles, once for each packet.
     #[inline(always)]
-    pub(crate) fn compute(&mut self) {
-        if self.hit_cache.is_seen {
+    pub(crate) fn compute_terms(&mut self) {
+        if self.hit_cache.has_terms {
             return;
         }
-        self.hit_cache.is_seen = true;
-        for i in 0..self.hit_cache.kept().min(MOST) {
-            self.hit_cache.id[i] = self.ids[self.hit_cache.place[i] as usize];
+        self.hit_cache.has_terms = true;
+        for i in 0..self.hit_cache.cached().min(SLOTS) {
+            self.hit_cache.id[i] = self.ids[self.hit_cache.index[i] as usize];
         }
-        self.seen.compute(self.origin, &self.hit_cache.corner, self.hit_cache.kept());
+        self.terms.compute(self.origin, &self.hit_cache.corner, self.hit_cache.cached());
     }
 }

@@ -1,15 +1,16 @@
-//! The triangles of a leaf before the rays of a packet: lanes are rays, one triangle at a time, unless few rays are left ([`super::single_rays`]).
+//! Intersection of the rays of a packet with the triangles of a leaf: one triangle at a time with a ray in each lane or, where few rays
+//! are left, one ray at a time ([`super::single_rays`]).
 //!
-//! Points are projected once for a group of sixteen rays or, where all rays of the packet start at one point, for each triangle that
-//! is tested. Most triangles are left out by the error bound of the whole leaf, which is that of [`crate::intersect::filter`] for the
-//! greatest corner of all; only for the others is it worked out.
+//! Points are projected once for a group of sixteen rays or, if all rays of the packet have the same origin, for each tested triangle.
+//! Most triangles are excluded by the error bound of [`crate::intersect::filter`] for the greatest corner of the whole leaf; only for
+//! the others the bound of the triangle itself is computed.
 
 use super::bounds::PacketBounds;
 use super::hit_cache::{HitCache, UNCACHED};
 use super::leaf_mesh::{Leaf, LeafMesh};
 use super::points::{CornerSource, Greatest, POINTS, Points, ProjectedOnDemand, Relative};
 use super::ray_group::RayGroup;
-use super::single_rays::{FEWEST_OF_GROUP, SingleRays};
+use super::single_rays::{FEW_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter;
 use crate::intersect::prepare::{Axes, CommonAxis};
@@ -19,24 +20,25 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
 
-/// In place of the number of a triangle among those that the packet keeps: it has not been asked for.
+/// In place of a triangle's index in the hit cache: no ray has hit it certainly so far.
 const NOT_CACHED_YET: u8 = u8::MAX;
 
-/// The rays of a packet, and what has been found for them.
+/// The rays of a packet with their queries and decided hits.
 pub(crate) struct PacketRays<'a, Q> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
-    /// Queries of rays for which anything has been decided, where their bit is set.
+    /// Queries of the rays whose bit is set in `queried`.
     pub(crate) queries: &'a mut [Q],
+    /// A bit for each ray with a decision in f64.
     pub(crate) queried: u64,
-    /// The rays, one by one.
+    /// The rays as prepared single rays.
     pub(crate) single_rays: &'a mut SingleRays,
     pub(crate) hit_cache: &'a mut HitCache,
-    /// Those that are not done.
+    /// A bit for each ray whose query is not complete.
     pub(crate) alive: u64,
 }
 
-/// What groups keep of triangles that wait, lane by lane.
+/// The uncached pending hits of a group; see [`RayGroup::leaf`] and [`RayGroup::triangle`].
 struct UncachedHits {
     leaf: [u32; LANES],
     triangle: [u32; LANES],
@@ -45,25 +47,25 @@ struct UncachedHits {
 impl UncachedHits {
     #[inline(always)]
     fn of<S: Simd>(s: S, group: &RayGroup<S>) -> Self {
-        let mut apart = UncachedHits { leaf: [0; LANES], triangle: [0; LANES] };
-        s.store_u(group.leaf, &mut apart.leaf);
-        s.store_u(group.triangle, &mut apart.triangle);
-        apart
+        let mut hits = UncachedHits { leaf: [0; LANES], triangle: [0; LANES] };
+        s.store_u(group.leaf, &mut hits.leaf);
+        s.store_u(group.triangle, &mut hits.triangle);
+        hits
     }
 
-    /// What waits in a lane.
+    /// The pending hit of a lane as a candidate; `pending` is the lane's [`RayGroup::pending`].
     #[inline(always)]
-    fn candidate(&self, hit_cache: &HitCache, waiting: u32, lane: usize) -> Candidate {
-        match waiting {
+    fn candidate(&self, hit_cache: &HitCache, pending: u32, lane: usize) -> Candidate {
+        match pending {
             NONE => Candidate::NONE,
             UNCACHED => Candidate { leaf: self.leaf[lane], triangle: self.triangle[lane] },
-            number => hit_cache.candidate(number),
+            cached => hit_cache.candidate(cached),
         }
     }
 }
 
 impl<Q: Query> PacketRays<'_, Q> {
-    /// Tests the triangles of a leaf for rays of the packet, a bit each. Returns whether any has a nearer hit.
+    /// Intersects the rays whose bit is set with the triangles of a leaf. Returns whether any has a nearer hit than before.
     #[inline(always)]
     pub(crate) fn enter_leaf<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
@@ -74,11 +76,11 @@ impl<Q: Query> PacketRays<'_, Q> {
         leaf: &Leaf<'_, B>,
         mut rays: u64,
     ) -> bool {
-        // Nearest hits are asked in packets only of coherent rays, of which seldom few are left.
+        // In packets for nearest hits, whose rays are coherent, few rays are rarely left.
         if Q::ANY {
             for (i, group) in groups.iter().enumerate() {
                 let active = (rays >> (i * LANES)) as u32 & 0xffff;
-                if active.count_ones() <= FEWEST_OF_GROUP {
+                if active.count_ones() <= FEW_OF_GROUP {
                     rays &= !(0xffff << (i * LANES));
                     self.enter_leaf_singly::<S, H, B>(s, group, i, leaf, active);
                 }
@@ -89,11 +91,11 @@ impl<Q: Query> PacketRays<'_, Q> {
         }
         let count = leaf.block.triangles().min(WIDTH as u32);
         let triangles = !leaf.block.outside(s, bounds) & ((1 << count) - 1);
-        let (mut used, mut rest) = (0u64, triangles);
-        while rest != 0 {
-            let [a, b, c] = leaf.block.points_of(rest.trailing_zeros() as usize);
+        let (mut used, mut remaining) = (0u64, triangles);
+        while remaining != 0 {
+            let [a, b, c] = leaf.block.points_of(remaining.trailing_zeros() as usize);
             used |= 1 << a | 1 << b | 1 << c;
-            rest &= rest - 1;
+            remaining &= remaining - 1;
         }
         if triangles == 0 {
             return false;
@@ -103,7 +105,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             leaf.block.relative(s, view.origin, relative);
             spread = relative.spread(s, view, B::PARTS, used);
         }
-        let (mut nearer, mut numbers) = (false, [NOT_CACHED_YET; WIDTH]);
+        let (mut nearer, mut cache_indices) = (false, [NOT_CACHED_YET; WIDTH]);
         for (i, group) in groups.iter_mut().enumerate() {
             let active = (rays >> (i * LANES)) as u32 & 0xffff;
             if active != 0 {
@@ -114,7 +116,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                     i,
                     (points, relative, spread),
                     leaf,
-                    &mut numbers,
+                    &mut cache_indices,
                     (triangles, used),
                     active,
                 );
@@ -123,7 +125,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         nearer
     }
 
-    /// Tests the triangles of a leaf for rays of a group one at a time: whether they hit any.
+    /// Intersects the active rays of an any-hit group with the triangles of a leaf, one ray at a time. `at` is the index of the group.
     #[inline(always)]
     fn enter_leaf_singly<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
@@ -144,6 +146,8 @@ impl<Q: Query> PacketRays<'_, Q> {
         }
     }
 
+    /// Intersects the active rays of a group with triangles of a leaf, a bit each, whose points are set in `used`. Returns whether any ray
+    /// has a nearer hit than before. This is a part of a kernel: its parameters are separate so that they stay in registers.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
     fn enter_group<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
@@ -154,7 +158,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         at: usize,
         (points, relative, spread): (&mut Points, &Relative, [f32; 2]),
         leaf: &Leaf<'_, B>,
-        numbers: &mut [u8; WIDTH],
+        cache_indices: &mut [u8; WIDTH],
         (triangles, mut used): (u32, u64),
         active: u32,
     ) -> bool {
@@ -166,10 +170,20 @@ impl<Q: Query> PacketRays<'_, Q> {
             let [size, depth] = spread;
             let error = filter::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
-            return self.test(s, group, at, &corners, error, leaf, numbers, triangles, active);
+            return self.test_triangles(
+                s,
+                group,
+                at,
+                &corners,
+                error,
+                leaf,
+                cache_indices,
+                triangles,
+                active,
+            );
         }
         let order = group.common.map_or([0, 1, 2], CommonAxis::order);
-        // Copies, which stay in registers where the group itself would be read for each point.
+        // Copies stay in registers; fields of `group` would be loaded for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
         let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
@@ -183,13 +197,15 @@ impl<Q: Query> PacketRays<'_, Q> {
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);
         let error = filter::error(s, size, greatest.depth, floor);
-        self.test(s, group, at, &*points, error, leaf, numbers, triangles, active)
+        self.test_triangles(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
     }
 
-    /// Tests triangles, a bit each, for rays of a group; `error` bounds those of weights for all of them.
+    /// Intersects the active rays of a group with triangles, a bit each, given the projections of their corners. `error` bounds the errors
+    /// of the weights of all of them. Returns whether any ray has a nearer hit. As for [`Self::enter_group`], the parameters are
+    /// separate.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
-    fn test<S: Simd, B: LeafMesh>(
+    fn test_triangles<S: Simd, B: LeafMesh>(
         &mut self,
         s: S,
         group: &mut RayGroup<S>,
@@ -197,7 +213,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         corners: &impl CornerSource<S>,
         error: S::F,
         leaf: &Leaf<'_, B>,
-        numbers: &mut [u8; WIDTH],
+        cache_indices: &mut [u8; WIDTH],
         mut triangles: u32,
         mut active: u32,
     ) -> bool {
@@ -233,16 +249,16 @@ impl<Q: Query> PacketRays<'_, Q> {
                 let clear = sure & s.mask_bits(s.lt(tested.farthest, group.nearest));
                 let m = s.mask(clear);
                 if clear != 0 {
-                    let number = &mut numbers[triangle as usize % WIDTH];
-                    if *number == NOT_CACHED_YET {
-                        let place = (leaf.block.first() + triangle) as usize;
-                        s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(place));
-                        *number = self.hit_cache.add(leaf, triangle) as u8;
+                    let cache_index = &mut cache_indices[triangle as usize % WIDTH];
+                    if *cache_index == NOT_CACHED_YET {
+                        let index = (leaf.block.first() + triangle) as usize;
+                        s.prefetch(self.object.triangle_ids.as_ptr().wrapping_add(index));
+                        *cache_index = self.hit_cache.add(leaf, triangle) as u8;
                     }
-                    let number = u32::from(*number);
-                    group.accept(s, m, [tested.nearest, tested.farthest], number);
-                    if number == UNCACHED {
-                        group.keep(s, m, leaf, triangle);
+                    let pending = u32::from(*cache_index);
+                    group.accept(s, m, [tested.nearest, tested.farthest], pending);
+                    if pending == UNCACHED {
+                        group.store_uncached(s, m, leaf, triangle);
                     }
                 }
                 nearer |= clear != 0;
@@ -260,7 +276,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         nearer
     }
 
-    /// Decides a candidate for a few rays of a group, and with it the one that waits.
+    /// Decides a candidate for the rays of lanes, and before it their pending hits.
     #[inline(always)]
     fn settle_lanes<S: Simd>(
         &mut self,
@@ -270,9 +286,9 @@ impl<Q: Query> PacketRays<'_, Q> {
         candidate: Candidate,
         mut lanes: u32,
     ) {
-        let mut waiting = [0; LANES];
-        s.store_u(group.waiting, &mut waiting);
-        let apart = UncachedHits::of(s, group);
+        let mut pending = [0; LANES];
+        s.store_u(group.pending, &mut pending);
+        let uncached = UncachedHits::of(s, group);
         let (mut scale, mut limit, mut nearest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         s.store(group.scale, &mut scale);
         s.store(group.limit, &mut limit);
@@ -281,36 +297,36 @@ impl<Q: Query> PacketRays<'_, Q> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let ray = at * LANES + lane;
-            let pending = apart.candidate(self.hit_cache, waiting[lane], lane);
-            if self.settle_one(ray, pending, (candidate.leaf, 1 << candidate.triangle)) {
+            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
+            if self.settle_one(ray, pending_hit, (candidate.leaf, 1 << candidate.triangle)) {
                 self.alive &= !(1 << ray);
             } else if let Some(t) = self.queries[ray].found_bounds() {
                 let [near, far] = t.map(|t| t * f64::from(scale[lane]));
                 nearest[lane] = (near as f32).next_down();
                 limit[lane] = limit[lane].min((far as f32).next_up());
             }
-            waiting[lane] = NONE;
+            pending[lane] = NONE;
         }
-        group.waiting = s.load_u(&waiting);
+        group.pending = s.load_u(&pending);
         group.limit = s.load(&limit);
         group.nearest = s.load(&nearest);
     }
 
-    /// Decides for a few rays of a group the candidate that waits.
+    /// Decides the pending hits of the rays of lanes.
     #[inline(always)]
     pub(crate) fn settle_last<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, mut lanes: u32) {
-        let mut waiting = [0; LANES];
-        s.store_u(group.waiting, &mut waiting);
-        let apart = UncachedHits::of(s, group);
+        let mut pending = [0; LANES];
+        s.store_u(group.pending, &mut pending);
+        let uncached = UncachedHits::of(s, group);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
-            let waiting = apart.candidate(self.hit_cache, waiting[lane], lane);
-            self.settle_one(at * LANES + lane, waiting, (NONE, 0));
+            let pending_hit = uncached.candidate(self.hit_cache, pending[lane], lane);
+            self.settle_one(at * LANES + lane, pending_hit, (NONE, 0));
         }
     }
 
-    /// Offers candidates of a ray to its query, as [`settle`] does.
+    /// Offers candidates of a ray to its query; see [`settle`].
     #[inline(always)]
     fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
         if self.queried >> ray & 1 == 0 {

@@ -1,10 +1,10 @@
-//! Packets: up to 64 rays that go together through the BVH, four groups of sixteen.
+//! Packets: up to 64 coherent rays that traverse the BVH together, as four groups of sixteen.
 //!
-//! [`coherence`] tells which rays go together, and [`runs`] takes them from a batch. A packet ([`packet`]) tests boxes first by
-//! what bounds all its rays ([`bounds`]: a [`frustum`], or a [`segment_box`] of short rays), then by group
-//! ([`ray_group`]), and triangles of leaves ([`leaf`], [`leaf_mesh`], [`points`]) with a ray in each lane. Where few
-//! rays are left they go one at a time ([`single_rays`]). Hits are computed at the end, those of rays from one point with what
-//! their triangles share ([`hit_cache`]).
+//! [`runs`] finds runs of consecutive rays of a batch that [`coherence`] considers suitable. A packet ([`packet`]) tests boxes
+//! first against bounds of all its rays ([`bounds`]: a [`frustum`], or a [`segment_box`] of short rays) and then against each
+//! group ([`ray_group`]), one ray in a lane. Leaves ([`leaf`], [`leaf_mesh`], [`points`]) test one triangle at a time against a
+//! group. Where few rays of a packet remain, each of them is traversed by itself ([`single_rays`]). Hits are evaluated at the end;
+//! rays from one point share the terms that depend only on their origin and the triangle ([`hit_cache`]).
 
 pub(crate) mod bounds;
 pub(crate) mod coherence;

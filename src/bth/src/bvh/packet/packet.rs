@@ -1,9 +1,9 @@
-//! Packets: up to 64 rays that go together through the wide BVH.
+//! Traversal of the wide BVH by a packet of up to 64 rays.
 //!
-//! A node's sixteen children are tested against what all the rays together can meet ([`super::frustum`]), and those that
-//! remain against the rays, sixteen at a time. f32 lanes leave out what certainly does not matter, as everywhere;
-//! a triangle that is certainly hit, and certainly nearer than all before, only takes its place as the one to
-//! be computed at the end; what is not certain is decided at once ([`crate::bvh::candidate`]).
+//! The sixteen children of a node are tested against the bounds of all rays ([`super::bounds`]), and those that remain against the rays,
+//! sixteen at a time. Triangles are decided as for single rays: the f32 filter excludes those that are certainly missed; one that is
+//! certainly hit, and certainly nearer than all before, becomes the ray's pending hit, which is computed at the end; the others are
+//! decided at once ([`crate::bvh::candidate`]).
 
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, PACKET, StackEntry};
@@ -12,7 +12,7 @@ use super::leaf::PacketRays;
 use super::leaf_mesh::Leaf;
 use super::points::{Points, Relative};
 use super::ray_group::RayGroup;
-use super::single_rays::{FEWEST_OF_PACKET, SingleRays};
+use super::single_rays::{FEW_OF_PACKET, SingleRays};
 use crate::bvh::nodes::{Wide, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
@@ -25,7 +25,7 @@ use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
 use std::any::Any;
 
-/// Memory that packets need, kept from one batch to the next.
+/// Memory of packets, kept from one batch to the next.
 #[derive(Debug)]
 pub(crate) struct PacketBuffers {
     stack: Vec<StackEntry>,
@@ -33,7 +33,8 @@ pub(crate) struct PacketBuffers {
     relative: Relative,
     single_rays: SingleRays,
     pub(crate) hit_cache: HitCache,
-    seen: OriginTermsLanes,
+    /// Terms of the cached triangles for the packet's origin.
+    origin_terms: OriginTermsLanes,
     intersections: [Intersections; GROUPS],
 }
 
@@ -45,17 +46,19 @@ impl Default for PacketBuffers {
             relative: Relative::NONE,
             single_rays: SingleRays::NONE,
             hit_cache: HitCache::NONE,
-            seen: OriginTermsLanes::NONE,
+            origin_terms: OriginTermsLanes::NONE,
             intersections: [Intersections::NONE; GROUPS],
         }
     }
 }
 
-/// Groups of the instruction set that was last asked for: to clear them for every batch would take as long as to trace a few rays.
+/// Groups for the instruction set that was used last. They are kept, because initializing them for every batch would take as long as
+/// tracing a few rays.
 #[derive(Debug, Default)]
 pub(crate) struct GroupStorage(Option<Box<dyn Any>>);
 
 impl GroupStorage {
+    /// The groups for an instruction set.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(&mut self, s: S) -> &mut [RayGroup<S>; GROUPS] {
         if !self.0.as_ref().is_some_and(|groups| groups.is::<[RayGroup<S>; GROUPS]>()) {
@@ -65,19 +68,19 @@ impl GroupStorage {
     }
 }
 
-/// The rays of a packet, prepared, and what is decided of them.
+/// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
 pub(crate) struct Packets<'a, S: Simd, Q> {
     pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
     queries: [Q; PACKET],
     pub(crate) buffers: &'a mut PacketBuffers,
 }
 
-/// How a packet did.
+/// Result of the traversal of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PacketOutcome {
-    /// Rays that took part in an average step, per cent.
+    /// The packet was traced; the value is the average share of its rays that took part in a step, in per cent.
     Lanes(u32),
-    /// There is something that only single rays can do; nothing has been handed on.
+    /// The packet met something that only single rays support. No answer has been stored.
     Refused,
 }
 
@@ -89,7 +92,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         buffers: &'a mut PacketBuffers,
         ray: &Ray,
     ) -> Self {
-        // At every level all children but the one entered wait.
+        // At every level all children but the entered one are stacked.
         let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
         if buffers.stack.len() < entries {
             buffers.stack.resize(entries, StackEntry::default());
@@ -97,8 +100,9 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         Packets { groups, queries: [Q::new(ray); PACKET], buffers }
     }
 
-    /// Traces rays for which the groups have been prepared, and hands on the place and query of those that hit
-    /// something.
+    /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something.
+    ///
+    /// This is one kernel, longer than other functions: code, mask, limit and the top of the stack stay in registers from step to step.
     #[inline(always)]
     pub(crate) fn trace<H: PacketBounds<S>>(
         &mut self,
@@ -106,17 +110,17 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         object: &ObjectView<'_>,
         bounds: &H,
         rays: &[Ray],
-        to: &mut Sink<'_, Q>,
+        sink: &mut Sink<'_, Q>,
     ) -> PacketOutcome {
         let Packets { groups, queries, buffers } = self;
-        let PacketBuffers { stack, points, relative, single_rays, hit_cache, seen, intersections } =
+        let PacketBuffers { stack, points, relative, single_rays, hit_cache, origin_terms, intersections } =
             &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         single_rays.clear();
         let mut rays = PacketRays { object, rays, queries, single_rays, hit_cache, queried: 0, alive: all };
         if let Some(group) = groups.last_mut() {
-            // Lanes without a ray hold nothing up.
+            // Lanes without a ray get the least limit, so that they never keep a child or a triangle.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
             group.limit = s.select(valid, group.limit, s.splat(f32::MIN));
         }
@@ -129,23 +133,23 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             match Child::from_code(code) {
                 Some(Child::Node(line)) => {
                     let node = object.node(line);
-                    let buffers = stack[top..].first_chunk_mut().expect("as many levels as the header says");
-                    top += if H::MIXED && mask.count_ones() <= FEWEST_OF_PACKET {
-                        rays.single_rays.children(s, groups, mask, (line, node), buffers)
+                    let entries = stack[top..].first_chunk_mut().expect("as many levels as the header says");
+                    top += if H::MIXED && mask.count_ones() <= FEW_OF_PACKET {
+                        rays.single_rays.children(s, groups, mask, (line, node), entries)
                     } else {
-                        children::<S, H, Q>(s, bounds, groups, mask, (line, node), limit, buffers)
+                        children::<S, H, Q>(s, bounds, groups, mask, (line, node), limit, entries)
                     };
                 }
                 Some(Child::Indexed(line)) => {
-                    let mut buffers = None;
-                    let leaf = Leaf { block: object.indexed(line, &mut buffers), code };
+                    let mut unpacked = None;
+                    let leaf = Leaf { block: object.indexed(line, &mut unpacked), code };
                     if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
                 }
                 Some(Child::Raw(line)) => {
-                    let mut buffers = None;
-                    let leaf = Leaf { block: object.raw(line, &mut buffers), code };
+                    let mut unpacked = None;
+                    let leaf = Leaf { block: object.raw(line, &mut unpacked), code };
                     if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
@@ -176,7 +180,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 let node = object.node(entry.parent);
                 code = node.child[entry.slot as usize % WIDTH];
                 prefetch(s, Wide, object.node_base(), code);
-                // Later: hits may have come between, which leave less of it to meet.
+                // The rays are tested against the box only here, because hits since the parent was entered may have shortened them.
                 if !H::MIXED {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);
                 }
@@ -185,14 +189,15 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 }
             }
         }
-        finish::<S, H, Q>(s, groups, (seen, intersections), &mut rays, all, to);
+        finish::<S, H, Q>(s, groups, (origin_terms, intersections), &mut rays, all, sink);
         let steps = u64::from(steps);
         PacketOutcome::Lanes((u64::from(used) * 100 / (steps * rays.rays.len() as u64)) as u32)
     }
 }
 
-/// Writes the children of a node that rays of the packet may meet together before a depth, the nearest last, and of rays that go into
-/// different octants which ones do; returns how many.
+/// Writes the stack entries of the children of a node that the bounds of the packet meet before the depth `limit`, the nearest last;
+/// returns their number. Where directions lie in different octants, each entry gets only the rays that may meet its box. The
+/// parameters are separate, because this is a part of the kernel [`Packets::trace`].
 #[inline(always)]
 fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     s: S,
@@ -201,7 +206,7 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     rays: u64,
     (parent, node): (u32, &WideNode),
     limit: f32,
-    to: &mut [StackEntry; WIDTH],
+    entries: &mut [StackEntry; WIDTH],
 ) -> usize {
     let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
     let (bits, keys) = bounds.children(s, node, limit);
@@ -211,17 +216,17 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     } else {
         s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
     };
-    let mut some = 0;
+    let mut written = 0;
     for i in 0..count {
         let slot = slot[i];
         let rays = if H::MIXED { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
-        to[some % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
-        some += usize::from(rays != 0);
+        entries[written % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
+        written += usize::from(rays != 0);
     }
-    some
+    written
 }
 
-/// Which of these rays, a bit each, meet the box of a child. Groups none of whose rays is asked about are left out.
+/// The rays that may meet the box of a child, a bit each. Only groups with a bit in `rays` are tested.
 #[inline(always)]
 fn meeting<S: Simd, H: PacketBounds<S>>(
     s: S,
@@ -242,32 +247,32 @@ fn meeting<S: Simd, H: PacketBounds<S>>(
     meets
 }
 
-/// Computes what is still to be computed, and hands on what was found.
+/// Computes the pending hits, and stores the answers of all rays that hit something.
 #[inline(always)]
 fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
     s: S,
     groups: &[RayGroup<S>],
-    (seen, intersections): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
+    (origin_terms, intersections): (&mut OriginTermsLanes, &mut [Intersections; GROUPS]),
     rays: &mut PacketRays<'_, Q>,
     all: u64,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) {
     if Q::ANY {
         let mut hit = all & !rays.alive;
         let mut query = Q::new(&rays.rays[0]);
         query.accept();
         while hit != 0 {
-            to.query(hit.trailing_zeros() as usize, &query);
+            sink.query(hit.trailing_zeros() as usize, &query);
             hit &= hit - 1;
         }
         return;
     }
-    // First all, then what comes of them: so the divisions of one group overlap with the next.
+    // All groups are computed before any answer is stored, so that the divisions of one group overlap with the next.
     let mut cached = CachedHits {
         origin: rays.rays[0].origin,
         ids: rays.object.triangle_ids,
         hit_cache: rays.hit_cache,
-        seen,
+        origin_terms,
     };
     for (group, intersections) in groups.iter().zip(&mut *intersections) {
         group.intersect::<H>(s, &mut cached, intersections);
@@ -276,19 +281,19 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         let queried = (rays.queried >> (i * LANES)) as u32 & 0xffff;
         let clear = intersections.certain & !queried;
         if clear != 0 {
-            to.hits(s, i * LANES, clear, intersections);
+            sink.hits(s, i * LANES, clear, intersections);
         }
-        let rest = intersections.open | intersections.certain & queried;
-        if rest != 0 {
-            rays.settle_last(s, group, i, rest);
+        let open = intersections.open | intersections.certain & queried;
+        if open != 0 {
+            rays.settle_last(s, group, i, open);
         }
     }
-    // Those of which something had to be decided alone.
+    // The rays with a decision in f64.
     let mut queried = rays.queried;
     while queried != 0 {
         let ray = queried.trailing_zeros() as usize;
         queried &= queried - 1;
-        to.query(ray, &rays.queries[ray]);
+        sink.query(ray, &rays.queries[ray]);
     }
 }
 

@@ -1,7 +1,8 @@
-//! Sixteen rays of a packet, a lane each.
+//! Sixteen rays of a packet, one in each lane.
 //!
-//! What [`crate::intersect::boxes`] and [`crate::intersect::filter`] do for one ray and sixteen boxes or triangles, here for sixteen rays and
-//! one box or triangle: the same operations on the same prepared floats ([`crate::intersect::prepare`]), so the same bounds hold.
+//! [`crate::intersect::boxes`] and [`crate::intersect::filter`] test one ray against sixteen boxes or triangles; here sixteen rays are
+//! tested against one box or triangle, by the same operations on the same prepared values ([`crate::intersect::prepare`]), so the same
+//! error bounds hold.
 
 use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
@@ -15,7 +16,7 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 
-/// Sixteen rays, and what they have found.
+/// Sixteen rays and their hits so far. Fields whose names occur in [`prepare::PreparedLanes`] have the meaning documented there.
 #[derive(Clone, Copy)]
 pub(crate) struct RayGroup<S: Simd> {
     pub(crate) origin: [S::F; 3],
@@ -23,38 +24,39 @@ pub(crate) struct RayGroup<S: Simd> {
     pub(crate) reciprocal: [S::F; 3],
     near_addend: [S::F; 3],
     far_addend: [S::F; 3],
-    /// Rays that go down along each axis.
+    /// For each axis the rays with a negative direction.
     negative: [S::M; 3],
     /// Depth of t = 1.
     pub(crate) scale: S::F,
-    /// Nothing whose depth is certainly less than this matters,
+    /// Least depth of hits in the ray's range.
     pub(crate) first: S::F,
-    /// or certainly exceeds this.
+    /// Upper limit of the depths of hits that can still change the result.
     pub(crate) limit: S::F,
-    /// Greatest coordinate of the object's box, seen from the origin.
+    /// Distance (maximum norm) from the origin to the farthest corner of the object's box.
     pub(crate) reach: S::F,
+    /// The axis of each direction's greatest |component|.
     pub(crate) mixed: MixedAxes<S>,
-    /// The axis along the rays, if it is the same for all.
+    /// That axis, if it is the same for all rays.
     pub(crate) common: Option<CommonAxis>,
     pub(crate) projection: Projection<S>,
-    /// From which to which depth hits are certainly in range.
+    /// Least and greatest depth between which a hit is certainly in the ray's range.
     pub(crate) certain: [S::F; 2],
     /// Lower bound of the depth of the nearest hit so far.
     pub(crate) nearest: S::F,
-    /// The triangle of the nearest hit so far if it is still to be computed, else `NONE`: its number among those of the
-    /// packet ([`HitCache`]), or [`UNCACHED`].
-    pub(crate) waiting: S::U,
-    /// Of one that is kept apart the leaf,
+    /// The triangle of the pending hit: its index in the [`HitCache`](super::hit_cache::HitCache), [`UNCACHED`], or `NONE` without one.
+    pub(crate) pending: S::U,
+    /// For an uncached pending hit the child code of its leaf.
     pub(crate) leaf: S::U,
-    /// the triangle within,
+    /// For an uncached pending hit the index of the triangle in the leaf.
     pub(crate) triangle: S::U,
-    /// its place in leaf order and corners (`[corner][axis]`).
-    place: S::U,
+    /// For an uncached pending hit the triangle's index in leaf order.
+    index: S::U,
+    /// For an uncached pending hit the corners (`[corner][axis]`).
     corner: [[S::F; 3]; 3],
 }
 
 impl<S: Simd> RayGroup<S> {
-    /// A place for rays.
+    /// A group without rays.
     #[inline(always)]
     pub(crate) fn vacant(s: S) -> Self {
         let (zero, none, no) = (s.splat(0.0), s.splat_u(NONE), s.mask(0));
@@ -74,39 +76,44 @@ impl<S: Simd> RayGroup<S> {
             projection: Projection { origin: [zero; 2], shear: [zero; 2], forward: zero, start: zero },
             certain: [zero; 2],
             nearest: zero,
-            waiting: none,
+            pending: none,
             leaf: none,
             triangle: none,
-            place: none,
+            index: none,
             corner: [[zero; 3]; 3],
         }
     }
 
-    /// A triangle is certainly the nearest hit so far of these lanes, between these depths.
+    /// Makes a triangle, given as for `pending`, the pending hit of lanes. `depth` holds the bounds of its depth.
     #[inline(always)]
-    pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], number: u32) {
+    pub(crate) fn accept(&mut self, s: S, m: S::M, depth: [S::F; 2], triangle: u32) {
         self.nearest = s.select(m, depth[0], self.nearest);
         self.limit = s.select(m, depth[1], self.limit);
-        self.waiting = s.select_u(m, s.splat_u(number), self.waiting);
+        self.pending = s.select_u(m, s.splat_u(triangle), self.pending);
     }
 
-    /// What is to be known of it to compute the hit, if the packet does not keep it.
+    /// Stores an uncached pending hit of lanes.
     #[inline(always)]
-    pub(crate) fn keep<B: TriangleBlock>(&mut self, s: S, m: S::M, leaf: &Leaf<'_, B>, triangle: u32) {
+    pub(crate) fn store_uncached<B: TriangleBlock>(
+        &mut self,
+        s: S,
+        m: S::M,
+        leaf: &Leaf<'_, B>,
+        triangle: u32,
+    ) {
         self.leaf = s.select_u(m, s.splat_u(leaf.code), self.leaf);
         self.triangle = s.select_u(m, s.splat_u(triangle), self.triangle);
-        self.place = s.select_u(m, s.splat_u(leaf.block.first() + triangle), self.place);
+        self.index = s.select_u(m, s.splat_u(leaf.block.first() + triangle), self.index);
         for c in 0..3 {
             for k in 0..3 {
-                // Each straight from the leaf: through an array, what was written in words would be read as more.
+                // Each is loaded directly from the leaf: loading vectors from an array that was just written by words would stall.
                 let x = s.splat(leaf.block.coordinate(triangle as usize, c, k));
                 self.corner[c][k] = s.select(m, x, self.corner[c][k]);
             }
         }
     }
 
-    /// Prepares the first sixteen of rays; the last fills up lanes that are too many. False if one of them can't be
-    /// prepared.
+    /// Prepares the first sixteen of the rays; unused lanes repeat the last ray. Returns false if a ray cannot be prepared in f32.
     #[inline(always)]
     pub(crate) fn prepare<H: PacketBounds<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
         let mut field = match rays.first_chunk() {
@@ -119,7 +126,7 @@ impl<S: Simd> RayGroup<S> {
         };
         self.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
         self.common = self.mixed.common(s);
-        // Not one store more than there must be: they are what preparing waits for.
+        // Only the needed fields are stored, because stores limit the speed of preparation.
         if H::FROM_POINT {
             for k in 0..3 {
                 field[k] = s.splat(rays[0].origin[k]);
@@ -130,19 +137,19 @@ impl<S: Simd> RayGroup<S> {
         if !H::MIXED {
             self.direction = [field[4], field[5], field[6]];
         }
-        // Groups are kept from batch to batch: what an earlier one found, of another object maybe, must not be taken up.
+        // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
         self.nearest = s.splat(f32::INFINITY);
-        self.waiting = s.splat_u(NONE);
-        // Each taken over where it is made: merged first, they would all pass through memory once more.
+        self.pending = s.splat_u(NONE);
+        // `set_prepared` is called in both branches: joining the results first would pass them through memory.
         match self.common {
-            Some(common) => self.take::<H>(s, prepare::prepare_lanes(s, bounds, field, &common)),
-            None => self.take::<H>(s, prepare::prepare_lanes(s, bounds, field, &self.mixed)),
+            Some(common) => self.set_prepared::<H>(s, prepare::prepare_lanes(s, bounds, field, &common)),
+            None => self.set_prepared::<H>(s, prepare::prepare_lanes(s, bounds, field, &self.mixed)),
         }
     }
 
-    /// Takes over what rays are prepared to; false if one of them can't be prepared.
+    /// Stores prepared rays; false if one of them is not usable.
     #[inline(always)]
-    fn take<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::PreparedLanes<S>) -> bool {
+    fn set_prepared<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::PreparedLanes<S>) -> bool {
         self.reciprocal = lanes.reciprocal;
         if !H::FROM_POINT {
             self.reach = lanes.reach;
@@ -161,7 +168,7 @@ impl<S: Simd> RayGroup<S> {
         s.mask_bits(lanes.usable) == 0xffff
     }
 
-    /// What the rays are prepared to, where they do not start at one point.
+    /// The prepared rays, for groups whose rays do not have the same origin.
     #[inline(always)]
     pub(crate) fn lanes(&self, s: S) -> prepare::PreparedLanes<S> {
         prepare::PreparedLanes {
@@ -182,8 +189,8 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// The rays that may meet a box within their range. Where all go into the same octant ([`PacketBounds::MIXED`] is false) the corners
-    /// are that at which they enter and the one at which they leave, else the lower and the upper one.
+    /// The rays that may meet a box within their range, a bit each. If all directions lie in one octant ([`PacketBounds::MIXED`] is
+    /// false), the corners are that at which rays enter the box and that at which they leave, else the lower and the upper one.
     #[inline(always)]
     pub(crate) fn meets<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
         let (mut enter, mut leave) = (self.first, self.limit);
@@ -206,7 +213,7 @@ impl<S: Simd> RayGroup<S> {
         s.mask_bits(s.le(enter, leave))
     }
 
-    /// Computes where rays cross the triangles that wait to be computed; if none does, it is only said so.
+    /// Computes the pending hits. Without any, only the bit masks of `intersections` are cleared.
     #[inline(always)]
     pub(crate) fn intersect<H: PacketBounds<S>>(
         &self,
@@ -214,28 +221,28 @@ impl<S: Simd> RayGroup<S> {
         cached: &mut CachedHits<'_>,
         intersections: &mut Intersections,
     ) {
-        let some = s.mask_bits(s.lt_u(self.waiting, s.splat_u(NONE)));
+        let lanes = s.mask_bits(s.lt_u(self.pending, s.splat_u(NONE)));
         (intersections.certain, intersections.open) = (0, 0);
-        if some == 0 {
+        if lanes == 0 {
             return;
         }
-        let apart = s.eq_u(self.waiting, s.splat_u(UNCACHED));
-        // Known where this is compiled, of most.
+        let uncached = s.eq_u(self.pending, s.splat_u(UNCACHED));
+        // For most kernels this is a constant.
         let kept = if H::FROM_POINT && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
-        if kept > 0 && s.mask_bits(apart) == 0 {
+        if kept > 0 && s.mask_bits(uncached) == 0 {
             cached.compute();
-            let (hit_cache, seen) = (&*cached.hit_cache, &*cached.seen);
+            let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
             let (mut direction, mut size) = ([[0.0; LANES]; 3], [0.0; LANES]);
             for k in 0..3 {
                 s.store(self.direction[k], &mut direction[k]);
             }
             s.store(self.scale, &mut size);
-            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), self.waiting), &mut intersections.triangle);
-            let waiting = self.waiting;
-            return if hit_cache.are_few() {
-                intersections.compute_from_point::<S, true>(s, some, &direction, &size, seen, waiting)
+            s.store_u(s.lookup_u(s.load_u(&hit_cache.id), self.pending), &mut intersections.triangle);
+            let pending = self.pending;
+            return if hit_cache.is_at_most_half_full() {
+                intersections.compute_from_point::<S, true>(s, lanes, &direction, &size, terms, pending)
             } else {
-                intersections.compute_from_point::<S, false>(s, some, &direction, &size, seen, waiting)
+                intersections.compute_from_point::<S, false>(s, lanes, &direction, &size, terms, pending)
             };
         }
         let (hit_cache, ids) = (&*cached.hit_cache, cached.ids);
@@ -247,13 +254,14 @@ impl<S: Simd> RayGroup<S> {
             for c in 0..3 {
                 let mut corner = self.corner[c][k];
                 if kept > 0 {
-                    corner = s.select(apart, corner, s.lookup(s.load(&hit_cache.corner[c][k]), self.waiting));
+                    corner =
+                        s.select(uncached, corner, s.lookup(s.load(&hit_cache.corner[c][k]), self.pending));
                 }
                 s.store(corner, &mut pairs.corner[c][k]);
             }
         }
-        let place = s.select_u(apart, self.place, s.lookup_u(s.load_u(&hit_cache.place), self.waiting));
-        s.store_u(s.gather_u(s.mask(some), ids, place), &mut intersections.triangle);
-        intersections.compute(s, some, &pairs);
+        let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
+        s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
+        intersections.compute(s, lanes, &pairs);
     }
 }

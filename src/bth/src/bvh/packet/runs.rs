@@ -1,4 +1,5 @@
-//! Which rays of a batch go in packets: runs of neighbours that go together, as long as packets serve enough of their rays.
+//! Selection of the rays of a batch that are traced in packets: runs of consecutive coherent rays, as long as enough of their rays take
+//! part in each step.
 
 use super::bounds::PacketBounds;
 use super::coherence::{Guard, Span, is_same_octant};
@@ -14,19 +15,21 @@ use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
 
-/// Rays in a line of the cache.
+/// Rays in a cache line.
 const RAYS_PER_CACHE_LINE: usize = 64 / size_of::<Ray>();
-/// Fewer rays make no packet.
-const FEWEST: usize = 2 * LANES;
+/// Least number of rays of a packet.
+const MIN_RAYS: usize = 2 * LANES;
 
-/// Per cent of its rays that a step of a packet must serve on average: with less, one ray at a time is faster.
+/// The least average share of a packet's rays, in per cent, that must take part in a step. Below it single rays are faster.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MinimumUse {
+    /// The share for coherent rays.
     pub(crate) coherent: u32,
+    /// The share for short rays.
     pub(crate) short: u32,
 }
 
-/// By measurement.
+/// The shares that were measured to be the fastest (docs/notes/packets.md).
 pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 10, short: 8 };
 
 /// Memory kept from one batch to the next.
@@ -34,21 +37,25 @@ pub(crate) const MINIMUM_USE: MinimumUse = MinimumUse { coherent: 10, short: 8 }
 pub(crate) struct PacketScratch {
     groups: GroupStorage,
     buffers: PacketBuffers,
-    /// Places of the rays that are left.
+    /// Indices of the rays that were not traced in packets.
     pub(crate) rest: Vec<u32>,
 }
 
-/// How many rays went in packets, and how many packets served too few of theirs.
+/// Statistics of the packets of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PacketCount {
+    /// Rays traced in packets.
     pub(crate) rays: usize,
+    /// Packets of coherent rays.
     pub(crate) coherent: usize,
+    /// Packets of short rays.
     pub(crate) short: usize,
+    /// Packets in whose steps too few rays took part.
     pub(crate) poor: usize,
 }
 
-/// Traces those rays of a batch that are better traced in packets, and leaves the others in `scratch.rest`, unless it does
-/// not try at all. Hands on places and queries of rays that hit something.
+/// Traces the coherent rays of a batch in packets, and stores the answers of those that hit something. The indices of the other rays
+/// are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
@@ -56,11 +63,11 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     rays: &[Ray],
     scratch: &mut PacketScratch,
     least: MinimumUse,
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) -> PacketCount {
     let mut count = PacketCount::default();
-    // Where tetrahedra have no subtree beside them, and through packed nodes, rays go alone.
-    if rays.len() < FEWEST
+    // Packets do not support tet leaves without a subtree, nor packed nodes.
+    if rays.len() < MIN_RAYS
         || object.has_packed_nodes()
         || object.tet_leaves.first().is_some_and(|leaf| leaf.subtree == NONE)
     {
@@ -69,35 +76,35 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     let bounds = object.bounds;
     let PacketScratch { groups, buffers, rest } = scratch;
     rest.clear();
-    let mut runs = Runs { bounds: &bounds, rays, at: 0, coherent: Guard::new(), short: Guard::new(), rest };
-    // The first apart, so that the packets are made where they stay and only if there are any.
+    let mut runs = Runs { bounds: &bounds, rays, next: 0, coherent: Guard::new(), short: Guard::new(), rest };
+    // The first run is found before the loop, so that `packets` is made in its final place, and only if there are any.
     let Some(mut run) = runs.next::<S, Q>(s) else { return count };
     let mut packets = Packets::<S, Q>::new(object, groups.of(s), buffers, &rays[0]);
     loop {
-        let (at, own) = (run.at, run.rays);
-        // So that the next rays are there when this packet is done.
-        let next = own.as_ptr().wrapping_add(PACKET);
+        let (first, rays) = (run.first, run.rays);
+        // The next rays are in the cache when this packet is done.
+        let next = rays.as_ptr().wrapping_add(PACKET);
         for line in 0..PACKET / RAYS_PER_CACHE_LINE {
             s.prefetch(next.wrapping_add(line * RAYS_PER_CACHE_LINE));
         }
-        let to = &mut to.part(at);
+        let sink = &mut sink.part(first);
         let (outcome, guard, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
-                // Whether any hit will do is most often asked on the way to a light, from different points.
+                // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
                 let outcome = if !Q::ANY && span.is_from_point() {
-                    frustum::<S, Q, true>(s, object, &bounds, &span, &mut packets, own, to)
+                    frustum::<S, Q, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                 } else {
-                    frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, own, to)
+                    frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, rays, sink)
                 };
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
-            // Others never are; so this need not be compiled for them.
+            // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
             Kind::Short(_) if !Q::ANY => {
                 (PacketOutcome::Refused, &mut runs.short, least.short, &mut count.short)
             }
             Kind::Short(segments) => {
-                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, own) {
-                    packets.trace(s, object, &SegmentBox::new(s, segments), own, to)
+                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays) {
+                    packets.trace(s, object, &SegmentBox::new(s, segments), rays, sink)
                 } else {
                     PacketOutcome::Refused
                 };
@@ -105,10 +112,10 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             }
         };
         match outcome {
-            PacketOutcome::Refused => runs.leave(at, own.len()),
+            PacketOutcome::Refused => runs.skip(first, rays.len()),
             PacketOutcome::Lanes(share) => {
-                guard.learn(share >= least_use);
-                count.rays += own.len();
+                guard.record(share >= least_use);
+                count.rays += rays.len();
                 *kind += 1;
                 count.poor += usize::from(share < least_use);
             }
@@ -119,17 +126,19 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     count
 }
 
-/// Rays that go together.
+/// Consecutive rays that make a packet.
 struct Run<'a> {
-    /// Place of the first in the batch.
-    at: usize,
+    /// Index of the first ray in the batch.
+    first: usize,
     rays: &'a [Ray],
     kind: Kind,
 }
 
-/// How they do.
+/// The kind of a packet.
 enum Kind {
+    /// The directions are similar.
     Coherent(Span),
+    /// The rays are short and close together; the value is their box.
     Short([[f32; 3]; 2]),
 }
 
@@ -137,36 +146,37 @@ enum Kind {
 struct Runs<'a, 'b> {
     bounds: &'b ObjectBounds,
     rays: &'a [Ray],
-    /// Where the next begins.
-    at: usize,
+    /// Index of the next ray.
+    next: usize,
     coherent: Guard,
     short: Guard,
-    /// Places of rays that go alone.
+    /// Indices of the rays that are not in a packet.
     rest: &'b mut Vec<u32>,
 }
 
 impl<'a> Runs<'a, '_> {
-    /// The next run; rays before it go alone.
+    /// The next run. The rays before it are added to `rest`.
     #[inline(always)]
     fn next<S: Simd, Q: Query>(&mut self, s: S) -> Option<Run<'a>> {
-        while self.at < self.rays.len() {
-            let at = self.at;
-            let rays = &self.rays[at..self.rays.len().min(at + PACKET)];
-            self.at = at + PACKET;
+        while self.next < self.rays.len() {
+            let first = self.next;
+            let rays = &self.rays[first..self.rays.len().min(first + PACKET)];
+            self.next = first + PACKET;
             if let Some(kind) = choose::<S, Q>(s, self.bounds, rays, &mut self.coherent, &mut self.short) {
-                return Some(Run { at, rays, kind });
+                return Some(Run { first, rays, kind });
             }
-            self.leave(at, rays.len());
+            self.skip(first, rays.len());
         }
         None
     }
 
-    fn leave(&mut self, at: usize, count: usize) {
-        self.rest.extend(at as u32..(at + count) as u32);
+    /// Adds rays to `rest`.
+    fn skip(&mut self, first: usize, count: usize) {
+        self.rest.extend(first as u32..(first + count) as u32);
     }
 }
 
-/// How rays may go together, if they may.
+/// The kind of packet that rays may make, if any.
 #[inline(always)]
 fn choose<S: Simd, Q: Query>(
     s: S,
@@ -175,7 +185,7 @@ fn choose<S: Simd, Q: Query>(
     coherent: &mut Guard,
     short: &mut Guard,
 ) -> Option<Kind> {
-    if rays.len() < FEWEST {
+    if rays.len() < MIN_RAYS {
         return None;
     }
     let try_coherent = coherent.is_open() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
@@ -193,7 +203,7 @@ fn choose<S: Simd, Q: Query>(
     None
 }
 
-/// Traces a coherent run.
+/// Traces a run of coherent rays. The parameters are separate, because this is a part of the kernel [`trace`].
 #[inline(always)]
 fn frustum<S: Simd, Q: Query, const POINT: bool>(
     s: S,
@@ -202,17 +212,17 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     span: &Span,
     packets: &mut Packets<'_, S, Q>,
     rays: &[Ray],
-    to: &mut Sink<'_, Q>,
+    sink: &mut Sink<'_, Q>,
 ) -> PacketOutcome {
     if !prepare::<S, Q, Frustum<S, POINT>>(s, bounds, packets, rays) {
         return PacketOutcome::Refused;
     }
     let frustum = Frustum::<S, POINT>::new(s, bounds, span, &packets.groups[..rays.len().div_ceil(LANES)]);
     packets.buffers.hit_cache.clear(s, POINT);
-    packets.trace(s, object, &frustum, rays, to)
+    packets.trace(s, object, &frustum, rays, sink)
 }
 
-/// Prepares all groups; false if a ray can't be.
+/// Prepares the groups of a packet; false if a ray cannot be prepared in f32.
 #[inline(always)]
 fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
     s: S,

@@ -1,10 +1,10 @@
-//! The box of short rays that lie close together.
+//! Packet bounds of short rays that lie close together: a box.
 
 use super::bounds::{FrustumView, PacketBounds};
 use crate::simd::Simd;
 use bth_format::layout::{WIDTH, WideNode};
 
-/// A box of the parts of short rays that can hit anything ([`Span::segments`]).
+/// A box of all points at which the rays can hit something ([`Span::segments`](super::coherence::Span::segments)).
 pub(crate) struct SegmentBox<S: Simd> {
     lower: [S::F; 3],
     upper: [S::F; 3],
@@ -21,8 +21,8 @@ impl<S: Simd> SegmentBox<S> {
 }
 
 impl<S: Simd> PacketBounds<S> for SegmentBox<S> {
-    const MIXED: bool = true;
-    const FROM_POINT: bool = false;
+    const MIXED_OCTANTS: bool = true;
+    const COMMON_ORIGIN: bool = false;
 
     #[inline(always)]
     fn view(&self) -> Option<&FrustumView> {
@@ -40,7 +40,7 @@ impl<S: Simd> PacketBounds<S> for SegmentBox<S> {
     }
 
     #[inline(always)]
-    fn sides(&self, s: S, rows: [S::F; 3]) -> S::U {
+    fn outcodes(&self, s: S, rows: [S::F; 3]) -> S::U {
         let mut out = s.splat_u(0);
         for k in 0..3 {
             let (above, below) = (s.lt(self.upper[k], rows[k]), s.lt(rows[k], self.lower[k]));

@@ -1,7 +1,7 @@
-//! Few rays of a packet before a node or a leaf: one ray at a time, lanes are children or triangles.
+//! Tests of the rays of a packet one at a time, against all children of a node or all triangles of a leaf, where few rays are left.
 //!
-//! Half of the leaves that sixteen rays of ambient occlusion enter matter to one of them only
-//! (docs/notes/packets.md): one ray and sixteen triangles at once take far less than sixteen rays and each triangle in turn.
+//! Half of the leaves that sixteen rays of ambient occlusion enter are met by one of them only (docs/notes/packets.md). Testing one ray
+//! against sixteen triangles at once is then far faster than testing sixteen rays against each triangle in turn.
 
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, StackEntry};
@@ -12,18 +12,18 @@ use crate::intersect::prepare::{Prepared, PreparedRay};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 
-/// Rays of a group that are few before a leaf, by measurement,
-pub(crate) const FEWEST_OF_GROUP: u32 = 6;
-/// and rays of a packet that are few before a node.
-pub(crate) const FEWEST_OF_PACKET: u32 = 24;
+/// Greatest number of rays of a group that are tested one at a time in a leaf, by measurement.
+pub(crate) const FEW_OF_GROUP: u32 = 6;
+/// Greatest number of rays of a packet that are tested one at a time in a node, by measurement.
+pub(crate) const FEW_OF_PACKET: u32 = 24;
 
-/// The rays of a packet, each by itself; of groups that have been asked for.
+/// The rays of a packet as prepared single rays. Groups are converted at their first use.
 #[derive(Debug)]
 pub(crate) struct SingleRays {
     group: [Prepared; GROUPS],
-    /// Between which depths hits matter.
+    /// For each group the least and the greatest depth of hits that can change the rays' results, at the time of conversion.
     depths: [[F32Lanes; 2]; GROUPS],
-    /// Groups that are there, a bit each.
+    /// A bit for each converted group.
     ready: u32,
 }
 
@@ -34,15 +34,16 @@ impl SingleRays {
         ready: 0,
     };
 
-    /// Begins anew.
+    /// Removes all rays.
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.ready = 0;
     }
 
-    /// Writes the rays of a group, unless they are there; what is for boxes only where it may ever be asked for.
+    /// Converts the rays of a group unless this has been done. Values for box tests are written only if `for_boxes`, because no other
+    /// use of them follows.
     #[inline(always)]
-    fn want<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, for_boxes: bool) {
+    fn convert<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, for_boxes: bool) {
         if self.ready >> at & 1 == 0 {
             self.ready |= 1 << at;
             let lines = if for_boxes { 0..2 } else { 1..2 };
@@ -52,7 +53,7 @@ impl SingleRays {
         }
     }
 
-    /// A ray of a group, by the place of the group and its own.
+    /// A prepared ray, by the index of its group and its lane.
     #[inline(always)]
     fn prepared(&self, at: usize, lane: usize) -> &PreparedRay {
         self.group[at % GROUPS].prepared(lane).expect("packets are made of rays that are prepared")
@@ -67,12 +68,12 @@ impl SingleRays {
         (at, lane): (usize, usize),
         block: &impl TriangleBlock,
     ) -> Candidates<S> {
-        self.want(s, group, at, H::MIXED);
+        self.convert(s, group, at, H::MIXED);
         let [first, last] = &self.depths[at % GROUPS];
         self.prepared(at, lane).filter.candidates(s, block, first[lane % LANES], last[lane % LANES])
     }
 
-    /// Writes the children of a node that any of these rays, a bit each, may meet, and which do; returns how many.
+    /// Writes the stack entries of the children of a node that any of the given rays may meet; returns their number.
     #[inline(always)]
     pub(crate) fn children<S: Simd>(
         &mut self,
@@ -80,18 +81,18 @@ impl SingleRays {
         groups: &[RayGroup<S>],
         mut rays: u64,
         (parent, node): (u32, &WideNode),
-        to: &mut [StackEntry; WIDTH],
+        entries: &mut [StackEntry; WIDTH],
     ) -> usize {
-        // A lane for each child, a bit for each ray: those of the first two groups, and of the others.
-        let (mut meeting, mut some) = ([s.splat_u(0); 2], 0);
+        // A lane for each child, with a bit for each ray that may meet it: the first word for rays 0 to 31, the second for the others.
+        let (mut meeting, mut children) = ([s.splat_u(0); 2], 0);
         while rays != 0 {
             let ray = rays.trailing_zeros() as usize;
             rays &= rays - 1;
             let (at, lane) = (ray / LANES, ray % LANES);
-            self.want(s, &groups[at % groups.len()], at, true);
+            self.convert(s, &groups[at % groups.len()], at, true);
             let slabs = &self.prepared(at, lane).slabs;
             let (bits, _) = slabs.children(s, node, slabs.last);
-            some |= bits;
+            children |= bits;
             let half = &mut meeting[ray / 32];
             *half = s.select_u(s.mask(bits), s.or_u(*half, s.splat_u(1 << (ray % 32))), *half);
         }
@@ -99,11 +100,11 @@ impl SingleRays {
         s.store_u(meeting[0], &mut words[0]);
         s.store_u(meeting[1], &mut words[1]);
         let mut count = 0;
-        while some != 0 {
-            let slot = some.trailing_zeros() as usize % WIDTH;
-            some &= some - 1;
+        while children != 0 {
+            let slot = children.trailing_zeros() as usize % WIDTH;
+            children &= children - 1;
             let rays = u64::from(words[0][slot]) | u64::from(words[1][slot]) << 32;
-            to[count % WIDTH] = StackEntry { rays, parent, slot: slot as u32, key: f32::NEG_INFINITY };
+            entries[count % WIDTH] = StackEntry { rays, parent, slot: slot as u32, key: f32::NEG_INFINITY };
             count += 1;
         }
         count
@@ -121,22 +122,22 @@ mod tests {
     use bth_format::object::ObjectBounds;
     use bth_random::Rng;
 
-    /// What rays meet, a bit each, of each child.
+    /// For each child the rays that may meet it, a bit each. The last field holds the rays to test.
     struct Children<'a>(&'a [Ray], &'a WideNode, u64);
 
     impl Kernel for Children<'_> {
         type Output = [u64; WIDTH];
         fn run<S: Simd>(self, s: S) -> [u64; WIDTH] {
-            let Children(rays, node, few) = self;
+            let Children(rays, node, tested) = self;
             let mut groups = [RayGroup::vacant(s); GROUPS];
             for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
                 assert!(group.prepare::<SegmentBox<S>>(s, &ObjectBounds::around(8.0), rays));
             }
             let groups = &groups[..rays.len().div_ceil(LANES)];
-            let (mut single_rays, mut to) = (SingleRays::NONE, [StackEntry::default(); WIDTH]);
-            let count = single_rays.children(s, groups, few, (7, node), &mut to);
+            let (mut single_rays, mut entries) = (SingleRays::NONE, [StackEntry::default(); WIDTH]);
+            let count = single_rays.children(s, groups, tested, (7, node), &mut entries);
             let mut out = [0; WIDTH];
-            for entry in &to[..count] {
+            for entry in &entries[..count] {
                 assert!(entry.parent == 7 && entry.rays != 0, "{entry:?}");
                 assert_eq!(out[entry.slot as usize], 0, "each child once");
                 out[entry.slot as usize] = entry.rays;
@@ -145,7 +146,7 @@ mod tests {
         }
     }
 
-    /// Whether a ray meets a box that is wider by `more` on all sides, in f64.
+    /// Whether a ray meets a box that is enlarged by `more` on all sides, in f64.
     fn meets(ray: &Ray, lower: [f32; 3], upper: [f32; 3], more: f64) -> bool {
         if lower[0] > upper[0] {
             return false;
@@ -160,12 +161,12 @@ mod tests {
     }
 
     #[test]
-    fn children_are_met_by_the_rays_that_f64_says() {
+    fn children_are_met_by_the_same_rays_as_in_f64() {
         let mut rng = Rng::new(31);
         let mut unit = || rng.below(1 << 20) as f32 / (1 << 19) as f32 - 1.0;
-        let (mut hit_cache, mut missed) = (0, 0);
+        let (mut met, mut missed) = (0, 0);
         for round in 0..120 {
-            // The last group of some packets is not full, or there is but one.
+            // Some packets have a last group that is not full, or only one group.
             let rays: Vec<Ray> = (0..PACKET - round % 60)
                 .map(|_| {
                     let [origin, direction] = [(); 2].map(|()| [(); 3].map(|()| 8.0 * unit()));
@@ -180,20 +181,20 @@ mod tests {
                     (node.bounds[k][0][slot], node.bounds[k][1][slot]) = (middle - size, middle + size);
                 }
             }
-            let few = (0..rays.len()).fold(0u64, |few, i| few | u64::from(unit() > 0.5) << i);
+            let tested = (0..rays.len()).fold(0u64, |tested, i| tested | u64::from(unit() > 0.5) << i);
             for isa in Isa::ALL {
-                let found = isa.run(Children(&rays, &node, few));
+                let found = isa.run(Children(&rays, &node, tested));
                 for (slot, &found) in found.iter().enumerate() {
                     let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
                     for (i, ray) in rays.iter().enumerate() {
                         let is_found = found >> i & 1 != 0;
-                        let queried = few >> i & 1 != 0;
-                        assert!(queried || !is_found, "{isa}: only rays that were queried about");
-                        if queried && meets(ray, lower, upper, 0.0) {
+                        let is_tested = tested >> i & 1 != 0;
+                        assert!(is_tested || !is_found, "{isa}: only tested rays are found");
+                        if is_tested && meets(ray, lower, upper, 0.0) {
                             assert!(is_found, "{isa}: {ray:?} meets {lower:?}, {upper:?}");
-                            hit_cache += 1;
+                            met += 1;
                         }
-                        if queried && !meets(ray, lower, upper, 1e-4) {
+                        if is_tested && !meets(ray, lower, upper, 1e-4) {
                             assert!(!is_found, "{isa}: {ray:?} misses {lower:?}, {upper:?}");
                             missed += 1;
                         }
@@ -202,6 +203,6 @@ mod tests {
                 }
             }
         }
-        assert!(hit_cache > 1000 && missed > 1000, "{hit_cache}, {missed}");
+        assert!(met > 1000 && missed > 1000, "{met}, {missed}");
     }
 }

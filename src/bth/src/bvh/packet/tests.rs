@@ -1,4 +1,4 @@
-//! Packets against one ray at a time: the same bits, on every instruction set, over a surface of shared edges.
+//! Tests that packets give the same bits as single rays with every instruction set, over a surface of triangles with shared edges.
 
 use crate::bvh::packet::runs::{self as packets, MINIMUM_USE, MinimumUse, PacketCount, PacketScratch};
 use crate::object::single;
@@ -15,7 +15,7 @@ use bth_format::object::{ObjectView, Records};
 use bth_random::Rng;
 use zerocopy::{FromZeros, IntoBytes};
 
-/// Quads of the surface along x and y, and of a leaf.
+/// Number of quads of the surface along x and y, and of quads of a leaf.
 const QUADS: [usize; 2] = [32, 64];
 const BLOCK: [usize; 2] = [2, 4];
 
@@ -24,14 +24,14 @@ struct Surface {
     header: Object,
     lines: Vec<CacheLine>,
     ids: Vec<u32>,
-    /// Its points.
+    /// Points of the surface.
     points: Vec<[f32; 3]>,
 }
 
-/// Packets whatever they are worth.
+/// Packets are made of all coherent rays, however few take part in a step.
 const ALWAYS: MinimumUse = MinimumUse { coherent: 0, short: 0 };
 
-/// A block that follows the lines.
+/// Appends a block to the lines; returns the index of its first line.
 fn append(lines: &mut Vec<CacheLine>, block: &[u8]) -> u32 {
     let line = lines.len() as u32;
     lines.resize(lines.len() + block.len() / 64, CacheLine([0; 16]));
@@ -56,7 +56,7 @@ fn node(children: &[([[f32; 3]; 2], u32)]) -> WideNode {
 }
 
 impl Surface {
-    /// Heights are small integers; then all is scaled and moved along x.
+    /// A surface whose heights are small integers, scaled and then moved along x.
     fn new(scale: f32, away: f32) -> Surface {
         let mut rng = Rng::new(5);
         let height: Vec<f32> = (0..(QUADS[0] + 1) * (QUADS[1] + 1)).map(|_| rng.below(5) as f32).collect();
@@ -132,7 +132,7 @@ impl Surface {
         Surface { header, lines, ids, points }
     }
 
-    /// One of its indexed leaves as a whole object.
+    /// An object that consists of one of the indexed leaves.
     fn one_leaf(&self) -> Surface {
         let line = NODE_LINES * (1 + WIDTH) + RAW_LINES;
         let lines = self.lines[line..line + INDEXED_LINES].to_vec();
@@ -164,7 +164,7 @@ impl Surface {
     }
 }
 
-/// Packets of a batch as a kernel.
+/// Kernel that traces the packets of a batch.
 struct Packed<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
@@ -193,7 +193,7 @@ fn packed<Q: Query>(
     (count, scratch.rest)
 }
 
-/// In memory that other batches may have used.
+/// As [`packed`], with memory that other batches may have used.
 fn packed_in<Q: Query>(
     isa: Isa,
     scratch: &mut PacketScratch,
@@ -212,7 +212,7 @@ fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.triangle]
 }
 
-/// Compares packets with single rays; returns how many packets and how many hits there were.
+/// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
 fn check(surface: &Surface, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
@@ -246,8 +246,8 @@ fn unit(rng: &mut Rng) -> f32 {
     rng.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
 }
 
-/// Rays from near an eye to near a place of the surface, in runs of 64: exactly from the eye and to points of the surface
-/// where `exact`.
+/// Runs of 64 rays from near a camera to near a point of the surface; with `exact` they start exactly at the camera and are aimed at
+/// points of the surface.
 fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = vec![];
@@ -269,7 +269,7 @@ fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
     rays
 }
 
-/// Short rays from places near a point, all ways.
+/// Short rays in all directions, from near a point.
 fn short(surface: &Surface, scale: f32, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = vec![];
@@ -306,7 +306,7 @@ fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
     }
 }
 
-/// Packets of rays from one point that hit a few triangles, or more than are kept, or some of each.
+/// Packets of rays with the same origin that hit few triangles, or more than the hit cache holds.
 #[test]
 fn views_from_one_point_are_traced_to_the_same_bits() {
     let mut rng = Rng::new(12);
@@ -323,7 +323,7 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
     }
     let [(count, hits), _] = check(&surface, &rays, ALWAYS);
     assert!(count.coherent > 60 && hits > 1000, "{count:?}, {hits}");
-    // How many triangles the rays of a packet hit: both halves of what is kept, and more.
+    // The numbers of triangles that a packet hits include at most half of the hit cache, more than half, and more than it holds.
     let mut all = vec![Hit::MISS; rays.len()];
     packed::<Nearest>(Isa::Scalar, &surface.view(), &rays, ALWAYS, &mut all);
     let mut runs = [0; 3];
@@ -354,7 +354,7 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
     for (i, (a, b)) in coherent.chunks(64).zip(short.chunks(64)).enumerate() {
         rays.extend_from_slice(if i % 2 == 0 { a } else { b });
         if i % 5 == 0 {
-            // Anything at all: rays without a line, from within the surface, backward in t.
+            // Other rays: without a line, from within the surface, with negative t.
             for _ in 0..64 {
                 let pick = |rng: &mut Rng, x: f32| if rng.below(60) == 0 { f32::NAN } else { x };
                 let origin = [(); 3].map(|()| {
@@ -366,7 +366,7 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
             }
         }
     }
-    // A last packet that is not full.
+    // The last packet is not full.
     rays.extend_from_slice(&coherent[..50]);
     let [(nearest, _), (any, _)] = check(&surface, &rays, ALWAYS);
     assert!(nearest.rays > 0 && nearest.rays < rays.len(), "{nearest:?}");
@@ -374,7 +374,7 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
 }
 
 #[test]
-fn rays_that_lanes_cannot_hold_are_left_to_go_alone() {
+fn rays_that_f32_cannot_prepare_are_left_to_single_rays() {
     for scale in [1e15, 1e-42] {
         let surface = Surface::new(scale, 0.0);
         let rays = bundles(&surface, scale, false, 7);
@@ -385,8 +385,8 @@ fn rays_that_lanes_cannot_hold_are_left_to_go_alone() {
 }
 
 #[test]
-fn packets_that_serve_few_of_their_rays_make_way() {
-    // Every other ray of a run passes far from the others, so hardly any step serves half of them.
+fn packets_with_few_active_rays_are_followed_by_single_rays() {
+    // Every other ray of a run passes far from the others, so in few steps half of them take part.
     let surface = Surface::new(1.0, 0.0);
     let mut rays = bundles(&surface, 1.0, false, 8);
     let mut rng = Rng::new(9);
@@ -401,14 +401,14 @@ fn packets_that_serve_few_of_their_rays_make_way() {
     }
 }
 
-/// What packets keep between batches says nothing about the next object.
+/// Memory that packets keep between batches does not affect the next object.
 #[test]
 fn nothing_of_a_batch_is_left_for_the_next() {
     let surface = Surface::new(1.0, 0.0);
     let leaf = surface.one_leaf();
     let mut rng = Rng::new(13);
     let middle = leaf.points[7];
-    // Through a vertex, so that hits must be decided alone.
+    // Rays through a vertex need decisions in f64.
     let rays: Vec<Ray> = (0..128)
         .map(|_| {
             let away = [(); 3].map(|()| (rng.below(64) as f32 - 31.5) / 128.0);

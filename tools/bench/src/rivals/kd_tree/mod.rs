@@ -71,12 +71,12 @@ mod tests {
     use crate::rays::Random;
     use bth::rays::Ray;
 
-    fn soup(count: usize, random: &mut Random) -> Vec<[[f32; 3]; 3]> {
-        let mut corner = |middle: [f64; 3]| middle.map(|x| (x + 0.1 * (random.unit() - 0.5)) as f32);
-        let mut middles = Random(17);
+    fn soup(count: usize, rng: &mut Rng) -> Vec<[[f32; 3]; 3]> {
+        let mut corner = |middle: [f64; 3]| middle.map(|x| (x + 0.1 * (rng.unit_f64() - 0.5)) as f32);
+        let mut middles = Rng::new(17);
         (0..count)
             .map(|_| {
-                let middle = [middles.unit(), middles.unit(), middles.unit()];
+                let middle = [middles.unit_f64(), middles.unit_f64(), middles.unit_f64()];
                 [corner(middle), corner(middle), corner(middle)]
             })
             .collect()
@@ -101,14 +101,14 @@ mod tests {
     fn agrees_with_all_triangles(corners: Vec<[[f32; 3]; 3]>, extent: f64) {
         let tree = KdTree::build(corners.clone());
         let all: Vec<u32> = (0..corners.len() as u32).collect();
-        let mut random = Random(3);
+        let mut rng = Rng::new(3);
         let mut hits = 0;
         for _ in 0..3000 {
-            let point = |r: &mut Random| [r.unit(), r.unit(), r.unit()].map(|x| (x * extent) as f32);
-            let origin = point(&mut random);
-            let direction = random.sphere().to_array().map(|x| x as f32);
+            let point = |r: &mut Rng| [r.unit_f64(), r.unit_f64(), r.unit_f64()].map(|x| (x * extent) as f32);
+            let origin = point(&mut rng);
+            let direction = on_sphere(rng).to_array().map(|x| x as f32);
             let tmax =
-                if random.unit() < 0.5 { f32::INFINITY } else { (0.5 * extent * random.unit()) as f32 };
+                if rng.unit_f64() < 0.5 { f32::INFINITY } else { (0.5 * extent * rng.unit_f64()) as f32 };
             let ray = Ray { origin, tmin: 0.0, direction, tmax };
             let (found, expected) = (tree.walk::<false>(&ray, &mut Vec::new()), tree.nearest_of(&ray, &all));
             assert_eq!(found.t, expected.t, "{ray:?}");
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn the_walk_finds_the_nearest_of_all_triangles_of_a_soup() {
-        agrees_with_all_triangles(soup(700, &mut Random(5)), 1.0);
+        agrees_with_all_triangles(soup(700, &mut Rng::new(5)), 1.0);
     }
 
     #[test]
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn splits_follow_the_surface_area() {
-        let tree = KdTree::build(soup(2000, &mut Random(5)));
+        let tree = KdTree::build(soup(2000, &mut Rng::new(5)));
         let inner = tree.nodes.iter().filter(|n| matches!(n, Node::Inner { .. })).count();
         assert!(inner > 500, "{inner} inner nodes");
         assert!(tree.lists.len() < 20 * tree.corners.len(), "{} references", tree.lists.len());

@@ -1,9 +1,14 @@
-/* C interface of bth: opens compiled BTH files and traces rays.
+/* C interface of bth: opens compiled BTH files and traces rays. Link with libbth.
  *
- * Link with libbth. All functions may be called from any thread; queries on one scene may run
- * side by side, but not beside bth_set_seconds, bth_set_frame and bth_close. Rays are in world space; directions need not be normalized, and t is in
- * units of the direction. A ray whose origin or direction is not finite, whose direction is zero, or
- * whose tmin exceeds its tmax hits nothing.
+ * All functions may be called from any thread. Functions that take a const bth_scene may run on one scene at the same time;
+ * bth_set_seconds, bth_set_frame and bth_close must not run at the same time as any other function on that scene.
+ *
+ * In a file without scene sections, such as a compiled model, each object has one instance with the same index, and object
+ * space is world space.
+ *
+ * Every pointer must be null or valid. Functions that return a code return BTH_ERROR_ARGUMENT for a null pointer that is not
+ * documented as allowed. Queries with a null scene, null rays or null results do nothing. The other functions treat a null scene
+ * as one without instances.
  */
 #ifndef BTH_H
 #define BTH_H
@@ -17,7 +22,9 @@ extern "C" {
 
 typedef struct bth_scene bth_scene;
 
-/* The points origin + t * direction with tmin <= t <= tmax (which may be infinite). 32 bytes. */
+/* A ray in world space: the points origin + t * direction with tmin <= t <= tmax. The direction need not be normalized; t is
+ * in units of its length. tmin and tmax may be infinite. A ray hits nothing if its origin or direction is not finite, its
+ * direction is zero, tmin or tmax is NaN, or tmin exceeds tmax. 32 bytes. */
 typedef struct {
     float origin[3];
     float tmin;
@@ -25,17 +32,18 @@ typedef struct {
     float tmax;
 } bth_ray;
 
+/* The index that stands for no instance, triangle or node. */
 #define BTH_NONE 0xFFFFFFFFu
 
-/* A triangle of an instance; BTH_NONE in both fields for none. The triangle is the face of the
- * source file after fan triangulation; the instance is 0 in the file of a single object. */
+/* A triangle of an instance; both fields are BTH_NONE for no triangle. The triangle is an index into the triangles of the
+ * object's source file after fan triangulation of its faces. 8 bytes. */
 typedef struct {
     uint32_t instance;
     uint32_t triangle;
 } bth_surface;
 
-/* The nearest hit. t is infinite for a miss. u and v are the barycentric weights of the triangle's
- * second and third vertex. 20 bytes. */
+/* The nearest hit of a ray, or a miss. t is in units of the length of the ray's direction, and infinite for a miss. u and v, from
+ * 0 to 1, are the barycentric weights of the triangle's second and third vertex. The surface of a miss is BTH_NONE. 20 bytes. */
 typedef struct {
     float t;
     float u;
@@ -44,66 +52,72 @@ typedef struct {
 } bth_hit;
 
 /* Flags of bth_open. */
-#define BTH_READ 0u /* read the file into memory and check every index: safe for any file */
-#define BTH_MAP 1u  /* map the file: nobody may change or shrink it until bth_close, and its contents
-                       must come from a trusted compiler (section contents are not checked) */
+#define BTH_READ 0u /* reads the file into memory and checks every index: safe for any file */
+#define BTH_MAP 1u  /* maps the file into memory and does not check the contents of objects: it must not be changed or
+                       truncated until bth_close, and must have been written by a trusted compiler */
 
-/* Results. */
+/* Results of functions. */
 #define BTH_OK 0
-#define BTH_ERROR_ARGUMENT (-1)    /* a null pointer, an unknown flag, a path that is not UTF-8, no such row */
+#define BTH_ERROR_ARGUMENT (-1)    /* a null pointer, an unknown flag, a path that is not UTF-8, an instance that does not
+                                      exist, or a time that is not finite */
 #define BTH_ERROR_FILE (-2)        /* the file could not be read */
-#define BTH_ERROR_FORMAT (-3)      /* not a BTH file, or one that breaks the specification */
-#define BTH_ERROR_VERSION (-4)     /* a version or feature that this library does not know */
+#define BTH_ERROR_FORMAT (-3)      /* not a BTH file, or one that violates the specification */
+#define BTH_ERROR_VERSION (-4)     /* a version or feature that this library does not support */
 #define BTH_ERROR_INTERNAL (-5)    /* a defect of this library */
-#define BTH_ERROR_SCENE (-6)       /* an instance cannot be shown at this time: its transform cannot be inverted or
-                                      is not finite; the text names the node */
+#define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed at the given time: its transform cannot be inverted or
+                                      is not finite; the text of the error gives the node */
 
-/* Opens a compiled file. On success stores the scene and returns 0; else leaves *scene null
- * and returns a negative code, and bth_last_error tells what is wrong, where, and what to do. */
+/* Opens a compiled file; path is in UTF-8. On success stores the scene in *scene and returns BTH_OK. On failure stores null,
+ * unless path or scene is null, and returns a negative code; bth_last_error then describes what is wrong, where, and what can
+ * be done. */
 int32_t bth_open(const char *path, uint32_t flags, bth_scene **scene);
 
-/* Closes a scene; null is allowed. */
+/* Closes a scene and frees its memory; null is allowed. */
 void bth_close(bth_scene *scene);
 
-/* Text of the last error on this thread, never null; valid until the next call here that can fail. */
+/* Text of the last error on the calling thread, never null. It is valid until the next call on this thread that
+ * can fail. */
 const char *bth_last_error(void);
 
-/* Nearest hits of `count` rays. `from` (or null) names, per ray, the surface that it starts on:
- * a hint where to begin, which never changes an answer. */
+/* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
+ * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
+ * After an internal error all rays are misses. */
 void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
-/* For each ray 1 if it hits anything, else 0. */
+/* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
+ * the other arrays. After an internal error rays are misses. */
 void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
 
-/* First and last frame and frames per second of the scene; the pointers may be null. A file without a scene has frame 0
- * alone. */
+/* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
+ * null. A file without scene sections has only frame 0, at one frame per second. */
 void bth_frames(const bth_scene *scene, int32_t *first, int32_t *last, double *rate);
 
-/* Seconds that the scene is shown at: after bth_open those of its first frame. */
+/* Time of the scene in seconds: after bth_open that of its first frame; 0 in a file without scene sections. */
 double bth_seconds(const bth_scene *scene);
 
-/* Moves the scene to a time or to a frame (frame / rate seconds), which may lie outside its range: evaluates the tracks and
- * places what moved. No query may be running on the scene. Does nothing in a file without a scene. Returns 0, or a
- * negative code and leaves the scene as it was. */
+/* Sets the time of the scene, in seconds or to that of a frame (frame / rate). It may lie outside of the range of frames. The
+ * animation is evaluated, and the instances that moved are placed anew. Without scene sections this has no effect. Returns
+ * BTH_OK, or a negative code, and the scene is then unchanged. */
 int32_t bth_set_seconds(bth_scene *scene, double seconds);
 int32_t bth_set_frame(bth_scene *scene, int32_t frame);
 
 /* An instance at the scene's time. 112 bytes. */
 typedef struct {
-    double to_world[3][4]; /* from the object's space to the world: rows, applied to columns (x, y, z, 1) */
-    uint32_t object;
-    uint32_t node;         /* that carries it; BTH_NONE in files without a scene */
-    uint32_t visible;      /* 1 if rays can meet it, else 0 */
+    double to_world[3][4]; /* transform from object space to world space: rows, applied to columns (x, y, z, 1) */
+    uint32_t object;       /* index of its object */
+    uint32_t node;         /* index of the node to which it is attached; BTH_NONE in a file without scene sections */
+    uint32_t visible;      /* 1 if rays can hit it, else 0 */
     uint32_t reserved;     /* 0 */
 } bth_instance;
 
-/* Instances of the scene, seen or not; surfaces name them by row. */
+/* Number of instances of the scene, visible or not. bth_surface.instance is an index below this number. */
 uint32_t bth_instance_count(const bth_scene *scene);
 
-/* Writes what an instance is; BTH_ERROR_ARGUMENT if there is no such row. */
+/* Stores the instance with index `row` in *instance. Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such instance or a
+ * pointer is null. */
 int32_t bth_get_instance(const bth_scene *scene, uint32_t row, bth_instance *instance);
 
-/* Bytes of the sections that traversal reads. */
+/* Size in bytes of the sections that traversal reads; 0 if the scene is null. */
 uint64_t bth_resident_bytes(const bth_scene *scene);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
-//! C interface of bth. `include/bth.h` is the reference; this file must match it.
-#![allow(unsafe_code)] // FFI: every function takes pointers from C.
+//! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
+#![allow(unsafe_code)] // Most functions take pointers from C.
 
 pub mod motion;
 
@@ -10,9 +10,11 @@ use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+// Flags of `bth_open`.
 const READ: u32 = 0;
 const MAP: u32 = 1;
 
+// Results of functions, `BTH_OK` and `BTH_ERROR_*` in C.
 const OK: i32 = 0;
 const ERROR_ARGUMENT: i32 = -1;
 const ERROR_FILE: i32 = -2;
@@ -22,15 +24,18 @@ const ERROR_INTERNAL: i32 = -5;
 const ERROR_SCENE: i32 = -6;
 
 thread_local! {
+    /// Result of [`bth_last_error`].
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
 
+/// Stores the text of an error for [`bth_last_error`] and returns its code.
 fn fail(code: i32, text: String) -> i32 {
     let text = CString::new(text.replace('\0', "?")).unwrap_or_default();
     LAST_ERROR.with(|last| *last.borrow_mut() = text);
     code
 }
 
+/// The result in C for an error of the runtime.
 fn code_of(error: &Error) -> i32 {
     match error.code() {
         Code::Read => ERROR_FILE,
@@ -43,28 +48,28 @@ fn code_of(error: &Error) -> i32 {
 /// Opens a file; see `bth.h`.
 ///
 /// # Safety
-/// `path` is null or a C string; `scene` is null or may be written. With the map flag, the contract of
-/// [`runtime::map`] holds for the file until the scene is closed.
+/// `path` is null or points to a C string; `scene` is null or valid for writes. With the flag `BTH_MAP` the file must meet the
+/// contract of [`runtime::map`] until the scene is closed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *mut Scene) -> i32 {
     if scene.is_null() || path.is_null() {
         return fail(ERROR_ARGUMENT, "bth_open: path and scene must not be null".into());
     }
-    // SAFETY: not null, and writable by contract.
+    // SAFETY: it is not null, so it is valid for writes by the contract of this function.
     unsafe { *scene = std::ptr::null_mut() };
-    // SAFETY: not null, and the caller passes a C string.
+    // SAFETY: it is not null, so it points to a C string by the contract of this function.
     let Ok(path) = unsafe { CStr::from_ptr(path) }.to_str() else {
         return fail(ERROR_ARGUMENT, "bth_open: the path is not UTF-8".into());
     };
     let opened = catch_unwind(|| match flags {
         READ => Some(runtime::open(Path::new(path))),
-        // SAFETY: with the map flag the caller guarantees the contract of `map`.
+        // SAFETY: with this flag the contract of this function includes that of `map`.
         MAP => Some(unsafe { runtime::map(Path::new(path)) }),
         _ => None,
     });
     match opened {
         Ok(Some(Ok(opened))) => {
-            // SAFETY: as above.
+            // SAFETY: it is not null, so it is valid for writes by the contract of this function.
             unsafe { *scene = Box::into_raw(Box::new(opened)) };
             OK
         }
@@ -77,11 +82,12 @@ pub unsafe extern "C" fn bth_open(path: *const c_char, flags: u32, scene: *mut *
 /// Closes a scene; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or comes from [`bth_open`], is closed only once, and no query is running on it.
+/// `scene` is null, or it comes from [`bth_open`], has not been closed, and no other call uses it now or later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_close(scene: *mut Scene) {
     if !scene.is_null() {
-        // SAFETY: made by Box::into_raw in bth_open, and not closed before.
+        // SAFETY: `bth_open` obtained the pointer from `Box::into_raw`, and by the contract of this function it has not been
+        // freed and is not used by another call.
         drop(unsafe { Box::from_raw(scene) });
     }
 }
@@ -92,13 +98,14 @@ pub extern "C" fn bth_last_error() -> *const c_char {
     LAST_ERROR.with(|last| last.borrow().as_ptr())
 }
 
-/// Scene, rays and, unless null, the primitives on which they start.
+/// The arguments of a query: the scene, the rays, and for each ray the triangle on which it starts, if given.
 type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [Surface]>);
 
-/// The arguments of a query as slices; `None` when there is nothing to do.
+/// The arguments of a query as slices; `None` if there are no rays, or `scene` or `rays` is null.
 ///
 /// # Safety
-/// Each pointer is null or points to what `bth.h` requires, which outlives the result.
+/// `scene` is null or open. `rays` and `from` are each null or point to `count` elements. All of them outlive the result and are
+/// not written to during its life.
 unsafe fn batch<'a>(
     scene: *const Scene,
     rays: *const Ray,
@@ -108,8 +115,8 @@ unsafe fn batch<'a>(
     if scene.is_null() || rays.is_null() || count == 0 {
         return None;
     }
-    // SAFETY: not null; a scene from bth_open, and `count` rays and surfaces, which have the layout of the
-    // C structs and no invalid values.
+    // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` and `from` point to `count`
+    // elements. `Ray` and `Surface` have the layout of the C structs, and all bit patterns are valid for them.
     unsafe {
         let from = (!from.is_null()).then(|| std::slice::from_raw_parts(from, count));
         Some((&*scene, std::slice::from_raw_parts(rays, count), from))
@@ -119,7 +126,8 @@ unsafe fn batch<'a>(
 /// Nearest hits; see `bth.h`.
 ///
 /// # Safety
-/// `scene` comes from [`bth_open`] and is open; `rays` and `hits`, and `from` unless null, have `count` elements.
+/// `scene` is null or open. `rays`, `from` and `hits` are each null or point to `count` elements; those of `hits` are valid for
+/// writes and do not overlap the others.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_nearest(
     scene: *const Scene,
@@ -128,23 +136,24 @@ pub unsafe extern "C" fn bth_nearest(
     hits: *mut Hit,
     count: usize,
 ) {
-    // SAFETY: the caller's contract.
+    // SAFETY: the contract of `batch` is part of that of this function.
     let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hits.is_null() {
         return;
     }
-    // SAFETY: not null, `count` elements by contract; any bits are a valid `Hit`.
+    // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
+    // slices above. All bit patterns are valid for `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
-    // Unwinding must not reach C. After a panic, which would be a defect of the library, all rays miss.
+    // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
     if catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits))).is_err() {
         hits.fill(Hit::MISS);
     }
 }
 
-/// Any hits; see `bth.h`.
+/// Whether rays hit anything; see `bth.h`.
 ///
 /// # Safety
-/// As for [`bth_nearest`]; `hit` has `count` bytes.
+/// As for [`bth_nearest`], with `hit` in place of `hits`: it is null or points to `count` bytes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_any(
     scene: *const Scene,
@@ -153,38 +162,39 @@ pub unsafe extern "C" fn bth_any(
     hit: *mut u8,
     count: usize,
 ) {
-    // SAFETY: the caller's contract.
+    // SAFETY: the contract of `batch` is part of that of this function.
     let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hit.is_null() {
         return;
     }
-    // SAFETY: not null, `count` bytes by contract.
+    // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
+    // above.
     let hit = unsafe { std::slice::from_raw_parts_mut(hit, count) };
-    // `bool` has invalid bit patterns, so the bytes of the caller are not used as `bool`. A single ray takes a path without
-    // the buffer of a part.
+    // The caller's bytes are not used as a slice of `bool`, because `bool` has invalid bit patterns. A single ray does not need
+    // the buffer of [`any_in_chunks`].
     if let [hit] = hit {
         let mut found = [false];
         let traced = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut found)));
         *hit = (traced.is_ok() && found[0]).into();
     } else {
-        any_in_parts(scene, rays, from, hit);
+        any_in_chunks(scene, rays, from, hit);
     }
 }
 
-/// Rays that are traced together by [`bth_any`].
-const PART: usize = 1024;
+/// Number of rays that [`any_in_chunks`] traces together.
+const CHUNK: usize = 1024;
 
-/// Any hits, a [`PART`] at a time.
+/// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
 #[inline(never)]
-fn any_in_parts(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
-    let mut part = [false; PART];
-    for (i, (rays, hit)) in rays.chunks(PART).zip(hit.chunks_mut(PART)).enumerate() {
-        let from = from.map(|f| &f[i * PART..i * PART + rays.len()]);
-        let part = &mut part[..rays.len()];
-        if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, part))).is_err() {
-            part.fill(false);
+fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
+    let mut buffer = [false; CHUNK];
+    for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
+        let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);
+        let found = &mut buffer[..rays.len()];
+        if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, found))).is_err() {
+            found.fill(false);
         }
-        for (out, found) in hit.iter_mut().zip(part) {
+        for (out, found) in hit.iter_mut().zip(found) {
             *out = (*found).into();
         }
     }
@@ -193,9 +203,9 @@ fn any_in_parts(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut
 /// Bytes of the sections that traversal reads; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or comes from [`bth_open`] and is open.
+/// `scene` is null or open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_resident_bytes(scene: *const Scene) -> u64 {
-    // SAFETY: null or valid by contract.
+    // SAFETY: by contract it is null or open, hence valid for reads.
     unsafe { scene.as_ref() }.map_or(0, Scene::resident_bytes)
 }

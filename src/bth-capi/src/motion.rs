@@ -1,4 +1,4 @@
-//! The part of the C interface that sets the time of scenes and describes their instances.
+//! The part of the C interface that sets the time of scenes and returns their instances.
 
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
 use runtime::{Error, Scene};
@@ -20,14 +20,14 @@ const _: () = assert!(size_of::<Instance>() == 112);
 /// Frames and rate of a scene; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; each of the others is null or may be written.
+/// `scene` is null or open; each of the other pointers is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_frames(scene: *const Scene, first: *mut i32, last: *mut i32, rate: *mut f64) {
-    // SAFETY: null or valid by contract.
+    // SAFETY: by contract it is null or open, hence valid for reads.
     let view = unsafe { scene.as_ref() }.and_then(Scene::description);
     let found =
         view.map_or((0, 0, 1.0), |v| (v.scene[0].first_frame, v.scene[0].last_frame, v.scene[0].rate));
-    // SAFETY: each is null, and then skipped, or writable by contract.
+    // SAFETY: by contract each pointer is null, and then skipped, or valid for writes.
     unsafe {
         first.as_mut().into_iter().for_each(|out| *out = found.0);
         last.as_mut().into_iter().for_each(|out| *out = found.1);
@@ -41,20 +41,20 @@ pub unsafe extern "C" fn bth_frames(scene: *const Scene, first: *mut i32, last: 
 /// `scene` is null or open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_seconds(scene: *const Scene) -> f64 {
-    // SAFETY: null or valid by contract.
+    // SAFETY: by contract it is null or open, hence valid for reads.
     unsafe { scene.as_ref() }.map_or(0.0, Scene::seconds)
 }
 
 /// Moves a scene to a time; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open, and nothing else uses it meanwhile.
+/// `scene` is null or open, and no other call uses it at the same time.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32 {
     if !seconds.is_finite() {
         return fail(ERROR_ARGUMENT, format!("bth_set_seconds: expected a finite time, found {seconds}"));
     }
-    // SAFETY: the caller's contract.
+    // SAFETY: the contract of `update` is that of this function.
     unsafe { update(scene, "bth_set_seconds", |scene| scene.set_seconds(seconds).map(drop)) }
 }
 
@@ -64,21 +64,26 @@ pub unsafe extern "C" fn bth_set_seconds(scene: *mut Scene, seconds: f64) -> i32
 /// As for [`bth_set_seconds`].
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_set_frame(scene: *mut Scene, frame: i32) -> i32 {
-    // SAFETY: the caller's contract.
+    // SAFETY: the contract of `update` is that of this function.
     unsafe { update(scene, "bth_set_frame", |scene| scene.set_frame(frame).map(drop)) }
 }
 
-/// Calls `go` with the scene; turns errors and panics into codes.
+/// Calls `set_time` with the scene, and returns its error or panic as a code. `name` is that of the C function, for error
+/// messages.
 ///
 /// # Safety
 /// As for [`bth_set_seconds`].
-unsafe fn update(scene: *mut Scene, name: &str, go: impl FnOnce(&mut Scene) -> Result<(), Error>) -> i32 {
-    // SAFETY: null or open, and not used by anything else, by contract.
+unsafe fn update(
+    scene: *mut Scene,
+    name: &str,
+    set_time: impl FnOnce(&mut Scene) -> Result<(), Error>,
+) -> i32 {
+    // SAFETY: by contract it is null or open, and not used by another call at the same time.
     let Some(scene) = (unsafe { scene.as_mut() }) else {
         return fail(ERROR_ARGUMENT, format!("{name}: scene must not be null"));
     };
-    // Unwinding must not reach C.
-    match catch_unwind(AssertUnwindSafe(|| go(scene))) {
+    // A panic must not unwind into C.
+    match catch_unwind(AssertUnwindSafe(|| set_time(scene))) {
         Ok(Ok(())) => OK,
         Ok(Err(error)) => fail(code_of(&error), error.to_string()),
         Err(_) => fail(ERROR_INTERNAL, format!("{name}: internal error")),
@@ -91,17 +96,17 @@ unsafe fn update(scene: *mut Scene, name: &str, go: impl FnOnce(&mut Scene) -> R
 /// `scene` is null or open.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_instance_count(scene: *const Scene) -> u32 {
-    // SAFETY: null or valid by contract.
+    // SAFETY: by contract it is null or open, hence valid for reads.
     unsafe { scene.as_ref() }.map_or(0, Scene::instance_count)
 }
 
 /// An instance; see `bth.h`.
 ///
 /// # Safety
-/// `scene` is null or open; `instance` is null or may be written.
+/// `scene` is null or open; `instance` is null or valid for writes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn bth_get_instance(scene: *const Scene, row: u32, instance: *mut Instance) -> i32 {
-    // SAFETY: each is null or valid by contract.
+    // SAFETY: by contract `scene` is null or open, and `instance` is null or valid for writes.
     let (Some(scene), Some(out)) = (unsafe { scene.as_ref() }, unsafe { instance.as_mut() }) else {
         return fail(ERROR_ARGUMENT, "bth_get_instance: scene and instance must not be null".into());
     };

@@ -1,4 +1,4 @@
-//! Runtime of BTH files: opens a compiled file and traces rays, zero-copy.
+//! Runtime of BTH files: opens compiled files and traces rays through them, without copying or converting their sections.
 //!
 //! ```no_run
 //! use bth::rays::{Ray, Surface};
@@ -12,7 +12,7 @@
 //! # Ok::<(), bth::Error>(())
 //! ```
 #![warn(missing_docs)]
-// Iterators and closures over lanes would be compiled without the instruction set that the lanes need.
+// Kernels loop over lanes by index: iterators and closures could be compiled as functions without the kernel's instruction set.
 #![allow(clippy::needless_range_loop)]
 
 mod bvh;

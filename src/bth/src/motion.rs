@@ -1,4 +1,4 @@
-//! What moves in a scene: time, instances, nodes.
+//! The part of [`Scene`] that sets the time and returns the transforms of instances and nodes at that time.
 
 use crate::instances::{Update, World};
 use crate::scene::Scene;
@@ -7,47 +7,50 @@ use bth_format::{Error, File, SceneView};
 /// An instance at the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceView {
-    /// The object that stands there.
+    /// Index of its object.
     pub object: u32,
-    /// Node that carries it; `NONE` in files without a scene.
+    /// Index of the node to which it is attached; `u32::MAX` in a file without scene sections.
     pub node: u32,
-    /// From the object's space to the world: rows of four, applied to columns (x, y, z, 1).
+    /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to columns (x, y, z, 1).
     pub to_world: [[f64; 4]; 3],
-    /// Whether rays can meet it.
+    /// Whether rays can hit it: it is neither hidden nor scaled to zero, and its object has triangles. Always true in a file
+    /// without scene sections.
     pub visible: bool,
 }
 
-/// Checks that everything that is seen at a file's first frame can be placed; looks at nothing of the objects but their
-/// headers.
+/// Checks the scene sections of a file, and that every visible instance can be placed at the first frame. The sections of objects
+/// are not checked.
 ///
 /// # Errors
-/// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` with the node.
+/// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
 pub fn check_first_frame(file: &File) -> Result<(), Error> {
     World::new(file).map(drop)
 }
 
 impl Scene {
-    /// The scene sections; `None` when the file has none: then each object stands once in the world, as it is.
+    /// The scene sections; `None` if the file has none.
     pub fn description(&self) -> Option<SceneView<'_>> {
         self.world().and_then(|_| self.file().scene())
     }
 
-    /// Seconds at which the scene is shown; after opening those of its first frame.
+    /// Time of the scene in seconds: after opening, that of its first frame; 0 without scene sections.
     pub fn seconds(&self) -> f64 {
         self.world().map_or(0.0, |world| world.seconds)
     }
 
-    /// Moves the scene to a time: evaluates tracks and rebuilds what moved. Does nothing without a scene.
+    /// Sets the time of the scene in seconds: evaluates the animation, places the instances that moved and rebuilds the top-level
+    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections this
+    /// has no effect.
     ///
     /// # Errors
-    /// `BTH-S001` when the transform of an instance that can be seen cannot be inverted, `BTH-S002` when it is not
-    /// finite or leads beyond the range of `f32`; with the node. The scene is then as it was.
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
+    /// finite in `f32`. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
-        let (file, world) = self.parts_mut();
+        let (file, world) = self.file_and_world_mut();
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(file, seconds))
     }
 
-    /// Moves the scene to a frame, which may lie outside its range.
+    /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
     ///
     /// # Errors
     /// As [`Self::set_seconds`].
@@ -56,12 +59,12 @@ impl Scene {
         self.set_seconds(f64::from(frame) / rate)
     }
 
-    /// Instances in the scene, seen or not.
+    /// Number of instances in the scene, visible or not.
     pub fn instance_count(&self) -> u32 {
-        self.world().map_or(self.object_count(), |world| world.placed.len() as u32)
+        self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
     }
 
-    /// The object of an instance.
+    /// Index of an instance's object.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -85,32 +88,34 @@ impl Scene {
                 visible: true,
             };
         };
-        let visible = world.placed[instance as usize].is_some();
+        let visible = world.placements[instance as usize].is_some();
         let row = self.file().instances()[instance as usize];
         let (to_world, _) = self.node(row.node);
         InstanceView { object: row.object, node: row.node, to_world, visible }
     }
 
-    /// From a node's space to the world at the scene's time (rows of four, applied to columns (x, y, z, 1)), and
-    /// whether the node can be seen.
+    /// The transform from a node's space to world space at the scene's time, as in [`InstanceView::to_world`], and whether the
+    /// node is visible.
     ///
     /// # Panics
-    /// If there is no such node.
+    /// If there is no such node, as in a file without scene sections.
     pub fn node(&self, node: u32) -> ([[f64; 4]; 3], bool) {
         self.world().expect("a file with nodes").node(self.file(), node)
     }
 
-    /// A normal of an instance's object in the world: by the inverse transpose. Its length has no meaning.
+    /// Transforms a normal from an instance's object space to world space, by the transpose of the inverse. The result is not
+    /// normalized.
     ///
     /// # Panics
-    /// If there is no such instance, or it cannot be seen.
+    /// In a file with scene sections, if there is no such instance or it is not visible.
     pub fn normal_to_world(&self, instance: u32, normal: [f64; 3]) -> [f64; 3] {
         let Some(world) = self.world() else { return normal };
-        let placed = world.placed[instance as usize].as_ref().expect("an instance that can be seen");
-        placed.inverse.normal(normal)
+        let placement = world.placements[instance as usize].as_ref().expect("an instance that can be seen");
+        placement.inverse.normal(normal)
     }
 
-    /// World box of an instance, slightly larger than it; `None` when it cannot be seen.
+    /// Lower and upper end of a box in world space that contains an instance and is slightly enlarged to cover roundings; `None`
+    /// if the instance is not visible.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -122,12 +127,13 @@ impl Scene {
         world.bounds(self.file(), instance)
     }
 
-    /// Objects that rays have been traced in since the scene was opened; all of them in files without a scene.
+    /// Number of objects in which rays have been traced since the scene was opened; without scene sections, of all objects.
     pub fn touched_objects(&self) -> usize {
-        self.world().map_or(self.object_count() as usize, |world| world.touched())
+        self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
     }
 
-    /// Bytes on the heap: of the instances and the top level, and of the hierarchy.
+    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy. Both are 0 without scene
+    /// sections.
     pub fn heap_bytes(&self) -> (usize, usize) {
         self.world().map_or((0, 0), |world| world.bytes())
     }

@@ -1,27 +1,26 @@
-//! Rays, hits and surfaces: what callers pass in and get back.
-//!
-//! These types are those of the C interface (`bth.h`), bit for bit.
+//! Rays, hits and the triangles of instances, as they are passed to and returned from queries. The types have the layout of those
+//! of the C interface (`bth.h`).
 
 use bth_format::layout::NONE;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// A ray, world space: the points `origin + t * direction` with `tmin <= t <= tmax`.
-/// The direction need not be normalized; t is in units of it.
+/// A ray in world space: the points `origin + t * direction` with `tmin <= t <= tmax`. The direction need not be normalized; t is
+/// in units of its length.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Ray {
-    /// Start point.
+    /// Point at t = 0, finite.
     pub origin: [f32; 3],
-    /// Least t of a hit.
+    /// Least t of a hit; may be negative or infinite.
     pub tmin: f32,
-    /// Direction, any length but zero.
+    /// Direction of any length except zero, finite.
     pub direction: [f32; 3],
     /// Greatest t of a hit; may be infinite.
     pub tmax: f32,
 }
 
 impl Ray {
-    /// Rays as rows of the bits of their floats.
+    /// For each ray the bits of its eight numbers, in the order of the fields.
     pub(crate) fn rows(rays: &[Ray]) -> &[[u32; 8]] {
         <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")
     }
@@ -31,36 +30,36 @@ impl Ray {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Surface {
-    /// Instance in the scene; 0 in the file of a single object.
+    /// Index of the instance in the scene. In a file without scene sections it is the index of the object.
     pub instance: u32,
-    /// Face of the source file, after fan triangulation.
+    /// Index of the triangle among those of the source file, after fan triangulation of its faces.
     pub triangle: u32,
 }
 
 impl Surface {
-    /// No surface: a miss, or a ray that starts nowhere in particular.
+    /// No triangle: the surface of a miss, and of a ray of which it is not known where it starts.
     pub const NONE: Surface = Surface { instance: NONE, triangle: NONE };
 }
 
-/// Nearest hit of a ray.
+/// Nearest hit of a ray, or a miss.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct Hit {
-    /// Distance in units of the direction; infinite for a miss.
+    /// Distance in units of the length of the ray's direction, rounded to f32; infinite for a miss.
     pub t: f32,
-    /// Barycentric weight of the triangle's second vertex, 0 to 1.
+    /// Barycentric weight of the triangle's second vertex, from 0 to 1.
     pub u: f32,
-    /// Barycentric weight of the triangle's third vertex, 0 to 1.
+    /// Barycentric weight of the triangle's third vertex, from 0 to 1.
     pub v: f32,
-    /// What was hit.
+    /// The triangle, or [`Surface::NONE`] for a miss.
     pub surface: Surface,
 }
 
 impl Hit {
-    /// Nothing was hit.
+    /// The result for a ray that hits nothing.
     pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, surface: Surface::NONE };
 
-    /// Whether something was hit.
+    /// Whether the ray hits a triangle.
     pub fn is_hit(&self) -> bool {
         self.t < f32::INFINITY
     }

@@ -1,4 +1,4 @@
-//! A scene: what callers open and trace.
+//! Scenes: opening of compiled files and queries by rays in world space.
 
 use crate::instances::World;
 use crate::object;
@@ -10,37 +10,40 @@ use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use std::path::Path;
 
-/// An open file, ready to trace. A file with a scene shows its instances at a time (see
-/// [`Scene::set_frame`]); in others each object stands once in the world, untransformed: instance
-/// and object numbers are the same.
+/// An open file that can be traced. The instances of a file with scene sections are placed as at a given time (see
+/// [`Scene::set_frame`]). In a file without scene sections, each object has one instance with the same index, and object space is
+/// world space.
 ///
-/// Queries take `&self` and may run on any number of threads. A ray whose origin or direction is not
-/// finite, whose direction is zero or whose `tmin` exceeds its `tmax` hits nothing.
+/// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its origin or direction is not
+/// finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin` exceeds `tmax`.
 ///
-/// Answers are exact: a ray hits a closed triangle if and only if its real line meets it within
-/// [`tmin`, `tmax`] (t as reported, rounded to f32), lines within the plane of a triangle excepted; of equal
-/// hits the triangle of least id is reported. They depend neither on hints nor on the structure in the file.
-/// In a scene the ray is first transformed into the object's space and rounded there: relative 2^-24 for each
-/// component of origin and direction. Of equal t the instance of least number is reported.
+/// Results are exact: a ray hits a closed triangle if and only if its line intersects the triangle in real arithmetic at a t
+/// that, rounded to f32 as reported, lies in the closed interval from `tmin` to `tmax`. Lines in the plane of a triangle do not
+/// hit it. Among hits of equal t in an object the triangle of least id is reported. Results depend neither on hints nor on the
+/// acceleration structures in the file. In a file with scene sections, a ray is first transformed into the object's space, where
+/// each component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of equal t in several
+/// instances that of least index is reported.
 #[derive(Debug)]
 pub struct Scene {
     file: File,
-    /// What the file's scene sections say, at a time; `None` without them.
+    /// The instances at the scene's time; `None` if the file has no scene sections.
     world: Option<World>,
 }
 
-/// Reads a compiled file into memory and checks every index, so that tracing is safe whatever the
-/// file holds. Costs O(file); hashes and geometry are [`mod@bth_format::verify`]'s business.
+/// Reads a compiled file into memory and checks every index, so that tracing is safe for any contents of the file. The time is
+/// linear in the size of the file. Hashes and geometry are not checked; see [`mod@bth_format::verify`].
 ///
 /// # Errors
-/// `BTH-O…` when it cannot be read, `BTH-F0…` when header or table, `BTH-F1…` when contents break the
-/// specification; the error names the section and byte. `BTH-S…` when the first frame of its scene cannot be shown.
+/// - `BTH-O…` if the file cannot be read.
+/// - `BTH-F0…` if the header or the section table violates the specification, `BTH-F1…` if the contents of a section do. The error
+///   gives the section and the byte offset.
+/// - `BTH-S…` if an instance cannot be placed at the first frame of the scene.
 pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
     let path = path.as_ref();
     Scene::checked(File::read(path)?).map_err(|e| e.in_file(path))
 }
 
-/// As [`open`], from bytes, which are copied.
+/// As [`open`], for the contents of a file in memory, which are copied.
 ///
 /// # Errors
 /// As [`open`].
@@ -48,15 +51,16 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
 }
 
-/// Maps a compiled file and checks header, section table and scene only: ready at once whatever its size.
+/// Maps a compiled file into memory and checks only its header, section table and scene sections, so the time does not depend on
+/// the size of its objects.
 ///
 /// # Safety
-/// Until the scene is dropped nobody may write to the file or truncate it (see [`File::map`]).
-/// The contents must be such that [`open`] accepts them: files that `bthc` wrote and nobody changed. With
-/// others, tracing may panic or never end; it does not read out of bounds.
+/// Until the scene is dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be such that
+/// [`open`] accepts them, as those of unchanged files that `bthc` has written. With other contents tracing may panic or not
+/// terminate, but it does not read out of bounds.
 ///
 /// # Errors
-/// As [`open`], without those about contents of objects.
+/// As [`open`], except for those about the contents of objects.
 #[allow(unsafe_code)]
 pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
     // SAFETY: the caller's contract includes that of `File::map`.
@@ -65,6 +69,7 @@ pub unsafe fn map(path: impl AsRef<Path>) -> Result<Scene, Error> {
 }
 
 impl Scene {
+    /// Checks all sections of a file and opens its scene.
     fn checked(file: File) -> Result<Scene, Error> {
         for object in 0..file.object_count() {
             file.check(object)?;
@@ -72,35 +77,36 @@ impl Scene {
         Scene::with_world(file)
     }
 
+    /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
         let world = World::new(&file)?;
         Ok(Scene { file, world })
     }
 
-    /// The instances, if the file has a scene.
+    /// The instances; `None` if the file has no scene sections.
     pub(crate) fn world(&self) -> Option<&World> {
         self.world.as_ref()
     }
 
-    /// The file and the instances, to move these.
-    pub(crate) fn parts_mut(&mut self) -> (&File, &mut Option<World>) {
+    /// The file, and mutable access to the instances.
+    pub(crate) fn file_and_world_mut(&mut self) -> (&File, &mut Option<World>) {
         (&self.file, &mut self.world)
     }
 
-    /// The file behind the scene.
+    /// The file of the scene.
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Objects in the scene.
+    /// Number of objects in the file.
     pub fn object_count(&self) -> u32 {
         self.file.object_count()
     }
 
-    /// The sections of an object.
+    /// The sections of an object, given its index.
     ///
     /// # Panics
-    /// If there is no such object.
+    /// If `object` is not less than [`Self::object_count`].
     pub fn object(&self, object: u32) -> ObjectView<'_> {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
@@ -110,37 +116,38 @@ impl Scene {
         self.file.view(object).expect("an object below object_count, checked when opened")
     }
 
-    /// A file and its instances.
+    /// A scene with given instances.
     #[cfg(test)]
-    pub(crate) fn of(file: File, world: World) -> Scene {
+    pub(crate) fn with_instances(file: File, world: World) -> Scene {
         Scene { file, world: Some(world) }
     }
 
-    /// The only object that rays can meet, where its space is the world's, and the instance it is: no top level is needed then.
+    /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
+    /// are then traced directly in the object, without the top level.
     #[inline(always)]
     fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
         };
         let (instance, object) = world.sole()?;
-        world.touch(object);
+        world.mark_traced(object);
         Some((self.view(object), instance))
     }
 
-    /// Bytes of the sections that traversal reads.
+    /// Size in bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
         self.file.resident_bytes()
     }
 
-    /// Nearest hit of a ray. `from` is the surface that it starts on, or [`Surface::NONE`]: a hint,
-    /// where to begin, which never changes the answer.
+    /// Nearest hit of a ray in world space, or [`Hit::MISS`]. `from` is the triangle on which the ray starts, or
+    /// [`Surface::NONE`]. It is a hint where a traversal of tetrahedra may begin, and never changes the result.
     pub fn nearest(&self, ray: &Ray, from: Surface) -> Hit {
         let mut hit = Hit::MISS;
         self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));
         hit
     }
 
-    /// As [`Self::nearest`], with a count of the work.
+    /// As [`Self::nearest`], with statistics of the traversal.
     pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
@@ -150,9 +157,9 @@ impl Scene {
         }
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
-            let (hit, more) =
+            let (hit, object_steps) =
                 object::nearest_counted(self.view(instance), &ray, hint(from, instance), instance);
-            steps += more;
+            steps += object_steps;
             if hit.t < best.t {
                 (best, ray.tmax) = (hit, hit.t);
             }
@@ -160,14 +167,16 @@ impl Scene {
         (best, steps)
     }
 
-    /// Whether a ray hits anything; `from` as for [`Self::nearest`].
+    /// Whether a ray in world space hits anything. `from` is a hint as for [`Self::nearest`].
     pub fn any(&self, ray: &Ray, from: Surface) -> bool {
         let mut found = false;
         self.any_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut found));
         found
     }
 
-    /// Nearest hits of many rays; `from`, if given, names the surface that each starts on.
+    /// Stores the nearest hit of each ray, or [`Hit::MISS`], in `hits`. Rays are in world space. `from` holds for each ray the
+    /// triangle on which it starts, a hint as for [`Self::nearest`]; without hints it is `None`. Coherent rays that are adjacent
+    /// in the slice are traced fastest.
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -176,15 +185,15 @@ impl Scene {
         check_lengths(rays, from, hits.len());
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
-                object::nearest_to(object, ray, hint(surface(from, 0), instance), instance, hit);
+                object::nearest_to(object, ray, hint(start_surface(from, 0), instance), instance, hit);
             }
-            (sole, ..) => self.nearest_many(sole, rays, from, hits),
+            (sole, ..) => self.nearest_general(sole, rays, from, hits),
         }
     }
 
-    /// As [`Self::nearest_batch`], for more rays than one, or more objects.
+    /// As [`Self::nearest_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
-    fn nearest_many(
+    fn nearest_general(
         &self,
         sole: Option<(&ObjectView<'_>, u32)>,
         rays: &[Ray],
@@ -195,7 +204,7 @@ impl Scene {
         if let Some((object, instance)) = sole {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = object::nearest(object, ray, hint(surface(from, i), instance), instance);
+                    *hit = object::nearest(object, ray, hint(start_surface(from, i), instance), instance);
                 }
                 return;
             }
@@ -210,10 +219,10 @@ impl Scene {
         for instance in 0..self.object_count() {
             let object = self.view(instance);
             for (i, (ray, best)) in rays.iter().zip(hits.iter_mut()).enumerate() {
-                // Not `min`, which would make a range of NaN.
+                // Not `f32::min`, which would replace a `tmax` of NaN by a number.
                 let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
                 let ray = Ray { tmax, ..*ray };
-                let hit = object::nearest(object, &ray, hint(surface(from, i), instance), instance);
+                let hit = object::nearest(object, &ray, hint(start_surface(from, i), instance), instance);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -221,7 +230,7 @@ impl Scene {
         }
     }
 
-    /// Whether each of many rays hits anything.
+    /// Stores in `found` for each ray in world space whether it hits anything. `from` is as for [`Self::nearest_batch`].
     ///
     /// # Panics
     /// If the slices differ in length.
@@ -230,15 +239,15 @@ impl Scene {
         check_lengths(rays, from, found.len());
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
-                *found = object::any(object, ray, hint(surface(from, 0), instance));
+                *found = object::any(object, ray, hint(start_surface(from, 0), instance));
             }
-            (sole, ..) => self.any_many(sole, rays, from, found),
+            (sole, ..) => self.any_general(sole, rays, from, found),
         }
     }
 
-    /// As [`Self::nearest_many`], of [`Self::any_batch`].
+    /// As [`Self::any_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
-    fn any_many(
+    fn any_general(
         &self,
         sole: Option<(&ObjectView<'_>, u32)>,
         rays: &[Ray],
@@ -249,7 +258,7 @@ impl Scene {
         if let Some((object, instance)) = sole {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = object::any(object, ray, hint(surface(from, i), instance));
+                    *found = object::any(object, ray, hint(start_surface(from, i), instance));
                 }
                 return;
             }
@@ -264,7 +273,7 @@ impl Scene {
         for instance in 0..self.object_count() {
             let object = self.view(instance);
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || object::any(object, ray, hint(surface(from, i), instance));
+                *found = *found || object::any(object, ray, hint(start_surface(from, i), instance));
             }
         }
     }
@@ -275,17 +284,19 @@ fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
     assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
 }
 
-fn surface(from: Option<&[Surface]>, ray: usize) -> Surface {
+/// The triangle on which a ray of a batch starts, or [`Surface::NONE`].
+fn start_surface(from: Option<&[Surface]>, ray: usize) -> Surface {
     from.map_or(Surface::NONE, |f| f[ray])
 }
 
-/// The triangles of the only object that rays start on, if that is of use.
+/// For each ray the triangle of an instance's object on which it starts, or `NONE`. `None` if there are no hints, or if the
+/// object has no tetrahedra, because only their traversal uses hints.
 fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>, instance: u32) -> Option<Vec<u32>> {
     let from = from.filter(|_| !object.tet_leaves.is_empty())?;
     Some(from.iter().map(|&from| hint(from, instance)).collect())
 }
 
-/// The triangle of an object that a ray starts on, or `NONE`.
+/// The triangle of an instance's object on which a ray starts, or `NONE`.
 fn hint(from: Surface, instance: u32) -> u32 {
     if from.instance == instance { from.triangle } else { NONE }
 }

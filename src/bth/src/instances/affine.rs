@@ -4,8 +4,8 @@ use crate::rays::Ray;
 use crate::simd::LANES;
 use bth_format::layout::Node;
 
-/// Greatest condition number, in the maximum norm, of transforms that are not treated as singular. Beyond it the rounding of rays to
-/// f32 in object space, 2^-24, would be as large as the object.
+/// Greatest condition number, in the maximum norm, of transforms that are not treated as singular. Beyond it the rounding of rays
+/// to f32 in object space, 2^-24, would be as large as the object.
 const GREATEST_CONDITION: f64 = (1u64 << 24) as f64;
 
 /// An affine transform: a point p is mapped to `linear * p + translation`.
@@ -33,8 +33,8 @@ impl Affine {
     pub(crate) const IDENTITY: Affine =
         Affine { linear: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
-    /// The transform that scales, then rotates by a quaternion, which is normalized here, then translates. It is not finite if the
-    /// quaternion is zero. `parts` are translation, quaternion (x, y, z, w) and scale.
+    /// The transform that scales, then rotates by a quaternion, which is normalized here, then translates. It is not finite if
+    /// the quaternion is zero. `parts` are translation, quaternion (x, y, z, w) and scale.
     pub(crate) fn from_parts(parts: &[f64; 10]) -> Affine {
         let [t0, t1, t2, x, y, z, w, sx, sy, sz] = *parts;
         // The division by the greatest component keeps squares from overflow and underflow.
@@ -163,13 +163,13 @@ impl Inverse {
         self.linear == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] && self.origin == [0.0; 3]
     }
 
-    /// Transforms a ray to object space, with the same points at the same t except for one rounding to f32 of each component of origin
-    /// and direction (relative 2^-24). All triangles of an object are tested with the same rounded ray, so there are no leaks within
-    /// an object. Where two objects touch, answers may differ by that rounding from those for one joined object.
+    /// Transforms a ray to object space, with the same points at the same t except for one rounding to f32 of each component of
+    /// origin and direction (relative 2^-24). All triangles of an object are tested with the same rounded ray, so there are no
+    /// leaks within an object. Where two objects touch, answers may differ by that rounding from those for one joined object.
     pub(crate) fn ray(&self, ray: &Ray) -> ObjectRay {
-        let from = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - self.origin[k]);
+        let relative = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - self.origin[k]);
         let direction = ray.direction.map(f64::from);
-        let origin = self.linear.map(|row| dot(row, from) as f32);
+        let origin = self.linear.map(|row| dot(row, relative) as f32);
         let direction = self.linear.map(|row| dot(row, direction));
         let greatest = direction.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let exponent = (greatest.to_bits() >> 52) as i32 - 1023;
@@ -193,15 +193,15 @@ impl Inverse {
         let Inverse { linear, origin: object_origin } = *self;
         // There are no branches, so that the loop is vectorized.
         for i in 0..LANES {
-            let (mut from, mut along) = ([0.0; 3], [0.0; 3]);
+            let (mut relative, mut world_direction) = ([0.0; 3], [0.0; 3]);
             for k in 0..3 {
-                from[k] = f64::from(origin[k][i]) - object_origin[k];
-                along[k] = f64::from(direction[k][i]);
+                relative[k] = f64::from(origin[k][i]) - object_origin[k];
+                world_direction[k] = f64::from(direction[k][i]);
             }
             let mut greatest = 0.0;
             for k in 0..3 {
-                let component = dot(linear[k], along);
-                origin[k][i] = dot(linear[k], from) as f32;
+                let component = dot(linear[k], world_direction);
+                origin[k][i] = dot(linear[k], relative) as f32;
                 direction[k][i] = component as f32;
                 greatest = if component.abs() > greatest { component.abs() } else { greatest };
             }
@@ -238,8 +238,8 @@ mod tests {
     fn inverses_undo_sheared_and_mirrored_transforms_at_any_scale() {
         let mut rng = Rng::new(1);
         let mut checked = 0;
-        for round in 0..2000 {
-            let scale = [1.0, 1e-30, 1e30, 1e-5, 1e4][round % 5];
+        for case in 0..2000 {
+            let scale = [1.0, 1e-30, 1e30, 1e-5, 1e4][case % 5];
             let affine = random(&mut rng, scale);
             let Some((inverse, condition)) = affine.inverse() else { continue };
             let p = [(); 3].map(|()| unit(&mut rng));
@@ -276,8 +276,8 @@ mod tests {
     #[test]
     fn rays_keep_their_t_whatever_the_scale() {
         let mut rng = Rng::new(5);
-        for round in 0..2000 {
-            let scale = [1.0, 1e-25, 1e25, 3.0, 1e-3][round % 5];
+        for case in 0..2000 {
+            let scale = [1.0, 1e-25, 1e25, 3.0, 1e-3][case % 5];
             let mut affine = random(&mut rng, scale);
             affine.translation = affine.translation.map(|x| x * scale);
             let Some((inverse, condition)) = affine.inverse() else { continue };
@@ -294,7 +294,7 @@ mod tests {
                 let expected = f64::from(ray.origin[k]) + 2.0 * f64::from(ray.direction[k]);
                 // Condition number times the rounding of origin (|p - o| <= 3) and direction (2 |d|).
                 let bound = condition * scale * 5.0 * 2f64.powi(-23);
-                assert!((back[k] - expected).abs() <= bound, "round {round}: {back:?}, {expected}");
+                assert!((back[k] - expected).abs() <= bound, "case {case}: {back:?}, {expected}");
             }
         }
     }
@@ -303,7 +303,7 @@ mod tests {
     fn sixteen_rays_at_once_are_the_same_to_the_bit() {
         let mut rng = Rng::new(9);
         let mut unscaled = 0;
-        for round in 0..500 {
+        for case in 0..500 {
             let scale = [1.0, 1e-12, 1e12, 1e25, 1e-25, 3.0][rng.below(6) as usize];
             let Some((inverse, _)) = random(&mut rng, scale).inverse() else { continue };
             let mut lanes = RayLanes::NONE;
@@ -311,7 +311,7 @@ mod tests {
             for lane in 0..LANES {
                 let mut point = |size: f64| [(); 3].map(|()| (unit(&mut rng) * size) as f32);
                 let mut ray = Ray { origin: point(3.0), tmin: 0.5, direction: point(1.0), tmax: 2.0 };
-                ray.direction[lane % 3] *= [1.0, 0.0, -0.0, f32::INFINITY, f32::NAN][(round + lane) % 5];
+                ray.direction[lane % 3] *= [1.0, 0.0, -0.0, f32::INFINITY, f32::NAN][(case + lane) % 5];
                 for k in 0..3 {
                     (lanes.origin[k][lane], lanes.direction[k][lane]) = (ray.origin[k], ray.direction[k]);
                 }

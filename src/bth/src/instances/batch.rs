@@ -3,8 +3,8 @@
 
 use super::World;
 use super::enter_object::ObjectRays;
-use super::packets::Packets;
-use super::placement::Placed;
+use super::packets::TopLevelPackets;
+use super::placement::Placement;
 use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
@@ -19,8 +19,8 @@ use std::cell::RefCell;
 
 /// Number of rays that advance together.
 const CHUNK: usize = 2048;
-/// From this number of rays on, the rays through one instance are a batch of their own: they are as many as four packets hold, so the
-/// cost of a further batch is small. Fewer rays are joined with those through other instances of the same object.
+/// From this number of rays on, the rays through one instance are a batch of their own: they are as many as four packets hold, so
+/// the cost of a further batch is small. Fewer rays are joined with those through other instances of the same object.
 const MIN_RAYS_PER_INSTANCE: usize = 256;
 
 /// A query over the rays of a batch.
@@ -35,12 +35,12 @@ trait SceneQuery {
 #[derive(Default)]
 struct ActiveRays {
     /// The coherent rays.
-    packets: Packets,
+    packets: TopLevelPackets,
     /// The other rays.
     traversals: RayTraversals,
     /// Indices within the chunk of the other rays that have not ended.
     active: Vec<u32>,
-    /// The visits of this round.
+    /// The visits to be traced before the rays advance.
     visits: VisitQueue,
 }
 
@@ -73,15 +73,13 @@ impl Kernel for StartKernel<'_> {
         let top = &world.top;
         packets.start(s, top, rays, active);
         // A ray visits the instance on which it starts first, because a hit there shortens it at little cost.
-        let start = |number: usize| world.start_of(batch.from, first + number);
+        let start = |index: usize| world.start_instance(batch.from, first + index);
         if batch.from.is_some() {
-            let starts = active.iter().filter_map(|&number| Some((number, start(number as usize)?)));
-            visits
-                .all
-                .extend(starts.map(|(number, instance)| Visit { ray: first as u32 + number, instance }));
+            let starts = active.iter().filter_map(|&index| Some((index, start(index as usize)?)));
+            visits.all.extend(starts.map(|(index, instance)| Visit { ray: first as u32 + index, instance }));
             // If no other instance is visible, such a ray needs no traversal.
-            if world.is_alone() {
-                active.retain(|&number| start(number as usize).is_none());
+            if world.has_single_visible() {
+                active.retain(|&index| start(index as usize).is_none());
             }
         }
         // The traversal skips the instance that has been visited first.
@@ -110,9 +108,9 @@ impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
             active_rays: ActiveRays { packets, traversals, active, visits },
         } = self;
         let world = batch.world;
-        let tmax = |number: usize| query.tmax(first + number);
-        packets.advance(&batch.rays[first..], tmax, |number, instance| {
-            visits.all.push(Visit { ray: (first + number) as u32, instance });
+        let tmax = |index: usize| query.tmax(first + index);
+        packets.advance(&batch.rays[first..], tmax, |index, instance| {
+            visits.all.push(Visit { ray: (first + index) as u32, instance });
         });
         traversals.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
     }
@@ -163,33 +161,33 @@ impl World {
     }
 
     /// The instance on which a ray starts, if it is given and visible.
-    fn start_of(&self, from: Option<&[Surface]>, ray: usize) -> Option<u32> {
+    fn start_instance(&self, from: Option<&[Surface]>, ray: usize) -> Option<u32> {
         let instance = from?[ray].instance;
-        self.placed.get(instance as usize)?.is_some().then_some(instance)
+        self.placements.get(instance as usize)?.is_some().then_some(instance)
     }
 
     /// The placement of an instance that is in the top level.
     #[inline]
-    pub(super) fn placed_at(&self, instance: u32) -> &Placed {
-        self.placed[instance as usize].as_ref().expect("the top level holds visible instances")
+    pub(super) fn placement(&self, instance: u32) -> &Placement {
+        self.placements[instance as usize].as_ref().expect("the top level holds visible instances")
     }
 
     /// Traces all queued visits, object by object, and empties the queue.
     fn trace(&self, batch: &SceneBatch<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
         // Neighbouring rays through one instance remain coherent in its space.
-        visits.sort(self.placed.len());
+        visits.sort(self.placements.len());
         let mut trace = |object: u32, visits: &[Visit]| {
-            self.touch(object);
+            self.mark_traced(object);
             let object = batch.file.view(object).expect("checked when opened");
             query.trace(batch, object, visits);
         };
         let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;
         short_runs.clear();
         let mut first = 0;
-        for same in sorted.chunk_by(|a, b| a.instance == b.instance) {
-            let (object, end) = (self.placed_at(same[0].instance).object(), first + same.len());
-            if same.len() >= MIN_RAYS_PER_INSTANCE {
-                trace(object, same);
+        for run in sorted.chunk_by(|a, b| a.instance == b.instance) {
+            let (object, end) = (self.placement(run[0].instance).object(), first + run.len());
+            if run.len() >= MIN_RAYS_PER_INSTANCE {
+                trace(object, run);
             } else {
                 short_runs.push([object, first as u32, end as u32]);
             }
@@ -290,8 +288,8 @@ impl SceneQuery for SceneCounted<'_> {
         for &visit in visits {
             let object_ray = batch.object_ray(visit, self.ray.tmax.min(self.best.t));
             let from = batch.hint(visit.ray as usize, visit.instance);
-            let (hit, more) = object::nearest_counted(object, &object_ray.ray, from, visit.instance);
-            self.steps += more;
+            let (hit, object_steps) = object::nearest_counted(object, &object_ray.ray, from, visit.instance);
+            self.steps += object_steps;
             self.best = better(self.ray, &self.best, &hit, object_ray.t_scale).unwrap_or(self.best);
         }
     }

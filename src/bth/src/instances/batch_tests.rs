@@ -1,7 +1,7 @@
-//! Tests of batches through instances, against a loop over all instances.
+//! Tests of batches through instances. The oracle is a loop over all instances.
 
 use super::super::affine::Affine;
-use super::super::placement::Parts;
+use super::super::placement::PartBoxes;
 use super::*;
 use crate::scene::Scene;
 use bth_random::Rng;
@@ -15,7 +15,8 @@ fn unit(rng: &mut Rng) -> f64 {
     rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0
 }
 
-/// Rigid, scaled, mirrored, sheared, and often on a coarse grid, so that rays meet edges exactly.
+/// A random transform: a rotation with scales of either sign, a translation of magnitude `spread`, and in one of four cases a
+/// shear. In one of three cases rotation and translation lie on a coarse grid, so that rays often hit edges exactly.
 fn transform(rng: &mut Rng, spread: f64) -> Affine {
     let coarse = rng.below(3) == 0;
     let number = |rng: &mut Rng| if coarse { (unit(rng) * 2.0).round() } else { unit(rng) };
@@ -32,44 +33,46 @@ fn transform(rng: &mut Rng, spread: f64) -> Affine {
     affine
 }
 
+/// A world of `count` instances, of which about one in eight is not visible, and their transforms.
 fn world(file: &File, rng: &mut Rng, count: usize) -> (World, Vec<Affine>) {
     let spread = [0.0, 1.0, 4.0, 1e4][rng.below(4) as usize];
     let transforms: Vec<Affine> = (0..count).map(|_| transform(rng, spread)).collect();
-    let place = |transform: &Affine, number: u64| {
-        let number = (number % u64::from(file.object_count())) as u32;
-        // Of every other one as closely as can be.
-        let parts = match number % 2 {
-            0 => Parts::of(&file.object(number).unwrap()),
-            _ => Parts::whole(file.object_header(number)),
+    let place = |transform: &Affine, random: u64| {
+        let object = (random % u64::from(file.object_count())) as u32;
+        // Both kinds of boxes are tested.
+        let parts = match object % 2 {
+            0 => PartBoxes::of_root_children(&file.object(object).unwrap()),
+            _ => PartBoxes::whole(file.object_header(object)),
         };
-        Placed::new(transform, number, file.object_header(number), &parts).ok()
+        Placement::new(transform, object, file.object_header(object), &parts).ok()
     };
-    let placed = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
-    (World::of_places(placed, file.object_count()), transforms)
+    let placements = transforms.iter().map(|t| place(t, rng.next()).filter(|_| rng.below(8) > 0)).collect();
+    (World::with_placements(placements, file.object_count()), transforms)
 }
 
-/// All instances, one after another, without the top level.
-fn brute(world: &World, file: &File, ray: &Ray) -> Hit {
+/// Oracle: the nearest hit of a loop over all instances, without the top level.
+fn nearest_by_loop(world: &World, file: &File, ray: &Ray) -> Hit {
     let mut best = Hit::MISS;
-    for (number, placed) in world.placed.iter().enumerate() {
-        let Some(placed) = placed else { continue };
-        let object = placed.inverse.ray(ray);
-        let view = file.object(placed.object()).unwrap();
-        let hit = object::nearest(&view, &object.ray, bth_format::layout::NONE, number as u32);
+    for (instance, placement) in world.placements.iter().enumerate() {
+        let Some(placement) = placement else { continue };
+        let object = placement.inverse.ray(ray);
+        let view = file.object(placement.object()).unwrap();
+        let hit = object::nearest(&view, &object.ray, bth_format::layout::NONE, instance as u32);
         best = better(ray, &best, &hit, object.t_scale).unwrap_or(best);
     }
     best
 }
 
+/// Random rays, each aimed at a point of an object under one of the transforms.
 fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
     let targets = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.25, 0.0], [0.2, 0.3, 0.0]];
     (0..count)
         .map(|i| {
             let transform = &transforms[rng.below(transforms.len() as u64) as usize];
             let target = transform.apply(targets[rng.below(5) as usize]);
-            // From close by to so far away that the boxes must be widened for the ray.
-            let away = [0.0, 1.0, 10.0, 1e3, 1e5, 1e7, 1e12][rng.below(7) as usize];
-            let mut origin = [0, 1, 2].map(|k| (target[k] + unit(rng) * away) as f32);
+            // For rays from the greater distances the boxes must be widened.
+            let distance = [0.0, 1.0, 10.0, 1e3, 1e5, 1e7, 1e12][rng.below(7) as usize];
+            let mut origin = [0, 1, 2].map(|k| (target[k] + unit(rng) * distance) as f32);
             if rng.below(3) == 0 {
                 let k = rng.below(3) as usize;
                 origin[k] = target[k] as f32;
@@ -88,12 +91,12 @@ fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
 }
 
 #[test]
-fn the_top_level_and_hints_change_no_answer() {
+fn top_level_and_hints_do_not_change_results() {
     let mut rng = Rng::new(11);
-    let (mut hits_seen, mut far_hits, mut all) = (0, 0, 0);
-    for round in 0..600 {
-        let file = File::from_bytes(FILES[round % 2]).unwrap();
-        let count = [1, 2, 7, 16, 17, 40, 300][round % 7];
+    let (mut hit_count, mut far_hits, mut ray_count) = (0, 0, 0);
+    for case in 0..600 {
+        let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = rays(&mut rng, &transforms, 40);
         let from: Vec<Surface> = rays
@@ -106,24 +109,27 @@ fn the_top_level_and_hints_change_no_answer() {
             world.nearest(&file, &rays, from, &mut hits);
             world.any(&file, &rays, from, &mut found);
             for (i, ray) in rays.iter().enumerate() {
-                let expected = brute(&world, &file, ray);
-                assert_eq!(hits[i], expected, "round {round}, ray {i}: {ray:?}");
-                assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
+                let expected = nearest_by_loop(&world, &file, ray);
+                assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
+                assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
                 if i % 8 == 0 {
                     assert_eq!(world.nearest_counted(&file, ray, Surface::NONE).0, expected);
                 }
                 let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
                 far_hits += u32::from(expected.is_hit() && start > world.top.reach);
-                hits_seen += u32::from(expected.is_hit());
-                all += 1;
+                hit_count += u32::from(expected.is_hit());
+                ray_count += 1;
             }
         }
     }
-    assert!(hits_seen > all / 3 && far_hits > 500, "{hits_seen} of {all} hit, {far_hits} from afar");
+    assert!(
+        hit_count > ray_count / 3 && far_hits > 500,
+        "{hit_count} of {ray_count} hit, {far_hits} from afar"
+    );
 }
 
 #[test]
-fn rays_without_a_line_hit_nothing() {
+fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
     let file = File::from_bytes(FILES[0]).unwrap();
     let world = world(&file, &mut Rng::new(3), 50).0;
     let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
@@ -142,41 +148,44 @@ fn rays_without_a_line_hit_nothing() {
     }
 }
 
-/// Rays that go nearly the same way, from close together.
+/// Coherent rays: of nearly the same direction, from points close to each other.
 fn bundle(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
     let transform = &transforms[rng.below(transforms.len() as u64) as usize];
     let target = transform.apply([0.3, 0.3, 0.0]);
-    let away = [0.5, 3.0, 30.0, 1e5][rng.below(4) as usize];
-    let from = [(); 3].map(|()| (0.2 + unit(rng).abs()) * away * [1.0, -1.0][rng.below(2) as usize]);
-    let (spread, apart) = ([0.0, 0.01, 0.05][rng.below(3) as usize], [0.0, 0.1][rng.below(2) as usize]);
+    let distance = [0.5, 3.0, 30.0, 1e5][rng.below(4) as usize];
+    let offset = [(); 3].map(|()| (0.2 + unit(rng).abs()) * distance * [1.0, -1.0][rng.below(2) as usize]);
+    let (direction_spread, origin_spread) =
+        ([0.0, 0.01, 0.05][rng.below(3) as usize], [0.0, 0.1][rng.below(2) as usize]);
     let scale = [1.0, 1e-3, 1e3, 1e-20][rng.below(4) as usize];
     let tmax = [f64::INFINITY, 1.0 / scale][rng.below(2) as usize] as f32;
     (0..count)
         .map(|_| {
-            let origin = [0, 1, 2].map(|k| (target[k] + from[k] + unit(rng) * apart * away * 0.1) as f32);
-            let direction = [0, 1, 2].map(|k| ((-from[k] + unit(rng) * spread * away) * scale) as f32);
+            let origin = [0, 1, 2]
+                .map(|k| (target[k] + offset[k] + unit(rng) * origin_spread * distance * 0.1) as f32);
+            let direction =
+                [0, 1, 2].map(|k| ((-offset[k] + unit(rng) * direction_spread * distance) * scale) as f32);
             Ray { origin, tmin: 0.0, direction, tmax }
         })
         .collect()
 }
 
 #[test]
-fn packets_through_the_top_level_change_no_answer() {
+fn packets_through_the_top_level_do_not_change_results() {
     let mut rng = Rng::new(23);
-    let (mut in_packets, mut all, mut hits_seen, mut refused) = (0, 0, 0, 0);
-    for round in 0..200 {
-        let file = File::from_bytes(FILES[round % 2]).unwrap();
-        let count = [1, 7, 17, 40, 150][round % 5];
+    let (mut in_packets, mut ray_count, mut hit_count, mut refused) = (0, 0, 0, 0);
+    for case in 0..200 {
+        let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let count = [1, 7, 17, 40, 150][case % 5];
         let (world, transforms) = world(&file, &mut rng, count);
-        let rays = bundle(&mut rng, &transforms, [33, 64, 100][round % 3]);
+        let rays = bundle(&mut rng, &transforms, [33, 64, 100][case % 3]);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
         world.nearest(&file, &rays, None, &mut hits);
         world.any(&file, &rays, None, &mut found);
         for (i, ray) in rays.iter().enumerate() {
-            let expected = brute(&world, &file, ray);
-            assert_eq!(hits[i], expected, "round {round}, ray {i}: {ray:?}");
-            assert_eq!(found[i], expected.is_hit(), "round {round}, ray {i}: {ray:?}");
-            hits_seen += usize::from(expected.is_hit());
+            let expected = nearest_by_loop(&world, &file, ray);
+            assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
+            assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
+            hit_count += usize::from(expected.is_hit());
         }
         let mut active_rays = ActiveRays::default();
         let batch = SceneBatch { world: &world, file: &file, rays: &rays, from: None };
@@ -188,30 +197,30 @@ fn packets_through_the_top_level_change_no_answer() {
         });
         in_packets += usize::from(!active_rays.packets.is_empty());
         refused += usize::from(active_rays.packets.is_empty() && count == 150);
-        all += rays.len();
+        ray_count += rays.len();
     }
-    assert!(in_packets > 60, "{in_packets} of 200 rounds in packets");
-    assert!(hits_seen > all / 5 && refused > 2, "{hits_seen} of {all} hit, {refused} refused");
+    assert!(in_packets > 60, "{in_packets} of 200 cases in packets");
+    assert!(hit_count > ray_count / 5 && refused > 2, "{hit_count} of {ray_count} hit, {refused} refused");
 }
 
 #[test]
-fn the_only_instance_is_traced_as_one_of_many() {
+fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_level() {
     let mut rng = Rng::new(31);
-    let (mut hits_seen, mut all) = (0, 0);
-    for round in 0..60 {
-        let file = File::from_bytes(FILES[round % 2]).unwrap();
+    let (mut hit_count, mut ray_count) = (0, 0);
+    for case in 0..60 {
+        let file = File::from_bytes(FILES[case % 2]).unwrap();
         let identity = Affine::IDENTITY;
-        let number = rng.below(u64::from(file.object_count())) as u32;
-        let parts = Parts::whole(file.object_header(number));
-        let placed = Placed::new(&identity, number, file.object_header(number), &parts).unwrap();
+        let object = rng.below(u64::from(file.object_count())) as u32;
+        let parts = PartBoxes::whole(file.object_header(object));
+        let placement = Placement::new(&identity, object, file.object_header(object), &parts).unwrap();
         // The other instances are not visible.
-        let (row, count) = (round % 5, [1, 3, 40, 64][round % 4]);
-        let mut places = vec![None; 5];
-        places[row] = Some(placed);
-        let world = World::of_places(places.clone(), file.object_count());
-        assert_eq!(world.sole(), Some((row as u32, number)));
-        places[(row + 1) % 5] = Some(placed);
-        assert_eq!(World::of_places(places, file.object_count()).sole(), None);
+        let (row, count) = (case % 5, [1, 3, 40, 64][case % 4]);
+        let mut placements = vec![None; 5];
+        placements[row] = Some(placement);
+        let world = World::with_placements(placements.clone(), file.object_count());
+        assert_eq!(world.sole(), Some((row as u32, object)));
+        placements[(row + 1) % 5] = Some(placement);
+        assert_eq!(World::with_placements(placements, file.object_count()).sole(), None);
 
         let rays = rays(&mut rng, &[identity], count);
         let from: Vec<Surface> = rays
@@ -221,15 +230,15 @@ fn the_only_instance_is_traced_as_one_of_many() {
         let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
         world.nearest(&file, &rays, Some(&from), &mut hits);
         world.any(&file, &rays, Some(&from), &mut found);
-        let scene = Scene::of(file, world);
+        let scene = Scene::with_instances(file, world);
         let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
         scene.nearest_batch(&rays, Some(&from), &mut sole_hits);
         scene.any_batch(&rays, Some(&from), &mut sole_found);
-        assert_eq!((&sole_hits, &sole_found), (&hits, &found), "round {round}: {rays:?}");
+        assert_eq!((&sole_hits, &sole_found), (&hits, &found), "case {case}: {rays:?}");
         assert_eq!(scene.nearest_counted(&rays[0], from[0]).0, hits[0]);
         assert_eq!(scene.touched_objects(), 1);
-        hits_seen += hits.iter().filter(|hit| hit.is_hit()).count();
-        all += count;
+        hit_count += hits.iter().filter(|hit| hit.is_hit()).count();
+        ray_count += count;
     }
-    assert!(hits_seen > all / 4, "{hits_seen} of {all} hit");
+    assert!(hit_count > ray_count / 4, "{hit_count} of {ray_count} hit");
 }

@@ -43,7 +43,8 @@ impl ObjectRays {
     }
 }
 
-/// The kernel of [`ObjectRays::fill`]. It transforms up to sixteen rays of the same instance at a time; visits are sorted by instance.
+/// The kernel of [`ObjectRays::fill`]. It transforms up to sixteen rays of the same instance at a time; visits are sorted by
+/// instance.
 struct EnterKernel<'a, T> {
     object_rays: &'a mut ObjectRays,
     batch: &'a SceneBatch<'a>,
@@ -78,7 +79,7 @@ impl<T: Fn(usize) -> f32> Kernel for EnterKernel<'_, T> {
                 s.store(s.floats(words[k]), &mut lanes.origin[k]);
                 s.store(s.floats(words[4 + k]), &mut lanes.direction[k]);
             }
-            batch.world.placed_at(instance).inverse.transform(&mut lanes);
+            batch.world.placement(instance).inverse.transform(&mut lanes);
             for k in 0..3 {
                 rows[k] = s.load(&lanes.origin[k]);
                 rows[4 + k] = s.load(&lanes.direction[k]);

@@ -1,17 +1,17 @@
 //! Instances of a scene at a time, and rays through them.
 //!
-//! An update of the time ([`world`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`pose`]), computes the inverse
-//! transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the boxes
-//! ([`top_level`]). A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others one by one
-//! ([`traverse`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's visits are transformed into
-//! its space ([`enter_object`]) and traced there together, with t unchanged.
+//! An update of the time ([`world`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`hierarchy`]), computes the
+//! inverse transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the
+//! boxes ([`top_level`]). A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others
+//! one by one ([`traverse`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's visits are
+//! transformed into its space ([`enter_object`]) and traced there together, with t unchanged.
 
 mod affine;
 mod batch;
 mod enter_object;
+mod hierarchy;
 mod packets;
 mod placement;
-mod pose;
 mod scene_batch;
 mod top_level;
 mod tracks;

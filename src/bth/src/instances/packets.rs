@@ -1,12 +1,13 @@
 //! Packets of up to 64 coherent rays in the top level.
 //!
-//! A packet is traversed once: all instances whose boxes any of its rays may meet are listed, nearest first, and then visited one
-//! after the other. If the list grows too long, most of its instances are hidden by others, and the rays are traversed singly.
+//! A packet is traversed once: all instances whose boxes any of its rays may intersect are listed, nearest first, and then
+//! visited one after the other. If the list exceeds its limit, the rays are traversed one by one, because most of the listed
+//! instances would be occluded by others.
 
 use super::top_level::{INSTANCE, TopLevel};
 use super::traverse::limit;
 use crate::bvh::packet::bounds::PacketBounds;
-use crate::bvh::packet::coherence::{Guard, Span, is_same_octant};
+use crate::bvh::packet::coherence::{PacketBackoff, Span, is_same_octant};
 use crate::bvh::packet::entry::PACKET;
 use crate::bvh::packet::frustum::Frustum;
 use crate::bvh::packet::ray_group::RayGroup;
@@ -25,19 +26,20 @@ const MAX_INSTANCES: usize = 64;
 /// Entries of the stack of nodes; rays that need more are not traced as a packet.
 const MAX_STACKED_NODES: usize = 64;
 
-/// An instance whose box rays of a packet may meet.
+/// An instance whose box is intersected by rays of a packet.
 #[derive(Clone, Copy, Debug)]
-struct Item {
-    /// Lower bound of the depth at which any of the rays enters the box; a depth is t times the greatest |component| of the direction.
+struct ListedInstance {
+    /// Lower bound of the depth at which any of the rays enters the box; a depth is t times the greatest |component| of the
+    /// direction.
     depth: f32,
     instance: u32,
-    /// A bit for each of these rays.
+    /// Bit i is set if ray i of the packet intersects the box.
     rays: u64,
 }
 
-/// A packet with its range of the listed instances.
+/// A packet, and the range of its instances in the list.
 #[derive(Clone, Copy, Debug)]
-struct Packet {
+struct TopLevelPacket {
     /// Index of its first ray in the chunk.
     first: u32,
     /// The next instance to be visited, as an index of `items`.
@@ -48,37 +50,37 @@ struct Packet {
 
 /// The packets of a chunk.
 #[derive(Debug, Default)]
-pub(super) struct Packets {
-    items: Vec<Item>,
-    packets: Vec<Packet>,
-    /// After a packet with too many instances, the next few groups of rays are not tried as packets.
-    guard: Guard,
+pub(super) struct TopLevelPackets {
+    items: Vec<ListedInstance>,
+    packets: Vec<TopLevelPacket>,
+    /// Decides after packets with too many instances that the next rays are not tried as packets.
+    backoff: PacketBackoff,
 }
 
 /// Result of listing the instances of up to 64 rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Listed {
-    /// All instances that the rays may meet are listed.
+    /// All instances whose boxes the rays may intersect are listed.
     All,
     /// The rays are not coherent.
     Incoherent,
-    /// The rays may meet too many instances.
+    /// There are too many such instances, or too many nodes to be visited.
     TooMany,
 }
 
-impl Packets {
+impl TopLevelPackets {
     /// Whether there are no packets.
     pub(super) fn is_empty(&self) -> bool {
         self.packets.is_empty()
     }
 
-    /// Makes packets of coherent rays, and stores the indices of the other rays in `rest`.
+    /// Makes packets of the coherent rays of a chunk, and stores the indices of the other rays in `rest`.
     #[inline(always)]
     pub(super) fn start<S: Simd>(&mut self, s: S, top: &TopLevel, rays: &[Ray], rest: &mut Vec<u32>) {
         self.items.clear();
         self.packets.clear();
         rest.clear();
-        let bounds = ObjectBounds::around(top.farthest());
+        let bounds = ObjectBounds::around(top.greatest_coordinate());
         let mut groups = None;
         for (i, rays) in rays.chunks(PACKET).enumerate() {
             let first = (i * PACKET) as u32;
@@ -87,16 +89,16 @@ impl Packets {
             if S::HAS_VECTORS
                 && rays.len() >= MIN_RAYS
                 && is_same_octant(&rays[0], &rays[rays.len() - 1])
-                && self.guard.is_open()
+                && self.backoff.may_try()
             {
                 let groups = groups.get_or_insert_with(|| [RayGroup::vacant(s); GROUPS]);
                 listed = self.list(s, top, &bounds, groups, rays);
                 if listed != Listed::Incoherent {
-                    self.guard.record(listed == Listed::All);
+                    self.backoff.record(listed == Listed::All);
                 }
             }
             if listed == Listed::All {
-                self.packets.push(Packet { first, next: begin, end: self.items.len() as u32 });
+                self.packets.push(TopLevelPacket { first, next: begin, end: self.items.len() as u32 });
             } else {
                 self.items.truncate(begin as usize);
                 rest.extend(first..first + rays.len() as u32);
@@ -104,7 +106,7 @@ impl Packets {
         }
     }
 
-    /// Lists the instances that up to 64 rays may meet.
+    /// Lists the instances whose boxes up to 64 rays may intersect, nearest first.
     #[inline(always)]
     fn list<S: Simd>(
         &mut self,
@@ -144,11 +146,11 @@ impl Packets {
                     continue;
                 }
                 let corners = frustum.corners(node, slot);
-                let mut met = 0;
+                let mut hit_rays = 0;
                 for (i, group) in groups.iter().enumerate() {
-                    met |= u64::from(group.meets::<Frustum<S, false>>(s, corners)) << (i * LANES);
+                    hit_rays |= u64::from(group.may_enter::<Frustum<S, false>>(s, corners)) << (i * LANES);
                 }
-                let rays = met & all;
+                let rays = hit_rays & all;
                 if rays == 0 {
                     continue;
                 }
@@ -156,7 +158,7 @@ impl Packets {
                     if self.items.len() - begin == MAX_INSTANCES {
                         return Listed::TooMany;
                     }
-                    self.items.push(Item { depth: depths[slot], instance: code & !INSTANCE, rays });
+                    self.items.push(ListedInstance { depth: depths[slot], instance: code & !INSTANCE, rays });
                 } else {
                     if count == MAX_STACKED_NODES {
                         return Listed::TooMany;
@@ -170,9 +172,9 @@ impl Packets {
         Listed::All
     }
 
-    /// Advances each packet to the next instance that any of its rays may meet, and calls `visit` with the index of each such ray and
-    /// the instance. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance). Packets without a further
-    /// instance are removed.
+    /// Advances each packet to the next instance whose box any of its rays may still intersect, and calls `visit` with the index
+    /// of each such ray and the instance. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance).
+    /// Packets without a further instance are removed.
     #[inline(always)]
     pub(super) fn advance(
         &mut self,
@@ -182,23 +184,23 @@ impl Packets {
     ) {
         let items = &self.items;
         self.packets.retain_mut(|packet| {
-            let mut any = false;
-            while !any && packet.next < packet.end {
+            let mut visited = false;
+            while !visited && packet.next < packet.end {
                 let item = items[packet.next as usize];
                 packet.next += 1;
                 let mut bits = item.rays;
                 while bits != 0 {
-                    let number = packet.first as usize + bits.trailing_zeros() as usize;
+                    let ray = packet.first as usize + bits.trailing_zeros() as usize;
                     bits &= bits - 1;
-                    let Some(tmax) = tmax(number) else { continue };
-                    let [x, y, z] = rays[number].direction;
+                    let Some(tmax) = tmax(ray) else { continue };
+                    let [x, y, z] = rays[ray].direction;
                     if item.depth <= limit(x.abs().max(y.abs()).max(z.abs()), tmax) {
-                        visit(number, item.instance);
-                        any = true;
+                        visit(ray, item.instance);
+                        visited = true;
                     }
                 }
             }
-            any
+            visited
         });
     }
 }

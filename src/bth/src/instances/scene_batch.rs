@@ -19,7 +19,7 @@ pub(super) struct SceneBatch<'a> {
 impl SceneBatch<'_> {
     /// The ray of a visit in the space of the object, ended at `tmax`.
     pub(super) fn object_ray(&self, visit: Visit, tmax: f32) -> ObjectRay {
-        self.world.placed_at(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
+        self.world.placement(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
     }
 
     /// The triangle of an instance's object on which a ray starts, or `NONE`.

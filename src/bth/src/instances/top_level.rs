@@ -1,14 +1,14 @@
 //! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits whenever instances move.
 //!
-//! Sixteen instances or fewer become the children of one node. Splitting them further would give nodes with two or three children,
-//! whose empty slots cost memory and time.
+//! Sixteen instances or fewer become the children of one node. Splitting them further would give nodes with two or three
+//! children, whose empty slots cost memory and time.
 
-use super::placement::Placed;
+use super::placement::Placement;
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Rays whose origin has no greater |coordinate| than this factor times that of the instances' boxes use the boxes as they are built.
-/// For other rays the boxes are widened (see [`TopLevel::looseness`]).
+/// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
+/// rays from farther away they are widened during traversal, see [`TopLevel::origin_slack`].
 const REACH: f32 = 4.0;
 
 /// Bit of the child codes of instances; the other bits are the index of the instance.
@@ -17,24 +17,27 @@ pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 /// The top-level BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// The nodes, the root first, aligned to cache lines like those of objects. The child code of a node is the index of its first
-    /// line, that of an instance is [`INSTANCE`] and its index.
+    /// The nodes, the root first, aligned to cache lines like those of objects. The child code of a node is the index of its
+    /// first line, that of an instance is [`INSTANCE`] and its index.
     lines: Vec<CacheLine>,
     /// Greatest |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
-    /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by `looseness` times that |coordinate|.
+    /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by `origin_slack` times that
+    /// |coordinate|.
     pub(crate) reach: f32,
-    /// Greatest [`Placed::looseness`] of the instances.
-    pub(crate) looseness: f32,
+    /// Greatest [`Placement::origin_slack`] of the instances.
+    pub(crate) origin_slack: f32,
     /// Number of levels of nodes.
     pub(crate) depth: u32,
 }
 
-/// An instance during the build.
+/// A visible instance, while the BVH is built.
 #[derive(Clone, Copy, Debug)]
-struct Item {
+struct BuildItem {
+    /// Its world box, widened for rays from within the reach.
     bounds: Bounds,
-    row: u32,
+    /// Index of the instance.
+    instance: u32,
 }
 
 /// A box: the three lower ends, negated so that a union is a maximum of all six values, and the three upper ends.
@@ -44,6 +47,7 @@ struct Bounds([f32; 6]);
 impl Bounds {
     const EMPTY: Bounds = Bounds([f32::NEG_INFINITY; 6]);
 
+    /// Enlarges the box to contain another.
     fn grow(&mut self, other: &Bounds) {
         for i in 0..6 {
             self.0[i] = if other.0[i] > self.0[i] { other.0[i] } else { self.0[i] };
@@ -60,29 +64,29 @@ impl Bounds {
     }
 }
 
-/// A range of the items that becomes a node.
+/// A range of the items from which a node is built.
 #[derive(Clone, Copy, Debug)]
-struct Run {
+struct ItemRange {
     first: u32,
     end: u32,
     bounds: Bounds,
     /// For each axis twice the least coordinate of the items' centres.
     least: [f32; 3],
     /// For each axis twice the greatest coordinate of the items' centres.
-    most: [f32; 3],
+    greatest: [f32; 3],
 }
 
-impl Run {
+impl ItemRange {
     /// A range without items that begins at `first`.
-    fn empty(first: u32) -> Run {
-        let (least, most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        Run { first, end: first, bounds: Bounds::EMPTY, least, most }
+    fn empty(first: u32) -> ItemRange {
+        let (least, greatest) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        ItemRange { first, end: first, bounds: Bounds::EMPTY, least, greatest }
     }
 
-    fn of(first: u32, items: &[Item]) -> Run {
-        let mut run = Run::empty(first);
-        items.iter().for_each(|item| run.add(&item.bounds));
-        run
+    fn of(first: u32, items: &[BuildItem]) -> ItemRange {
+        let mut range = ItemRange::empty(first);
+        items.iter().for_each(|item| range.add(&item.bounds));
+        range
     }
 
     #[inline(always)]
@@ -92,7 +96,7 @@ impl Run {
         for k in 0..3 {
             let c = bounds.center(k);
             self.least[k] = if c < self.least[k] { c } else { self.least[k] };
-            self.most[k] = if c > self.most[k] { c } else { self.most[k] };
+            self.greatest[k] = if c > self.greatest[k] { c } else { self.greatest[k] };
         }
     }
 
@@ -107,52 +111,52 @@ struct Task {
     node: u32,
     /// Level in the BVH; 1 for the root.
     level: u32,
-    run: Run,
+    range: ItemRange,
 }
 
 impl TopLevel {
     /// Builds the BVH over the visible instances.
-    pub(crate) fn build(&mut self, placed: &[Option<Placed>]) {
-        // There is rarely more than one node for seven instances.
+    pub(crate) fn build(&mut self, placements: &[Option<Placement>]) {
+        // There is rarely more than one node for every seven instances.
         self.lines.clear();
-        self.lines.reserve_exact((placed.len() / 7 + 1) * NODE_LINES);
-        (self.extent, self.looseness, self.depth) = (0.0, 0.0, 0);
-        for place in placed.iter().flatten() {
-            self.looseness = self.looseness.max(place.looseness);
-            let ends = place.lower.iter().chain(&place.upper);
+        self.lines.reserve_exact((placements.len() / 7 + 1) * NODE_LINES);
+        (self.extent, self.origin_slack, self.depth) = (0.0, 0.0, 0);
+        for placement in placements.iter().flatten() {
+            self.origin_slack = self.origin_slack.max(placement.origin_slack);
+            let ends = placement.lower.iter().chain(&placement.upper);
             self.extent = ends.fold(self.extent, |m, x| m.max(x.abs()));
         }
         self.reach = REACH * self.extent;
-        let mut items = Vec::with_capacity(placed.len());
-        for (row, place) in placed.iter().enumerate() {
-            let Some(place) = place else { continue };
-            let pad = (place.looseness * self.reach).next_up();
+        let mut items = Vec::with_capacity(placements.len());
+        for (instance, placement) in placements.iter().enumerate() {
+            let Some(placement) = placement else { continue };
+            let pad = (placement.origin_slack * self.reach).next_up();
             let mut bounds = Bounds::EMPTY;
             for k in 0..3 {
-                bounds.0[k] = -((place.lower[k] - pad).next_down().max(f32::MIN));
-                bounds.0[3 + k] = (place.upper[k] + pad).next_up().min(f32::MAX);
+                bounds.0[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
+                bounds.0[3 + k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
             }
-            items.push(Item { bounds, row: row as u32 });
+            items.push(BuildItem { bounds, instance: instance as u32 });
         }
         if items.is_empty() {
             return;
         }
-        let mut tasks = vec![Task { node: self.add_node(), level: 1, run: Run::of(0, &items) }];
-        while let Some(Task { node, level, run }) = tasks.pop() {
+        let mut tasks = vec![Task { node: self.add_node(), level: 1, range: ItemRange::of(0, &items) }];
+        while let Some(Task { node, level, range }) = tasks.pop() {
             self.depth = self.depth.max(level);
             let items = &mut items[..];
-            if run.len() <= WIDTH as u32 {
-                for (slot, item) in items[run.first as usize..run.end as usize].iter().enumerate() {
-                    self.put(node, slot, INSTANCE | item.row, &item.bounds);
+            if range.len() <= WIDTH as u32 {
+                for (slot, item) in items[range.first as usize..range.end as usize].iter().enumerate() {
+                    self.put(node, slot, INSTANCE | item.instance, &item.bounds);
                 }
                 continue;
             }
-            let mut runs = [run; WIDTH];
-            let count = split_into(items, &mut runs);
-            for (slot, run) in runs[..count].iter().enumerate() {
+            let mut ranges = [range; WIDTH];
+            let count = split_into(items, &mut ranges);
+            for (slot, range) in ranges[..count].iter().enumerate() {
                 let child = self.add_node();
-                self.put(node, slot, child, &run.bounds);
-                tasks.push(Task { node: child, level: level + 1, run: *run });
+                self.put(node, slot, child, &range.bounds);
+                tasks.push(Task { node: child, level: level + 1, range: *range });
             }
         }
     }
@@ -177,6 +181,7 @@ impl TopLevel {
         self.lines.is_empty()
     }
 
+    /// Stores a child in a slot of a node.
     fn put(&mut self, node: u32, slot: usize, code: u32, bounds: &Bounds) {
         let lines = &mut self.lines[node as usize..][..NODE_LINES];
         let node = WideNode::mut_from_bytes(lines.as_mut_bytes()).expect("a node is as long as its lines");
@@ -187,9 +192,9 @@ impl TopLevel {
         }
     }
 
-    /// Greatest |coordinate| of the boxes as they are built.
-    pub(crate) fn farthest(&self) -> f32 {
-        (self.extent + self.looseness * self.reach).next_up().next_up()
+    /// Greatest |coordinate| of the boxes in the nodes.
+    pub(crate) fn greatest_coordinate(&self) -> f32 {
+        (self.extent + self.origin_slack * self.reach).next_up().next_up()
     }
 
     /// Bytes on the heap.
@@ -198,35 +203,36 @@ impl TopLevel {
     }
 }
 
-/// Splits the first run into up to 16, always the one of greatest area among those with more items than a node has children. Returns
-/// the number of runs.
-fn split_into(items: &mut [Item], runs: &mut [Run; WIDTH]) -> usize {
-    let priority = |run: &Run| if run.len() > WIDTH as u32 { run.bounds.area() } else { f64::NEG_INFINITY };
+/// Splits the first range into up to 16, always the one of greatest area among those with more items than a node has children.
+/// Returns the number of ranges.
+fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize {
+    let priority =
+        |range: &ItemRange| if range.len() > WIDTH as u32 { range.bounds.area() } else { f64::NEG_INFINITY };
     let mut areas = [f64::NEG_INFINITY; WIDTH];
-    areas[0] = priority(&runs[0]);
+    areas[0] = priority(&ranges[0]);
     let mut count = 1;
     while count < WIDTH {
-        let widest = (0..count).fold(0, |best, i| if areas[i] > areas[best] { i } else { best });
-        if areas[widest] == f64::NEG_INFINITY {
+        let largest = (0..count).fold(0, |best, i| if areas[i] > areas[best] { i } else { best });
+        if areas[largest] == f64::NEG_INFINITY {
             break;
         }
-        let (left, right) = split(items, runs[widest]);
-        (runs[widest], areas[widest]) = (left, priority(&left));
-        (runs[count], areas[count]) = (right, priority(&right));
+        let (left, right) = split(items, ranges[largest]);
+        (ranges[largest], areas[largest]) = (left, priority(&left));
+        (ranges[count], areas[count]) = (right, priority(&right));
         count += 1;
     }
     count
 }
 
-/// Splits a run of at least two items at the middle of their centres, along the axis on which the centres have the greatest extent. If
-/// all lie on one side, the run is halved.
-fn split(items: &mut [Item], run: Run) -> (Run, Run) {
-    let items = &mut items[run.first as usize..run.end as usize];
+/// Splits a range of at least two items at the middle of their centres, along the axis on which the centres have the greatest
+/// extent. If all centres lie on one side, the range is halved.
+fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
+    let items = &mut items[range.first as usize..range.end as usize];
     // Differences may overflow to infinity, which is then the greatest extent.
-    let spread = [0, 1, 2].map(|k| run.most[k] - run.least[k]);
+    let spread = [0, 1, 2].map(|k| range.greatest[k] - range.least[k]);
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
-    let middle = run.least[axis] / 2.0 + run.most[axis] / 2.0;
-    let (mut left, mut right) = (Run::empty(run.first), Run::empty(0));
+    let middle = range.least[axis] / 2.0 + range.greatest[axis] / 2.0;
+    let (mut left, mut right) = (ItemRange::empty(range.first), ItemRange::empty(0));
     let (mut i, mut end) = (0, items.len());
     while i < end {
         let bounds = items[i].bounds;
@@ -241,9 +247,12 @@ fn split(items: &mut [Item], run: Run) -> (Run, Run) {
     }
     if i == 0 || i == items.len() {
         let half = items.len() / 2;
-        return (Run::of(run.first, &items[..half]), Run::of(run.first + half as u32, &items[half..]));
+        return (
+            ItemRange::of(range.first, &items[..half]),
+            ItemRange::of(range.first + half as u32, &items[half..]),
+        );
     }
-    (right.first, right.end) = (left.end, run.end);
+    (right.first, right.end) = (left.end, range.end);
     (left, right)
 }
 

@@ -1,9 +1,11 @@
-//! The value of a track at a time (glTF 2.0 specification, appendix C).
+//! Interpolation of animation tracks, as of glTF animation samplers (glTF 2.0 specification, appendix C). A track holds the keys
+//! of one property of one node.
 
 use bth_format::SceneView;
 use bth_format::layout::*;
 
-/// The value of a checked track. As many of the four numbers are valid as the property has components; a quaternion is not normalized.
+/// The value of a checked track at a time in seconds. As many of the four numbers are valid as the property has
+/// components. A quaternion is not normalized.
 pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 4] {
     let property = Property::from_code(track.property).unwrap_or(Property::Visible);
     let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
@@ -14,38 +16,38 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
     let row = |key: usize, row: usize| -> [f64; 4] {
         std::array::from_fn(|i| if i < width { values[key * per_key + row * width + i] } else { 0.0 })
     };
-    let main = interpolation.values_per_key() / 2;
-    let after = times.partition_point(|t| *t <= seconds);
-    if after == 0 || after == times.len() || interpolation == Interpolation::Step {
-        return row(after.saturating_sub(1), main);
+    let value_row = interpolation.values_per_key() / 2;
+    let next = times.partition_point(|t| *t <= seconds);
+    if next == 0 || next == times.len() || interpolation == Interpolation::Step {
+        return row(next.saturating_sub(1), value_row);
     }
-    let (from, to) = (after - 1, after);
+    let (from, to) = (next - 1, next);
     let duration = times[to] - times[from];
     let part = (seconds - times[from]) / duration;
-    let (a, b) = (row(from, main), row(to, main));
+    let (a, b) = (row(from, value_row), row(to, value_row));
     if interpolation == Interpolation::Cubic {
         return hermite(a, row(from, 2), b, row(to, 0), part, duration);
     }
-    if property == Property::Rotation { great_circle(a, b, part) } else { mix(a, b, part) }
+    if property == Property::Rotation { slerp(a, b, part) } else { lerp(a, b, part) }
 }
 
-/// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do not
-/// decide.
+/// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do
+/// not decide.
 pub(crate) fn differs(view: &SceneView<'_>, track: &Track, a: f64, b: f64) -> bool {
     let (times, _) = view.keys(track, 0);
-    let after = |seconds: f64| times.partition_point(|t| *t <= seconds);
-    let row = after(a);
-    if a == b || row == after(b) && (row == 0 || row == times.len()) {
+    let next_key = |seconds: f64| times.partition_point(|t| *t <= seconds);
+    let row = next_key(a);
+    if a == b || row == next_key(b) && (row == 0 || row == times.len()) {
         return false;
     }
-    if row == after(b) && track.interpolation == Interpolation::Step as u32 {
+    if row == next_key(b) && track.interpolation == Interpolation::Step as u32 {
         return false;
     }
     value(view, track, a) != value(view, track, b)
 }
 
 /// Linear interpolation.
-fn mix(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
+fn lerp(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
 }
 
@@ -72,7 +74,7 @@ fn unit(q: [f64; 4]) -> [f64; 4] {
 }
 
 /// Spherical linear interpolation along the shorter arc (Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985).
-fn great_circle(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
+fn slerp(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     let (a, mut b) = (unit(a), unit(b));
     let mut cosine: f64 = a.iter().zip(&b).map(|(x, y)| x * y).sum();
     if cosine < 0.0 {
@@ -81,10 +83,10 @@ fn great_circle(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     let angle = cosine.min(1.0).acos();
     let sine = angle.sin();
     if sine == 0.0 {
-        return mix(a, b, part);
+        return lerp(a, b, part);
     }
-    let (from, to) = (((1.0 - part) * angle).sin() / sine, (part * angle).sin() / sine);
-    std::array::from_fn(|i| from * a[i] + to * b[i])
+    let (weight_a, weight_b) = (((1.0 - part) * angle).sin() / sine, (part * angle).sin() / sine);
+    std::array::from_fn(|i| weight_a * a[i] + weight_b * b[i])
 }
 
 #[cfg(test)]
@@ -110,7 +112,7 @@ mod tests {
         }
     }
 
-    /// The value of a single track.
+    /// The value at time `t` of a track with the given keys.
     fn sample(
         property: Property,
         interpolation: Interpolation,
@@ -158,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn splines_pass_through_their_keys_with_their_tangents() {
+    fn cubic_splines_have_the_values_and_tangents_of_their_keys() {
         let zero = [0.0; 3];
         let keys = [zero, [1.0, 2.0, 3.0], [4.0, 0.0, 0.0], [0.0, -6.0, 0.0], [2.0, 2.0, 2.0], zero].concat();
         let at = |t| sample(Property::Scale, Interpolation::Cubic, &[0.0, 2.0], &keys, t);
@@ -175,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn rotations_turn_evenly_and_the_shorter_way() {
+    fn rotations_have_constant_speed_along_the_shorter_arc() {
         let half = |degrees: f64| (degrees.to_radians() / 2.0).sin_cos();
         let ((s, c), sign) = (half(100.0), -3.0);
         // The second key is the same rotation with the other sign, and not of unit length.

@@ -1,6 +1,7 @@
 //! Traversal of the top level by single rays, from one instance to the next, nearest boxes first.
 //!
-//! Rays make one step each in turn, so that their latencies overlap. A ray pauses at each instance until it has been traced there.
+//! The rays of a block advance alternately, one step each, so that their memory latencies overlap. A ray stops at each instance
+//! until it has been traced in it.
 
 use super::top_level::{INSTANCE, TopLevel};
 use crate::bvh::ray_state::KEY_SLACK;
@@ -13,7 +14,7 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 
-/// Number of rays that step in turn: few enough that their states stay in the first-level cache.
+/// Number of rays that advance alternately; their states fit in the first-level cache.
 const BLOCK: usize = 64;
 
 /// Rays in the top level, by their index in the chunk.
@@ -39,10 +40,11 @@ struct TopLevelRay {
     top: StackPosition,
 }
 
-/// The constants for box tests of a ray, computed in f64. For rays from far away the boxes are widened.
-fn slabs_from_afar(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
-    RaySlabs::widened(ray, top.farthest(), |start| {
-        if start > f64::from(top.reach) { f64::from(top.looseness) * start } else { 0.0 }
+/// The constants of a ray for box tests, computed in f64. For rays from beyond [`TopLevel::reach`] they widen the boxes. `None`
+/// for rays that cannot hit anything.
+fn widened_slabs(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
+    RaySlabs::widened(ray, top.greatest_coordinate(), |start| {
+        if start > f64::from(top.reach) { f64::from(top.origin_slack) * start } else { 0.0 }
     })
 }
 
@@ -57,8 +59,8 @@ pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
 }
 
 impl RayTraversals {
-    /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of a ray
-    /// an instance that it is not to enter.
+    /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of
+    /// a ray an instance that it is not to enter.
     #[inline(always)]
     pub(super) fn start<S: Simd>(
         &mut self,
@@ -82,7 +84,7 @@ impl RayTraversals {
         if self.states.len() < rays.len() {
             self.states.resize(rays.len(), vacant);
         }
-        let bounds = ObjectBounds::around(top.farthest());
+        let bounds = ObjectBounds::around(top.greatest_coordinate());
         let mut prepared = Prepared::new();
         let mut index = [0; LANES];
         let mut kept = 0;
@@ -90,22 +92,22 @@ impl RayTraversals {
             let count = LANES.min(active.len() - first);
             index[..count].copy_from_slice(&active[first..first + count]);
             prepared.fill(s, &bounds, rays, &index, count);
-            for (lane, &number) in index[..count].iter().enumerate() {
-                let number = number as usize;
-                let ray = &rays[number];
+            for (lane, &ray_index) in index[..count].iter().enumerate() {
+                let ray_index = ray_index as usize;
+                let ray = &rays[ray_index];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
-                let state = &mut self.states[number];
+                let state = &mut self.states[ray_index];
                 match prepared.prepared(lane).filter(|_| is_near) {
                     Some(prepared) => state.slabs = prepared.slabs,
-                    None => match slabs_from_afar(ray, top) {
+                    None => match widened_slabs(ray, top) {
                         Some(slabs) => state.slabs = slabs,
                         None => continue,
                     },
                 }
                 (state.tmax, state.limit) = (ray.tmax, limit(state.slabs.scale, ray.tmax));
-                state.skip = skip(number).map_or(NONE, |instance| INSTANCE | instance);
-                state.top = self.stacks.start(number, 0);
+                state.skip = skip(ray_index).map_or(NONE, |instance| INSTANCE | instance);
+                state.top = self.stacks.start(ray_index, 0);
                 active[kept] = index[lane];
                 kept += 1;
             }
@@ -113,10 +115,10 @@ impl RayTraversals {
         active.truncate(kept);
     }
 
-    /// Advances each ray of `active` to the next instance whose box it may meet, and appends the visit to `visits` in the order of
-    /// `active`. `tmax` returns for the index of a ray the greatest t, rounded to f32, of hits that can change its result, or None if
-    /// its query is complete. Rays that are complete or meet no further instance are removed from `active`. `first_ray` is added to
-    /// the index of the ray of a visit.
+    /// Advances each ray of `active` to the next instance whose box it may intersect, and appends the visit to `visits` in the
+    /// order of `active`. `tmax` returns for the index of a ray the greatest t, rounded to f32, of hits that can change its
+    /// result, or None if its query is complete. Rays that are complete or have no further instance are removed from `active`.
+    /// `first_ray` is added to the index of the ray of a visit.
     #[inline(always)]
     pub(super) fn advance<S: Simd>(
         &mut self,
@@ -131,19 +133,19 @@ impl RayTraversals {
         for first in (0..active.len()).step_by(BLOCK) {
             let end = (first + BLOCK).min(active.len());
             block.inner.len = 0;
-            for (slot, &number) in active[first..end].iter().enumerate() {
-                let ray = number as usize;
+            for (slot, &ray_index) in active[first..end].iter().enumerate() {
+                let ray = ray_index as usize;
                 let code = match tmax(ray) {
                     Some(tmax) => self.resume(s, ray, tmax),
                     None => BOTTOM,
                 };
                 block.push(slot, code);
             }
-            let numbers = &active[first..end];
+            let ray_indices = &active[first..end];
             while block.inner.len > 0 {
                 for i in 0..block.inner.take() {
                     let slot = block.inner.get(i);
-                    let ray = numbers[slot] as usize;
+                    let ray = ray_indices[slot] as usize;
                     let code = self.step(s, top, ray, block.code[slot]);
                     block.push(slot, code);
                 }
@@ -152,11 +154,11 @@ impl RayTraversals {
             let mut count = visits.len();
             visits.resize(count + end - first, Visit { ray: NONE, instance: NONE });
             for slot in 0..end - first {
-                let (code, number) = (block.code[slot % BLOCK], active[first + slot]);
-                let state = &mut self.states[number as usize];
+                let (code, ray_index) = (block.code[slot % BLOCK], active[first + slot]);
+                let state = &mut self.states[ray_index as usize];
                 state.top = state.top.below();
-                visits[count] = Visit { ray: first_ray + number, instance: code & !INSTANCE };
-                active[kept] = number;
+                visits[count] = Visit { ray: first_ray + ray_index, instance: code & !INSTANCE };
+                active[kept] = ray_index;
                 count += usize::from(code != BOTTOM);
                 kept += usize::from(code != BOTTOM);
             }
@@ -178,7 +180,8 @@ impl RayTraversals {
         self.stacks.code(state.top)
     }
 
-    /// Replaces the node on top of a ray's stack by those of its children that the ray may meet; returns the new top's code.
+    /// Replaces the node on top of a ray's stack by those of its children whose boxes the ray may intersect. Returns the code of
+    /// the new top.
     #[inline(always)]
     fn step<S: Simd>(&mut self, s: S, top: &TopLevel, ray: usize, code: u32) -> u32 {
         let state = &mut self.states[ray];
@@ -194,11 +197,11 @@ impl RayTraversals {
     }
 }
 
-/// Rays that step in turn, by their slot in the block.
+/// The rays of a block, by their slot in it.
 struct RayBlock {
     /// Slots of the rays that have an inner node on top of their stack.
     inner: List,
-    /// For each slot the code on top of the stack. A ray pauses at the code of an instance or at [`BOTTOM`].
+    /// For each slot the code on top of the stack. A ray stops at the code of an instance or at [`BOTTOM`].
     code: [u32; BLOCK],
 }
 

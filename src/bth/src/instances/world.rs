@@ -1,7 +1,7 @@
 //! The instances of a scene at a time.
 
-use super::placement::{Misplaced, Parts, Placed};
-use super::pose::Pose;
+use super::hierarchy::NodeHierarchy;
+use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
 #[cfg(test)]
 use bth_format::SceneView;
@@ -27,19 +27,20 @@ pub struct Update {
 /// The instances of a file with scene sections at a time. The sections have been checked.
 #[derive(Debug)]
 pub(crate) struct World {
+    /// Time of the scene.
     pub(crate) seconds: f64,
-    pose: Pose,
+    hierarchy: NodeHierarchy,
     /// For each instance its placement; `None` if it is not visible.
-    pub(crate) placed: Vec<Option<Placed>>,
+    pub(crate) placements: Vec<Option<Placement>>,
     pub(crate) top: TopLevel,
     /// The only visible instance, if there is exactly one.
-    alone: Option<u32>,
+    only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
-    touched: Vec<AtomicBool>,
+    traced: Vec<AtomicBool>,
 }
 
 impl World {
-    /// The instances of a file at the first frame of its scene; `None` if the file has no scene.
+    /// The instances of a file at the first frame of its scene; `None` if the file has no scene sections.
     ///
     /// # Errors
     /// Those of [`File::check_scene`] and of [`Self::update`].
@@ -48,20 +49,20 @@ impl World {
         let scene = &view.scene[0];
         let mut world = World {
             seconds: f64::from(scene.first_frame) / scene.rate,
-            pose: Pose::new(&view),
-            placed: vec![None; view.instances.len()],
+            hierarchy: NodeHierarchy::new(&view),
+            placements: vec![None; view.instances.len()],
             top: TopLevel::default(),
-            alone: None,
-            touched: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
+            only_visible: None,
+            traced: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
         };
-        world.place(file, world.seconds, true)?;
+        world.place_instances(file, world.seconds, true)?;
         Ok(Some(world))
     }
 
     /// Instances with given placements, without a hierarchy.
     #[cfg(test)]
-    pub(crate) fn of_places(placed: Vec<Option<Placed>>, objects: u32) -> World {
-        let nothing = SceneView {
+    pub(crate) fn with_placements(placements: Vec<Option<Placement>>, objects: u32) -> World {
+        let empty = SceneView {
             scene: &[],
             nodes: &[],
             instances: &[],
@@ -73,129 +74,131 @@ impl World {
             names: &[],
         };
         let mut top = TopLevel::default();
-        top.build(&placed);
-        let touched = (0..objects).map(|_| AtomicBool::new(false)).collect();
-        let alone = alone(&placed);
-        World { seconds: 0.0, pose: Pose::new(&nothing), placed, top, alone, touched }
+        top.build(&placements);
+        let traced = (0..objects).map(|_| AtomicBool::new(false)).collect();
+        let only_visible = only_visible(&placements);
+        World { seconds: 0.0, hierarchy: NodeHierarchy::new(&empty), placements, top, only_visible, traced }
     }
 
-    /// Moves to a time. After an error the instances are as before.
+    /// Sets the time. After an error the instances are unchanged.
     ///
     /// # Errors
-    /// `BTH-S001` and `BTH-S002` with the node.
+    /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it or the world box is not finite. The error
+    /// gives the node.
     pub(crate) fn update(&mut self, file: &File, seconds: f64) -> Result<Update> {
-        let result = self.place(file, seconds, false);
+        let result = self.place_instances(file, seconds, false);
         match &result {
             Ok(_) => self.seconds = seconds,
             // The instances of the former time have been placed before, so placing them again succeeds.
-            Err(_) => drop(self.place(file, self.seconds, true)),
+            Err(_) => drop(self.place_instances(file, self.seconds, true)),
         }
         result
     }
 
     /// Places the instances that moved, or with `all` every instance, and rebuilds the top level.
-    fn place(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
+    fn place_instances(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
         let view = file.scene().expect("checked when the scene was opened");
-        let mut update = Update { nodes: self.pose.update(&view, seconds, all), ..Update::default() };
+        let mut update = Update { nodes: self.hierarchy.update(&view, seconds, all), ..Update::default() };
         for (row, instance) in view.instances.iter().enumerate() {
-            if !self.pose.moved(instance.node) {
+            if !self.hierarchy.moved(instance.node) {
                 continue;
             }
-            self.placed[row] = None;
+            self.placements[row] = None;
             update.placed += 1;
-            if self.pose.hidden(instance.node) {
+            if self.hierarchy.hidden(instance.node) {
                 continue;
             }
             let object = file.object_header(instance.object);
             if object.root == NONE {
                 continue;
             }
-            let world = self.pose.world(&view, instance.node);
-            // The boxes of the root's children give a tighter world box. They are used only if they are in memory already: reading
-            // the root of every mapped object would take longer than the tighter boxes save.
-            let touched = self.touched[instance.object as usize].load(Ordering::Relaxed);
+            let world = self.hierarchy.to_world(&view, instance.node);
+            // The boxes of the root's children give a tighter world box. They are used only if they are in memory already:
+            // reading the root of every mapped object would take longer than the tighter boxes save.
+            let traced = self.traced[instance.object as usize].load(Ordering::Relaxed);
             let parts = match file.view(instance.object) {
-                Ok(view) if touched || !file.is_mapped() => Parts::of(view),
-                _ => Parts::whole(object),
+                Ok(view) if traced || !file.is_mapped() => PartBoxes::of_root_children(view),
+                _ => PartBoxes::whole(object),
             };
-            let place = Placed::new(&world, instance.object, object, &parts).map_err(|why| {
-                let (code, expected, found) = match why {
-                    Misplaced::Singular => {
+            let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
+                let (code, expected, found) = match error {
+                    PlacementError::Singular => {
                         (Code::Singular, "a transform that can be inverted", "one that cannot")
                     }
-                    Misplaced::NotFinite => {
+                    PlacementError::NotFinite => {
                         (Code::NotFinite, "a finite transform and world box", "one that is not")
                     }
                 };
                 let name = view.node_name(instance.node).escape_debug();
                 let found = format!("{found}: node \"{name}\" at {seconds} s");
-                let at = u64::from(instance.node) * size_of::<Node>() as u64;
-                file.locate(Error::within_file(code, kind::NODES, at, expected, found), NONE)
+                let offset = u64::from(instance.node) * size_of::<Node>() as u64;
+                file.locate(Error::within_file(code, kind::NODES, offset, expected, found), NONE)
             })?;
-            self.placed[row] = Some(place);
+            self.placements[row] = Some(placement);
         }
         if update.placed > 0 {
             let start = Instant::now();
-            self.top.build(&self.placed);
-            self.alone = alone(&self.placed);
+            self.top.build(&self.placements);
+            self.only_visible = only_visible(&self.placements);
             update.top_level = start.elapsed();
         }
-        update.visible = self.placed.iter().flatten().count();
+        update.visible = self.placements.iter().flatten().count();
         Ok(update)
     }
 
-    /// World box of an instance, computed from the object's box, so it does not depend on which objects have been traced. `None` if the
-    /// instance is not visible.
+    /// World box of an instance, computed from the object's box, so it does not depend on which objects have been traced. `None`
+    /// if the instance is not visible.
     pub(crate) fn bounds(&self, file: &File, instance: u32) -> Option<([f32; 3], [f32; 3])> {
-        self.placed[instance as usize].as_ref()?;
+        self.placements[instance as usize].as_ref()?;
         let view = file.scene().expect("checked when the scene was opened");
         let instance = view.instances[instance as usize];
-        let (world, object) = (self.pose.world(&view, instance.node), file.object_header(instance.object));
-        let placed = Placed::new(&world, instance.object, object, &Parts::whole(object)).ok()?;
-        Some((placed.lower, placed.upper))
+        let (world, object) =
+            (self.hierarchy.to_world(&view, instance.node), file.object_header(instance.object));
+        let placement = Placement::new(&world, instance.object, object, &PartBoxes::whole(object)).ok()?;
+        Some((placement.lower, placement.upper))
     }
 
     /// The transform from a node's space to world space, as rows of four, and whether the node is visible.
     pub(crate) fn node(&self, file: &File, node: u32) -> ([[f64; 4]; 3], bool) {
         let view = file.scene().expect("checked when the scene was opened");
-        (self.pose.world(&view, node).rows(), !self.pose.hidden(node))
+        (self.hierarchy.to_world(&view, node).rows(), !self.hierarchy.hidden(node))
     }
 
-    /// The only visible instance and its object, if there is exactly one and the object's space is world space. Most such scenes are
-    /// models that were exported as scenes.
+    /// The only visible instance and its object, if there is exactly one and the object's space is world space. Most such scenes
+    /// are models that were exported as scenes.
     pub(crate) fn sole(&self) -> Option<(u32, u32)> {
-        let instance = self.alone?;
-        let place = self.placed[instance as usize].as_ref()?;
-        place.inverse.is_identity().then(|| (instance, place.object()))
+        let instance = self.only_visible?;
+        let placement = self.placements[instance as usize].as_ref()?;
+        placement.inverse.is_identity().then(|| (instance, placement.object()))
     }
 
     /// Whether exactly one instance is visible.
-    pub(crate) fn is_alone(&self) -> bool {
-        self.alone.is_some()
+    pub(crate) fn has_single_visible(&self) -> bool {
+        self.only_visible.is_some()
     }
 
-    /// Records that a ray is traced in an object.
-    pub(crate) fn touch(&self, object: u32) {
-        let touched = &self.touched[object as usize];
-        if !touched.load(Ordering::Relaxed) {
-            touched.store(true, Ordering::Relaxed);
+    /// Records that a ray is traced in an object. It is stored only once, so that threads do not contend for the cache line.
+    pub(crate) fn mark_traced(&self, object: u32) {
+        let traced = &self.traced[object as usize];
+        if !traced.load(Ordering::Relaxed) {
+            traced.store(true, Ordering::Relaxed);
         }
     }
 
     /// Number of objects in which rays have been traced.
-    pub(crate) fn touched(&self) -> usize {
-        self.touched.iter().filter(|t| t.load(Ordering::Relaxed)).count()
+    pub(crate) fn traced_objects(&self) -> usize {
+        self.traced.iter().filter(|t| t.load(Ordering::Relaxed)).count()
     }
 
     /// Bytes on the heap: of the instances and the top level, and of the hierarchy.
     pub(crate) fn bytes(&self) -> (usize, usize) {
-        (size_of_val(self.placed.as_slice()) + self.top.bytes(), self.pose.bytes())
+        (size_of_val(self.placements.as_slice()) + self.top.bytes(), self.hierarchy.bytes())
     }
 }
 
 /// The only visible instance, if there is exactly one.
-fn alone(placed: &[Option<Placed>]) -> Option<u32> {
-    let mut seen = placed.iter().enumerate().filter(|(_, place)| place.is_some());
-    let (row, _) = seen.next()?;
-    seen.next().is_none().then_some(row as u32)
+fn only_visible(placements: &[Option<Placement>]) -> Option<u32> {
+    let mut visible = placements.iter().enumerate().filter(|(_, placement)| placement.is_some());
+    let (row, _) = visible.next()?;
+    visible.next().is_none().then_some(row as u32)
 }

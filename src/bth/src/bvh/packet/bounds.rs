@@ -1,4 +1,4 @@
-//! Bounds of all rays of a packet, which boxes and triangles are tested against before the single rays are.
+//! Bounds of all rays of a packet, which are tested before the rays themselves.
 
 use crate::simd::Simd;
 use bth_format::layout::WideNode;
@@ -7,47 +7,45 @@ use bth_format::layout::WideNode;
 pub(crate) trait PacketBounds<S: Simd> {
     /// Whether the directions of the rays may lie in different octants.
     const MIXED_OCTANTS: bool;
-    /// Whether all rays start at one point. The corners of boxes ([`Self::corners`]) are then relative to it.
+    /// Whether the rays have the same origin, and corners of boxes are given relative to it.
     const COMMON_ORIGIN: bool;
-    /// Origin and slopes of the rays, with [`Self::COMMON_ORIGIN`].
+    /// The view from that origin, if `COMMON_ORIGIN`.
     fn view(&self) -> Option<&FrustumView>;
-    /// The children of a node whose boxes rays may enter before the depth `limit`, as bits, and lower bounds of the depths at
-    /// which any ray enters them.
+    /// The children of a node that any ray may meet before the depth `limit`, a bit each, and lower bounds of the depths at which any of
+    /// the rays enters them.
     fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F);
-    /// Outcodes of sixteen points, given as rows of x, y and z: a bit for each side of the bounds beyond which the point lies. A
-    /// triangle whose corners have a bit in common is missed by all rays.
-    fn outcodes(&self, s: S, rows: [S::F; 3]) -> S::U;
-    /// The two corners of a child's box, as [`RayGroup::meets`](super::ray_group::RayGroup::meets) expects them.
+    /// For sixteen points, given as rows of x, y and z, a bit for each side of the bounds beyond which they lie. A triangle whose three
+    /// corners have a bit in common is missed by all rays.
+    fn sides(&self, s: S, rows: [S::F; 3]) -> S::U;
+    /// The two corners of a child's box that [`RayGroup::may_enter`](super::ray_group::RayGroup::may_enter) takes.
     fn corners(&self, node: &WideNode, slot: usize) -> [[f32; 3]; 2];
 }
 
-/// The center of a frustum, and the interval of the slopes of its rays.
+/// The projection that coherent rays share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrustumView {
-    /// The rays' common origin, or the middle of the interval of their origins.
+    /// The common origin, or the middle of the origins.
     pub(crate) origin: [f32; 3],
-    /// The two axes of the plane of projection, and the main axis ([`Span::main_axis`](super::coherence::Span::main_axis)).
+    /// The two axes of the plane of projection, and the main axis of the directions.
     pub(super) axis: [usize; 3],
-    /// Middle of the interval of the slopes: change of the two coordinates in the plane per unit of the third.
+    /// For each axis of the plane the middle of the interval of slopes.
     pub(super) shear: [f32; 2],
-    /// Half the width of that interval.
+    /// For each axis of the plane half the width of that interval, rounded to nearest.
     pub(super) shear_width: [f32; 2],
 }
 
 impl FrustumView {
-    /// The axis along which the rays advance most.
+    /// The main axis of the directions.
     #[inline(always)]
-    pub(crate) fn main_axis(&self) -> usize {
+    pub(crate) fn axis(&self) -> usize {
         self.axis[2]
     }
 
-    /// Bounds of sixteen points relative to the origin, given as rows of x, y and z: the greatest |x| or |y| to which any ray
-    /// projects each point, and its |depth|.
-    ///
-    /// The first is the coordinate sheared by the middle of the interval of slopes plus half the interval's width times |depth|. An
-    /// addition of 2^-20 of the depth and a factor of 1 + 2^-20 exceed the roundings here and in the rays' own slopes.
+    /// For sixteen points relative to the origin, given as rows of x, y and z: an upper bound of |x| and |y| in the projection of any
+    /// ray, and |depth|. The bound is the sheared coordinate for the middle of the interval of slopes, plus half the interval times
+    /// the depth. Added to it are 2^-20 of the depth and of the sum, which exceed the roundings here and in the rays' slopes.
     #[inline(always)]
-    pub(crate) fn projected_bounds<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
+    pub(crate) fn spread<S: Simd>(&self, s: S, rows: [S::F; 3]) -> [S::F; 2] {
         const UP: f32 = 1.0 / (1 << 20) as f32;
         let depth = rows[self.axis[2]];
         let far = s.abs(depth);

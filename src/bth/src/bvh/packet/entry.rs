@@ -1,4 +1,4 @@
-//! The size of a packet, and an entry of its stack.
+//! The size of a packet, and the entries of its stack.
 
 use crate::simd::LANES;
 
@@ -7,17 +7,15 @@ pub(crate) const GROUPS: usize = 4;
 /// Greatest number of rays in a packet.
 pub(crate) const PACKET: usize = GROUPS * LANES;
 
-/// A child node or leaf that is still to be entered.
+/// A stacked child.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StackEntry {
-    /// The rays that entered the parent, as bits; where directions lie in different octants
-    /// ([`PacketBounds::MIXED_OCTANTS`](super::bounds::PacketBounds::MIXED_OCTANTS)), those of them that may enter the child's box.
+    /// A bit for each ray that entered the parent. In packets with different octants only rays that may meet the child's box are set.
     pub(crate) rays: u64,
-    /// Index of the cache line at which the parent begins.
+    /// Index of the parent's cache line.
     pub(crate) parent: u32,
-    /// Index of the child in its parent.
+    /// Index of the child in the parent.
     pub(crate) slot: u32,
-    /// Lower bound of the depth at which any ray enters the child, but for
-    /// [`KEY_SLACK`](crate::bvh::ray_state::KEY_SLACK); not set for any-hit queries.
+    /// Lower bound of the depth at which any ray enters the child.
     pub(crate) key: f32,
 }

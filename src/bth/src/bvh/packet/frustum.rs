@@ -23,7 +23,7 @@ use bth_format::object::ObjectBounds;
 /// its half width, and an interval of a. Coherent rays have |s| <= 1.25, rounded at most twice. Roundings: 6uE for the first two
 /// terms, 8uE for s in the third, 20uE for a, 8uE for the sums; the pad is 64uE.
 /// Where all rays have the same origin (`POINT`), the intervals of origins, widened by their pads, are also used for the single rays
-/// ([`RayGroup::meets`]), and the interval of a is zero.
+/// ([`RayGroup::may_enter`]), and the interval of a is zero.
 pub(crate) struct Frustum<S: Simd, const POINT: bool> {
     view: FrustumView,
     /// For each axis the end of the origins' interval that is nearest to the planes at which rays enter boxes.
@@ -126,8 +126,8 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
 }
 
 impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
-    const MIXED: bool = false;
-    const FROM_POINT: bool = POINT;
+    const MIXED_OCTANTS: bool = false;
+    const COMMON_ORIGIN: bool = POINT;
 
     #[inline(always)]
     fn view(&self) -> Option<&FrustumView> {

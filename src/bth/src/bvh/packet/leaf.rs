@@ -8,7 +8,9 @@
 use super::bounds::PacketBounds;
 use super::hit_cache::{HitCache, UNCACHED};
 use super::leaf_mesh::{Leaf, LeafMesh};
-use super::points::{CornerSource, Greatest, POINTS, Points, ProjectedOnDemand, Relative};
+use super::points::{
+    CornerSource, POINTS, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints,
+};
 use super::ray_group::RayGroup;
 use super::single_rays::{FEW_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
@@ -72,7 +74,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         s: S,
         bounds: &H,
         groups: &mut [RayGroup<S>],
-        (points, relative): (&mut Points, &mut Relative),
+        (points, relative): (&mut ProjectedPoints, &mut RelativePoints),
         leaf: &Leaf<'_, B>,
         mut rays: u64,
     ) -> bool {
@@ -147,7 +149,7 @@ impl<Q: Query> PacketRays<'_, Q> {
     }
 
     /// Intersects the active rays of a group with triangles of a leaf, a bit each, whose points are set in `used`. Returns whether any ray
-    /// has a nearer hit than before. This is a part of a kernel: its parameters are separate so that they stay in registers.
+    /// has a nearer hit than before. This is a part of a kernel and inlined into it: the parameters are variables of its caller.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
     fn enter_group<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
@@ -156,7 +158,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         bounds: &H,
         group: &mut RayGroup<S>,
         at: usize,
-        (points, relative, spread): (&mut Points, &Relative, [f32; 2]),
+        (points, relative, spread): (&mut ProjectedPoints, &RelativePoints, [f32; 2]),
         leaf: &Leaf<'_, B>,
         cache_indices: &mut [u8; WIDTH],
         (triangles, mut used): (u32, u64),
@@ -185,7 +187,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         let order = group.common.map_or([0, 1, 2], CommonAxis::order);
         // Copies stay in registers; fields of `group` would be loaded for each point.
         let (projection, mixed, is_common) = (group.projection, group.mixed, group.common.is_some());
-        let mut greatest = Greatest { coordinate: s.splat(0.0), depth: s.splat(0.0) };
+        let mut greatest = ProjectedMaxima { coordinate: s.splat(0.0), depth: s.splat(0.0) };
         let rows = [leaf.block.row(order[0]), leaf.block.row(order[1]), leaf.block.row(order[2])];
         while used != 0 {
             let i = used.trailing_zeros() as usize % POINTS;

@@ -1,4 +1,4 @@
-//! Leaves as packets read them: rows of the coordinates of points, and the points of each triangle.
+//! Leaves of both record formats as points and triangles between them.
 
 use super::bounds::PacketBounds;
 use super::points::RelativePoints;
@@ -6,111 +6,106 @@ use crate::intersect::filter::TriangleBlock;
 use crate::simd::Simd;
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 
-/// A leaf and its child code.
+/// A leaf's record and its child code.
 pub(crate) struct Leaf<'a, B> {
     pub(crate) block: &'a B,
     pub(crate) code: u32,
 }
 
-/// The points of a leaf, in object space, and the triangles between them, in either of the leaf's record formats.
+/// A leaf as points and triangles between them.
 pub(crate) trait LeafMesh: TriangleBlock {
-    /// Number of vectors of sixteen points that hold all points.
-    const VECTORS: usize;
-    /// One coordinate of all points.
+    /// Number of rows of sixteen points.
+    const PARTS: usize;
+    /// One coordinate of all points, as stored in the leaf.
     type Row<'a>: Copy
     where
         Self: 'a;
     /// The coordinates of all points along an axis.
     fn row(&self, axis: usize) -> Self::Row<'_>;
     /// The coordinate of a point, whose index is below [`super::points::POINTS`].
-    fn point_coordinate(row: Self::Row<'_>, point: usize) -> f32;
-    /// Indices of the three points of a triangle, below [`super::points::POINTS`].
-    fn corner_points(&self, triangle: usize) -> [usize; 3];
-    /// Stores all points relative to `origin`.
-    fn store_relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints);
-    /// The triangles, as bits, whose corners all lie beyond the same side of the bounds, so that all rays miss them.
-    fn outside<S: Simd, P: PacketBounds<S>>(&self, s: S, bounds: &P) -> u32;
+    fn at(row: Self::Row<'_>, point: usize) -> f32;
+    /// Indices of a triangle's points, below [`super::points::POINTS`].
+    fn points_of(&self, triangle: usize) -> [usize; 3];
+    /// Computes all points relative to an origin.
+    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints);
+    /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays miss them.
+    fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32;
 }
 
-/// The lanes in which three outcodes have a bit in common.
+/// The lanes in which the three words have a bit in common.
 #[inline(always)]
-fn lanes_with_common_bit<S: Simd>(s: S, [a, b, c]: [S::U; 3]) -> u32 {
+fn common<S: Simd>(s: S, [a, b, c]: [S::U; 3]) -> u32 {
     s.mask_bits(s.lt_u(s.splat_u(0), s.and_u(a, s.and_u(b, c))))
 }
 
-/// Loads rows of x, y and z.
+/// Three rows of lanes.
 #[inline(always)]
 fn load<S: Simd>(s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
     [s.load(&rows[0]), s.load(&rows[1]), s.load(&rows[2])]
 }
 
-/// Number of floats in a raw leaf from the first corner's row of an axis to the end of the third corner's row of that axis.
+/// Floats from the begin of the first corner's row of an axis to the end of the third corner's row of that axis.
 const RAW_ROW: usize = 7 * WIDTH;
 
 impl LeafMesh for IndexedLeaf {
-    const VECTORS: usize = 1;
+    const PARTS: usize = 1;
     type Row<'a> = &'a [f32; WIDTH];
     #[inline(always)]
     fn row(&self, axis: usize) -> &[f32; WIDTH] {
         &self.vertex[axis]
     }
     #[inline(always)]
-    fn point_coordinate(row: &[f32; WIDTH], point: usize) -> f32 {
+    fn at(row: &[f32; WIDTH], point: usize) -> f32 {
         row[point % WIDTH]
     }
     #[inline(always)]
-    fn corner_points(&self, triangle: usize) -> [usize; 3] {
-        let triangle = triangle % WIDTH;
+    fn points_of(&self, triangle: usize) -> [usize; 3] {
+        let at = triangle % WIDTH;
         let [a, b, c] = &self.corner;
-        [
-            usize::from(a[triangle]) % WIDTH,
-            usize::from(b[triangle]) % WIDTH,
-            usize::from(c[triangle]) % WIDTH,
-        ]
+        [usize::from(a[at]) % WIDTH, usize::from(b[at]) % WIDTH, usize::from(c[at]) % WIDTH]
     }
     #[inline(always)]
-    fn store_relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
-        points.store(s, 0, load(s, &self.vertex), origin);
+    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
+        points.put(s, 0, load(s, &self.vertex), origin);
     }
     #[inline(always)]
-    fn outside<S: Simd, P: PacketBounds<S>>(&self, s: S, bounds: &P) -> u32 {
-        let outcodes = bounds.outcodes(s, load(s, &self.vertex));
+    fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {
+        let sides = bounds.sides(s, load(s, &self.vertex));
         let [a, b, c] = &self.corner;
-        let [a, b, c] = [s.load_bytes(a), s.load_bytes(b), s.load_bytes(c)];
-        lanes_with_common_bit(s, [s.lookup_u(outcodes, a), s.lookup_u(outcodes, b), s.lookup_u(outcodes, c)])
+        let of = [s.load_bytes(a), s.load_bytes(b), s.load_bytes(c)];
+        common(s, [s.lookup_u(sides, of[0]), s.lookup_u(sides, of[1]), s.lookup_u(sides, of[2])])
     }
 }
 
 impl LeafMesh for RawLeaf {
-    const VECTORS: usize = 3;
+    const PARTS: usize = 3;
     type Row<'a> = &'a [f32; RAW_ROW];
     #[inline(always)]
     fn row(&self, axis: usize) -> &[f32; RAW_ROW] {
         self.corner.as_flattened().as_flattened()[axis * WIDTH..]
             .first_chunk()
-            .expect("a leaf holds the rows up to the third corner")
+            .expect("up to the last corner")
     }
     #[inline(always)]
-    fn point_coordinate(row: &[f32; RAW_ROW], point: usize) -> f32 {
-        // The rows of the two other axes lie between those of consecutive corners.
+    fn at(row: &[f32; RAW_ROW], point: usize) -> f32 {
+        // Between the rows of two corners lie the rows of the other two axes.
         row[(point + point / WIDTH * (2 * WIDTH)).min(RAW_ROW - 1)]
     }
     #[inline(always)]
-    fn corner_points(&self, triangle: usize) -> [usize; 3] {
-        let triangle = triangle % WIDTH;
-        [triangle, WIDTH + triangle, 2 * WIDTH + triangle]
+    fn points_of(&self, triangle: usize) -> [usize; 3] {
+        let at = triangle % WIDTH;
+        [at, WIDTH + at, 2 * WIDTH + at]
     }
     #[inline(always)]
-    fn store_relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
+    fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints) {
         for c in 0..3 {
-            points.store(s, c, load(s, &self.corner[c]), origin);
+            points.put(s, c, load(s, &self.corner[c]), origin);
         }
     }
     #[inline(always)]
-    fn outside<S: Simd, P: PacketBounds<S>>(&self, s: S, bounds: &P) -> u32 {
+    fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32 {
         let [a, b, c] = &self.corner;
-        let outcodes =
-            [bounds.outcodes(s, load(s, a)), bounds.outcodes(s, load(s, b)), bounds.outcodes(s, load(s, c))];
-        lanes_with_common_bit(s, outcodes)
+        let sides = [bounds.sides(s, load(s, a)), bounds.sides(s, load(s, b)), bounds.sides(s, load(s, c))];
+        common(s, sides)
     }
 }

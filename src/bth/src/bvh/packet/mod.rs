@@ -1,10 +1,10 @@
-//! Packets: up to 64 coherent rays that traverse the BVH together, as four groups of sixteen.
+//! Traversal of the BVH by packets: up to 64 coherent rays, in four groups of sixteen lanes.
 //!
-//! [`runs`] finds runs of consecutive rays of a batch that [`coherence`] considers suitable. A packet ([`packet`]) tests boxes
-//! first against bounds of all its rays ([`bounds`]: a [`frustum`], or a [`segment_box`] of short rays) and then against each
-//! group ([`ray_group`]), one ray in a lane. Leaves ([`leaf`], [`leaf_mesh`], [`points`]) test one triangle at a time against a
-//! group. Where few rays of a packet remain, each of them is traversed by itself ([`single_rays`]). Hits are evaluated at the end;
-//! rays from one point share the terms that depend only on their origin and the triangle ([`hit_cache`]).
+//! [`runs`] finds coherent rays in a batch, by the measures of [`coherence`]. A packet ([`packet`]) tests boxes first against bounds of
+//! all its rays ([`bounds`]: a [`frustum`], or a [`segment_box`] of short rays), then against each group ([`ray_group`]), and the
+//! triangles of leaves ([`leaf`], [`leaf_mesh`], [`points`], [`projection`]) with one ray in each lane. Where few rays are left, these
+//! are tested one at a time ([`single_rays`]). Hits are computed at the end; for rays from one point the terms that do not depend on
+//! the direction are computed once for each triangle ([`hit_cache`]).
 
 pub(crate) mod bounds;
 pub(crate) mod coherence;

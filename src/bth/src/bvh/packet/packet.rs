@@ -10,7 +10,7 @@ use super::entry::{GROUPS, PACKET, StackEntry};
 use super::hit_cache::{CachedHits, HitCache};
 use super::leaf::PacketRays;
 use super::leaf_mesh::Leaf;
-use super::points::{Points, Relative};
+use super::points::{ProjectedPoints, RelativePoints};
 use super::ray_group::RayGroup;
 use super::single_rays::{FEW_OF_PACKET, SingleRays};
 use crate::bvh::nodes::{Wide, prefetch};
@@ -29,8 +29,8 @@ use std::any::Any;
 #[derive(Debug)]
 pub(crate) struct PacketBuffers {
     stack: Vec<StackEntry>,
-    points: Points,
-    relative: Relative,
+    points: ProjectedPoints,
+    relative: RelativePoints,
     single_rays: SingleRays,
     pub(crate) hit_cache: HitCache,
     /// Terms of the cached triangles for the packet's origin.
@@ -42,8 +42,8 @@ impl Default for PacketBuffers {
     fn default() -> Self {
         PacketBuffers {
             stack: Vec::new(),
-            points: Points::NONE,
-            relative: Relative::NONE,
+            points: ProjectedPoints::NONE,
+            relative: RelativePoints::NONE,
             single_rays: SingleRays::NONE,
             hit_cache: HitCache::NONE,
             origin_terms: OriginTermsLanes::NONE,
@@ -64,12 +64,12 @@ impl GroupStorage {
         if !self.0.as_ref().is_some_and(|groups| groups.is::<[RayGroup<S>; GROUPS]>()) {
             self.0 = Some(Box::new([RayGroup::vacant(s); GROUPS]));
         }
-        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("just made")
+        self.0.as_mut().and_then(|groups| groups.downcast_mut()).expect("the groups have just been made")
     }
 }
 
 /// The state of a packet: its prepared rays, their queries and its memory. One value serves all packets of a batch.
-pub(crate) struct Packets<'a, S: Simd, Q> {
+pub(crate) struct PacketTracer<'a, S: Simd, Q> {
     pub(crate) groups: &'a mut [RayGroup<S>; GROUPS],
     queries: [Q; PACKET],
     pub(crate) buffers: &'a mut PacketBuffers,
@@ -84,7 +84,7 @@ pub(crate) enum PacketOutcome {
     Refused,
 }
 
-impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
+impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
     #[inline(always)]
     pub(crate) fn new(
         object: &ObjectView<'_>,
@@ -97,12 +97,12 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         if buffers.stack.len() < entries {
             buffers.stack.resize(entries, StackEntry::default());
         }
-        Packets { groups, queries: [Q::new(ray); PACKET], buffers }
+        PacketTracer { groups, queries: [Q::new(ray); PACKET], buffers }
     }
 
     /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something.
     ///
-    /// This is one kernel, longer than other functions: code, mask, limit and the top of the stack stay in registers from step to step.
+    /// This is one kernel, longer than other functions: all steps share code, mask, limit and the top of the stack.
     #[inline(always)]
     pub(crate) fn trace<H: PacketBounds<S>>(
         &mut self,
@@ -112,7 +112,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
         rays: &[Ray],
         sink: &mut Sink<'_, Q>,
     ) -> PacketOutcome {
-        let Packets { groups, queries, buffers } = self;
+        let PacketTracer { groups, queries, buffers } = self;
         let PacketBuffers { stack, points, relative, single_rays, hit_cache, origin_terms, intersections } =
             &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
@@ -133,8 +133,9 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
             match Child::from_code(code) {
                 Some(Child::Node(line)) => {
                     let node = object.node(line);
-                    let entries = stack[top..].first_chunk_mut().expect("as many levels as the header says");
-                    top += if H::MIXED && mask.count_ones() <= FEW_OF_PACKET {
+                    let entries =
+                        stack[top..].first_chunk_mut().expect("the BVH is no deeper than its header says");
+                    top += if H::MIXED_OCTANTS && mask.count_ones() <= FEW_OF_PACKET {
                         rays.single_rays.children(s, groups, mask, (line, node), entries)
                     } else {
                         children::<S, H, Q>(s, bounds, groups, mask, (line, node), limit, entries)
@@ -181,7 +182,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
                 code = node.child[entry.slot as usize % WIDTH];
                 prefetch(s, Wide, object.node_base(), code);
                 // The rays are tested against the box only here, because hits since the parent was entered may have shortened them.
-                if !H::MIXED {
+                if !H::MIXED_OCTANTS {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);
                 }
                 if mask != 0 {
@@ -197,7 +198,7 @@ impl<'a, S: Simd, Q: Query> Packets<'a, S, Q> {
 
 /// Writes the stack entries of the children of a node that the bounds of the packet meet before the depth `limit`, the nearest last;
 /// returns their number. Where directions lie in different octants, each entry gets only the rays that may meet its box. The
-/// parameters are separate, because this is a part of the kernel [`Packets::trace`].
+/// parameters are separate, because this is a part of the kernel [`PacketTracer::trace`].
 #[inline(always)]
 fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     s: S,
@@ -219,7 +220,7 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     let mut written = 0;
     for i in 0..count {
         let slot = slot[i];
-        let rays = if H::MIXED { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
+        let rays = if H::MIXED_OCTANTS { rays & meeting(s, bounds, groups, rays, node, slot) } else { rays };
         entries[written % WIDTH] = StackEntry { rays, parent, slot, key: key[i] };
         written += usize::from(rays != 0);
     }
@@ -240,7 +241,7 @@ fn meeting<S: Simd, H: PacketBounds<S>>(
     let mut meets = 0;
     for (i, group) in groups.iter().enumerate() {
         if rays >> (i * LANES) & 0xffff != 0 {
-            let bits = group.meets::<H>(s, corners);
+            let bits = group.may_enter::<H>(s, corners);
             meets |= u64::from(bits) << (i * LANES);
         }
     }

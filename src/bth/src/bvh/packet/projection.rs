@@ -2,41 +2,41 @@
 
 use crate::simd::Simd;
 
-/// The projection of points along sixteen rays, one in a lane, onto the plane of the two axes other than that of the direction's
-/// greatest |component|. Its fields are those of [`TriangleFilter`](crate::intersect::filter::TriangleFilter).
+/// The projection along sixteen rays, one in each lane, onto the plane that is perpendicular to the axis of the direction's greatest
+/// |component|.
 #[derive(Clone, Copy)]
 pub(crate) struct Projection<S: Simd> {
-    /// The rays' origins along the two axes of the plane.
+    /// Origins of the rays in the plane.
     pub(crate) origin: [S::F; 2],
-    /// Change of the plane's coordinates along the ray per unit of depth.
+    /// Slopes of the rays: change of the plane's coordinates per unit of depth.
     pub(crate) shear: [S::F; 2],
-    /// 1 or -1, the sign of the direction along the third axis.
+    /// 1 or -1, the sign of the direction along the third axis; a depth is `forward * z + start`.
     pub(crate) forward: S::F,
     /// Depth of the coordinate 0 along the third axis.
     pub(crate) start: S::F,
 }
 
 impl<S: Simd> Projection<S> {
-    /// Projects a point, given in the axes of the projection, to x, y and depth. x and y are negated, which changes no weight,
-    /// because weights are sums of products of an x and a y.
+    /// Projects a point whose coordinates are in the order of the axes. The two coordinates in the plane are negated, which does not
+    /// change any weight.
     #[inline(always)]
-    pub(crate) fn project(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+    pub(crate) fn of(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         let depth = s.fma(z, self.forward, self.start);
         let (x, y) = (s.sub(self.origin[0], x), s.sub(self.origin[1], y));
         [s.fma(self.shear[0], depth, x), s.fma(self.shear[1], depth, y), depth]
     }
 
-    /// The projection for [`Self::project_relative`]: its `shear` is per unit of the third coordinate instead of depth.
+    /// The projection for points relative to the common origin of the rays: its slopes are per unit of z, not of depth.
     #[inline(always)]
-    pub(crate) fn to_relative(mut self, s: S) -> Self {
+    pub(crate) fn relative(mut self, s: S) -> Self {
         self.shear = [s.mul(self.shear[0], self.forward), s.mul(self.shear[1], self.forward)];
         self
     }
 
-    /// Projects a point that is relative to the common origin of the rays, given in the axes of the projection, to x, y and depth.
-    /// The depth is not used for x and y, so that it need not be computed for the triangles that are excluded without it.
+    /// As [`Self::of`] for a point relative to the common origin. The depth is not used by the other coordinates, because for most
+    /// triangles it is not needed and its computation is removed.
     #[inline(always)]
-    pub(crate) fn project_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
+    pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         [s.fnma(self.shear[0], z, x), s.fnma(self.shear[1], z, y), s.mul(z, self.forward)]
     }
 }

@@ -127,14 +127,14 @@ impl<S: Simd> RayGroup<S> {
         self.mixed = MixedAxes::of(s, [field[4], field[5], field[6]]);
         self.common = self.mixed.common(s);
         // Only the needed fields are stored, because stores limit the speed of preparation.
-        if H::FROM_POINT {
+        if H::COMMON_ORIGIN {
             for k in 0..3 {
                 field[k] = s.splat(rays[0].origin[k]);
             }
-        } else if !H::MIXED {
+        } else if !H::MIXED_OCTANTS {
             self.origin = [field[0], field[1], field[2]];
         }
-        if !H::MIXED {
+        if !H::MIXED_OCTANTS {
             self.direction = [field[4], field[5], field[6]];
         }
         // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
@@ -151,7 +151,7 @@ impl<S: Simd> RayGroup<S> {
     #[inline(always)]
     fn set_prepared<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::PreparedLanes<S>) -> bool {
         self.reciprocal = lanes.reciprocal;
-        if !H::FROM_POINT {
+        if !H::COMMON_ORIGIN {
             self.reach = lanes.reach;
             self.negative = lanes.negative;
             self.near_addend = lanes.near_addend;
@@ -162,7 +162,7 @@ impl<S: Simd> RayGroup<S> {
         self.certain = lanes.certain;
         let prepare::PreparedLanes { origin, shear, forward, start, .. } = lanes;
         (self.projection.shear, self.projection.forward) = (shear, forward);
-        if !H::FROM_POINT {
+        if !H::COMMON_ORIGIN {
             (self.projection.origin, self.projection.start) = (origin, start);
         }
         s.mask_bits(lanes.usable) == 0xffff
@@ -189,17 +189,17 @@ impl<S: Simd> RayGroup<S> {
         }
     }
 
-    /// The rays that may meet a box within their range, a bit each. If all directions lie in one octant ([`PacketBounds::MIXED`] is
+    /// The rays that may meet a box within their range, a bit each. If all directions lie in one octant ([`PacketBounds::MIXED_OCTANTS`] is
     /// false), the corners are that at which rays enter the box and that at which they leave, else the lower and the upper one.
     #[inline(always)]
-    pub(crate) fn meets<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
+    pub(crate) fn may_enter<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
         let (mut enter, mut leave) = (self.first, self.limit);
         for k in 0..3 {
             let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
-            if H::MIXED {
+            if H::MIXED_OCTANTS {
                 (near, far) = (s.select(self.negative[k], far, near), s.select(self.negative[k], near, far));
             }
-            (near, far) = if H::FROM_POINT {
+            (near, far) = if H::COMMON_ORIGIN {
                 (s.mul(near, self.reciprocal[k]), s.mul(far, self.reciprocal[k]))
             } else {
                 (
@@ -228,7 +228,7 @@ impl<S: Simd> RayGroup<S> {
         }
         let uncached = s.eq_u(self.pending, s.splat_u(UNCACHED));
         // For most kernels this is a constant.
-        let kept = if H::FROM_POINT && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
+        let kept = if H::COMMON_ORIGIN && S::HAS_FAST_F64_LOOKUP { cached.hit_cache.kept() } else { 0 };
         if kept > 0 && s.mask_bits(uncached) == 0 {
             cached.compute();
             let (hit_cache, terms) = (&*cached.hit_cache, &*cached.origin_terms);
@@ -248,7 +248,7 @@ impl<S: Simd> RayGroup<S> {
         let (hit_cache, ids) = (&*cached.hit_cache, cached.ids);
         let mut pairs = Pairs::NONE;
         for k in 0..3 {
-            let origin = if H::FROM_POINT { s.splat(cached.origin[k]) } else { self.origin[k] };
+            let origin = if H::COMMON_ORIGIN { s.splat(cached.origin[k]) } else { self.origin[k] };
             s.store(origin, &mut pairs.origin[k]);
             s.store(self.direction[k], &mut pairs.direction[k]);
             for c in 0..3 {

@@ -2,10 +2,10 @@
 //! part in each step.
 
 use super::bounds::PacketBounds;
-use super::coherence::{Guard, Span, is_same_octant};
+use super::coherence::{PacketBackoff, Span, is_same_octant};
 use super::entry::PACKET;
 use super::frustum::Frustum;
-use super::packet::{GroupStorage, PacketBuffers, PacketOutcome, Packets};
+use super::packet::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
 use super::segment_box::SegmentBox;
 use crate::query::Query;
 use crate::query::sink::Sink;
@@ -76,10 +76,17 @@ pub(crate) fn trace<S: Simd, Q: Query>(
     let bounds = object.bounds;
     let PacketScratch { groups, buffers, rest } = scratch;
     rest.clear();
-    let mut runs = Runs { bounds: &bounds, rays, next: 0, coherent: Guard::new(), short: Guard::new(), rest };
+    let mut runs = Runs {
+        bounds: &bounds,
+        rays,
+        next: 0,
+        coherent: PacketBackoff::new(),
+        short: PacketBackoff::new(),
+        rest,
+    };
     // The first run is found before the loop, so that `packets` is made in its final place, and only if there are any.
     let Some(mut run) = runs.next::<S, Q>(s) else { return count };
-    let mut packets = Packets::<S, Q>::new(object, groups.of(s), buffers, &rays[0]);
+    let mut packets = PacketTracer::<S, Q>::new(object, groups.of(s), buffers, &rays[0]);
     loop {
         let (first, rays) = (run.first, run.rays);
         // The next rays are in the cache when this packet is done.
@@ -88,7 +95,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             s.prefetch(next.wrapping_add(line * RAYS_PER_CACHE_LINE));
         }
         let sink = &mut sink.part(first);
-        let (outcome, guard, least_use, kind) = match run.kind {
+        let (outcome, backoff, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
                 // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
                 let outcome = if !Q::ANY && span.is_from_point() {
@@ -114,7 +121,7 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         match outcome {
             PacketOutcome::Refused => runs.skip(first, rays.len()),
             PacketOutcome::Lanes(share) => {
-                guard.record(share >= least_use);
+                backoff.record(share >= least_use);
                 count.rays += rays.len();
                 *kind += 1;
                 count.poor += usize::from(share < least_use);
@@ -148,8 +155,8 @@ struct Runs<'a, 'b> {
     rays: &'a [Ray],
     /// Index of the next ray.
     next: usize,
-    coherent: Guard,
-    short: Guard,
+    coherent: PacketBackoff,
+    short: PacketBackoff,
     /// Indices of the rays that are not in a packet.
     rest: &'b mut Vec<u32>,
 }
@@ -182,14 +189,14 @@ fn choose<S: Simd, Q: Query>(
     s: S,
     bounds: &ObjectBounds,
     rays: &[Ray],
-    coherent: &mut Guard,
-    short: &mut Guard,
+    coherent: &mut PacketBackoff,
+    short: &mut PacketBackoff,
 ) -> Option<Kind> {
     if rays.len() < MIN_RAYS {
         return None;
     }
-    let try_coherent = coherent.is_open() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
-    let try_short = Q::ANY && short.is_open();
+    let try_coherent = coherent.may_try() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
+    let try_short = Q::ANY && short.may_try();
     if !try_coherent && !try_short {
         return None;
     }
@@ -210,7 +217,7 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     object: &ObjectView<'_>,
     bounds: &ObjectBounds,
     span: &Span,
-    packets: &mut Packets<'_, S, Q>,
+    packets: &mut PacketTracer<'_, S, Q>,
     rays: &[Ray],
     sink: &mut Sink<'_, Q>,
 ) -> PacketOutcome {
@@ -227,7 +234,7 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
 fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
     s: S,
     bounds: &ObjectBounds,
-    packets: &mut Packets<'_, S, Q>,
+    packets: &mut PacketTracer<'_, S, Q>,
     rays: &[Ray],
 ) -> bool {
     let mut ready = true;

@@ -40,7 +40,7 @@ impl<S: Simd> PacketBounds<S> for SegmentBox<S> {
     }
 
     #[inline(always)]
-    fn outcodes(&self, s: S, rows: [S::F; 3]) -> S::U {
+    fn sides(&self, s: S, rows: [S::F; 3]) -> S::U {
         let mut out = s.splat_u(0);
         for k in 0..3 {
             let (above, below) = (s.lt(self.upper[k], rows[k]), s.lt(rows[k], self.lower[k]));

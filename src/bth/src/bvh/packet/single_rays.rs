@@ -68,7 +68,7 @@ impl SingleRays {
         (at, lane): (usize, usize),
         block: &impl TriangleBlock,
     ) -> Candidates<S> {
-        self.convert(s, group, at, H::MIXED);
+        self.convert(s, group, at, H::MIXED_OCTANTS);
         let [first, last] = &self.depths[at % GROUPS];
         self.prepared(at, lane).filter.candidates(s, block, first[lane % LANES], last[lane % LANES])
     }

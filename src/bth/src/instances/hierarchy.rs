@@ -1,6 +1,7 @@
-//! The transforms of the nodes at a time. An update evaluates the tracks and then the hierarchy from the roots, only where nodes moved.
+//! The node hierarchy and the transforms of its nodes at a time. An update evaluates the animation tracks and multiplies the
+//! transforms from the roots down, for the nodes that moved only.
 //!
-//! Values of tracks are not stored. Whether a node moved follows from the keys around the old and the new time.
+//! Values of tracks are not stored: whether a node moved follows from the keys around the old and the new time.
 
 use super::affine::Affine;
 use super::tracks;
@@ -12,9 +13,9 @@ const MOVED: u8 = 1;
 /// Bit of a node's state: it or an ancestor is hidden.
 const HIDDEN: u8 = 2;
 
-/// The hierarchy of nodes at a time.
+/// The node hierarchy at a time.
 #[derive(Debug)]
-pub(crate) struct Pose {
+pub(crate) struct NodeHierarchy {
     /// Time of the last update; NaN before the first.
     seconds: f64,
     /// For each node [`MOVED`] and [`HIDDEN`].
@@ -22,14 +23,14 @@ pub(crate) struct Pose {
     /// The nodes with children, ascending. Only their transforms are stored.
     parents: Vec<u32>,
     /// For each node of `parents` its transform to world space.
-    world: Vec<Affine>,
+    to_world: Vec<Affine>,
     /// For each node the index of its first track, with a further element at the end; empty without tracks.
     first_track: Vec<u32>,
 }
 
-impl Pose {
+impl NodeHierarchy {
     /// The hierarchy of a checked scene, before the first update.
-    pub(crate) fn new(view: &SceneView<'_>) -> Pose {
+    pub(crate) fn new(view: &SceneView<'_>) -> NodeHierarchy {
         let mut parents: Vec<u32> = view.nodes.iter().map(|n| n.parent).filter(|p| *p != NONE).collect();
         parents.sort_unstable();
         parents.dedup();
@@ -40,38 +41,40 @@ impl Pose {
             let first = |node: usize| view.tracks.partition_point(|t| (t.node as usize) < node) as u32;
             (0..=view.nodes.len()).map(first).collect()
         };
-        Pose {
+        NodeHierarchy {
             seconds: f64::NAN,
             state: vec![0; view.nodes.len()],
-            world: vec![Affine::IDENTITY; parents.len()],
+            to_world: vec![Affine::IDENTITY; parents.len()],
             parents,
             first_track,
         }
     }
 
-    /// Moves to a time; returns how many nodes moved, were hidden or became visible. With `all` every node counts.
+    /// Sets the time in seconds, and returns the number of nodes that moved, were hidden or became visible. With `all`, all nodes
+    /// are evaluated and counted.
     pub(crate) fn update(&mut self, view: &SceneView<'_>, seconds: f64, all: bool) -> usize {
-        let before = std::mem::replace(&mut self.seconds, seconds);
-        let (mut moved, mut parent_rows) = (0, 0);
+        let previous = std::mem::replace(&mut self.seconds, seconds);
+        let (mut moved, mut next_parent_row) = (0, 0);
         for row in 0..view.nodes.len() {
-            let is_parent = self.parents.get(parent_rows) == Some(&(row as u32));
-            let world_row = parent_rows;
-            parent_rows += usize::from(is_parent);
-            let changed = !all && self.differs(view, row, before);
+            let is_parent = self.parents.get(next_parent_row) == Some(&(row as u32));
+            let parent_row = next_parent_row;
+            next_parent_row += usize::from(is_parent);
+            let changed = !all && self.differs(view, row, previous);
             let node = &view.nodes[row];
-            let above = match node.parent {
+            let parent_state = match node.parent {
                 NONE => 0,
                 parent => self.state[parent as usize],
             };
-            if !(all || changed || above & MOVED != 0) {
+            if !(all || changed || parent_state & MOVED != 0) {
                 self.state[row] &= HIDDEN;
                 continue;
             }
             moved += 1;
-            let hidden = above & HIDDEN != 0 || !self.is_visible(view, row as u32);
+            let hidden = parent_state & HIDDEN != 0 || !self.is_visible(view, row as u32);
             self.state[row] = MOVED | if hidden { HIDDEN } else { 0 };
             if is_parent {
-                self.world[world_row] = self.below(view, node.parent, &self.local(view, row as u32));
+                self.to_world[parent_row] =
+                    self.child_to_world(view, node.parent, &self.local(view, row as u32));
             }
         }
         moved
@@ -88,10 +91,10 @@ impl Pose {
     }
 
     /// The transform from a node's space to world space.
-    pub(crate) fn world(&self, view: &SceneView<'_>, node: u32) -> Affine {
+    pub(crate) fn to_world(&self, view: &SceneView<'_>, node: u32) -> Affine {
         match self.parents.binary_search(&node) {
-            Ok(row) => self.world[row],
-            Err(_) => self.below(view, view.nodes[node as usize].parent, &self.local(view, node)),
+            Ok(row) => self.to_world[row],
+            Err(_) => self.child_to_world(view, view.nodes[node as usize].parent, &self.local(view, node)),
         }
     }
 
@@ -99,13 +102,13 @@ impl Pose {
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.state.as_slice())
             + size_of_val(self.parents.as_slice())
-            + size_of_val(self.world.as_slice())
+            + size_of_val(self.to_world.as_slice())
             + size_of_val(self.first_track.as_slice())
     }
 
     /// The transform to world space of a child of `parent`, given its transform to the parent's space.
-    fn below(&self, view: &SceneView<'_>, parent: u32, local: &Affine) -> Affine {
-        if parent == NONE { *local } else { self.world(view, parent).times(local) }
+    fn child_to_world(&self, view: &SceneView<'_>, parent: u32, local: &Affine) -> Affine {
+        if parent == NONE { *local } else { self.to_world(view, parent).times(local) }
     }
 
     /// Indices of the tracks of a node.
@@ -116,9 +119,9 @@ impl Pose {
         }
     }
 
-    /// Whether a track of a node may have another value than at the time `before`.
-    fn differs(&self, view: &SceneView<'_>, node: usize, before: f64) -> bool {
-        self.tracks_of(node).any(|i| tracks::differs(view, &view.tracks[i], before, self.seconds))
+    /// Whether a track of a node may have another value than at the time `previous`.
+    fn differs(&self, view: &SceneView<'_>, node: usize, previous: f64) -> bool {
+        self.tracks_of(node).any(|i| tracks::differs(view, &view.tracks[i], previous, self.seconds))
     }
 
     /// The transform from a node's space to its parent's, with the values of the node's tracks.
@@ -150,12 +153,12 @@ impl Pose {
     /// Whether a node is visible by its flag or its track of visibility, and its scale is not zero.
     fn is_visible(&self, view: &SceneView<'_>, row: u32) -> bool {
         let node = &view.nodes[row as usize];
-        let of = |property: Property| {
+        let value_of = |property: Property| {
             let mut tracks = self.tracks_of(row as usize).map(|i| &view.tracks[i]);
             let track = tracks.find(|track| track.property == property as u32)?;
             Some(tracks::value(view, track, self.seconds))
         };
-        let visible = match of(Property::Visible) {
+        let visible = match value_of(Property::Visible) {
             Some(value) => value[0] != 0.0,
             None => node.flags & NODE_HIDDEN == 0,
         };
@@ -164,7 +167,7 @@ impl Pose {
                 !Affine::of_matrix(node).is_zero()
             } else {
                 let scale = [node.transform[7], node.transform[8], node.transform[9]];
-                let scale = of(Property::Scale).map_or(scale, |value| [value[0], value[1], value[2]]);
+                let scale = value_of(Property::Scale).map_or(scale, |value| [value[0], value[1], value[2]]);
                 !scale.contains(&0.0)
             }
     }

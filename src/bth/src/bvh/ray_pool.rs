@@ -19,16 +19,16 @@ const MIN_INNER: u8 = (POOL_SIZE / 4) as u8;
 
 /// Slots of rays with the same kind of next step. Indices are `u8`, so the length 256 makes bounds checks unnecessary; at most
 /// POOL_SIZE + 1 entries are used.
-type List = [u8; 256];
+type StepList = [u8; 256];
 
 /// The slots of the pool by the kind of their ray's next step.
 struct StepLists {
     /// The next step enters an inner node.
-    inner: List,
+    inner: StepList,
     /// The next step enters a leaf.
-    leaf: List,
+    leaf: StepList,
     /// The top of the stack is [`BOTTOM`], or the code of an empty child of a node.
-    bottom: List,
+    bottom: StepList,
 }
 
 /// Lengths of the three [`StepLists`], a byte each. Loops work on a copy, which stays in a register.

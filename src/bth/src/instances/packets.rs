@@ -8,7 +8,7 @@ use super::top_level::{INSTANCE, TopLevel};
 use super::traverse::limit;
 use crate::bvh::packet::bounds::PacketBounds;
 use crate::bvh::packet::coherence::{PacketBackoff, Span, is_same_octant};
-use crate::bvh::packet::entry::PACKET;
+use crate::bvh::packet::entry::{GROUPS, MIN_RAYS, PACKET};
 use crate::bvh::packet::frustum::Frustum;
 use crate::bvh::packet::ray_group::RayGroup;
 use crate::bvh::stack::BOTTOM;
@@ -17,10 +17,6 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectBounds;
 
-/// Groups of sixteen rays in a packet.
-const GROUPS: usize = PACKET / LANES;
-/// Least number of rays of a packet.
-const MIN_RAYS: usize = 2 * LANES;
 /// Greatest number of instances that a packet lists.
 const MAX_INSTANCES: usize = 64;
 /// Entries of the stack of nodes; rays that need more are not traced as a packet.

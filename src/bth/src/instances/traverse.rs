@@ -200,18 +200,18 @@ impl RayTraversals {
 /// The rays of a block, by their slot in it.
 struct RayBlock {
     /// Slots of the rays that have an inner node on top of their stack.
-    inner: List,
+    inner: SlotList,
     /// For each slot the code on top of the stack. A ray stops at the code of an instance or at [`BOTTOM`].
     code: [u32; BLOCK],
 }
 
 /// A list of slots.
-struct List {
+struct SlotList {
     slot: [u8; 2 * BLOCK],
     len: u8,
 }
 
-impl List {
+impl SlotList {
     #[inline(always)]
     fn get(&self, i: u8) -> usize {
         usize::from(self.slot[usize::from(i) % (2 * BLOCK)]) % BLOCK
@@ -225,7 +225,7 @@ impl List {
 
 impl RayBlock {
     fn new() -> Self {
-        let inner = List { slot: [0; 2 * BLOCK], len: 0 };
+        let inner = SlotList { slot: [0; 2 * BLOCK], len: 0 };
         RayBlock { inner, code: [BOTTOM; BLOCK] }
     }
 

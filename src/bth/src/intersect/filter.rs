@@ -27,9 +27,9 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 const _: () = assert!(WIDTH == LANES);
 
 /// 8u = 2^-21: bounds the error δ of a sheared coordinate relative to the reach r.
-pub(crate) const PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
+pub(crate) const F32_PROJECTION_ERROR: f64 = 8.0 / (1 << 24) as f64;
 /// 8δ/r, a little enlarged to cover the roundings of the bounds that are computed from it.
-pub(crate) const ERROR_SLOPE: f32 = 8.01 * PROJECTION_ERROR as f32;
+pub(crate) const ERROR_SLOPE: f32 = 8.01 * F32_PROJECTION_ERROR as f32;
 /// From this reach on, products of weights and depths could overflow: all triangles are candidates then.
 const MAX_REACH: f64 = (1u64 << 40) as f64;
 /// Slack of depths relative to the greatest |depth|: twice the bound of their roundings.
@@ -286,7 +286,7 @@ pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
 #[inline(always)]
 pub(crate) fn error<S: Simd>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
     let reach = s.add(l1_norm, greatest_depth);
-    const DELTA: f32 = PROJECTION_ERROR as f32;
+    const DELTA: f32 = F32_PROJECTION_ERROR as f32;
     // A little more than 4, to cover the roundings of δ itself.
     s.fma(s.mul(reach, s.splat(4.001 * DELTA)), s.fma(reach, s.splat(DELTA), l1_norm), floor)
 }

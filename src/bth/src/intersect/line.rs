@@ -12,7 +12,7 @@ use crate::rays::Ray;
 pub(crate) const RATIO_ERROR: f64 = 1.0 / (1u64 << 28) as f64;
 /// 8u with u = 2^-53: bounds the error of a projected coordinate relative to the greatest |coordinate| of the point relative to
 /// the ray's origin; see [`Line::project`].
-pub(crate) const PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
+pub(crate) const F64_PROJECTION_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// The line of a ray in the ray's space, with the constants of its projection.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +106,7 @@ impl Line {
     /// exceed `reach`.
     #[inline(always)]
     pub(crate) fn projection_error(reach: f64) -> f64 {
-        PROJECTION_ERROR * reach
+        F64_PROJECTION_ERROR * reach
     }
 
     /// Greatest |coordinate| of any point of a box relative to the origin.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Environment variable with the default: `measured`, `bvh` or `tets`.
-const VARIABLE: &str = "BTH_HINTS";
+const HINTS_VARIABLE: &str = "BTH_HINTS";
 
 /// How batches use hints where a file has tetrahedra and a BVH over the same triangles. Answers have the same bits in all cases; this
 /// is for measurements and tests.
@@ -20,7 +20,7 @@ pub enum Hinted {
 }
 
 /// 0 if nothing is chosen yet, else the index in `ALL` plus one.
-static CHOSEN: AtomicU8 = AtomicU8::new(0);
+static CHOSEN_HINTS: AtomicU8 = AtomicU8::new(0);
 
 impl Hinted {
     const ALL: [(Hinted, &str); 3] =
@@ -28,15 +28,15 @@ impl Hinted {
 
     /// Sets how all later batches of this process use hints.
     pub fn choose(self) {
-        CHOSEN.store(self as u8 + 1, Ordering::Relaxed);
+        CHOSEN_HINTS.store(self as u8 + 1, Ordering::Relaxed);
     }
 
     /// The value set by [`Self::choose`], else the one that the environment variable `BTH_HINTS` names, else
     /// [`Hinted::Measured`].
     pub fn chosen() -> Hinted {
-        match CHOSEN.load(Ordering::Relaxed) {
+        match CHOSEN_HINTS.load(Ordering::Relaxed) {
             0 => {
-                let named = std::env::var(VARIABLE).ok().and_then(|name| name.parse().ok());
+                let named = std::env::var(HINTS_VARIABLE).ok().and_then(|name| name.parse().ok());
                 let hinted: Hinted = named.unwrap_or_default();
                 // Two threads that arrive here at once store the same value.
                 hinted.choose();

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Environment variable with the name of the instruction set to use in place of the best: `scalar`, `avx2` or `avx512`.
-const VARIABLE: &str = "BTH_ISA";
+const ISA_VARIABLE: &str = "BTH_ISA";
 
 /// An instruction set for which kernels are compiled. Answers have the same bits on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,7 +64,7 @@ impl FromStr for Isa {
 }
 
 /// 0 as long as none is chosen, else the index in [`Isa::ALL`] plus one.
-static CHOSEN: AtomicU8 = AtomicU8::new(0);
+static CHOSEN_ISA: AtomicU8 = AtomicU8::new(0);
 const SCALAR: u8 = Isa::Scalar as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
@@ -103,7 +103,7 @@ impl Isa {
         if !self.is_available() {
             return Err(IsaError::Missing(self));
         }
-        CHOSEN.store(self as u8 + 1, Ordering::Relaxed);
+        CHOSEN_ISA.store(self as u8 + 1, Ordering::Relaxed);
         Ok(())
     }
 
@@ -111,7 +111,7 @@ impl Isa {
     /// variable `BTH_ISA` if this machine has it, else the best.
     #[inline]
     pub fn chosen() -> Isa {
-        match CHOSEN.load(Ordering::Relaxed) {
+        match CHOSEN_ISA.load(Ordering::Relaxed) {
             0 => Isa::choose_first(),
             SCALAR => Isa::Scalar,
             AVX2 => Isa::Avx2,
@@ -123,7 +123,7 @@ impl Isa {
     fn choose_first() -> Isa {
         let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
         // Threads that run this concurrently store the same value.
-        CHOSEN.store(isa as u8 + 1, Ordering::Relaxed);
+        CHOSEN_ISA.store(isa as u8 + 1, Ordering::Relaxed);
         isa
     }
 
@@ -133,7 +133,9 @@ impl Isa {
     /// # Errors
     /// [`IsaError`] if the value names no instruction set, or one that this machine does not have.
     pub fn from_environment() -> Result<Option<Isa>, IsaError> {
-        let Some(name) = std::env::var_os(VARIABLE).filter(|name| !name.is_empty()) else { return Ok(None) };
+        let Some(name) = std::env::var_os(ISA_VARIABLE).filter(|name| !name.is_empty()) else {
+            return Ok(None);
+        };
         let isa: Isa = name.to_string_lossy().parse()?;
         if isa.is_available() { Ok(Some(isa)) } else { Err(IsaError::Missing(isa)) }
     }

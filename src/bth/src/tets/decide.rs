@@ -16,7 +16,7 @@ use bth_format::layout::{FACE_BIT, NONE, TetFace};
 /// A ray that returns to the lanes more often is walked to its end in f64.
 const MAX_RETURNS: u8 = 16;
 /// Slack of bounds of t, relative to them: more than all roundings together.
-const SLACK: f64 = 1.0 / (1 << 20) as f64;
+const T_BOUND_SLACK: f64 = 1.0 / (1 << 20) as f64;
 
 impl<Q: Query + Copy> WalkBatch<'_, Q> {
     /// The line of a ray that is prepared for lanes.
@@ -156,8 +156,10 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
         let per_t = self.rays[slot as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));
         // Depths have a relative error of 2^-24, and the t of a hit is rounded once more.
-        let (low, high) =
-            (least * (1.0 - SLACK.copysign(least)), greatest * (1.0 + SLACK.copysign(greatest)));
+        let (low, high) = (
+            least * (1.0 - T_BOUND_SLACK.copysign(least)),
+            greatest * (1.0 + T_BOUND_SLACK.copysign(greatest)),
+        );
         if self.queries[slot as usize].offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
             return self.finish(slot, WalkOutcome::Done);
         }

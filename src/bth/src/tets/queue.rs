@@ -15,42 +15,42 @@ const GREATEST_DIRECTION: f32 = (1u64 << 40) as f32;
 /// Least value of a direction's greatest |component|.
 const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 /// Slack of comparisons of depths with bounds of t, relative to the depth: more than all roundings together.
-const SLACK: f32 = 1.0 / (1 << 20) as f32;
+const LANE_DEPTH_SLACK: f32 = 1.0 / (1 << 20) as f32;
 /// The slack of depths near 0: more than the least positive f32 times the greatest direction.
-const LEAST_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
+const LEAST_DEPTH_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
 /// Products of three lengths up to this value, 2^40, do not overflow.
 const GREATEST_REACH: f32 = GREATEST_DIRECTION;
 /// Bound of the amount that underflow removes from such products, 2^-120.
 const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
 
 /// Greatest number of queued rays.
-const CAPACITY: usize = 4 * LANES;
+const QUEUE_CAPACITY: usize = 4 * LANES;
 
 /// Queue of prepared rays: a row for each field of [`Lanes`], read at `first` and written at `end`.
 pub(super) struct ReadyQueue {
-    words: [[u32; CAPACITY + LANES]; word::COUNT],
-    floats: [[f32; CAPACITY + LANES]; float::COUNT],
+    words: [[u32; QUEUE_CAPACITY + LANES]; word::COUNT],
+    floats: [[f32; QUEUE_CAPACITY + LANES]; float::COUNT],
     first: usize,
     end: usize,
 }
 
 /// The sixteen elements of a row from `at` on.
 #[inline(always)]
-fn sixteen<T>(row: &[T; CAPACITY + LANES], at: usize) -> &[T; LANES] {
+fn sixteen<T>(row: &[T; QUEUE_CAPACITY + LANES], at: usize) -> &[T; LANES] {
     row[at..].first_chunk().expect("rows have sixteen elements to spare")
 }
 
 /// The sixteen elements of a row from `at` on.
 #[inline(always)]
-fn sixteen_mut<T>(row: &mut [T; CAPACITY + LANES], at: usize) -> &mut [T; LANES] {
+fn sixteen_mut<T>(row: &mut [T; QUEUE_CAPACITY + LANES], at: usize) -> &mut [T; LANES] {
     row[at..].first_chunk_mut().expect("rows have sixteen elements to spare")
 }
 
 impl ReadyQueue {
     pub(super) fn new() -> Self {
         ReadyQueue {
-            words: [[0; CAPACITY + LANES]; word::COUNT],
-            floats: [[0.0; CAPACITY + LANES]; float::COUNT],
+            words: [[0; QUEUE_CAPACITY + LANES]; word::COUNT],
+            floats: [[0.0; QUEUE_CAPACITY + LANES]; float::COUNT],
             first: 0,
             end: 0,
         }
@@ -68,7 +68,7 @@ impl ReadyQueue {
 
     /// Whether sixteen more rays can be pushed.
     pub(super) fn has_space(&self) -> bool {
-        self.end + LANES <= CAPACITY
+        self.end + LANES <= QUEUE_CAPACITY
     }
 
     /// Appends the lanes whose bit is set.
@@ -108,7 +108,7 @@ impl ReadyQueue {
 /// The slack of a depth.
 #[inline(always)]
 fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
-    s.fma(s.abs(depth), s.splat(SLACK), s.splat(LEAST_SLACK))
+    s.fma(s.abs(depth), s.splat(LANE_DEPTH_SLACK), s.splat(LEAST_DEPTH_SLACK))
 }
 
 /// Sixteen rays, prepared for projection, and the projections of the faces that they enter through.
@@ -266,7 +266,7 @@ impl<S: Simd> Ready<S> {
         for p in &corner {
             farthest = s.max(s.abs(p.depth), farthest);
         }
-        let doubt = s.fma(area, s.splat(SLACK), s.mul(bound, s.splat(6.0)));
+        let doubt = s.fma(area, s.splat(LANE_DEPTH_SLACK), s.mul(bound, s.splat(6.0)));
         let behind = s.lt(s.fma(doubt, farthest, s.add(volume, s.splat(LEAST_VOLUME))), s.mul(low, area));
         let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
         let able = s.and(s.or(up, down), s.and(behind, near));

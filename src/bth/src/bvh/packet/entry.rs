@@ -6,6 +6,8 @@ use crate::simd::LANES;
 pub(crate) const GROUPS: usize = 4;
 /// Greatest number of rays in a packet.
 pub(crate) const PACKET: usize = GROUPS * LANES;
+/// Least number of rays of a packet.
+pub(crate) const MIN_RAYS: usize = 2 * LANES;
 
 /// A stacked child.
 #[derive(Clone, Copy, Debug, Default)]

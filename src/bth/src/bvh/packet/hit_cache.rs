@@ -10,9 +10,9 @@ use crate::intersect::filter::TriangleBlock;
 use crate::simd::{LANES, Simd};
 
 /// Greatest number of cached triangles.
-pub(crate) const CAPACITY: usize = LANES;
+pub(crate) const CACHED_TRIANGLES: usize = LANES;
 /// In place of the index of a triangle that is not in the cache; each ray that hits it stores it.
-pub(crate) const UNCACHED: u32 = CAPACITY as u32;
+pub(crate) const UNCACHED: u32 = CACHED_TRIANGLES as u32;
 
 /// The cached triangles of a packet.
 #[derive(Clone, Copy, Debug)]
@@ -21,13 +21,13 @@ pub(crate) struct HitCache {
     /// Corners of the triangles: `[corner][axis]`.
     pub(crate) corner: [[F32Lanes; 3]; 3],
     /// Indices of the triangles in leaf order.
-    pub(crate) index: [u32; CAPACITY],
+    pub(crate) index: [u32; CACHED_TRIANGLES],
     /// Ids of the triangles.
-    pub(crate) id: [u32; CAPACITY],
+    pub(crate) id: [u32; CACHED_TRIANGLES],
     /// Child codes of their leaves.
-    leaf: [u32; CAPACITY],
+    leaf: [u32; CACHED_TRIANGLES],
     /// Indices of the triangles in their leaves.
-    triangle: [u32; CAPACITY],
+    triangle: [u32; CACHED_TRIANGLES],
     /// Number of triangles of pending hits, cached or not.
     count: usize,
     /// Number of triangles that may be cached: 0 if the rays have different origins, or if the previous packet had too many.
@@ -38,11 +38,11 @@ pub(crate) struct HitCache {
 
 impl HitCache {
     pub(crate) const NONE: HitCache = HitCache {
-        corner: [[[0.0; CAPACITY]; 3]; 3],
-        index: [0; CAPACITY],
-        id: [0; CAPACITY],
-        leaf: [0; CAPACITY],
-        triangle: [0; CAPACITY],
+        corner: [[[0.0; CACHED_TRIANGLES]; 3]; 3],
+        index: [0; CACHED_TRIANGLES],
+        id: [0; CACHED_TRIANGLES],
+        leaf: [0; CACHED_TRIANGLES],
+        triangle: [0; CACHED_TRIANGLES],
         count: 0,
         capacity: 0,
         is_computed: false,
@@ -51,8 +51,11 @@ impl HitCache {
     /// Empties the cache.
     #[inline(always)]
     pub(crate) fn clear<S: Simd>(&mut self, _: S, from_point: bool) {
-        self.capacity =
-            if S::HAS_FAST_F64_LOOKUP && from_point && self.count <= CAPACITY { CAPACITY } else { 0 };
+        self.capacity = if S::HAS_FAST_F64_LOOKUP && from_point && self.count <= CACHED_TRIANGLES {
+            CACHED_TRIANGLES
+        } else {
+            0
+        };
         self.count = 0;
         self.is_computed = false;
     }
@@ -66,7 +69,7 @@ impl HitCache {
     /// Whether the triangles fill at most half of the cache.
     #[inline(always)]
     pub(crate) fn is_at_most_half_full(&self) -> bool {
-        self.count <= CAPACITY / 2
+        self.count <= CACHED_TRIANGLES / 2
     }
 
     /// Adds a triangle of a leaf; returns its index, or [`UNCACHED`] if the cache is full.
@@ -74,7 +77,7 @@ impl HitCache {
     pub(crate) fn add<B: TriangleBlock>(&mut self, leaf: &Leaf<'_, B>, triangle: u32) -> u32 {
         let at = self.count;
         self.count += 1;
-        if at >= self.capacity.min(CAPACITY) {
+        if at >= self.capacity.min(CACHED_TRIANGLES) {
             return UNCACHED;
         }
         for c in 0..3 {
@@ -90,7 +93,7 @@ impl HitCache {
     /// A cached triangle as a candidate.
     #[inline(always)]
     pub(crate) fn candidate(&self, index: u32) -> Candidate {
-        let at = index as usize % CAPACITY;
+        let at = index as usize % CACHED_TRIANGLES;
         Candidate { leaf: self.leaf[at], triangle: self.triangle[at] }
     }
 }
@@ -112,7 +115,7 @@ impl CachedHits<'_> {
             return;
         }
         self.hit_cache.is_computed = true;
-        for i in 0..self.hit_cache.kept().min(CAPACITY) {
+        for i in 0..self.hit_cache.kept().min(CACHED_TRIANGLES) {
             self.hit_cache.id[i] = self.ids[self.hit_cache.index[i] as usize];
         }
         self.origin_terms.compute(self.origin, &self.hit_cache.corner, self.hit_cache.kept());

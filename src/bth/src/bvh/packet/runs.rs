@@ -3,7 +3,7 @@
 
 use super::bounds::PacketBounds;
 use super::coherence::{PacketBackoff, Span, is_same_octant};
-use super::entry::PACKET;
+use super::entry::{MIN_RAYS, PACKET};
 use super::frustum::Frustum;
 use super::packet::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
 use super::segment_box::SegmentBox;
@@ -17,8 +17,6 @@ use bth_format::object::ObjectView;
 
 /// Rays in a cache line.
 const RAYS_PER_CACHE_LINE: usize = 64 / size_of::<Ray>();
-/// Least number of rays of a packet.
-const MIN_RAYS: usize = 2 * LANES;
 
 /// The least average share of a packet's rays, in per cent, that must take part in a step. Below it single rays are faster.
 #[derive(Clone, Copy, Debug)]

@@ -1,171 +1,23 @@
 //! Tests that packets give the same bits as single rays with every instruction set, over a surface of triangles with shared edges.
 
+mod height_field;
+
+use self::height_field::HeightField;
 use crate::bvh::packet::runs::{self as packets, MINIMUM_USE, MinimumUse, PacketCount, PacketScratch};
 use crate::object::single;
 use crate::query::sink::Sink;
 use crate::query::{Any, Nearest, Query};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use bth_format::layout::{
-    CacheLine, Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, NONE, Object, RAW_LINES, RawLeaf,
-};
-use bth_format::layout::{WIDTH, WideNode};
-use bth_format::object::ObjectBounds;
-use bth_format::object::{ObjectView, Records};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
 use bth_random::Rng;
-use zerocopy::{FromZeros, IntoBytes};
-
-/// Number of quads of the surface along x and y, and of quads of a leaf.
-const QUADS: [usize; 2] = [32, 64];
-const BLOCK: [usize; 2] = [2, 4];
-
-/// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
-struct Surface {
-    header: Object,
-    lines: Vec<CacheLine>,
-    ids: Vec<u32>,
-    /// Points of the surface.
-    points: Vec<[f32; 3]>,
-}
 
 /// Packets are made of all coherent rays, however few take part in a step.
 const ALWAYS: MinimumUse = MinimumUse { coherent: 0, short: 0 };
 
-/// Appends a block to the lines; returns the index of its first line.
-fn append(lines: &mut Vec<CacheLine>, block: &[u8]) -> u32 {
-    let line = lines.len() as u32;
-    lines.resize(lines.len() + block.len() / 64, CacheLine([0; 16]));
-    lines[line as usize..].as_mut_bytes().copy_from_slice(block);
-    line
-}
-
-fn bounds(points: &[[f32; 3]]) -> [[f32; 3]; 2] {
-    let end = |k: usize, pick: fn(f32, f32) -> f32| points.iter().map(|p| p[k]).reduce(pick).unwrap();
-    [[0, 1, 2].map(|k| end(k, f32::min)), [0, 1, 2].map(|k| end(k, f32::max))]
-}
-
-fn node(children: &[([[f32; 3]; 2], u32)]) -> WideNode {
-    let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [f32::MIN; WIDTH]]; 3], child: [NONE; WIDTH] };
-    for (i, (bounds, code)) in children.iter().enumerate() {
-        node.child[i] = *code;
-        for k in 0..3 {
-            (node.bounds[k][0][i], node.bounds[k][1][i]) = (bounds[0][k], bounds[1][k]);
-        }
-    }
-    node
-}
-
-impl Surface {
-    /// A surface whose heights are small integers, scaled and then moved along x.
-    fn new(scale: f32, away: f32) -> Surface {
-        let mut rng = Rng::new(5);
-        let height: Vec<f32> = (0..(QUADS[0] + 1) * (QUADS[1] + 1)).map(|_| rng.below(5) as f32).collect();
-        let point = |x: usize, y: usize| {
-            let z = height[y * (QUADS[0] + 1) + x];
-            [(2.0 * x as f32 + away) * scale, 2.0 * y as f32 * scale, z * scale]
-        };
-        let (mut ids, mut points, mut leaves) = (vec![], vec![], vec![]);
-        let mut lines = vec![CacheLine([0; 16]); NODE_LINES * (1 + WIDTH)];
-        for i in 0..QUADS[0] / BLOCK[0] * QUADS[1] / BLOCK[1] {
-            let (x0, y0) = (i % 16 * BLOCK[0], i / 16 * BLOCK[1]);
-            let first = ids.len() as u32;
-            let own: Vec<[f32; 3]> = (0..15).map(|v| point(x0 + v % 3, y0 + v / 3)).collect();
-            let triangles: Vec<[usize; 3]> = (0..8)
-                .flat_map(|q| {
-                    let v = q % 2 + q / 2 * 3;
-                    [[v, v + 1, v + 4], [v, v + 4, v + 3]]
-                })
-                .collect();
-            ids.extend((0..16).map(|t| 9999 - (first + t)));
-            let code = if i % 3 == 0 {
-                let mut leaf = RawLeaf::new_zeroed();
-                (leaf.first, leaf.triangles) = (first, 16);
-                for (t, of) in triangles.iter().enumerate() {
-                    for c in 0..3 {
-                        for k in 0..3 {
-                            leaf.corner[c][k][t] = own[of[c]][k];
-                        }
-                    }
-                }
-                assert_eq!(leaf.as_bytes().len(), RAW_LINES * 64);
-                Child::Raw(append(&mut lines, leaf.as_bytes())).code()
-            } else {
-                let mut leaf = IndexedLeaf::new_zeroed();
-                (leaf.first, leaf.triangles, leaf.vertices) = (first, 16, 15);
-                for v in 0..16 {
-                    for k in 0..3 {
-                        leaf.vertex[k][v] = own[v % 15][k];
-                    }
-                }
-                for (t, of) in triangles.iter().enumerate() {
-                    for c in 0..3 {
-                        leaf.corner[c][t] = of[c] as u8;
-                    }
-                }
-                assert_eq!(leaf.as_bytes().len(), INDEXED_LINES * 64);
-                Child::Indexed(append(&mut lines, leaf.as_bytes())).code()
-            };
-            leaves.push((bounds(&own), code));
-            points.extend(own);
-        }
-        let mut inner = vec![];
-        for (i, children) in leaves.chunks(WIDTH).enumerate() {
-            let line = NODE_LINES * (1 + i);
-            lines[line..line + NODE_LINES].as_mut_bytes().copy_from_slice(node(children).as_bytes());
-            let corners: Vec<[f32; 3]> = children.iter().flat_map(|c| c.0).collect();
-            inner.push((bounds(&corners), Child::Node(line as u32).code()));
-        }
-        lines[..NODE_LINES].as_mut_bytes().copy_from_slice(node(&inner).as_bytes());
-        let [lower, upper] = bounds(&points);
-        let header = Object {
-            lower,
-            upper,
-            root: Child::Node(0).code(),
-            record: 0,
-            triangles: 10_000,
-            dropped: 0,
-            depth: 2,
-            coordinates: 0,
-            grid_origin: [0.0; 3],
-            displacement: 0.0,
-        };
-        Surface { header, lines, ids, points }
-    }
-
-    /// An object that consists of one of the indexed leaves.
-    fn one_leaf(&self) -> Surface {
-        let line = NODE_LINES * (1 + WIDTH) + RAW_LINES;
-        let lines = self.lines[line..line + INDEXED_LINES].to_vec();
-        let points = self.points[15..30].to_vec();
-        let [lower, upper] = bounds(&points);
-        let header = Object { lower, upper, root: Child::Indexed(0).code(), depth: 0, ..self.header };
-        Surface { header, lines, ids: self.ids.clone(), points }
-    }
-
-    fn view(&self) -> ObjectView<'_> {
-        ObjectView {
-            header: &self.header,
-            bounds: ObjectBounds::new(&self.header),
-            grid: None,
-            lines: &self.lines,
-            triangle_ids: &self.ids,
-            tet_leaves: &[],
-            records: Records::None,
-            tet_vertices: &[],
-            tet_faces: &[],
-            hull_faces: &[],
-            triangle_faces: &[],
-            positions: &[],
-            triangles: &[],
-            corners: &[],
-            normals: &[],
-            uvs: &[],
-        }
-    }
-}
-
 /// Kernel that traces the packets of a batch.
-struct Packed<'a, 'b, Q: Query> {
+struct PacketBatch<'a, 'b, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     scratch: &'a mut PacketScratch,
@@ -173,7 +25,7 @@ struct Packed<'a, 'b, Q: Query> {
     sink: Sink<'b, Q>,
 }
 
-impl<Q: Query> Kernel for Packed<'_, '_, Q> {
+impl<Q: Query> Kernel for PacketBatch<'_, '_, Q> {
     type Output = PacketCount;
     #[inline(always)]
     fn run<S: Simd>(mut self, s: S) -> PacketCount {
@@ -203,7 +55,7 @@ fn packed_in<Q: Query>(
     answers: &mut [Q::Answer],
 ) -> PacketCount {
     let sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
-    let count = isa.run(Packed { object, rays, scratch, least, sink });
+    let count = isa.run(PacketBatch { object, rays, scratch, least, sink });
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     count
 }
@@ -213,7 +65,7 @@ fn bits(hit: &Hit) -> [u32; 4] {
 }
 
 /// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
-fn check(surface: &Surface, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
+fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
     let alone = |ray: &Ray| {
@@ -248,7 +100,7 @@ fn unit(rng: &mut Rng) -> f32 {
 
 /// Runs of 64 rays from near a camera to near a point of the surface; with `exact` they start exactly at the camera and are aimed at
 /// points of the surface.
-fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
+fn bundles(surface: &HeightField, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = vec![];
     for _ in 0..40 {
@@ -270,7 +122,7 @@ fn bundles(surface: &Surface, scale: f32, exact: bool, seed: u64) -> Vec<Ray> {
 }
 
 /// Short rays in all directions, from near a point.
-fn short(surface: &Surface, scale: f32, seed: u64) -> Vec<Ray> {
+fn short(surface: &HeightField, scale: f32, seed: u64) -> Vec<Ray> {
     let mut rng = Rng::new(seed);
     let mut rays = vec![];
     for _ in 0..40 {
@@ -287,7 +139,7 @@ fn short(surface: &Surface, scale: f32, seed: u64) -> Vec<Ray> {
 #[test]
 fn coherent_bundles_are_traced_to_the_same_bits_as_single_rays() {
     for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
-        let surface = Surface::new(scale, away);
+        let surface = HeightField::new(scale, away);
         let rays = bundles(&surface, scale, false, 1);
         for (count, hits) in check(&surface, &rays, ALWAYS) {
             assert!(count.coherent >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
@@ -298,7 +150,7 @@ fn coherent_bundles_are_traced_to_the_same_bits_as_single_rays() {
 #[test]
 fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
     for scale in [1.0, 0.125] {
-        let surface = Surface::new(scale, 0.0);
+        let surface = HeightField::new(scale, 0.0);
         let rays = bundles(&surface, scale, true, 2);
         for (count, hits) in check(&surface, &rays, ALWAYS) {
             assert!(count.coherent >= 5 && hits > 500, "{count:?}, {hits}");
@@ -310,7 +162,7 @@ fn bundles_through_vertices_and_along_edges_are_traced_to_the_same_bits() {
 #[test]
 fn views_from_one_point_are_traced_to_the_same_bits() {
     let mut rng = Rng::new(12);
-    let surface = Surface::new(1.0, 0.0);
+    let surface = HeightField::new(1.0, 0.0);
     let eye = [30.3, 60.1, 90.7];
     let mut rays = vec![];
     for run in 0..120 {
@@ -338,7 +190,7 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
 #[test]
 fn short_bundles_are_traced_to_the_same_bits() {
     for (scale, away) in [(1.0, 0.0), (1e-9, 0.0), (1e9, 0.0), (0.001, 1e6)] {
-        let surface = Surface::new(scale, away);
+        let surface = HeightField::new(scale, away);
         let rays = short(&surface, scale, 3);
         let [_, (count, hits)] = check(&surface, &rays, ALWAYS);
         assert!(count.short >= 5 && hits > 100, "{scale}, {away}: {count:?}, {hits}");
@@ -347,7 +199,7 @@ fn short_bundles_are_traced_to_the_same_bits() {
 
 #[test]
 fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
-    let surface = Surface::new(1.0, 0.0);
+    let surface = HeightField::new(1.0, 0.0);
     let (coherent, short) = (bundles(&surface, 1.0, false, 4), short(&surface, 1.0, 5));
     let mut rng = Rng::new(6);
     let mut rays = vec![];
@@ -376,7 +228,7 @@ fn a_batch_of_all_kinds_is_split_and_traced_to_the_same_bits() {
 #[test]
 fn rays_that_f32_cannot_prepare_are_left_to_single_rays() {
     for scale in [1e15, 1e-42] {
-        let surface = Surface::new(scale, 0.0);
+        let surface = HeightField::new(scale, 0.0);
         let rays = bundles(&surface, scale, false, 7);
         for (count, _) in check(&surface, &rays, ALWAYS) {
             assert_eq!(count, PacketCount::default(), "{scale}");
@@ -387,7 +239,7 @@ fn rays_that_f32_cannot_prepare_are_left_to_single_rays() {
 #[test]
 fn packets_with_few_active_rays_are_followed_by_single_rays() {
     // Every other ray of a run passes far from the others, so in few steps half of them take part.
-    let surface = Surface::new(1.0, 0.0);
+    let surface = HeightField::new(1.0, 0.0);
     let mut rays = bundles(&surface, 1.0, false, 8);
     let mut rng = Rng::new(9);
     for ray in &mut rays {
@@ -404,7 +256,7 @@ fn packets_with_few_active_rays_are_followed_by_single_rays() {
 /// Memory that packets keep between batches does not affect the next object.
 #[test]
 fn nothing_of_a_batch_is_left_for_the_next() {
-    let surface = Surface::new(1.0, 0.0);
+    let surface = HeightField::new(1.0, 0.0);
     let leaf = surface.one_leaf();
     let mut rng = Rng::new(13);
     let middle = leaf.points[7];

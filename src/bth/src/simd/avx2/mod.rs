@@ -25,7 +25,7 @@ type M = [__m256i; 2];
 impl Avx2 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static FOUND: LazyLock<bool> = LazyLock::new(|| {
+        static AVX2_FOUND: LazyLock<bool> = LazyLock::new(|| {
             is_x86_feature_detected!("avx2")
                 && is_x86_feature_detected!("fma")
                 && is_x86_feature_detected!("bmi1")
@@ -33,7 +33,7 @@ impl Avx2 {
                 && is_x86_feature_detected!("lzcnt")
                 && is_x86_feature_detected!("popcnt")
         });
-        FOUND.then_some(Avx2(()))
+        AVX2_FOUND.then_some(Avx2(()))
     }
 
     /// Runs a kernel compiled for these features.

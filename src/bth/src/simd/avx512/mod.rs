@@ -20,7 +20,7 @@ pub(super) struct Avx512(());
 impl Avx512 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        static FOUND: LazyLock<bool> = LazyLock::new(|| {
+        static AVX512_FOUND: LazyLock<bool> = LazyLock::new(|| {
             is_x86_feature_detected!("avx512f")
                 && is_x86_feature_detected!("avx512bw")
                 && is_x86_feature_detected!("avx512cd")
@@ -33,7 +33,7 @@ impl Avx512 {
                 && is_x86_feature_detected!("lzcnt")
                 && is_x86_feature_detected!("popcnt")
         });
-        FOUND.then_some(Avx512(()))
+        AVX512_FOUND.then_some(Avx512(()))
     }
 
     /// Runs a kernel compiled for these features.

@@ -39,7 +39,7 @@ pub fn compiled(model: &Model, options: &Options) -> Scene {
 }
 
 /// The model in every structure, the BVH first. Structures with tetrahedra are included where the worker exists, and a
-/// tetrahedralization of the whole model only if `whole` tells that the model has one.
+/// tetrahedralization of the whole model only where `whole` is set.
 pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
     let mut packed = bvh.clone();

@@ -10,7 +10,7 @@ use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{assorted, onward};
 use std::sync::{Mutex, MutexGuard};
 
-/// The instruction set is the process's: tests that choose it take turns.
+/// The instruction set is a setting of the whole process, so tests that set it run one after the other.
 fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(|e| e.into_inner())
@@ -144,8 +144,7 @@ fn batches_at_all_scales_have_the_bits_of_single_rays() {
     }
 }
 
-/// The tests in f32 are there to be measured against the exact one: they must find what it finds, but for a few rays that
-/// pass close to an edge.
+/// The f32 triangle tests find the hits of the exact test, except for a few rays that pass close to an edge.
 #[test]
 fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_set() {
     let _turn = turn();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 #[allow(clippy::print_stdout)]
-/// Builds the library and the C program; none, with a line that says why, without a C compiler.
+/// Builds the library and the C program. Without a C compiler prints why not, and returns `None`.
 fn c_program(folder: &Path, name: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());

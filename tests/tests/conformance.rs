@@ -77,7 +77,7 @@ fn files_read_and_mapped_hold_the_same() {
     for case in valid() {
         let path = folder("valid").join(format!("{}.bth", case.name));
         let read = bth_format::File::read(&path).unwrap();
-        // SAFETY: nobody changes the committed files while the test runs.
+        // SAFETY: no process changes the committed files while the test runs.
         #[allow(unsafe_code)]
         let mapped = unsafe { bth_format::File::map(&path) }.unwrap();
         assert_eq!(read.bytes(), mapped.bytes());

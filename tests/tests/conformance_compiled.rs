@@ -1,5 +1,5 @@
 //! Files that the compiler writes satisfy the specification, as the reader, the verifier and the reader in Python check it.
-#![allow(clippy::print_stdout)] // a test that cannot run says so
+#![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 use bth_compile::Silent;
 use bth_compile::pipeline::{Options, Structure, compile};
@@ -7,7 +7,7 @@ use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Compiles a model; `None` when the worker that it needs is missing.
+/// Compiles a model; `None` where the structure needs a worker and there is none.
 fn compiled(model: &bth_scenes::Model, options: &Options) -> Option<Vec<u8>> {
     if options.structure != Structure::Bvh && bth_tests::worker().is_none() {
         return None;
@@ -29,7 +29,7 @@ fn kinds() -> impl Iterator<Item = Options> {
                 structure,
                 record,
                 keep_subtrees,
-                // So cheap that the knot's tetrahedra are taken.
+                // At this cost of a step the tetrahedra of the knot are chosen.
                 costs: bth_compile::costs::Options { c_tet: Some(1e-3), ..Default::default() },
                 ..Options::default()
             })

@@ -1,6 +1,6 @@
 //! Quantized leaves: no vertex moves farther than the file states, answers are exact for the triangles as they are stored, and
 //! files are as small as documented.
-#![allow(clippy::print_stdout, reason = "says what was skipped")]
+#![allow(clippy::print_stdout, reason = "tests print what they skip")]
 
 #[allow(dead_code)]
 mod corpus_support;
@@ -44,7 +44,7 @@ fn check_file(path: &Path, mesh: &Mesh, grid: GridBits) -> f64 {
     for triangle in oracle::triangles(&object) {
         for (stored, source) in triangle.corners.into_iter().zip(mesh.corners(triangle.id)) {
             assert!(distance(stored, source) <= most, "{stored:?} {source:?} {most}");
-            // What shares a vertex goes on sharing it: where a vertex goes depends on itself alone.
+            // Triangles that share a vertex still share it: its place on the grid depends on its position alone.
             assert_eq!(stored, object.grid.unwrap().nearest(source));
         }
     }
@@ -73,7 +73,7 @@ fn no_vertex_is_farther_from_its_source_than_the_file_says() {
     for (i, path) in paths.iter().enumerate() {
         let (mesh, _) = bth_import::import(path, Keep::None, &Silent).unwrap();
         let shares = [GridBits::B21, GridBits::B16].map(|grid| check_file(path, &mesh, grid));
-        // What is promised of closed meshes, and kept by triangles that share nothing too.
+        // The documented sizes of closed meshes; triangles without shared vertices stay within them, too.
         if i < ours {
             assert!(shares[0] <= 0.8 && shares[1] <= 0.65, "{}: {shares:?}", path.display());
         }
@@ -102,8 +102,8 @@ fn answers_on_a_grid_are_exact_for_the_stored_triangles_in_every_structure() {
     }
 }
 
-/// t but for a double rounding, and the same triangle or one that the line crosses at this very t; weights as exact as is
-/// promised, relative to their sum.
+/// Whether two answers agree: t to one ulp, since the expected one is rounded twice, and either the same triangle with u and
+/// v within the documented error, or another triangle that the line crosses at the same t.
 fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
     let near = |a: f32, b: f32| (f64::from(a) - f64::from(b)).abs() <= 1.0 / f64::from(1 << 24);
     if a.t.to_bits().abs_diff(b.t.to_bits()) > 1 {
@@ -123,7 +123,7 @@ fn check_answers(scene: &Scene) {
     let triangles = oracle::triangles(&scene.object(0));
     let corners: Vec<_> = triangles.iter().map(|t| t.corners).collect();
     let mut rays = bth_tests::rays::assorted(&corners, 300, 5);
-    // Neighbours that are alike go in packets.
+    // Rays with similar directions are traced in packets.
     let like = rays[0];
     rays.extend((0..128).map(|i| {
         let mut ray = like;

@@ -1,5 +1,5 @@
 //! Every messy model ends in a compiled file that verifies, or in an error that a person can act on.
-#![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
+#![allow(clippy::print_stdout, reason = "tests print what they skip and what they found")]
 
 mod corpus_support;
 
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use corpus_support::{data_and_compiler, listed_triangles, models, run};
 
-/// On the wall clock of a busy machine; what is promised is below.
+/// Wall-clock limit, generous for busy machines; the documented limits are below.
 const LIMIT: Duration = Duration::from_secs(300);
 /// What a messy model may take: seconds of CPU time of the compiler, and memory. No messy model has as many as 70,000
 /// triangles.

@@ -1,5 +1,5 @@
 //! The downloaded static models compile, verify, and give the same answers to rays with and without tetrahedra.
-#![allow(clippy::print_stdout, reason = "says what was skipped and what was found")]
+#![allow(clippy::print_stdout, reason = "tests print what they skip and what they found")]
 
 mod corpus_support;
 
@@ -25,7 +25,7 @@ fn most_triangles() -> u64 {
     }
 }
 
-/// The models to try, with their triangles; says which are left out.
+/// The models to try, with their numbers of triangles; prints which are left out.
 fn chosen(data: &Path) -> Vec<(PathBuf, u64)> {
     let mut chosen = Vec::new();
     for model in models(&data.join("static")) {
@@ -115,7 +115,7 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
         };
         let (a, b) = (tets.nearest(&ray, Surface::NONE), bvh.nearest(&ray, Surface::NONE));
         assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
-        // Where triangles meet either may be named; the distance is what must agree.
+        // Where triangles meet, either may be reported; only the distance must agree.
         hits += usize::from(a.t.is_finite());
     }
     hits

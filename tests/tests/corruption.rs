@@ -6,7 +6,7 @@ use bth_tests::conformance::{Editor, Seal, valid};
 fn passes(bytes: &[u8]) -> bool {
     let Ok(file) = bth_format::File::from_bytes(bytes) else { return false };
     let good = (0..file.object_count()).all(|i| file.check(i).is_ok());
-    // A scene that opens can be moved to any time and traced, or says why not.
+    // A scene that opens can be set to any time and traced, or returns an error.
     if let Ok(mut scene) = bth::from_bytes(bytes)
         && scene.description().is_some()
     {
@@ -19,7 +19,7 @@ fn passes(bytes: &[u8]) -> bool {
         }
     }
     if good {
-        // Verifying must end too; it may find fault.
+        // Verification must end, too; it may report errors.
         let _ = bth_format::verify::verify(&file);
     }
     good
@@ -48,7 +48,7 @@ fn every_flipped_byte_is_found() {
     }
 }
 
-/// With all hashes made right again the flips reach the checks of table and indices.
+/// With all hashes recomputed, the flipped bits reach the checks of the section table and the indices.
 #[test]
 fn flips_behind_right_hashes_end_in_a_result() {
     let (mut passed, mut refused) = (0, 0);
@@ -66,7 +66,7 @@ fn flips_behind_right_hashes_end_in_a_result() {
     assert!(passed > 0 && refused > passed / 4, "{passed} passed, {refused} were refused");
 }
 
-/// Words that break arithmetic, in every place, behind right hashes.
+/// Extreme 32-bit values in every place, with correct hashes.
 #[test]
 fn extreme_words_behind_right_hashes_end_in_a_result() {
     for case in valid() {

@@ -1,4 +1,4 @@
-"""Whether two triangles are in bad contact, in exact rational arithmetic: slow and obvious.
+"""Whether two triangles are in bad contact, in exact rational arithmetic: a slow, simple reference.
 
 The common part of two triangles is one of them clipped by the other. It is a convex polygon,
 segment or point; the contact is harmless if that is nothing but the vertex or edge they share.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""World matrices of a glTF scene's nodes at some times, independently of the library.
+"""World matrices of a glTF scene's nodes at some times, computed independently of the library.
 
     gltf_poses.py FILE.glb SECONDS...
 

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Checks our triangles in bad contact against pymeshlab's self-intersecting faces.
+"""Checks the triangles that `bthc marks` reports in bad contact against pymeshlab's self-intersecting faces.
 
-    self_intersections.py MODEL.tris IDS [--name NAME]     a model, and our triangle ids
+    self_intersections.py MODEL.tris IDS [--name NAME]     a model, and the reported triangle ids
     self_intersections.py --planted                        the list of planted contacts
 
 MODEL.tris is what `bthc marks MODEL --tris MODEL.tris` writes: `TRIS`, u32 1, u64 count, then 9 f32
 per triangle, little-endian. IDS is the output of `bthc marks --json` (`bad_triangles`), or a text
 file with one id per line; other lines are skipped.
 
-pymeshlab sees proper crossings only, in floating point: its set must be part of ours. Each triangle
-that it has and we have not is tested against all that its box touches in exact rational arithmetic.
-An exception passes if that proves pymeshlab wrong and `exceptions.json` lists it with a reason;
-`--record` adds proven ones to the list. Exits with 1 on any other exception.
+pymeshlab detects proper crossings only, in floating point, so its set must be a subset of the reported
+one. Each triangle of its set that is not reported is tested in exact rational arithmetic against all
+triangles whose boxes meet its box. It passes if that finds no bad contact and `exceptions.json` lists
+it with a reason; `--record` adds such triangles to the list. Exits with 1 otherwise.
 """
 
 import argparse
@@ -60,8 +60,8 @@ def weld(triangles):
 
 
 def pymeshlab_ids(triangles):
-    """Our ids of the faces that pymeshlab selects. Triangles of zero area are not given to it: they
-    can be hit by no ray and take no part in our structures."""
+    """Ids of the triangles that pymeshlab selects, and of those passed to it. Triangles of zero area are left
+    out: no ray hits them, and the compiler drops them."""
     positions, rows = weld(triangles)
     proper = (rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 2] != rows[:, 0])
     # Only triangles that are nearly without area need the exact test.
@@ -99,7 +99,7 @@ def check(name, triangles, ours, record):
     for i in sorted(theirs - ours):
         near = near_ids(triangles, ids, i)
         contacts = [j for j in near if exact.in_bad_contact(triangles[i], triangles[j])]
-        # pymeshlab does not say which pair it saw: one of the triangles near that it has, too.
+        # pymeshlab does not report pairs: a partner is one of the near triangles that it selects, too.
         partners = contacts or [j for j in near if j in theirs]
         for j in [i] + partners:
             print(f"  triangle {j}: {triangles[j].tolist()}")

@@ -7,11 +7,11 @@ use std::time::Duration;
 /// Between two tries to get a lock that another process has.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// The right to work on a key; given back when dropped, or when the process ends however it ends.
+/// Exclusive lock on the work for a key; released when dropped, or when the process ends in any way.
 #[derive(Debug)]
 pub struct WorkLock {
     path: PathBuf,
-    /// Whether another process had it before: it may have left what is wanted.
+    /// Whether another process held the lock before: it may have stored the result.
     pub waited: bool,
     _file: File,
 }

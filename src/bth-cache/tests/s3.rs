@@ -7,7 +7,7 @@ use std::time::Instant;
 
 const LARGE: u64 = 1 << 30;
 
-/// A store of its own with the server behind it; nothing, with a line that says so, when there is no server.
+/// A new store with the server as its shared cache. Without a server prints that, and returns `None`.
 fn store(folder: &tempfile::TempDir) -> Option<(Store, String)> {
     let Ok(url) = std::env::var("BTH_TEST_S3") else {
         println!("skipped: BTH_TEST_S3 names no bucket (tools/s3/run does)");
@@ -34,11 +34,11 @@ fn what_one_machine_makes_another_finds() {
     assert_eq!(two.find(&key("a")), Some(record.clone()));
     assert!(two.read(&record).as_deref() == Some(&content[..]));
     assert_eq!(two.statistics().shared_hits, 1);
-    // The copy serves without the server.
+    // The local copy suffices without the server.
     let alone = Store::open(there.path(), LARGE).unwrap();
     assert!(alone.find(&key("a")).and_then(|r| alone.read(&r)).as_deref() == Some(&content[..]));
 
-    // What was damaged there is not taken over.
+    // Damaged entries of the server are not copied.
     let s3 = S3::open(&url).unwrap();
     let hex = record.blob.hex();
     s3.put(&format!("blobs/{}/{hex}", &hex[..2]), b"something else", true).unwrap();
@@ -54,7 +54,7 @@ fn a_server_that_cannot_be_reached_is_gone_on_without() {
     if store(&folder).is_none() {
         return;
     }
-    // A bucket that is not there answers like a server without rights; a name that leads nowhere like no server.
+    // The bucket does not exist, which must be handled like a server that cannot be reached.
     let gone = S3::open("s3://no-such-bucket/x").unwrap();
     let local = tempfile::tempdir().unwrap();
     let store = Store::open(local.path(), LARGE).unwrap().with_remote(Box::new(gone));

@@ -1,4 +1,5 @@
-//! The store's promises: damage is noticed, the size is kept, nothing in use goes, a shared store is a bonus.
+//! What the store guarantees: damage is detected, the size limit holds, entries in use are kept, and a failing shared store
+//! does no harm.
 
 use bth_cache::{Digest, Folder, Key, Record, Store};
 use serde_json::json;
@@ -37,7 +38,7 @@ fn overwrite(path: &Path, bytes: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
-/// When a content was last used, as the store sees it.
+/// Sets the time at which the store considers a content last used.
 fn set_used(store: &Store, record: &Record, seconds_ago: u64) {
     let time = SystemTime::now() - Duration::from_secs(seconds_ago);
     File::open(store.path(record)).unwrap().set_modified(time).unwrap();

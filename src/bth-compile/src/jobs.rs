@@ -1,13 +1,13 @@
 //! A pool of jobs that share threads and memory.
 //!
-//! Jobs run on threads of their own, not in the shared pool of rayon, where a job that waits for another process could block
-//! the job that this process waits for.
+//! Jobs run on separate threads, not in the shared pool of rayon, where a job that waits for another process could block
+//! the job for which that process waits.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Runs the jobs, at most `parallel` at a time and no more than need `memory` bytes together by the `estimate`; one is run in
-/// any case. Results are in the order of the jobs.
+/// Runs the jobs, at most `parallel` at a time, and only as many as together need at most `memory` bytes by the `estimate`;
+/// a job that needs more runs alone. Results are in the order of the jobs.
 ///
 /// `within` runs the work of each thread, for example in a pool of its own.
 pub fn run<J: Send, T: Send>(
@@ -61,7 +61,7 @@ impl Memory {
         Self { limit, taken: Mutex::new(0), given_back: Condvar::new() }
     }
 
-    /// Waits until there is enough memory, or no other job has any.
+    /// Waits until there is enough memory, or no other job has reserved any.
     fn take(&self, bytes: u64) -> Share<'_> {
         let taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let too_much = |taken: &mut u64| *taken > 0 && taken.saturating_add(bytes) > self.limit;

@@ -29,7 +29,7 @@ pub struct Options {
     pub coordinates: coordinates::Options,
     /// Builder of the binary BVH.
     pub bvh: bvh::Options,
-    /// Collapse to the wide BVH; `keep_subtrees` below overrules the one in here.
+    /// Collapse to the wide BVH; its field `keep_subtrees` is overridden by the one below.
     pub collapse: bvh::CollapseOptions,
     /// Selection of the nodes to tetrahedralize.
     pub costs: costs::Options,
@@ -41,7 +41,8 @@ pub struct Options {
     pub keep_subtrees: bool,
     /// Whether to store the positions and triangles of the source.
     pub geometry: bool,
-    /// Estimated bytes of memory for the objects of a scene that are compiled at the same time; one is compiled in any case.
+    /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
+    /// may exceed it.
     /// The result does not depend on it.
     pub objects_memory: u64,
 }
@@ -65,7 +66,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// How tetrahedra will be stored; the size of the BVH is left open.
+    /// How tetrahedra will be stored; the size of the object without them is not set.
     pub fn storage(&self) -> costs::Storage {
         costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }
     }

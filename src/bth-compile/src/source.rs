@@ -32,7 +32,7 @@ impl SourceDigest {
         Ok(Self { file: digest(path)?, others })
     }
 
-    /// Returns `read` if the files still have these hashes: nothing else proves that it was read from the hashed content.
+    /// Returns `read` if the files still have these hashes, which proves that it was read from the hashed content.
     ///
     /// # Errors
     /// `BTH-O002` when they do not.
@@ -54,7 +54,7 @@ impl SourceDigest {
     }
 }
 
-/// The files of a model: its own, then those that a glTF document refers to.
+/// The files of a model: the model itself, then those to which a glTF document refers.
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.

@@ -3,6 +3,7 @@
 //! [`DVec3`] computes products and sums one by one, in the order x, y, z and unfused, so results are the same on every machine.
 
 use bth_import::Mesh;
+use bth_random::Rng;
 use glam::DVec3;
 
 /// Corners of a triangle.
@@ -18,4 +19,10 @@ pub(crate) fn double_area([a, b, c]: [DVec3; 3]) -> DVec3 {
 /// A vector divided by its length. `DVec3::normalize` multiplies by the reciprocal, which rounds twice.
 pub(crate) fn unit(v: DVec3) -> DVec3 {
     v / v.length()
+}
+
+/// A direction that is uniform on the sphere. The length divides, as in [`unit`]: compiled files depend on the last bits of
+/// sampled rays, in which `Rng::unit_vector` differs.
+pub(crate) fn uniform_direction(random: &mut Rng) -> DVec3 {
+    unit(random.point_in_ball().into())
 }

@@ -1,5 +1,5 @@
 //! A stage whose results change gets a new version in `cached/keys.rs`: otherwise caches would serve the old results.
-// Tests say what they skip.
+// Tests print what they skip.
 #![allow(clippy::print_stdout)]
 
 use bth_cache::Store;

@@ -41,7 +41,7 @@ pub fn triangles(object: &ObjectView<'_>) -> Vec<Triangle> {
                     found.push(Triangle { id: object.triangle_ids[leaf.first as usize + row], corners });
                 }
             }
-            // A subtree that may accompany the tet leaf holds the same triangles, so it is not visited.
+            // A subtree that is kept beside the tet leaf holds the same triangles, so it is not visited.
             Some(Child::Tets(row)) => {
                 let leaf = &object.tet_leaves[row as usize];
                 let faces = &object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];

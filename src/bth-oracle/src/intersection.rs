@@ -44,7 +44,7 @@ fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
     &a[0] * minor(1, 2) + &a[1] * minor(2, 0) + &a[2] * minor(0, 1)
 }
 
-/// Whether a ray has a line: finite, and a direction that is not zero.
+/// Whether a ray defines a line: its coordinates are finite and its direction is not zero.
 pub(crate) fn has_line(ray: &Ray) -> bool {
     ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) && ray.direction != [0.0; 3]
 }
@@ -80,7 +80,8 @@ pub(crate) fn intersect_exactly(
     let sides =
         [determinant(direction, &b, &c), determinant(direction, &c, &a), determinant(direction, &a, &b)];
     let (positive, negative) = (sides.iter().any(Signed::is_positive), sides.iter().any(Signed::is_negative));
-    // Both signs: the line misses. Neither sign: the line lies in the plane, or the triangle has no area as seen along it.
+    // With both signs the line misses. With neither the line lies in the plane, or the triangle has no area in the
+    // projection along it.
     if positive == negative {
         return None;
     }
@@ -170,7 +171,7 @@ mod tests {
                 let eighth = |n: i32| BigRational::new(n.into(), 8.into());
                 prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });
             } else {
-                // Only when the line lies in the plane or the triangle has no area.
+                // There is no intersection only when the line lies in the plane or the triangle has no area.
                 let p = |q: [f32; 3]| sub(&q.map(integer), &origin.map(integer));
                 let [x, y, z] = scaled.map(p);
                 prop_assert!(determinant(&x, &y, &z).is_zero());

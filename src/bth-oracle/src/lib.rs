@@ -1,5 +1,5 @@
-//! The one slow and obvious reference for ray queries, which tests, fuzzers, `bthc trace --exact` and the accuracy
-//! benchmarks compare with: every triangle against the ray, in exact arithmetic.
+//! The reference for ray queries, with which tests, fuzzers, `bthc trace --exact` and the accuracy benchmarks compare: every
+//! triangle is tested against the ray in exact arithmetic, slowly and simply.
 //!
 //! Exact are, for finite rays and vertices of any magnitude, the decision whether the line of a ray meets a triangle, the
 //! order of the intersections along the ray, and t, u and v as quotients. Triangles are closed: edges and vertices belong

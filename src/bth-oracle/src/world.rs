@@ -78,7 +78,7 @@ impl World {
         })
     }
 
-    /// Whether anything is hit.
+    /// Whether any triangle is hit within the ray's range.
     pub fn any(&self, ray: &Ray) -> bool {
         self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }

@@ -361,18 +361,15 @@ mod tests {
 
     #[test]
     fn changed_and_random_bytes_never_panic() {
-        let mut state = 1u64;
-        let mut random = move || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 33) as usize
-        };
+        let mut random = bth_random::Rng::new(1);
+        let mut below = |n: usize| random.below(n as u64) as usize;
         let seeds: Vec<Vec<u8>> = requests().iter().map(Request::to_bytes).collect();
         let seeds: Vec<Vec<u8>> = seeds.into_iter().chain(replies().iter().map(Reply::to_bytes)).collect();
         for _ in 0..20_000 {
-            let mut bytes = seeds[random() % seeds.len()].clone();
-            for _ in 0..1 + random() % 4 {
-                let at = random() % bytes.len();
-                bytes[at] = [0, 1, 0x7f, 0xff, random() as u8][random() % 5];
+            let mut bytes = seeds[below(seeds.len())].clone();
+            for _ in 0..1 + below(4) {
+                let at = below(bytes.len());
+                bytes[at] = [0, 1, 0x7f, 0xff, below(256) as u8][below(5)];
             }
             // A message that is accepted must encode to the same bytes.
             if let Ok(request) = Request::from_bytes(&bytes) {

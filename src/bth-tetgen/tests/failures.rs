@@ -2,6 +2,7 @@
 //! what it calls wrong input, for which no input is known that brings them about and not its end; those are planted:
 //! `bth-compile`, tests/tets/faults.rs.)
 
+use bth_random::Rng;
 use bth_tetgen_protocol::{Failure, Job, Reply, Request, read_frame, write_frame};
 use std::process::{Command, Stdio};
 
@@ -70,12 +71,8 @@ fn what_is_no_request() {
 
 #[test]
 fn memory_runs_out() {
-    let mut state = 1u64;
-    let mut unit = || {
-        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
-        (state >> 11) as f64 / (1u64 << 53) as f64
-    };
-    let points = (0..200_000).map(|_| [unit(), unit(), unit()]).collect();
+    let mut random = Rng::new(1);
+    let points = (0..200_000).map(|_| [(); 3].map(|()| random.unit_f64())).collect();
     fails(&boxed(SWITCHES, points, Vec::new()), 96 << 20, Failure::Memory);
 }
 

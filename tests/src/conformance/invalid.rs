@@ -171,6 +171,7 @@ const fn child(slot: usize) -> usize {
     384 + 4 * slot
 }
 
+/// Faults of the BVH, its leaves and the source geometry. A table of cases, hence its length.
 fn tree() -> Vec<Case> {
     let base = "two-levels";
     let object = |name, at, value| field(name, base, kind::OBJECT, at, value);
@@ -253,6 +254,7 @@ fn tree() -> Vec<Case> {
     ]
 }
 
+/// Faults of tet leaves.
 fn tets() -> Vec<Case> {
     let base = "tets-link32";
     let leaf = |name, row: usize, at: usize, value| field(name, base, kind::TET_LEAVES, 64 * row + at, value);
@@ -302,6 +304,7 @@ fn tets() -> Vec<Case> {
     ]
 }
 
+/// Faults that only `verify` finds: contents that contradict the source geometry or each other.
 fn geometry() -> Vec<Case> {
     let (base, tets) = ("two-levels", "tets-tet16");
     let half = 0.5f32.to_bits();

@@ -181,7 +181,7 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     let grid = bits.map(|bits| {
         let step = [8.0, 8.0, 16.0].map(|extent| extent / (1u32 << bits as u32) as f32);
         let grid = Grid { bits, origin: [0.0; 3], step };
-        // So that who compares with the source has to round.
+        // A reader that compares with the source must round to the grid.
         let off = step.map(|s| 0.375 * s);
         positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| p[k] + off[k]));
         (grid, off.iter().map(|x| x * x).sum::<f32>().sqrt().next_up())

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 /// A closed surface.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// What makes it hard.
+    /// The name, which describes the difficulty.
     pub name: &'static str,
     /// Its triangles.
     pub grid: Grid,

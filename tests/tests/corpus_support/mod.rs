@@ -18,7 +18,7 @@ pub(crate) fn program(name: &str) -> Option<PathBuf> {
     file.is_file().then_some(file)
 }
 
-/// The test models and the compiler, or a line that says what is missing.
+/// The test models and the compiler; `None`, and a printed line, where one is missing.
 pub(crate) fn data_and_compiler() -> Option<(PathBuf, PathBuf)> {
     match (data(), program("bthc")) {
         (Some(data), Some(bthc)) => Some((data, bthc)),
@@ -48,7 +48,7 @@ pub(crate) struct Ended {
 
 /// Runs a program; one that takes longer than `limit` is ended and reported as an error.
 pub(crate) fn run(command: &mut Command, limit: Duration) -> Result<Ended, String> {
-    // Files instead of pipes: a pipe that nobody reads while we wait would block the program.
+    // Files instead of pipes: the program would block on a full pipe that is not read until it ends.
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let (out, err) = (folder.path().join("out"), folder.path().join("err"));
     let create = |path: &Path| std::fs::File::create(path).map_err(|e| e.to_string());

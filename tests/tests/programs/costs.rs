@@ -120,7 +120,7 @@ fn calibration_needs_the_worker_and_says_so() {
 
 #[test]
 fn the_rays_of_a_scene_decide_which_objects_are_tetrahedralized() {
-    // Two balls, of which the camera sees one; the other is behind it.
+    // Two balls: one in view of the camera, one behind the camera.
     let scene = r#"version = 1
 camera = "eye"
 objects = [{ name = "seen", model = "seen.obj" }, { name = "behind", model = "behind.obj" }]

@@ -50,7 +50,7 @@ fn interrupted_compilation_exits_130_and_leaves_nothing() {
             interrupted += 1;
             assert_eq!(litter(folder.path(), &["ball.obj"]), [""; 0]);
         } else {
-            // It had ended before, or the signal came before the program listened.
+            // It had ended before, or the signal came before its handler was installed.
             let unheard = std::os::unix::process::ExitStatusExt::signal(&status) == Some(2);
             assert!(status.success() || unheard || !sent.success(), "{status:?}");
             check_output(folder.path());

@@ -1,10 +1,10 @@
 //! Mistakes that users make: every program answers with an error that can be acted on and the documented exit code, and
-//! never with a panic or a backtrace, even where the environment asks for backtraces.
+//! never with a panic or a backtrace, even where the environment enables backtraces.
 
 use crate::support::{Run, command, folder, run_with, sphere};
 use std::path::Path;
 
-/// Runs a program in an environment that asks for backtraces.
+/// Runs a program with backtraces enabled in its environment.
 fn mistaken(program: &str, folder: &Path, args: &[&str]) -> Run {
     let mut command = command(program, folder, args);
     command.env("RUST_BACKTRACE", "1").env("RUST_LIB_BACKTRACE", "1");

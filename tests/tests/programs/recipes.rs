@@ -73,7 +73,7 @@ impl Project {
         let mut command = Command::new(program);
         command.args(args).current_dir(self.at(folder)).env("PATH", &self.path);
         command.env("BTH_CACHE_DIR", self.at("cache")).env_remove("BTH_NO_CACHE");
-        // A clone has pointers until somebody pulls, whatever this machine's git is set up for.
+        // Clones hold Git LFS pointers until `git lfs pull`, whatever the user's git configuration.
         command.env("GIT_LFS_SKIP_SMUDGE", "1");
         command.output().unwrap()
     }
@@ -83,7 +83,7 @@ impl Project {
         assert!(done.status.success(), "{program} {args:?}: {done:?}");
     }
 
-    /// Calls of the compiler since this was asked last.
+    /// Calls of the compiler since the last call of this function.
     fn calls(&self) -> usize {
         let calls = std::fs::read_to_string(self.at("calls")).unwrap().lines().count();
         std::fs::write(self.at("calls"), "").unwrap();

@@ -218,7 +218,7 @@ fn manifests_are_played_through_the_cache() {
     run("bth-play", folder.path(), &args).expect(0);
     assert_eq!(kept(), 2, "a changed model is");
 
-    // Without the compiler in the same folder the error of the player tells what to do.
+    // Without the compiler in the same folder the error of the player has a hint.
     let alone = tempfile::tempdir().unwrap();
     let program = alone.path().join("bth-play");
     let built = bth_tests::target_folder().join("bth-play");

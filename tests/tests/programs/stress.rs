@@ -3,6 +3,7 @@
 use crate::cache::{cached, scene};
 use crate::support::{command, run_with};
 use bth_random::Rng;
+use std::collections::HashMap;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -13,7 +14,7 @@ fn seconds() -> f64 {
     set.map_or(4.0, |text| text.parse().expect("BTH_STRESS_SECONDS is a number"))
 }
 
-/// Everything below a folder but locks.
+/// Names of all files below a folder.
 fn files(folder: &Path) -> Vec<String> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -26,82 +27,95 @@ fn files(folder: &Path) -> Vec<String> {
     found
 }
 
+/// A scene with its models, the options to compile them with, and the outputs without a cache.
+struct Corpus {
+    folder: tempfile::TempDir,
+    inputs: Vec<String>,
+    /// The file for each input and each row of [`OPTIONS`].
+    expected: HashMap<(String, usize), Vec<u8>>,
+}
+
+const OPTIONS: [&[&str]; 3] =
+    [&["--min-tet-triangles", "64"], &["--structure", "bvh"], &["--quality", "best"]];
+
+impl Corpus {
+    fn new() -> Corpus {
+        let folder = scene(6);
+        let inputs: Vec<String> = (0..6).map(|i| format!("{i}.obj")).chain(["s.manifest".into()]).collect();
+        let mut expected = HashMap::new();
+        for input in &inputs {
+            for (row, options) in OPTIONS.iter().enumerate() {
+                let args = [&["compile", input, "-o", "expected.bth", "-q", "--no-cache"], *options].concat();
+                cached(folder.path(), &args).expect(0);
+                let bytes = std::fs::read(folder.path().join("expected.bth")).unwrap();
+                expected.insert((input.clone(), row), bytes);
+            }
+        }
+        std::fs::create_dir(folder.path().join("temporary")).unwrap();
+        Corpus { folder, inputs, expected }
+    }
+
+    /// Compiles inputs of a seeded sequence one after another until `end`, kills the compiler in about half of the runs, and
+    /// checks every output. Returns the numbers of runs that were killed and that ended.
+    fn compile_until(&self, end: Instant, number: u64) -> (u32, u32) {
+        let path = self.folder.path();
+        let output = format!("out-{number}.bth");
+        let mut rng = Rng::new(number);
+        let (mut killed, mut ended) = (0, 0);
+        while Instant::now() < end {
+            let input = &self.inputs[rng.below(self.inputs.len() as u64) as usize];
+            let row = rng.below(3) as usize;
+            // The store is small, so that entries are evicted while other processes read them.
+            let args = ["compile", input, "-o", &output, "-q", "--cache-size", "400k", "--threads", "1"];
+            let mut command = command("bthc", path, &[&args, OPTIONS[row]].concat());
+            command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", path.join("cache"));
+            command.env("TMPDIR", path.join("temporary"));
+            let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+            if rng.below(2) == 0 {
+                std::thread::sleep(Duration::from_millis(rng.below(60)));
+                killed += u32::from(child.try_wait().unwrap().is_none());
+                child.kill().unwrap();
+            }
+            let done = child.wait_with_output().unwrap();
+            let stderr = String::from_utf8_lossy(&done.stderr);
+            assert!(!stderr.contains("damaged"), "{stderr}");
+            if done.status.success() {
+                ended += 1;
+                let bytes = std::fs::read(path.join(&output)).unwrap();
+                assert!(bytes == self.expected[&(input.clone(), row)], "{input} {:?}", OPTIONS[row]);
+            }
+            // A later compilation may reuse unchanged objects of an output that is left in place.
+            if rng.below(2) == 0 {
+                let _ = std::fs::remove_file(path.join(&output));
+            }
+        }
+        (killed, ended)
+    }
+}
+
 #[test]
 fn eight_processes_with_random_kills_leave_a_store_that_verifies() {
-    let folder = scene(6);
-    let path = folder.path();
-    let inputs: Vec<String> = (0..6).map(|i| format!("{i}.obj")).chain(["s.manifest".into()]).collect();
-    let options: [&[&str]; 3] =
-        [&["--min-tet-triangles", "64"], &["--structure", "bvh"], &["--quality", "best"]];
-    // The expected outputs, compiled without a cache.
-    let mut expected = std::collections::HashMap::new();
-    for input in &inputs {
-        for (i, options) in options.iter().enumerate() {
-            let args = [&["compile", input, "-o", "expected.bth", "-q", "--no-cache"], *options].concat();
-            cached(path, &args).expect(0);
-            expected.insert((input.as_str(), i), std::fs::read(path.join("expected.bth")).unwrap());
-        }
-    }
-    let temporary = &path.join("temporary");
-    std::fs::create_dir(temporary).unwrap();
+    let corpus = &Corpus::new();
+    let path = corpus.folder.path();
     let end = Instant::now() + Duration::from_secs_f64(seconds());
-    let (inputs, options, expected) = (&inputs, &options, &expected);
-    let (kills, whole) = std::thread::scope(|scope| {
-        let process = |number: u64| {
-            move || {
-                let mut rng = Rng::new(number);
-                let (mut kills, mut whole) = (0, 0);
-                while Instant::now() < end {
-                    let input = &inputs[rng.below(inputs.len() as u64) as usize];
-                    let choice = rng.below(3) as usize;
-                    let output = format!("out-{number}.bth");
-                    // The store is small, so that entries are evicted while other processes read them.
-                    let args =
-                        ["compile", input, "-o", &output, "-q", "--cache-size", "400k", "--threads", "1"];
-                    let mut command = command("bthc", path, &[&args, options[choice]].concat());
-                    command.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", path.join("cache"));
-                    command.env("TMPDIR", temporary);
-                    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-                    if rng.below(2) == 0 {
-                        std::thread::sleep(Duration::from_millis(rng.below(60)));
-                        kills += u32::from(child.try_wait().unwrap().is_none());
-                        child.kill().unwrap();
-                    }
-                    let done = child.wait_with_output().unwrap();
-                    let said = String::from_utf8_lossy(&done.stderr);
-                    assert!(!said.contains("damaged"), "{said}");
-                    if done.status.success() {
-                        whole += 1;
-                        let bytes = std::fs::read(path.join(&output)).unwrap();
-                        assert!(
-                            bytes == expected[&(input.as_str(), choice)],
-                            "{input} {:?}",
-                            options[choice]
-                        );
-                    }
-                    // A later compilation may reuse unchanged objects of an output that is left in place.
-                    if rng.below(2) == 0 {
-                        let _ = std::fs::remove_file(path.join(&output));
-                    }
-                }
-                (kills, whole)
-            }
-        };
-        let running: Vec<_> = (0..8).map(|number| scope.spawn(process(number))).collect();
-        let ended = running.into_iter().map(|thread| thread.join().unwrap());
-        ended.fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+    let (killed, ended) = std::thread::scope(|scope| {
+        let running: Vec<_> =
+            (0..8).map(|number| scope.spawn(move || corpus.compile_until(end, number))).collect();
+        let counts = running.into_iter().map(|thread| thread.join().unwrap());
+        counts.fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
     });
-    println!("{whole} compilations ended, {kills} were killed");
-    assert!(kills > 0 && whole > 0);
+    println!("{ended} compilations ended, {killed} were killed");
+    assert!(killed > 0 && ended > 0);
+    let temporary = path.join("temporary");
     assert_eq!(
-        files(temporary),
+        files(&temporary),
         [""; 0],
         "killed compilers and their workers leave nothing, not even folders"
     );
-    assert_eq!(std::fs::read_dir(temporary).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(&temporary).unwrap().count(), 0);
     let partial = |name: &String| name.ends_with(".bth-part");
     let left = || files(&path.join("cache")).into_iter().filter(partial).collect::<Vec<_>>();
-    // There are none on systems where files can be written without a name.
+    // Systems on which files can be written without a name leave no unfinished ones.
     println!("{} unfinished files before verification", left().len());
     let verdict = cached(path, &["cache", "verify", "--json"]).expect(0).json();
     assert_eq!(verdict["damaged"], serde_json::json!([]));

@@ -74,7 +74,7 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
                 let same = !b.is_hit()
                     || a.surface
                         == Surface { instance: first[at].1, triangle: b.surface.triangle - first[at].0 };
-                // Where surfaces of two instances lie in one another either may be named.
+                // Where surfaces of two instances coincide, either may be reported.
                 other_name += usize::from(!same);
                 continue;
             }
@@ -93,7 +93,7 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
         // About as many rays meet their triangle at less than half a degree.
         assert!(graze < rays.len() / 50, "{name} frame {frame}: {graze} rays graze");
         assert!(other_name < rays.len() / 10, "{name} frame {frame}: {other_name} other surfaces");
-        // Any hit says the same as nearest hit.
+        // Any-hit queries agree with nearest-hit queries.
         let mut found = vec![false; rays.len()];
         scene.any_batch(&rays, None, &mut found);
         assert!(found.iter().zip(&ours).all(|(f, h)| *f == h.is_hit()), "{name} frame {frame}");
@@ -101,14 +101,14 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
     hit
 }
 
-/// The greatest coordinate in play.
+/// The greatest absolute coordinate of the object and of the origin of the ray.
 fn size(flat: &bth::Scene, ray: &Ray) -> f32 {
     let object = flat.object(0).header;
     let ends = object.lower.iter().chain(&object.upper).chain(&ray.origin);
     ends.fold(0.0f32, |m, x| m.max(x.abs()))
 }
 
-/// Answers for rays that are shifted by a few roundings of what they see.
+/// Answers for rays whose origin and target are shifted by a few rounding errors of the coordinates.
 fn shifted<'a>(flat: &'a bth::Scene, ray: &'a Ray) -> impl Iterator<Item = Hit> + 'a {
     let mut rng = Rng::new(77);
     let size = size(flat, ray);

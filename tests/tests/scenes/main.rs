@@ -1,5 +1,5 @@
 //! Scenes from end to end: import, compilation, animation and rays.
-#![allow(clippy::print_stdout)] // a test that cannot run says so
+#![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 mod flattened;
 mod import;

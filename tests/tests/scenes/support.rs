@@ -7,7 +7,7 @@ use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
 use bth_scene::Manifest;
 use std::path::{Path, PathBuf};
 
-/// BVH only: what tetrahedra change is other tests' business.
+/// A BVH only: tetrahedra are covered by other tests.
 pub(crate) fn options() -> Options {
     Options { structure: Structure::Bvh, ..Options::default() }
 }

@@ -19,8 +19,8 @@ fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
     }
 }
 
-/// Beyond the scales at which boxes are tested every box is entered, at the depth of the least t: found by the large version
-/// when that was -infinity, and keys of what waits became NaN.
+/// Where coordinates are beyond the range in which boxes are tested, every box is entered at the least t. Where that is
+/// -infinity, the sort keys of stacked nodes must not become NaN.
 #[test]
 fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
     for shape in shapes(4).iter().filter(|shape| shape.name.contains("scale 2^")) {
@@ -32,7 +32,7 @@ fn hierarchies_beyond_all_scales_are_walked_from_minus_infinity() {
     }
 }
 
-/// The checks themselves: answers that are wrong are counted as what they are.
+/// The checks themselves: wrong answers are counted under the right kind of defect.
 #[test]
 fn a_missed_and_a_made_up_hit_are_counted() {
     let shape = &shapes(1)[0];

@@ -20,7 +20,7 @@ type Bins = [[Bin; MAX_BINS]; 3];
 
 const EMPTY: Bins = [[Bin { bounds: Bounds::EMPTY, count: 0 }; MAX_BINS]; 3];
 
-/// Which bin a centre falls into; the same arithmetic decides the partition, so counts agree.
+/// Maps centres to bins. The partition uses the same arithmetic, so its counts agree with those of the bins.
 #[derive(Clone, Copy)]
 struct Grid {
     origin: [f32; 3],
@@ -63,7 +63,7 @@ fn merge(mut a: Bins, b: Bins) -> Bins {
     a
 }
 
-/// Boxes of the triangles and of their (half) centres.
+/// Bounds of the triangles and of their half centres (see [`Bounds::half_center`]).
 pub(super) fn measure(references: &[Reference]) -> (Bounds, Bounds) {
     fn serial(references: &[Reference]) -> (Bounds, Bounds) {
         let (mut all, mut centers) = (Bounds::EMPTY, Bounds::EMPTY);
@@ -98,7 +98,7 @@ pub(super) fn split(references: &mut [Reference], centers: &Bounds, bins: usize)
         if centers.lower[axis] >= centers.upper[axis] {
             continue;
         }
-        // Cost of everything from a bin on, then the mirror image against it.
+        // Costs of all triangles from each bin on; the sweep from the left then adds the costs of those before.
         let mut right_cost = [f64::INFINITY; MAX_BINS];
         let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
         for (bin, cost) in row[..bins].iter().zip(&mut right_cost).rev() {
@@ -124,7 +124,7 @@ pub(super) fn split(references: &mut [Reference], centers: &Bounds, bins: usize)
     Some(found.left)
 }
 
-/// Moves what `is_left` to the front, in place. The order depends on the input order alone.
+/// Moves the references that are `is_left` to the front, in place. The order depends on the input order alone.
 fn partition(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) {
     let (mut i, mut j) = (0, references.len());
     loop {

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// since a wide node takes at least one level of the binary tree.
 pub const MAX_LEVELS: u32 = 90;
 
-/// Subtrees of more triangles are built as separate tasks, between which cancellation is looked for.
+/// Subtrees of more triangles are built as separate tasks, each of which first checks for cancellation.
 const TASK: usize = 1 << 12;
 
 /// How much time to spend on the tree.
@@ -25,24 +25,24 @@ pub enum Quality {
     /// Binned SAH with 32 bins, full sweep in small nodes, two passes of reinsertion of the largest nodes.
     #[default]
     Balanced,
-    /// Full-sweep SAH but in the topmost nodes (where 32 bins are as good), three passes of reinsertion.
+    /// Full-sweep SAH except in the topmost nodes, where 32 bins give trees as good; three passes of reinsertion.
     Best,
 }
 
-/// What a [`Quality`] stands for. Measurements vary it.
+/// Parameters of the builder that a [`Quality`] selects; benchmarks vary them one by one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// Bins per axis, at most 32.
     pub bins: usize,
     /// Nodes of at most this many triangles are split by a full sweep.
     pub sweep_count: usize,
-    /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short
-    /// passes win more than a long one (measured on rooms and a car).
+    /// Share of the nodes, largest first, that each pass of reinsertion tries to move. Two short passes reduce the cost
+    /// more than a long one (measured on rooms and a car).
     pub reinsertion: Vec<f64>,
 }
 
 impl Quality {
-    /// What it stands for.
+    /// The parameters of this quality.
     pub fn effort(self) -> Effort {
         let (bins, sweep_count, reinsertion): (_, _, &[f64]) = match self {
             Quality::Fast => (16, 8, &[]),
@@ -60,7 +60,7 @@ pub struct Options {
     pub quality: Quality,
 }
 
-/// What [`build`] did.
+/// Report of [`build`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Triangles in the tree.
@@ -116,7 +116,7 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
     let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
     let mut nodes = vec![blank; 2 * references.len() - 1];
     let builder = Builder { effort, monitor };
-    builder.subtree(&mut references, &mut nodes, Place::ROOT, &mut sweep_split::Scratch::default())?;
+    builder.subtree(&mut references, &mut nodes, Destination::ROOT, &mut sweep_split::Scratch::default())?;
     let order = references.iter().map(|r| r.id).collect();
     drop(references);
     let mut bvh = BinaryBvh { nodes, order };
@@ -128,7 +128,7 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
     Ok((bvh, report))
 }
 
-/// Moves subtrees to better places, in passes that each try a share of the nodes. Boxes of leaves stay as they are.
+/// Moves subtrees to positions of lower cost, in passes that each try a share of the nodes. Boxes of leaves do not change.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -173,9 +173,9 @@ fn check_mesh(mesh: &Mesh) -> Result<()> {
     Ok(())
 }
 
-/// Where a subtree goes.
+/// Where the nodes and rows of a subtree go.
 #[derive(Clone, Copy)]
-struct Place {
+struct Destination {
     /// Index of its root.
     node: u32,
     /// First row of `order`.
@@ -184,8 +184,8 @@ struct Place {
     level: u32,
 }
 
-impl Place {
-    const ROOT: Place = Place { node: 0, first: 0, level: 0 };
+impl Destination {
+    const ROOT: Destination = Destination { node: 0, first: 0, level: 0 };
 }
 
 struct Builder<'a> {
@@ -199,7 +199,7 @@ impl Builder<'_> {
         &self,
         references: &mut [Reference],
         nodes: &mut [Node],
-        place: Place,
+        to: Destination,
         scratch: &mut sweep_split::Scratch,
     ) -> Result<()> {
         let count = references.len();
@@ -208,38 +208,33 @@ impl Builder<'_> {
             self.monitor.check()?;
         }
         let (bounds, centers) = binned_split::measure(references);
-        nodes[0] = Node {
-            lower: bounds.lower,
-            upper: bounds.upper,
-            first: place.first,
-            count: count as u32,
-            right: 0,
-        };
+        nodes[0] =
+            Node { lower: bounds.lower, upper: bounds.upper, first: to.first, count: count as u32, right: 0 };
         if count == 1 {
             return Ok(());
         }
-        let left = self.split(references, &centers, place.level, scratch);
-        let right = place.node + 2 * left as u32;
+        let left = self.split(references, &centers, to.level, scratch);
+        let right = to.node + 2 * left as u32;
         nodes[0].right = right;
         let (left_references, right_references) = references.split_at_mut(left);
         let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left - 1);
-        let level = place.level + 1;
-        let left_place = Place { node: place.node + 1, first: place.first, level };
-        let right_place = Place { node: right, first: place.first + left as u32, level };
+        let level = to.level + 1;
+        let left_to = Destination { node: to.node + 1, first: to.first, level };
+        let right_to = Destination { node: right, first: to.first + left as u32, level };
         if !task {
-            self.subtree(left_references, left_nodes, left_place, scratch)?;
-            return self.subtree(right_references, right_nodes, right_place, scratch);
+            self.subtree(left_references, left_nodes, left_to, scratch)?;
+            return self.subtree(right_references, right_nodes, right_to, scratch);
         }
         let (a, b) = rayon::join(
-            || self.task(left_references, left_nodes, left_place),
-            || self.task(right_references, right_nodes, right_place),
+            || self.task(left_references, left_nodes, left_to),
+            || self.task(right_references, right_nodes, right_to),
         );
         a.and(b)
     }
 
-    /// A subtree with buffers of its own.
-    fn task(&self, references: &mut [Reference], nodes: &mut [Node], place: Place) -> Result<()> {
-        self.subtree(references, nodes, place, &mut sweep_split::Scratch::default())?;
+    /// As [`Self::subtree`], with buffers of its own.
+    fn task(&self, references: &mut [Reference], nodes: &mut [Node], to: Destination) -> Result<()> {
+        self.subtree(references, nodes, to, &mut sweep_split::Scratch::default())?;
         if references.len() <= TASK {
             self.monitor.advance(references.len() as u64);
         }
@@ -258,7 +253,8 @@ impl Builder<'_> {
         if count == 2 {
             return 1;
         }
-        // Halving needs ceil(log2(count)) levels; any split is fine as long as that stays possible below it.
+        // Halving needs ceil(log2(count)) levels. SAH may split as it likes while enough levels remain for halving; else
+        // the node is halved.
         let halvings = usize::BITS - (count - 1).leading_zeros();
         if level + 1 + halvings > MAX_LEVELS {
             return split_median(references, centers);
@@ -274,7 +270,7 @@ impl Builder<'_> {
     }
 }
 
-/// Halves by the order of the centres along their widest axis.
+/// Halves the references by the order of their centres along the widest axis.
 fn split_median(references: &mut [Reference], centers: &Bounds) -> usize {
     let extent = |k: usize| centers.upper[k] - centers.lower[k];
     let axis = (1..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
@@ -286,14 +282,14 @@ fn split_median(references: &mut [Reference], centers: &Bounds) -> usize {
     middle
 }
 
-/// Halves by id what no plane can separate.
+/// Halves references with equal centres by id.
 fn split_by_id(references: &mut [Reference]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by_key(middle, |r| r.id);
     middle
 }
 
-/// See [`Report::visits`].
+/// Nodes that a random line through the root's box meets on average; see [`Report::visits`].
 pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     bvh.nodes.iter().map(area).sum::<f64>() / area(&bvh.nodes[0])

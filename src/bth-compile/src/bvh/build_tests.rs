@@ -1,7 +1,8 @@
-use super::super::samples::{Random, clutter, exponential, grid, soup};
+use super::super::samples::{clutter, exponential, grid, soup};
 use super::super::validate::validate_binary;
 use super::*;
 use crate::monitor::Silent;
+use bth_random::Rng;
 use proptest::prelude::*;
 
 const ALL: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Best];
@@ -110,7 +111,7 @@ fn bad_indices_and_positions_are_reported() {
     assert!(matches!(build(&mesh, &Options::default(), &Silent), Err(Error::Internal { .. })));
 }
 
-/// Asks to stop after a number of looks.
+/// A monitor that cancels after a number of checks.
 struct Stop(std::sync::atomic::AtomicI32);
 
 impl Monitor for Stop {
@@ -128,7 +129,7 @@ fn a_build_can_be_cancelled_anywhere() {
     }
 }
 
-/// The least sum of areas over all splits of a few triangles, tried one by one.
+/// Oracle: the least sum of areas over all splits of a few triangles, tried one by one.
 fn best_split_by_trial(references: &[Reference]) -> f64 {
     let mut best = f64::INFINITY;
     for axis in 0..3 {
@@ -174,11 +175,11 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
     fn random_meshes_build_valid_trees(count in 1usize..300, seed: u64, kind in 0..3) {
-        let mut random = Random::new(seed);
+        let mut random = Rng::new(seed);
         let mesh = match kind {
             0 => soup(count, seed),
             1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),
-            _ => grid(1 + random.below(12), random.unit(), seed),
+            _ => grid(1 + random.below(12) as usize, random.unit_f32(), seed),
         };
         check(&mesh);
     }

@@ -1,4 +1,4 @@
-//! The wide BVH: from plan to lines.
+//! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves and writes their lines.
 
 use super::bounds::Bounds;
 use super::plan::{Costs, Decision, Plan, Planner, Role, children};
@@ -13,9 +13,9 @@ use serde::Serialize;
 /// Options of [`collapse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollapseOptions {
-    /// Keep the BVH below tet leaves beside them.
+    /// Whether the BVH below each tet leaf is kept beside it.
     pub keep_subtrees: bool,
-    /// Costs that the tree is chosen by.
+    /// Costs by which the tree is chosen.
     pub costs: Costs,
     /// Limits on the tree.
     pub plan: Plan,
@@ -24,7 +24,7 @@ pub struct CollapseOptions {
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
-    /// Nodes in depth-first order, then leaves; after them the same for each kept subtree.
+    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept subtree.
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
@@ -36,7 +36,7 @@ pub struct Wide {
     pub subtrees: Vec<u32>,
 }
 
-/// What [`collapse`] did.
+/// Report of [`collapse`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CollapseReport {
     /// Wide nodes.
@@ -55,7 +55,7 @@ pub struct CollapseReport {
     pub tet_leaves: u64,
     /// Wide nodes on the longest path.
     pub depth: u32,
-    /// The least cost, which the tree was chosen by, without that of tet leaves; see [`Costs`].
+    /// Cost of the tree without its tet leaves, which the choice of the tree minimizes; see [`Costs`].
     pub cost: f64,
     /// Wide nodes that a random line through the root's box meets on average, kept subtrees not counted.
     pub node_visits: f64,
@@ -63,7 +63,7 @@ pub struct CollapseReport {
     pub leaf_visits: f64,
     /// Bytes of lines and triangle ids.
     pub bytes: u64,
-    /// These per triangle in a triangle leaf.
+    /// Bytes of lines and ids for each triangle in a triangle leaf.
     pub bytes_per_triangle: f64,
     /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
@@ -96,7 +96,7 @@ pub fn collapse(
 /// Decides for each node of the binary BVH, given the cut nodes; also returns the cost of the tree without its tet leaves.
 pub type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32)> + 'a;
 
-/// As [`collapse`], with the tree chosen by `decide`. For comparisons of ways to choose it.
+/// As [`collapse`], with the tree chosen by `decide`, for comparisons of methods.
 ///
 /// # Errors
 /// As [`collapse`], and those of `decide`.
@@ -199,7 +199,7 @@ struct Inner {
 struct Slot {
     /// Node of the binary BVH.
     node: u32,
-    /// Child code, once known.
+    /// Child code, once it is assigned.
     code: u32,
 }
 
@@ -219,7 +219,7 @@ impl Writer<'_> {
     /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each.
     fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
         let base = self.wide.lines.len();
-        // Settle the shape: slot 0 holds the root, every other slot belongs to a node.
+        // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
         let mut slots = vec![Slot { node: root, code: NONE }];
         let mut inner: Vec<Inner> = Vec::new();
         let mut leaves: Vec<usize> = Vec::new();

@@ -1,9 +1,10 @@
-use super::super::samples::{Random, clutter, exponential, grid, model, soup};
+use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
 use super::super::{Options, Plan, Quality, build};
 use super::*;
 use crate::monitor::Silent;
 use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
+use bth_random::Rng;
 use proptest::prelude::*;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -30,11 +31,11 @@ fn collapsed_by(
 }
 
 /// Disjoint nodes, each taken with probability 1 in `odds`, walking down from the root.
-fn random_cut(bvh: &BinaryBvh, odds: usize, random: &mut Random) -> Vec<u32> {
+fn random_cut(bvh: &BinaryBvh, odds: usize, random: &mut Rng) -> Vec<u32> {
     let mut cut = Vec::new();
     let mut at = 0;
     while at < bvh.nodes.len() {
-        let taken = random.below(odds) == 0;
+        let taken = random.below(odds as u64) == 0;
         if taken {
             cut.push(at as u32);
         }
@@ -111,7 +112,7 @@ fn chains_collapse_within_the_depth_limit() {
 fn the_lines_are_the_same_at_any_number_of_threads() {
     let mesh = grid(120, 10.0, 4);
     let bvh = built(&mesh, Quality::Fast);
-    let cut = random_cut(&bvh, 200, &mut Random::new(9));
+    let cut = random_cut(&bvh, 200, &mut Rng::new(9));
     let at = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("pool");
         pool.install(|| collapsed(&mesh, &bvh, &cut, true).0)
@@ -120,7 +121,7 @@ fn the_lines_are_the_same_at_any_number_of_threads() {
     assert!(one == at(2) && one == at(5));
 }
 
-/// Most children of a node and most triangles of a leaf that there are.
+/// Greatest number of children of a node and of triangles of a leaf.
 fn largest(wide: &Wide) -> (usize, u32) {
     let (mut children, mut triangles) = (0, 0);
     let mut pending = vec![wide.root];
@@ -151,7 +152,7 @@ fn plans_keep_their_limits() {
         [(grid(40, 9.0, 6), 1), (soup(2000, 7), 2), (clutter(1500, &[0.0, 1.0, 2.0, 5.0], 8), 3)]
     {
         let bvh = built(&mesh, Quality::Fast);
-        let cut = random_cut(&bvh, 150, &mut Random::new(seed));
+        let cut = random_cut(&bvh, 150, &mut Rng::new(seed));
         for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
             let plan = Plan { children, triangles };
             for keep in [false, true] {
@@ -167,7 +168,7 @@ fn plans_keep_their_limits() {
     assert!(children == 16 && triangles > 8, "no limit but that of the format: {children} {triangles}");
 }
 
-/// Least cost of a subtree in at most `slots` slots, straight from the definition.
+/// Oracle: least cost of a subtree in at most `slots` slots, by the recursive definition.
 fn cost_by_definition(mesh: &Mesh, bvh: &BinaryBvh, planner: &Planner, at: u32, slots: usize) -> f64 {
     let node = &bvh.nodes[at as usize];
     let Costs { node: node_cost, indexed, raw, .. } = planner.costs;
@@ -219,7 +220,7 @@ fn the_plan_has_the_least_cost_by_definition() {
 
 #[test]
 fn the_written_tree_costs_what_the_plan_says() {
-    // With one price for all leaves the cost follows from the visits and the lines.
+    // With one price for all leaves the cost follows from the visits and the number of lines.
     let costs = Costs { node: 1.3, indexed: [0.9, 0.0], raw: [0.9, 0.0], line: 0.03 };
     for mesh in [soup(3000, 1), grid(60, 4.0, 2), clutter(3000, &[0.0, 1.0, 2.0, 4.0, 8.0, 9.0], 3)] {
         let bvh = built(&mesh, Quality::Balanced);
@@ -276,11 +277,11 @@ proptest! {
     fn random_meshes_and_cuts_collapse_to_valid_trees(
         count in 1usize..400, seed: u64, kind in 0..3, odds in 1usize..60, keep: bool,
     ) {
-        let mut random = Random::new(seed);
+        let mut random = Rng::new(seed);
         let mesh = match kind {
             0 => soup(count, seed),
             1 => clutter(count, &[0.0, 1.0, 2.0, 0.5], seed),
-            _ => grid(1 + random.below(14), random.unit(), seed),
+            _ => grid(1 + random.below(14) as usize, random.unit_f32(), seed),
         };
         let bvh = built(&mesh, Quality::Balanced);
         let cut = random_cut(&bvh, odds, &mut random);

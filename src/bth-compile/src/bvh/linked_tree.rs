@@ -79,8 +79,8 @@ impl LinkedTree {
         self.nodes.iter().map(|n| n.bounds.half_area()).sum::<f64>() / self.node(self.root).bounds.half_area()
     }
 
-    /// Whether `moved`, which has a grandparent, may become the sibling of `target`: that must
-    /// change something, must not tie a subtree to itself nor exceed [`MAX_LEVELS`].
+    /// Whether `moved`, which has a grandparent, may become the sibling of `target`: the move must change the tree, must
+    /// not place a subtree below itself, and must keep within [`MAX_LEVELS`].
     pub(super) fn can_move(&self, moved: u32, target: u32) -> bool {
         let parent = self.node(moved).parent;
         if parent == NONE || self.node(parent).parent == NONE {
@@ -97,13 +97,13 @@ impl LinkedTree {
             at = self.node(at).parent;
             level += 1;
         }
-        // `level` counts the target itself, which goes down by one edge.
+        // `level` includes the target itself, which moves down by one edge.
         let height = self.heights[moved as usize].max(self.heights[target as usize]);
         level + u32::from(height) <= MAX_LEVELS
     }
 
-    /// Makes `moved` the sibling of `target` where [`LinkedTree::can_move`]. Its parent, which that
-    /// leaves without use, becomes the parent of both. Returns the change of the sum of all areas.
+    /// Makes `moved` the sibling of `target` where [`LinkedTree::can_move`]. Its former parent, which has no other child
+    /// then, becomes the parent of both. Returns the change of the sum of all areas.
     pub(super) fn move_beside(&mut self, moved: u32, target: u32) -> f64 {
         let parent = self.node(moved).parent;
         let grandparent = self.node(parent).parent;
@@ -121,7 +121,7 @@ impl LinkedTree {
         change + bounds.half_area() + self.refit(above)
     }
 
-    /// Puts `new` where `old` is below `parent`, or at the root.
+    /// Replaces the child `old` of `parent` by `new`, or the root.
     fn replace_child(&mut self, parent: u32, old: u32, new: u32) {
         self.nodes[new as usize].parent = parent;
         if parent == NONE {

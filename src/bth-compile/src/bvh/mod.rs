@@ -1,10 +1,10 @@
-//! The binary BVH that marks, costs and tets work on, and its collapse to the wide one.
+//! The binary BVH, input of the stages marks, costs and tets, and its collapse to the wide BVH.
 //!
-//! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to better places.
+//! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
 //! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
 //!
-//! `bth-bench quality` measures the gain of each step. Spatial splits are not made: nodes of 16 children take the few large
-//! triangles that overlap much into one leaf near the root, and splitting them gained nothing.
+//! `bth-bench quality` measures the gain of each step. Spatial splits are not made: with nodes of 16 children the few large
+//! triangles of much overlap end up in one leaf near the root, and splitting them gained nothing.
 
 mod binned_split;
 mod bounds;

@@ -1,4 +1,4 @@
-//! Which nodes of the binary BVH become wide nodes and leaves, by dynamic programming over SAH.
+//! Plans which nodes of the binary BVH become wide nodes and leaves, by dynamic programming over SAH costs.
 //!
 //! As in "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (Ylitie et al.
 //! 2017, §3.1): `cost[k]` of a node is the least cost of its subtree as at most `k` children of one
@@ -20,8 +20,8 @@ pub struct Costs {
     pub indexed: [f32; 2],
     /// A leaf without sharing, which is 10 lines, and each of its triangles.
     pub raw: [f32; 2],
-    /// One line of 64 bytes more per triangle of the model, visited or not, as a share of
-    /// the visits to the binary BVH: what the file may grow by to save visits.
+    /// Price of one more line of 64 bytes for each triangle of the model, visited or not, as a share of the visits to the
+    /// binary BVH. Weighs the size of the file against visits.
     pub line: f32,
 }
 
@@ -60,8 +60,8 @@ pub enum Role {
     Raw,
 }
 
-/// A node's decisions in 4 bits each: at 4 k for k in 2..16, how many of k slots its left child
-/// takes, 0 for "as with k - 1"; at 0, how many of 16 when it is itself a wide node; at 4, its role.
+/// A node's decisions in 4 bits each: at bit 4 k for k in 2..16, the number of k slots that its left child takes, 0 for the
+/// same as with k - 1; at bit 0, the number of 16 slots when it is itself a wide node; at bit 4, its role.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Decision(u64);
 
@@ -101,9 +101,9 @@ impl Decision {
     }
 }
 
-/// Costs and vertices of a subtree, as its parent needs them.
+/// Costs and vertices of a subtree, the input of the planning of its parent.
 struct Summary {
-    /// Least cost in at most so many slots; rows 1 to 15.
+    /// Least cost in at most as many slots as the row; rows 1 to 15.
     cost: [f32; WIDTH],
     /// Distinct vertices, ascending, when there are at most 16.
     vertices: Option<Vertices>,
@@ -173,7 +173,7 @@ pub struct Planner<'a> {
 const TASK: u32 = 1 << 13;
 
 impl<'a> Planner<'a> {
-    /// The BVH has at least one node.
+    /// Prepares the planning for a BVH of at least one node.
     pub(super) fn new(
         mesh: &'a Mesh,
         bvh: &'a BinaryBvh,
@@ -209,11 +209,11 @@ impl<'a> Planner<'a> {
             self.plain(at, node, &[], decisions)?;
         }
         decisions[0].set_cut();
-        // Which nodes are cut is given, and a slot's own cost is the same everywhere.
+        // The cut nodes are given, and the cost of the slot of a tet leaf is the same in every tree, so it is left out.
         Ok(Summary { cost: [0.0; WIDTH], vertices: None })
     }
 
-    /// A node that is not cut.
+    /// Plans a node that is not cut.
     fn plain(&self, at: u32, node: &Node, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
         let area = self.area(node);
         if node.is_leaf() {
@@ -254,7 +254,7 @@ impl<'a> Planner<'a> {
         decision.set_share(WIDTH, share);
         let mut summary = Summary { cost: [f32::INFINITY; WIDTH], vertices: None };
         let mut role = (area * self.costs.node + self.line * NODE_LINES as f32 + children, Role::Node);
-        // A subtree with a cut node has no vertices and at least one cut.
+        // A subtree with a cut node cannot be a triangle leaf.
         if node.count as usize <= self.plan.triangles && cut.is_empty() {
             if let (Some(a), Some(b)) = (&left.vertices, &right.vertices) {
                 summary.vertices = a.join(b);
@@ -285,7 +285,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The children, as nodes of the binary BVH, of a node that is a wide node of at most so many.
+/// The children, as nodes of the binary BVH, of a wide node of at most `most` children.
 pub(super) fn children(bvh: &BinaryBvh, decisions: &[Decision], at: u32, most: usize) -> Vec<u32> {
     let mut children = Vec::with_capacity(most);
     let share = decisions[at as usize].share(WIDTH);

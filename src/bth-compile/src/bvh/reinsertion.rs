@@ -1,4 +1,4 @@
-//! Insertion-based optimization: subtrees move to where they cost least.
+//! Optimization of the tree by reinsertion: subtrees move to the positions of least cost.
 //!
 //! After "Parallel Reinsertion for Bounding Volume Hierarchy Optimization" (Meister and Bittner
 //! 2018): the best places of a batch of subtrees are searched in parallel in the unchanged tree.
@@ -12,7 +12,7 @@ use crate::monitor::Monitor;
 use bth_format::layout::NONE;
 use rayon::prelude::*;
 
-/// Size of the first batch, which holds the largest nodes, whose moves matter most to each other.
+/// Size of the first batch. It is small because it holds the largest nodes, whose moves affect each other most.
 const FIRST_BATCH: usize = 16;
 /// Later batches have this share of what was tried before, so that there are few of them.
 const BATCH_GROWTH: usize = 16;
@@ -68,7 +68,7 @@ fn largest(tree: &LinkedTree, share: f64) -> Vec<u32> {
     keyed.into_iter().map(|(_, at)| at).collect()
 }
 
-/// A move that pays: the sum of all areas falls by `gain`.
+/// A move that lowers the sum of all areas by `gain`.
 #[derive(Clone, Copy, Debug)]
 struct Move {
     subtree: u32,
@@ -82,8 +82,8 @@ fn search(tree: &LinkedTree, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Optio
     let area = bounds.half_area();
     let parent = tree.node(subtree).parent;
     let mut best = Move { subtree, target: NONE, gain: 0.0 };
-    // What is won by taking the subtree out: its parent, and the shrinking of each ancestor below
-    // the one under which it goes back in.
+    // The area that removing the subtree saves: its parent's, and the decrease of each ancestor below the one under which
+    // it is inserted again.
     let mut saved = tree.node(parent).bounds.half_area();
     let mut remaining = Bounds::EMPTY;
     let mut below = subtree;
@@ -117,6 +117,6 @@ fn search(tree: &LinkedTree, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Optio
         }
         below = ancestor;
     }
-    // The present place wins nothing but rounding.
+    // At the present position the gain is nothing but rounding.
     (best.target != NONE && best.target != tree.sibling(subtree)).then_some(best)
 }

@@ -5,22 +5,6 @@ use bth_random::Rng;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Numbers for samples.
-pub(super) struct Random(Rng);
-
-impl Random {
-    pub(super) fn new(seed: u64) -> Self {
-        Self(Rng::new(seed))
-    }
-    /// In [0, 1).
-    pub(super) fn unit(&mut self) -> f32 {
-        (self.0.next() >> 40) as f32 / (1u32 << 24) as f32
-    }
-    pub(super) fn below(&mut self, n: usize) -> usize {
-        (self.0.next() % n as u64) as usize
-    }
-}
-
 /// Welds corners by their bits, with -0 as +0.
 pub(super) fn weld(corners: &[[[f32; 3]; 3]]) -> Mesh {
     let mut rows = HashMap::new();
@@ -39,12 +23,12 @@ pub(super) fn weld(corners: &[[[f32; 3]; 3]]) -> Mesh {
 
 /// Small separate triangles anywhere in the unit cube.
 pub(super) fn soup(count: usize, seed: u64) -> Mesh {
-    let mut random = Random::new(seed);
+    let mut random = Rng::new(seed);
     let size = 0.5 / (count as f32).cbrt();
     let corners: Vec<_> = (0..count)
         .map(|_| {
-            let center = [random.unit(), random.unit(), random.unit()];
-            std::array::from_fn(|_| center.map(|c| c + size * (random.unit() - 0.5)))
+            let center = [random.unit_f32(), random.unit_f32(), random.unit_f32()];
+            std::array::from_fn(|_| center.map(|c| c + size * (random.unit_f32() - 0.5)))
         })
         .collect();
     weld(&corners)
@@ -52,12 +36,12 @@ pub(super) fn soup(count: usize, seed: u64) -> Mesh {
 
 /// A height field of `2 * side * side` triangles.
 pub(super) fn grid(side: usize, height: f32, seed: u64) -> Mesh {
-    let mut random = Random::new(seed);
+    let mut random = Rng::new(seed);
     let row = side as u32 + 1;
     let mut mesh = Mesh::default();
     for y in 0..row {
         for x in 0..row {
-            mesh.positions.push([x as f32, y as f32, height * random.unit()]);
+            mesh.positions.push([x as f32, y as f32, height * random.unit_f32()]);
         }
     }
     for y in 0..side as u32 {
@@ -72,9 +56,13 @@ pub(super) fn grid(side: usize, height: f32, seed: u64) -> Mesh {
 
 /// Triangles with few distinct coordinates: many repeat, touch, coincide or have no area.
 pub(super) fn clutter(count: usize, values: &[f32], seed: u64) -> Mesh {
-    let mut random = Random::new(seed);
+    let mut random = Rng::new(seed);
     let corners: Vec<[[f32; 3]; 3]> = (0..count)
-        .map(|_| std::array::from_fn(|_| std::array::from_fn(|_| values[random.below(values.len())])))
+        .map(|_| {
+            std::array::from_fn(|_| {
+                std::array::from_fn(|_| values[random.below(values.len() as u64) as usize])
+            })
+        })
         .collect();
     weld(&corners)
 }

@@ -29,7 +29,7 @@ impl Split {
         self.left > 0
     }
 
-    /// Takes the split if it is cheaper, or as cheap and better balanced, so that stacks of equal
+    /// Replaces the split by another one that is cheaper, or equally cheap and better balanced, so that stacks of equal
     /// triangles do not become long chains.
     #[inline(always)]
     pub(super) fn improve(&mut self, cost: f64, axis: usize, position: usize, left: usize, total: usize) {

@@ -21,7 +21,7 @@ fn hittable(mesh: &Mesh) -> Vec<u32> {
     (0..mesh.triangles.len() as u32).filter(|&id| !is_zero_area(mesh.corners(id))).collect()
 }
 
-/// The contract of `BinaryBvh`. Quadratic in the depth of the tree. Returns the edges on the longest path.
+/// Asserts the contract of `BinaryBvh`. Quadratic in the depth of the tree. Returns the edges on the longest path.
 pub(super) fn validate_binary(mesh: &Mesh, bvh: &BinaryBvh) -> u32 {
     let mut sorted = bvh.order.clone();
     sorted.sort_unstable();
@@ -53,7 +53,7 @@ pub(super) fn validate_binary(mesh: &Mesh, bvh: &BinaryBvh) -> u32 {
     deepest
 }
 
-/// Reads a wide BVH back.
+/// Decodes a wide BVH from its lines.
 struct Reader<'a> {
     mesh: &'a Mesh,
     bvh: &'a BinaryBvh,
@@ -64,7 +64,7 @@ struct Reader<'a> {
     deepest: u32,
 }
 
-/// The contract of `Wide`: every triangle in exactly one leaf or cut node, boxes exact, corners
+/// Asserts the contract of `Wide`: every triangle in exactly one leaf or cut node, boxes exact, corners
 /// bit for bit and in order, every line used once.
 pub(super) fn validate_wide(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool, wide: &Wide) {
     let lines = BTreeSet::new();
@@ -85,7 +85,7 @@ pub(super) fn validate_wide(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subt
 }
 
 impl Reader<'_> {
-    /// Claims the lines of a structure.
+    /// Decodes a structure and marks its lines as used.
     fn read<T: FromBytes>(&mut self, line: u32, lines: usize) -> T {
         for l in line as usize..line as usize + lines {
             assert!(self.lines_seen.insert(l), "line {l} belongs to one structure");
@@ -163,7 +163,7 @@ impl Reader<'_> {
         all
     }
 
-    /// Claims a leaf's rows of the id table and compares its corners.
+    /// Marks a leaf's rows of the id table as used and compares its corners.
     fn ids(&mut self, first: u32, count: u32, corners: impl Fn(usize) -> [[f32; 3]; 3]) -> Vec<u32> {
         let ids = self.wide.triangle_ids[first as usize..(first + count) as usize].to_vec();
         for (t, &id) in ids.iter().enumerate() {

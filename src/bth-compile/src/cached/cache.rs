@@ -1,4 +1,4 @@
-//! Access to the store: lookups, results that are kept, the log of hits and misses.
+//! Access to the store: lookups and additions of results, and the log of hits and misses.
 
 use super::log::{Log, Miss};
 use crate::error::Result;
@@ -20,7 +20,7 @@ pub struct Cache<'a> {
 }
 
 impl<'a> Cache<'a> {
-    /// Keeps nothing.
+    /// A cache without a store, which keeps nothing.
     pub fn none() -> Self {
         Self { store: None, subject: String::new(), log: Mutex::default(), tetgen: OnceLock::new() }
     }
@@ -41,8 +41,8 @@ impl<'a> Cache<'a> {
         self.store
     }
 
-    /// The name of the tetrahedralizer in keys. Found out once, since starting the worker takes some milliseconds. `None`
-    /// when the worker fails: then nothing that needs it is kept.
+    /// The name of the tetrahedralizer in keys, determined once because starting the worker takes some milliseconds. `None`
+    /// when the worker fails; results that depend on it are not kept then.
     pub(crate) fn tetgen(&self, options: &tets::Options, monitor: &dyn Monitor) -> Result<Option<&str>> {
         if self.tetgen.get().is_none() {
             let found = tets::version(options, monitor)?;
@@ -51,7 +51,7 @@ impl<'a> Cache<'a> {
         Ok(self.tetgen.get().and_then(Option::as_deref))
     }
 
-    /// The record of a key. Not counted as a hit: it may be useless without its content.
+    /// The record of a key. Not counted as a hit, because the content may be missing.
     pub(crate) fn find(&self, key: &Key, monitor: &dyn Monitor) -> Option<Record> {
         let store = self.store?;
         let found = store.find(key);
@@ -82,7 +82,7 @@ impl<'a> Cache<'a> {
         file
     }
 
-    /// Whether the content of a record is there.
+    /// Whether the store has the content of a record.
     pub(crate) fn holds(&self, record: &Record) -> bool {
         self.store.is_some_and(|store| store.holds(record))
     }
@@ -125,7 +125,7 @@ impl<'a> Cache<'a> {
         self.note_put(key, "", self.store?.put_name(key, blob, bytes, report.clone()), monitor)
     }
 
-    /// Keeps a content that is of use on this machine only and whose misses need no explanation.
+    /// Keeps a content that is useful on this machine only and whose misses are not explained.
     pub(crate) fn put_here(&self, key: &Key, bytes: &[u8], monitor: &dyn Monitor) {
         let Some(store) = self.store else { return };
         self.warn_once(store.put_here(key, bytes, serde_json::Value::Null), monitor);
@@ -144,7 +144,7 @@ impl<'a> Cache<'a> {
         self.warn_once(put, monitor)
     }
 
-    /// The record; the first failure of a compilation is a warning.
+    /// The record. The first failure of a compilation is reported as a warning, later ones are not reported.
     fn warn_once(&self, put: std::io::Result<Record>, monitor: &dyn Monitor) -> Option<Record> {
         let store = self.store?;
         pass_notes(store, monitor);
@@ -167,7 +167,8 @@ impl<'a> Cache<'a> {
         Ok(lock)
     }
 
-    /// The result of a stage: from the cache if it is there and `decode` accepts it, else built and kept. `part` as in
+    /// The result of a stage: from the cache if it has the result and `decode` accepts it, else built and kept. `part` as
+    /// in
     /// [`Cache::fetch`].
     pub(super) fn get_or_build<T, R: Serialize + DeserializeOwned>(
         &self,
@@ -188,8 +189,8 @@ impl<'a> Cache<'a> {
         Ok((value, report))
     }
 
-    /// What `fetched` finds for a key, else the lock for building it, if it may be kept. Another process that holds the lock
-    /// is waited for; then it is looked up again.
+    /// The value that `fetched` finds for a key, else the lock for building it, if the result may be kept. If another
+    /// process holds the lock, this one waits for it and then looks the key up again.
     pub(crate) fn find_or_lock<T>(
         &self,
         (key, part): (Option<&Key>, &str),
@@ -213,7 +214,7 @@ impl<'a> Cache<'a> {
     /// Counts a hit.
     pub(crate) fn hit(&self, key: &Key, part: &str) {
         if let Some(store) = self.store {
-            // A scene may have thousands of objects: for those only misses are noted.
+            // A scene may have thousands of objects, so for objects only misses are stored.
             if part.is_empty() {
                 store.note_last(key, &self.subject_of(part));
             }

@@ -1,4 +1,4 @@
-//! Results of the stages as bytes, and the checks on bytes that come back.
+//! Encodes results of the stages as bytes, and decodes them with checks.
 
 use super::rows::{HashedRows, RowReader, RowWriter};
 use crate::marks::Marks;
@@ -106,11 +106,12 @@ impl Codec for Marks {
     }
 }
 
-/// What lies behind a face: a tetrahedron, 2³¹ + a constrained face, or all bits for the hull.
+/// The flag of a constrained face in the number that encodes the neighbour across a face: a tetrahedron, 2³¹ + a
+/// constrained face, or all bits set for the hull.
 const FACE: u32 = 1 << 31;
 const HULL: u32 = u32::MAX;
 
-/// In the cache the faces of a tetrahedralization number triangles within the node.
+/// In the cache the faces of a tetrahedralization refer to triangles by their number within the node.
 impl Codec for TetMesh {
     fn write(&self, to: &mut RowWriter) {
         let code = |behind: &Behind| match *behind {

@@ -15,23 +15,23 @@ use std::path::Path;
 
 /// Result of a compilation through the cache.
 #[derive(Debug)]
-pub struct Outcome<R> {
-    /// The compiled file; absent when the cache has it and it was not needed.
+pub struct CachedCompilation<R> {
+    /// The compiled file; absent when the cache has it and the caller does not need the bytes.
     pub content: Option<Content>,
     /// The report of the stages; absent when the file came from the cache.
     pub built: Option<R>,
     /// The record of the compiled file, if the cache has one.
     pub record: Option<Record>,
-    /// The report as JSON, of the compilation that made the file, whenever that was.
+    /// The report as JSON, of the compilation that made the file, which may be an earlier one.
     pub report: Value,
 }
 
-/// What a compilation through the cache would do.
+/// Prediction of a compilation through the cache.
 #[derive(Clone, Debug, Default)]
 pub struct DryRun {
     /// The record of the compiled file, if the cache has it.
     pub record: Option<Record>,
-    /// Else what differs from the last compilation of the same source.
+    /// Differences from the last compilation of the same source, if the cache does not have the file.
     pub because: Vec<String>,
     /// Objects of a scene that would be built.
     pub parts: Vec<Miss>,
@@ -52,7 +52,7 @@ impl DryRun {
     }
 }
 
-/// What [`compile`] would do. Reads and hashes the model, and does nothing else.
+/// What [`compile`] would do. Only reads and hashes the model.
 ///
 /// # Errors
 /// When the model cannot be read.
@@ -61,7 +61,8 @@ pub fn dry_run(source: &Path, options: &Options, cache: &Cache<'_>, monitor: &dy
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
 
-/// Compiles a model, or takes from the cache what was made of the same content before. `needed` decides whether the bytes
+/// Compiles a model, or takes results from the cache that were made from the same content. `needed` decides whether the
+/// bytes
 /// of a file in the cache are read.
 ///
 /// # Errors
@@ -72,7 +73,7 @@ pub fn compile(
     cache: &Cache<'_>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
-) -> Result<Outcome<Report>> {
+) -> Result<CachedCompilation<Report>> {
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
     let model = Model { path: source, digest: &digest };
@@ -87,7 +88,7 @@ pub fn compile(
     Ok(outcome)
 }
 
-/// Hashes a model. With its key, if the compiled file may be kept.
+/// Hashes a model. Returns its key too, if the compiled file may be kept.
 fn identify(
     source: &Path,
     options: &Options,
@@ -95,7 +96,7 @@ fn identify(
     monitor: &dyn Monitor,
     clock: &mut Clock,
 ) -> Result<(SourceDigest, Option<Key>)> {
-    // Starting the worker takes as long as hashing a small model.
+    // In parallel, because starting the worker takes as long as hashing a small model.
     let (digest, tetgen) = std::thread::scope(|scope| {
         let tetgen = scope.spawn(|| tetgen_in_keys(options, cache, monitor));
         let digest = clock.time("hash", || SourceDigest::of(source));
@@ -130,7 +131,7 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
     build: impl FnOnce() -> Result<(Content, R, bool)>,
-) -> Result<Outcome<R>> {
+) -> Result<CachedCompilation<R>> {
     let fetched = || key.and_then(|key| fetch(cache, key, needed, monitor));
     let (found, _working) = cache.find_or_lock((key, ""), monitor, fetched)?;
     if let Some(found) = found {
@@ -146,10 +147,10 @@ pub(crate) fn compile_or_fetch<R: Serialize>(
         (Some(key), false) => cache.put_name(key, (content.name(), content.length()), &report, monitor),
         (None, _) => None,
     };
-    Ok(Outcome { content: Some(content), built: Some(built), record, report })
+    Ok(CachedCompilation { content: Some(content), built: Some(built), record, report })
 }
 
-/// All bytes of a file that was put together.
+/// All bytes of a content.
 pub(crate) fn joined(content: &Content) -> Result<Cow<'_, [u8]>> {
     content.bytes().map_err(|e| Error::File {
         code: "BTH-O001",
@@ -164,11 +165,11 @@ fn fetch<R>(
     key: &Key,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
-) -> Option<Outcome<R>> {
+) -> Option<CachedCompilation<R>> {
     let mut record = cache.find(key, monitor)?;
     let content = if needed(&record) { Some(cache.read(&record, monitor)?.into()) } else { None };
     cache.hit(key, "");
     cache.store()?.touch(&record);
     let report = std::mem::take(&mut record.report);
-    Some(Outcome { content, built: None, report, record: Some(record) })
+    Some(CachedCompilation { content, built: None, report, record: Some(record) })
 }

@@ -1,6 +1,7 @@
-//! Keys: everything that each result depends on. Never paths, times, numbers of threads or the order of arguments.
+//! Keys of the cache: everything that each result depends on, and never paths, times, numbers of threads or the order of
+//! arguments.
 //!
-//! A change of a stage's results raises its version here; `tests/versions.rs` fails when that was forgotten.
+//! When the results of a stage change, its version in this file must be raised; `tests/versions.rs` fails otherwise.
 
 use super::codec::MeshSummary;
 use super::rows::HashedRows;
@@ -25,7 +26,7 @@ const COLLAPSE: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
-/// A mesh read from a model. The extension decides in which format the file is read, if it is a known one.
+/// A mesh read from a model. A supported extension determines the format in which the file is read.
 pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, keep: Keep) -> Key {
     Key::new("mesh")
         .with("source", source.text())
@@ -67,7 +68,7 @@ pub(crate) fn tets_of_node(
     let mut hasher = HashedRows::new("node");
     hasher.add(vertices);
     hasher.add(triangles);
-    // A node that can be replaced by smaller ones gets fewer attempts.
+    // Part of the key because a node that can be replaced by smaller ones gets fewer attempts.
     let smaller = options.cells.iter().any(|&size| (size as usize) < triangles.len());
     Key::new("tets")
         .with("geometry", hasher.finish().hex())
@@ -171,7 +172,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     if options.structure != Structure::Bvh {
-        // One by one, so that an explanation names the option that differs.
+        // Options are components of their own, so that an explanation names the one that differs.
         let fields = json(&options.costs);
         let fields = fields.as_object().into_iter().flatten();
         all.extend(fields.map(|(name, value)| (format!("selection {name}"), text(value))));
@@ -200,6 +201,6 @@ fn text(value: &impl Serialize) -> String {
 }
 
 fn json(value: &impl Serialize) -> serde_json::Value {
-    // Options are numbers, names and structures of them.
+    // Options consist of numbers, strings and structures of these, which JSON can express.
     serde_json::to_value(value).unwrap_or_else(|e| unreachable!("an option that is no JSON: {e}"))
 }

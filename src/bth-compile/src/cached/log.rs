@@ -19,8 +19,9 @@ pub struct Log {
 pub struct Miss {
     /// Its stage.
     pub stage: String,
-    /// Which object or mesh, where there are several.
+    /// The object or mesh, where the source has several.
     pub part: String,
-    /// What differs from the last key of the same source; `new` for a source without one, `evicted` for the same key.
+    /// Differences from the last key of the same source; `new` for a source without one, `evicted` where the key is the
+    /// same.
     pub because: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! Compilation through the cache: what was made of the same content before is taken from there.
+//! Compilation through the cache: results that were made from the same content are taken from there.
 //!
 //! This module wraps the pipeline from outside; no stage depends on it. `cache` accesses the store, `keys` lists what each
 //! result depends on, `codec`, `rows` and `topology` turn results into bytes, `stages` and `nodes` are the decorators of the
@@ -16,7 +16,7 @@ mod stages;
 mod topology;
 
 pub use cache::Cache;
-pub use compile::{DryRun, Outcome, compile, dry_run};
+pub use compile::{CachedCompilation, DryRun, compile, dry_run};
 pub use log::{Log, Miss};
 
 pub(crate) use codec::{Codec, MeshSummary, decode, encode};

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::tets::{NodeInput, NodeJob, NodeReport, NodeResult, NodeRunner, Outcome, TetMesh, TimedNodes};
 
-/// Takes results of nodes from the cache. A result that does not depend on clocks and machines is kept, failures too.
+/// Takes results of nodes from the cache. Results that do not depend on clocks and machines are kept, including failures.
 pub(super) struct CachedNodes<'a> {
     pub(super) cache: &'a Cache<'a>,
     pub(super) monitor: &'a dyn Monitor,
@@ -16,7 +16,7 @@ impl NodeRunner for CachedNodes<'_> {
         if self.cache.store().is_none() || job.options.planted.is_some() {
             return TimedNodes.run(job, build);
         }
-        // The key has the triangles alone: the box around them follows from the options.
+        // The key contains the triangles only, because the box around them follows from the options.
         let Some(input) = job.input() else { return TimedNodes.run(job, build) };
         let key = keys::tets_of_node(&input.vertices, &input.triangles, job.options, job.tetgen);
         if let Some((record, bytes)) = self.cache.fetch(&key, "", self.monitor)

@@ -1,4 +1,5 @@
-//! Slices of numbers as bytes: for each its length in bytes, then the bytes, padded to eight; and their hashes.
+//! Encodes slices of numbers as bytes (for each slice its length in bytes, then its bytes, padded to a multiple of eight),
+//! decodes them, and hashes them.
 
 use bth_files::Digest;
 use zerocopy::{FromBytes, Immutable, IntoBytes};

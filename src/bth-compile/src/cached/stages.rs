@@ -17,9 +17,9 @@ use std::path::Path;
 /// The stages of one object.
 pub(crate) struct CachedStages<'a> {
     cache: &'a Cache<'a>,
-    /// Which object of the source it is, to explain misses.
+    /// Name of the object within the source, which explanations of misses contain.
     part: &'a str,
-    /// Hash of the geometry that the next stage reads; hashed when a stage first needs it.
+    /// Hash of the geometry that the next stage reads, computed when a stage first needs it.
     geometry: Option<Digest>,
 }
 
@@ -29,13 +29,13 @@ impl<'a> CachedStages<'a> {
         Self { cache, part: "", geometry: None }
     }
 
-    /// The stages of an object whose mesh has been imported; `geometry` is the hash of that.
+    /// The stages of an object whose mesh has been imported; `geometry` is the hash of its geometry.
     pub(crate) fn of_object(cache: &'a Cache<'a>, part: &'a str, geometry: Digest) -> Self {
         Self { cache, part, geometry: Some(geometry) }
     }
 }
 
-/// The known hash of a mesh's geometry, else hashes it.
+/// The hash of a mesh's geometry, computed unless it is known.
 fn hash_once(known: &mut Option<Digest>, mesh: &Mesh) -> Digest {
     *known.get_or_insert_with(|| codec::geometry(mesh))
 }

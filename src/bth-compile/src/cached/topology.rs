@@ -1,4 +1,4 @@
-//! A binary BVH without its boxes, which are those of its triangles: 8 bytes a triangle instead of 80.
+//! A binary BVH without its boxes, which follow from the triangles: 8 bytes a triangle instead of 80.
 
 use super::codec::Codec;
 use super::rows::{RowReader, RowWriter};
@@ -10,7 +10,7 @@ use bth_import::Mesh;
 pub(crate) struct Topology {
     /// Triangles left of each inner node, in depth-first order.
     left: Vec<u32>,
-    /// As in the BVH.
+    /// Triangle ids, as in [`BinaryBvh::order`].
     order: Vec<u32>,
 }
 

@@ -1,11 +1,11 @@
-//! Boxes of a node in bytes: no box becomes smaller, and none grows by more than a step on a side.
+//! Boxes of a node's children in bytes, rounded outwards: no box becomes smaller, and no side moves by more than a step.
 
 use bth_format::layout::{NONE, PackedNode, WIDTH, WideNode};
 
-/// The greatest number of steps.
+/// Greatest number of steps along an axis.
 const MOST: f64 = 255.0;
 
-/// The same node with packed boxes; nothing where coordinates are too great.
+/// The node with packed boxes; `None` where coordinates are too great.
 pub(super) fn packed_node(node: &WideNode) -> Option<PackedNode> {
     let mut packed = PackedNode {
         bounds: [[[255; WIDTH], [0; WIDTH]]; 3],
@@ -22,7 +22,8 @@ pub(super) fn packed_node(node: &WideNode) -> Option<PackedNode> {
         let (origin, step) = steps(least, greatest)?;
         (packed.origin[axis], packed.step[axis]) = (origin as f32, step as f32);
         for slot in 0..used {
-            // Differences of ends that are much smaller than the origin are rounded: a step more makes good for it.
+            // The difference of an end and an origin of much greater magnitude is rounded; moving by one more step corrects
+            // this.
             let mut first = ((lower[slot] - origin) / step).floor();
             let mut last = ((upper[slot] - origin) / step).ceil();
             first -= f64::from(u8::from(origin + first * step > lower[slot]));
@@ -46,13 +47,13 @@ pub(super) fn packed_node(node: &WideNode) -> Option<PackedNode> {
 /// Origin and step of an axis: the least power of two by which bytes reach from end to end and ends are `f32`.
 fn steps(least: f64, greatest: f64) -> Option<(f64, f64)> {
     let size = least.abs().max(greatest.abs());
-    // No finer than what tells numbers of this size apart, and no finer than a normal f32.
+    // No finer than the resolution of f32 at this magnitude, and no finer than the least normal f32.
     let finest = (size / f64::from(1 << 23)).max((greatest - least) / MOST).max(f64::from(f32::MIN_POSITIVE));
-    // The power of two below it, bit for bit the same on every machine.
+    // The power of two at or below it, by its exponent bits, so that it is the same on every machine.
     let mut step = f64::from_bits(finest.to_bits() & 0x7ff << 52);
     while step <= f64::from(f32::MAX) {
         let origin = (least / step).floor() * step;
-        // Multiples of the step: the sum is exact, where the difference of the ends would be rounded.
+        // Both terms are multiples of the step, so the sum is exact; the difference of the ends would be rounded.
         if greatest <= origin + MOST * step && size / step <= f64::from(1 << 23) {
             return Some((origin, step));
         }

@@ -1,4 +1,4 @@
-//! Which grid: the finest that so many bits reach over the object's box.
+//! Choice of the grid: the finest one whose bits reach over the object's box.
 
 use crate::error::{Error, Place, Result};
 use bth_format::layout::{Grid, GridBits};
@@ -39,7 +39,7 @@ impl FromStr for MaxError {
 }
 
 impl MaxError {
-    /// In the units of an object with this diagonal.
+    /// The distance in the units of the object, whose box has this diagonal.
     fn distance(self, diagonal: f64) -> f64 {
         match self {
             MaxError::Absolute(distance) => distance,
@@ -52,7 +52,7 @@ impl MaxError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Boxes {
-    /// As they are.
+    /// In `f32`, unchanged.
     #[default]
     F32,
     /// Rounded outwards to bytes: nodes of three lines in place of seven.
@@ -65,15 +65,16 @@ impl Boxes {
     }
 }
 
-/// Which coordinates triangle leaves and nodes store.
+/// The form of coordinates in triangle leaves and nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Options {
-    /// So many bits. Without: `f32`, or if `max_error` is given the fewest that honour it.
+    /// Bits of a coordinate. If absent, coordinates are `f32`, or have the fewest bits that keep within `max_error` if that
+    /// is given.
     #[serde(serialize_with = "number_of_bits")]
     pub bits: Option<GridBits>,
     /// Greatest distance that a vertex may move.
     pub max_error: Option<MaxError>,
-    /// Boxes of nodes; they move no vertex, and no answer depends on them.
+    /// Boxes of nodes. They move no vertex, and no answer to a ray depends on them.
     #[serde(skip_serializing_if = "Boxes::is_f32")]
     pub boxes: Boxes,
 }
@@ -82,14 +83,14 @@ fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result:
     bits.map(|b| b as u32).serialize(to)
 }
 
-/// What became of the coordinates.
+/// Report on the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Bits of a coordinate.
     pub bits: u32,
     /// Greatest distance that a vertex moved, object space.
     pub displacement: f32,
-    /// Between neighbouring points of the grid.
+    /// Distance between neighbouring points of the grid on each axis.
     pub step: [f32; 3],
 }
 
@@ -99,7 +100,7 @@ pub(crate) struct OnGrid {
     pub(crate) grid: Grid,
     /// Greatest distance that a position moved, rounded up.
     pub(crate) displacement: f32,
-    /// Positions of the mesh as they were.
+    /// Original positions of the mesh.
     pub(crate) source: Vec<[f32; 3]>,
 }
 
@@ -176,9 +177,9 @@ fn too_large(source: &Path, bits: GridBits) -> Error {
 }
 
 /// Least and greatest coordinates.
-type Bounds = [[f32; 2]; 3];
+type AxisRanges = [[f32; 2]; 3];
 
-fn bounds(positions: &[[f32; 3]]) -> Option<Bounds> {
+fn bounds(positions: &[[f32; 3]]) -> Option<AxisRanges> {
     let first = positions.first()?;
     let mut bounds = first.map(|x| [x, x]);
     for point in positions {
@@ -189,12 +190,12 @@ fn bounds(positions: &[[f32; 3]]) -> Option<Bounds> {
     Some(bounds)
 }
 
-fn diagonal(bounds: Bounds) -> f64 {
+fn diagonal(bounds: AxisRanges) -> f64 {
     bounds.iter().map(|[low, high]| (f64::from(*high) - f64::from(*low)).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The finest grid of so many bits that holds a box; none near the greatest numbers.
-fn grid(bits: GridBits, bounds: Bounds) -> Option<Grid> {
+/// The finest grid of this many bits that contains a box; `None` where coordinates are near the greatest `f32`.
+fn grid(bits: GridBits, bounds: AxisRanges) -> Option<Grid> {
     let mut grid = Grid { bits, origin: [0.0; 3], step: [1.0; 3] };
     for (axis, ends) in bounds.into_iter().enumerate() {
         let mut fits = |exponent: i32| {
@@ -208,18 +209,18 @@ fn grid(bits: GridBits, bounds: Bounds) -> Option<Grid> {
     Some(grid)
 }
 
-/// An exponent below which the box has too many steps for sure; that of a normal number.
+/// An exponent of a normal number below which the box certainly has too many steps.
 fn first_exponent(bits: GridBits, [low, high]: [f32; 2]) -> i32 {
     let extent = f64::from(high) - f64::from(low);
     let floor = |x: f64| ((x.to_bits() >> 52) as i32 & 0x7ff) - 1023;
     let steps = if extent > 0.0 { floor(extent) - bits as i32 - 1 } else { i32::MIN };
-    // And its greatest coordinate more than 2^24.
+    // Below it the greatest coordinate is also more than 2^24 steps.
     let greatest = f64::from(low.abs().max(high.abs()));
     let multiples = if greatest > 0.0 { floor(greatest) - 24 } else { i32::MIN };
     steps.max(multiples).max(-126)
 }
 
-/// Greatest distance of a position from its point, rounded up.
+/// Greatest distance of a position from its grid point, rounded up.
 fn displacement(grid: &Grid, positions: &[[f32; 3]]) -> f32 {
     let square = |p: &[f32; 3]| {
         let q = grid.nearest(*p);
@@ -227,7 +228,7 @@ fn displacement(grid: &Grid, positions: &[[f32; 3]]) -> f32 {
     };
     let exact = positions.iter().map(square).fold(0.0, f64::max).sqrt();
     let rounded = exact as f32;
-    // One more than rounding up needs, for the roundings of f64 before.
+    // One unit in the last place beyond rounding up covers the rounding of the f64 operations above.
     if exact == 0.0 { 0.0 } else { rounded.next_up() }
 }
 
@@ -251,8 +252,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(500))]
-        /// Every vertex of random points at any scale: on the grid, and no farther than is said; the bound is not
-        /// looser than half the diagonal of a cell; what is on the grid stays.
+        /// At any scale every vertex lies on the grid afterwards, no farther than stated; the bound is at most half the
+        /// diagonal of a cell; points of the grid do not move.
         #[test]
         fn no_vertex_moves_farther_than_is_said(points in prop::collection::vec(prop::array::uniform3(number()), 1..40)) {
             for bits in GridBits::ALL {
@@ -274,7 +275,7 @@ mod tests {
                         let steps = on.grid.steps(axis, q[axis]);
                         prop_assert!((0..=i64::from(bits.max_steps())).contains(&steps), "{}", steps);
                         prop_assert_eq!(on.grid.coordinate(axis, steps as u32).to_bits(), q[axis].to_bits());
-                        // Half a step at most, so no coordinate has left its nearest point.
+                        // At most half a step, so every coordinate is at its nearest grid point.
                         let off = (f64::from(p[axis]) - f64::from(q[axis])).abs();
                         prop_assert!(off <= 0.5 * f64::from(on.grid.step[axis]));
                     }
@@ -286,7 +287,7 @@ mod tests {
         }
     }
 
-    /// Of a box of whole numbers, a half of one is the finest step that 16 bits reach.
+    /// For this box of integer coordinates, 1/2 is the finest step that 16 bits reach.
     #[test]
     fn grids_are_as_fine_as_their_bits_allow() {
         let bounds = [[-3.0, 32764.0], [0.0, 32768.0], [5.0, 5.0]];

@@ -1,6 +1,6 @@
-//! Coordinates and boxes in fewer bits. Vertices move to the points of a grid, once and before anything is built from them:
-//! what shares a vertex goes on sharing it, closed surfaces stay closed, and all that comes after is exact for the vertices
-//! as they are stored. Boxes of nodes are rounded outwards and change no answer.
+//! Coordinates and boxes in fewer bits. Vertices move to the points of a grid once, before anything is built from them.
+//! Triangles that share a vertex continue to share it, closed surfaces stay closed, and all later stages are exact for the
+//! vertices as they are stored. Boxes of nodes are rounded outwards, which changes no answer.
 
 mod boxes;
 mod choose;

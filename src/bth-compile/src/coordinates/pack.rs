@@ -1,4 +1,4 @@
-//! The lines of a wide BVH with its leaves on a grid, or boxes of nodes in bytes, which makes them shorter.
+//! Rewrites the lines of a wide BVH with shorter blocks: leaves on a grid, and nodes with boxes in bytes.
 
 use super::boxes::packed_node;
 use crate::bvh::Wide;
@@ -6,16 +6,16 @@ use crate::error::{Error, Result};
 use bth_format::layout::*;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// A block of the lines.
+/// A node or leaf in the lines.
 struct Block {
-    /// Its child in the wide BVH of `f32`.
+    /// Child code in the wide BVH of `f32`.
     old: Child,
-    /// Half line of its new place.
+    /// Offset of its new place, in half lines.
     half: u64,
 }
 
-/// Moves the blocks together, leaves shortened where there is a grid, on which their corners must lie, and nodes if they are
-/// to be packed. Whether they are now: coordinates may be too great for steps of bytes.
+/// Moves the blocks together, with leaves shortened where there is a grid, on which their corners must lie, and nodes
+/// shortened with `pack_nodes`. Returns whether nodes were packed; coordinates may be too great for steps of bytes.
 ///
 /// # Errors
 /// `BTH-L202` when a child code cannot address a leaf.
@@ -86,7 +86,7 @@ pub fn pack(wide: &mut Wide, grid: Option<&Grid>, pack_nodes: bool) -> Result<bo
     Ok(nodes.is_some())
 }
 
-/// The nodes among the blocks with their boxes packed, children as before; nothing if one has none.
+/// The nodes among the blocks with packed boxes and unchanged child codes; `None` if one of them cannot be packed.
 fn packed_nodes(wide: &Wide, blocks: &[Block]) -> Option<Vec<PackedNode>> {
     let node = |block: &Block| match block.old {
         Child::Node(line) => Some(packed_node(read(&wide.lines, line))),
@@ -95,7 +95,7 @@ fn packed_nodes(wide: &Wide, blocks: &[Block]) -> Option<Vec<PackedNode>> {
     blocks.iter().filter_map(node).collect()
 }
 
-/// All blocks, in the order of their lines.
+/// All nodes and leaves, in the order of their lines.
 fn blocks(wide: &Wide) -> Vec<Block> {
     let mut found = Vec::new();
     let mut stack: Vec<u32> = wide.subtrees.iter().copied().chain([wide.root]).collect();
@@ -200,7 +200,7 @@ impl Packed<'_> {
     }
 }
 
-/// Low bits per axis, and the high bits of all three.
+/// Low bits of each axis, and the high bits of all three axes together.
 fn split(grid: &Grid, rows: &[[f32; WIDTH]; 3]) -> ([[u16; WIDTH]; 3], [u16; WIDTH]) {
     let mut high = [0u16; WIDTH];
     let low = std::array::from_fn(|axis| {

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! exactly, on average over both sides of all triangles: the correction for rays that end at surfaces. What
-//! is left open is the ratio r = N_out / N_surf, which is measured.
+//! remains unknown is the ratio r = N_out / N_surf, which is measured.
 
 use super::Start;
 use crate::tets::{Behind, TetMesh};
@@ -33,7 +33,7 @@ pub fn area_steps(mesh: &TetMesh, start: Start) -> f64 {
         for k in 0..4 {
             let area = 0.5 * double_area([1, 2, 3].map(|i| corner(tet[(k + i) % 4]).into())).length();
             match behind[k] {
-                // Each is seen from both of its sides.
+                // Every inner face is listed by the tetrahedra on both of its sides and is counted once.
                 Behind::Tet(next) if (t as u32) < next => free += area,
                 Behind::Tet(_) | Behind::Hull => {}
                 Behind::Face(_) => hit += 0.5 * area,

@@ -1,25 +1,26 @@
 //! The selection of greatest gain over all suitable nodes, none below another, by dynamic programming from
 //! the leaves up.
 //!
-//! Under limits the better of two: a knapsack over the limits in steps, which is exact but for what rounding up to
-//! steps costs and so suits few large nodes; and prices for bytes and seconds (Lagrange multipliers), which take
-//! nodes in the order of gain per unit and so suit many small ones.
+//! Under limits two selections are made and the better one is taken. The first solves the knapsack problem with the limits
+//! divided into steps: exact except for rounding up to steps, and therefore good for few large nodes. The second uses
+//! prices for bytes and seconds (Lagrange multipliers), which take nodes in the order of gain per unit, and therefore is
+//! good for many small nodes.
 
 use super::gains::Gain;
 use crate::bvh::BinaryBvh;
 
-/// Halvings of the interval in which a price lies.
+/// Bisections of the interval in which a price lies.
 const HALVINGS: usize = 48;
-/// Steps of a limit that stands alone, and of each of two.
+/// Steps of a limit: where there is one limit, and of each where there are two.
 const ONE_STEPS: usize = 256;
 const BOTH_STEPS: usize = 31;
 
-/// Candidate nodes in ascending order, with what each saves and what it takes.
+/// Candidate nodes in ascending order, with the gain and the cost of each.
 pub(super) struct Candidates<'a> {
     pub(super) bvh: &'a BinaryBvh,
     pub(super) nodes: &'a [u32],
     pub(super) gains: &'a [Gain],
-    /// Bytes and seconds of each.
+    /// Bytes and seconds of the tetrahedra of each node.
     pub(super) takes: &'a [[f64; 2]],
 }
 
@@ -39,7 +40,7 @@ impl Candidates<'_> {
         if gain(&packed) > gain(&priced) { packed } else { priced }
     }
 
-    /// By the least prices under which the selection is not over any limit.
+    /// The selection at the least prices for which it is within all limits, by bisection.
     fn priced(&self, over: impl Fn(&[usize], usize) -> bool) -> Vec<usize> {
         let mut prices = [0.0; 2];
         let mut best = self.selection(prices);
@@ -47,7 +48,7 @@ impl Candidates<'_> {
             if !over(&best, kind) {
                 continue;
             }
-            // No node is worth more than this a unit.
+            // At a price above the greatest gain per unit no node is selected.
             let worth = (0..self.nodes.len()).map(|k| self.gains[k].saved / self.takes[k][kind]);
             let (mut low, mut high) = (0.0, worth.fold(0.0, f64::max));
             best = Vec::new();
@@ -65,7 +66,7 @@ impl Candidates<'_> {
         best
     }
 
-    /// By dynamic programming over the limits in steps; what nodes take is rounded up.
+    /// The selection by dynamic programming over the limits in steps; the steps of each node are rounded up.
     fn packed(&self, limits: [Option<f64>; 2]) -> Vec<usize> {
         let count = self.nodes.len();
         let steps = match limits {
@@ -75,7 +76,7 @@ impl Candidates<'_> {
         let width = (steps[0] + 1) * (steps[1] + 1);
         let cell = |room: [usize; 2]| room[0] * (steps[1] + 1) + room[1];
         let rooms = || (0..=steps[0]).flat_map(|a| (0..=steps[1]).map(move |b| [a, b]));
-        // What a node takes, in steps; more than there are if it does not fit.
+        // Steps that a node takes; more than there are if it does not fit.
         let taken = |k: usize| {
             [0, 1].map(|kind| match limits[kind] {
                 None => 0,
@@ -83,7 +84,7 @@ impl Candidates<'_> {
                 Some(limit) => (self.takes[k][kind] / limit * steps[kind] as f64).ceil() as usize,
             })
         };
-        // Greatest gain of the candidates from a row on, by the room that is left.
+        // Greatest gain of the candidates from a row on, by the steps that are left.
         let mut best = vec![0.0f64; (count + 1) * width];
         let with = |best: &[f64], k: usize, room: [usize; 2]| {
             let [a, b] = taken(k);
@@ -111,19 +112,19 @@ impl Candidates<'_> {
         rows
     }
 
-    /// Candidates below one follow it: the first that is not below.
+    /// The first candidate after `k` that is not below it; candidates below a node follow it.
     fn end(&self, k: usize) -> usize {
         let after = self.nodes[k] + 2 * self.bvh.nodes[self.nodes[k] as usize].count - 1;
         k + self.nodes[k..].partition_point(|n| *n < after)
     }
 
-    /// The selection of greatest gain after prices.
+    /// The selection of greatest gain after subtracting the prices of its bytes and seconds.
     fn selection(&self, prices: [f64; 2]) -> Vec<usize> {
         let count = self.nodes.len();
         let net =
             |k: usize| self.gains[k].saved - prices[0] * self.takes[k][0] - prices[1] * self.takes[k][1];
-        // Best gain of the candidates from a row on, given that the rows before are dealt with: either the row is
-        // taken and what is below it left out, or it is not.
+        // Greatest gain of the candidates from a row on: either the row is taken and the candidates below it are left out,
+        // or the row is left out.
         let mut best = vec![0.0; count + 1];
         let mut taken = vec![false; count];
         for k in (0..count).rev() {
@@ -148,7 +149,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Greatest gain within the limits over all selections, by trying them all.
+    /// Oracle: greatest gain within the limits over all selections, by trying every one.
     fn by_trying(c: &Candidates<'_>, limits: [Option<f64>; 2]) -> f64 {
         let mut best = 0.0f64;
         'sets: for set in 0u32..1 << c.nodes.len() {
@@ -188,10 +189,10 @@ mod tests {
             prop_assert!(bytes <= limit);
             let most = by_trying(&c, [Some(limit), None]);
             prop_assert!(gain(&limited) <= most + 1e-9);
-            // Rounding up takes at most a step for each node.
+            // Rounding up adds at most one step for each node.
             let less = limit * (1.0 - nodes.len() as f64 / ONE_STEPS as f64);
             prop_assert!(gain(&limited) >= by_trying(&c, [Some(less), None]) - 1e-9);
-            // A limit that binds nothing changes nothing.
+            // Limits that all candidates together meet do not change the selection.
             let all: f64 = takes.iter().map(|t| t[0]).sum();
             prop_assert_eq!(c.best([Some(all), None]), free);
         }

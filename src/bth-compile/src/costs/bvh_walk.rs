@@ -1,5 +1,5 @@
-//! Rays through the binary BVH in double precision: what they hit, and which nodes they enter on the way.
-//! These counts are the same on every machine, whatever its vector instructions.
+//! Rays through the binary BVH in double precision: their nearest hits and the nodes that they enter. The counts are the
+//! same on every machine, whatever its vector instructions.
 
 use super::rays::{SampleRay, enters};
 use crate::bvh::BinaryBvh;
@@ -10,7 +10,7 @@ use glam::DVec3;
 /// Result of tracing a ray through the binary BVH.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Traced {
-    /// Row of the BVH's order that was hit, and where.
+    /// Row of the BVH's order that was hit, and t of the hit.
     pub hit: Option<(u32, f64)>,
     /// Nodes whose boxes the ray entered, leaves included.
     pub visits: u32,
@@ -54,7 +54,8 @@ pub fn walk(mesh: &Mesh, bvh: &BinaryBvh, ray: &SampleRay, mut entered: impl FnM
     traced
 }
 
-/// Möller and Trumbore 1997, within (0, best].
+/// t of the intersection of a ray and a triangle within (0, best] (Möller and Trumbore 1997, "Fast, Minimum Storage
+/// Ray-Triangle Intersection").
 pub(super) fn crosses(ray: &SampleRay, [a, b, c]: [DVec3; 3], best: f64) -> Option<f64> {
     let (e1, e2) = (b - a, c - a);
     let direction = DVec3::from(ray.direction);

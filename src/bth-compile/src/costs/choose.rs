@@ -3,7 +3,7 @@
 use super::bottom_up::Candidates;
 use super::gains::{Gain, Sampled, sample};
 use super::least_useful::{Weighed, least_useful};
-use super::options::{Choice, Decision, Options, Report, Select, Verdict};
+use super::options::{Choice, Options, Report, Select, SelectionOutcome, Verdict};
 use super::prices::Prices;
 use super::subtree_sums::subtree_sums;
 use super::{Weighting, top_down};
@@ -14,19 +14,19 @@ use crate::monitor::Monitor;
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
 
-/// How the tetrahedra will be stored, and the size of the BVH beside them.
+/// How the tetrahedra will be stored, and the size of the object without them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Storage {
-    /// Their record.
+    /// Record that stores a tetrahedron.
     pub record: RecordKind,
-    /// Whether a BVH stays beside them.
+    /// Whether a BVH over the same triangles is kept beside the tetrahedra.
     pub keep_subtrees: bool,
-    /// Bytes of the object without tetrahedra, where they are known; else some are assumed. Of use to the limit on bytes.
+    /// Bytes of the object without tetrahedra, for the limit on bytes; estimated from the number of triangles where absent.
     pub plain_bytes: Option<u64>,
 }
 
 impl Storage {
-    /// Bytes of an object of so many triangles without tetrahedra.
+    /// Bytes of an object of this many triangles without tetrahedra, estimated where they are not known.
     fn plain_bytes(&self, triangles: usize) -> f64 {
         self.plain_bytes.map_or(BVH_BYTES * triangles as f64, |bytes| bytes as f64)
     }
@@ -62,14 +62,14 @@ pub fn choose(
         Select::Nodes(nodes) => (Choice { chosen: nodes.clone(), verdicts: Vec::new() }, 0.0, 0.0),
     };
     if !choice.chosen.is_empty() && cost_bvh - cost_with_tets < options.minimum_gain * cost_bvh {
-        for verdict in choice.verdicts.iter_mut().filter(|v| v.decision == Decision::Chosen) {
-            verdict.decision = Decision::RefusedGain;
+        for verdict in choice.verdicts.iter_mut().filter(|v| v.decision == SelectionOutcome::Chosen) {
+            verdict.decision = SelectionOutcome::RefusedGain;
         }
         choice.chosen.clear();
         cost_with_tets = cost_bvh;
     }
     let triangles: u64 = choice.chosen.iter().map(|&i| u64::from(bvh.nodes[i as usize].count)).sum();
-    let refused = |v: &&Verdict| v.decision == Decision::RefusedCost;
+    let refused = |v: &&Verdict| v.decision == SelectionOutcome::RefusedCost;
     let report = Report {
         options: options.clone(),
         examined: choice.verdicts.len() as u64,
@@ -87,7 +87,7 @@ pub fn choose(
 /// Limits on the bytes of tetrahedra and on the seconds to make them.
 struct Limits<'a> {
     prices: &'a Prices<'a>,
-    /// Bytes and seconds.
+    /// Most bytes and seconds; `None` where they are not limited.
     most: [Option<f64>; 2],
     /// Bytes of the BVH saved for each triangle of a tet leaf, where subtrees are not kept.
     pruned: f64,
@@ -97,46 +97,47 @@ impl<'a> Limits<'a> {
     fn new(triangles: usize, options: &Options, prices: &'a Prices<'a>, storage: Storage) -> Self {
         let count = triangles as f64;
         let plain = storage.plain_bytes(triangles);
-        // The map from triangles to faces is there as soon as there is any tet leaf.
+        // A file with any tet leaf also holds the map from triangles to faces.
         let map = size_of::<u32>() as f64 * count;
         let bytes = options.max_bytes_per_triangle.map(|most| (most * count - plain - map).max(0.0));
         let pruned = if storage.keep_subtrees { 0.0 } else { plain / count.max(1.0) };
         Limits { prices, most: [bytes, options.budget], pruned }
     }
 
-    /// Bytes and seconds that the tetrahedra of a node are expected to take, both above zero.
+    /// Expected bytes and seconds of a node's tetrahedra, both above zero.
     fn takes(&self, triangles: u32) -> [f64; 2] {
         let bytes = self.prices.bytes(triangles);
         let net = bytes - self.pruned * f64::from(triangles);
         [net.max(LEAST_SHARE * bytes), self.prices.seconds(triangles)]
     }
 
-    /// Whether a node alone is within them.
+    /// Whether the tetrahedra of a single node are within the limits.
     fn allow(&self, triangles: u32) -> bool {
         let takes = self.takes(triangles);
         self.most.iter().zip(takes).all(|(most, takes)| most.is_none_or(|most| takes <= most))
     }
 }
 
-/// Least share of a node's tetrahedra that counts where they take the place of its BVH.
+/// Least share of the bytes of a node's tetrahedra that is counted against the limit where the node's BVH is left out in
+/// exchange. Keeps the bytes positive, so that gain per byte stays defined.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Refuses the chosen nodes of least gain for what they take until the others are within the limits; returns the gain
-/// that is lost.
+/// Refuses the chosen nodes of least gain per byte or second until the others are within the limits; returns the lost gain.
 fn refuse_beyond(choice: &mut Choice, limits: &Limits<'_>) -> f64 {
     let mut lost = 0.0;
     for kind in 0..2 {
         let Some(most) = limits.most[kind] else { continue };
-        let verdicts = choice.verdicts.iter_mut().filter(|v| v.decision == Decision::Chosen);
+        let verdicts = choice.verdicts.iter_mut().filter(|v| v.decision == SelectionOutcome::Chosen);
         let mut chosen: Vec<&mut Verdict> = verdicts.collect();
         let weigh = |v: &&mut Verdict| Weighed { gain: v.gain, takes: limits.takes(v.count)[kind] };
         let items: Vec<Weighed> = chosen.iter().map(weigh).collect();
         let excess = items.iter().map(|item| item.takes).sum::<f64>() - most;
         for k in least_useful(&items, excess) {
-            chosen[k].decision = Decision::RefusedLimit;
+            chosen[k].decision = SelectionOutcome::RefusedLimit;
             lost += chosen[k].gain;
         }
-        choice.chosen = chosen.iter().filter(|v| v.decision == Decision::Chosen).map(|v| v.node).collect();
+        choice.chosen =
+            chosen.iter().filter(|v| v.decision == SelectionOutcome::Chosen).map(|v| v.node).collect();
     }
     lost
 }
@@ -159,7 +160,7 @@ fn best(
     };
     let nodes: Vec<u32> = top.iter().copied().filter(fits).collect();
     if nodes.is_empty() {
-        // No candidate: no rays need to be traced.
+        // Without candidates no rays need to be traced.
         let verdicts = top.iter().map(|&i| verdict(bvh, marks, options, i, None)).collect();
         return Ok((Choice { chosen: Vec::new(), verdicts }, 0.0, 0.0));
     }
@@ -186,20 +187,21 @@ fn best(
         let row = nodes.binary_search(&i).ok();
         let mut v = verdict(bvh, marks, options, i, row.map(|k| &gains[k]));
         if chosen.binary_search(&i).is_ok() {
-            v.decision = Decision::Chosen;
+            v.decision = SelectionOutcome::Chosen;
             skip_to = i + 2 * v.count - 1;
         } else if row.is_some() && v.gain > 0.0 {
-            v.decision = if limited { Decision::RefusedLimit } else { Decision::RefusedParts };
+            v.decision =
+                if limited { SelectionOutcome::RefusedLimit } else { SelectionOutcome::RefusedParts };
         }
         verdicts.push(v);
     }
     Ok((Choice { chosen, verdicts }, sampled.cost_bvh, sampled.cost_bvh - saved))
 }
 
-/// Bytes of the BVH for a triangle of a mesh, where they are not known.
+/// Assumed bytes of the BVH for each triangle of a mesh where its size is not known.
 const BVH_BYTES: f64 = 36.0;
 
-/// The nodes of at least so many triangles, and those children of them that have fewer; ascending.
+/// The nodes of at least this many triangles and their smaller children, ascending.
 fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
     let (mut nodes, mut i) = (Vec::new(), 0);
     while i < bvh.nodes.len() {
@@ -214,10 +216,10 @@ fn verdict(bvh: &BinaryBvh, marks: &Marks, options: &Options, i: u32, gain: Opti
     let count = bvh.nodes[i as usize].count;
     let suitable = marks.suitable[i as usize];
     let decision = match () {
-        _ if count < options.minimum_triangles => Decision::RefusedSmall,
-        _ if !suitable => Decision::Unsuitable,
-        _ if count > options.maximum_triangles => Decision::RefusedLarge,
-        _ => Decision::RefusedCost,
+        _ if count < options.minimum_triangles => SelectionOutcome::RefusedSmall,
+        _ if !suitable => SelectionOutcome::Unsuitable,
+        _ if count > options.maximum_triangles => SelectionOutcome::RefusedLarge,
+        _ => SelectionOutcome::RefusedCost,
     };
     let gain = gain.copied().unwrap_or_default();
     let Gain { saved, tets, bvh, steps } = gain;

@@ -29,12 +29,13 @@ pub enum Estimator {
     AverageDepth,
 }
 
-/// Steps without any level, and steps per level: of rays from outside and from surfaces. Fitted to sampled steps by
+/// Steps at level 0 and steps for each level, of rays from outside and from surfaces, for [`Estimator::FaceCount`]. Fitted
+/// to sampled steps by
 /// `bth-bench costs` on nodes of 1,024 to 80,000 triangles of five models.
 const BY_FACE_COUNT: [[f64; 2]; 2] = [[0.68, 4.17], [-10.84, 5.30]];
-/// The same where levels are found from depths.
+/// The same for [`Estimator::AverageDepth`].
 const BY_DEPTH: [[f64; 2]; 2] = [[1.32, 3.96], [-8.93, 4.83]];
-/// The least that a walk can take.
+/// Least number of steps of a walk.
 const LEAST: f64 = 1.0;
 
 impl Estimator {
@@ -100,7 +101,7 @@ mod tests {
                 last = a;
             }
         }
-        // The bunny: 31 and 32 were counted.
+        // On the bunny 31 and 32 steps were counted.
         let bunny = [Start::Outside, Start::Surface].map(|s| Estimator::FaceCount.steps(s, 69_451, 0.0));
         assert!((bunny[0] - 31.0).abs() < 4.0 && (bunny[1] - 32.0).abs() < 4.0, "{bunny:?}");
     }

@@ -1,8 +1,8 @@
 //! The gain of tetrahedralizing a node, by sample rays through the binary BVH.
 //!
-//! A ray that starts on a triangle of a tet leaf walks there first, and goes through the BVH only if it leaves the
-//! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is
-//! kept they walk, too. So the saving of a node is a sum over rays, and savings of disjoint nodes add up.
+//! A ray that starts on a triangle of a tet leaf walks its tetrahedra first, and traverses the BVH only if it leaves the
+//! leaf's box without a hit. Rays from outside take the BVH that is kept beside the tetrahedra; where none is kept they
+//! walk through the tetrahedra too. So the saving of a node is a sum over rays, and the savings of disjoint nodes add up.
 
 use super::bvh_walk::{Traced, walk};
 use super::options::Options;
@@ -15,16 +15,16 @@ use bth_import::Mesh;
 
 /// Steps of a ray as short as those for ambient occlusion, as a share of those of a bounce: 19 of 32 on the bunny.
 const SHORT_STEPS: f64 = 0.6;
-/// Rays of each kind: one for so many triangles, at least and at most so many.
+/// Triangles for each ray of a kind, and the least and greatest number of rays of a kind.
 const TRIANGLES_PER_RAY: usize = 16;
-const RAYS: [usize; 2] = [512, 4096];
+const RAYS_OF_KIND: [usize; 2] = [512, 4096];
 
 /// Estimated gain of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Gain {
     /// Nanoseconds saved for each ray of the model; below 0 where tetrahedra are the slower.
     pub(super) saved: f64,
-    /// Nanoseconds of a ray that may use the tetrahedra: through them, and through the BVH.
+    /// Nanoseconds of a ray that may use the tetrahedra: through the tetrahedra, and through the BVH.
     pub(super) tets: f64,
     pub(super) bvh: f64,
     /// Estimated steps.
@@ -44,15 +44,15 @@ pub(super) struct Sampled {
     pub(super) cost_bvh: f64,
 }
 
-/// Draws and traces the rays: those of a scene if there are any, else lines from everywhere and rays from all
-/// fronts.
+/// Draws and traces the rays: those of the scene if there is one, else uniform lines and rays from the fronts of all
+/// triangles.
 pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &Options, scene: Option<&Weighting>) -> Sampled {
     let [camera, surface] = scene.map_or(options.optimize_for.weights(), |s| s.shares());
     let drawn;
     let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match scene {
         Some(scene) => (&scene.outside, &scene.surface),
         None => {
-            let count = (bvh.order.len() / TRIANGLES_PER_RAY).clamp(RAYS[0], RAYS[1]);
+            let count = (bvh.order.len() / TRIANGLES_PER_RAY).clamp(RAYS_OF_KIND[0], RAYS_OF_KIND[1]);
             let root = bvh.nodes.first();
             let lines = root.map_or(Vec::new(), |root| rays::outside(root.lower, root.upper, count, 1));
             drawn = (lines, rays::from_surface(mesh, bvh, 0..bvh.order.len(), count, 2));
@@ -145,7 +145,7 @@ impl Sampled {
                     0 => prices.outside(node.count, n, LINES_THAT_HIT),
                     _ => prices.alone(node.count, n, LINES_THAT_HIT),
                 };
-                // At the root the ray is not prepared twice.
+                // A ray that enters the root's tetrahedra is not prepared for the BVH.
                 let prepared = if at == 0 { costs.ray } else { 0.0 };
                 let through = costs.outside * self.visits[at as usize] as f64
                     + (prepared - walked) * f64::from(self.entered[at as usize]);

@@ -1,7 +1,7 @@
-//! Constants from measurements.
+//! Fits constants to measurements by linear least squares.
 
-/// The coefficients of least squared *relative* error: `rows` are the terms and what their sum should be.
-/// `None` if the terms do not determine them.
+/// The coefficients of least squared *relative* error. Each of `rows` has the terms and the value that their weighted sum
+/// should have. `None` if the terms do not determine the coefficients.
 pub fn fit<const N: usize>(rows: &[([f64; N], f64)]) -> Option<[f64; N]> {
     let mut system = [[0.0; N]; N];
     let mut right = [0.0; N];
@@ -14,7 +14,7 @@ pub fn fit<const N: usize>(rows: &[([f64; N], f64)]) -> Option<[f64; N]> {
             right[i] += terms[i];
         }
     }
-    // Gauss, with the largest pivot.
+    // Gaussian elimination with partial pivoting.
     for i in 0..N {
         let pivot = (i..N).max_by(|a, b| system[*a][i].abs().total_cmp(&system[*b][i].abs()))?;
         system.swap(i, pivot);

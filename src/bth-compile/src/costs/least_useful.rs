@@ -1,6 +1,6 @@
-//! What to leave out when too much is taken.
+//! Selection of the nodes to leave out when a limit is exceeded.
 
-/// What a chosen node saves and what it takes of a limit.
+/// The gain of a chosen node and its share of a limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Weighed {
     /// Saving, in any unit.
@@ -9,8 +9,8 @@ pub struct Weighed {
     pub takes: f64,
 }
 
-/// The rows to leave out for `over` less to be taken: those of least gain for what they take, but none without which
-/// the others are enough. Ascending; all of them when all take less than `over`.
+/// The rows to leave out so that at least `over` bytes or seconds are freed: those of least gain per unit, without any row
+/// that the others make unnecessary. Ascending; all rows if together they take less than `over`.
 pub fn least_useful(items: &[Weighed], over: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..items.len()).collect();
     let worth = |k: &usize| items[*k].gain / items[*k].takes;
@@ -23,7 +23,7 @@ pub fn least_useful(items: &[Weighed], over: f64) -> Vec<usize> {
         freed += items[k].takes;
         out.push(k);
     }
-    // The best of them may come back if the others are enough.
+    // The rows of greatest gain stay if the others free enough.
     for place in (0..out.len()).rev() {
         let takes = items[out[place]].takes;
         if freed - takes >= over {

@@ -1,8 +1,9 @@
-//! Which suitable nodes to tetrahedralize.
+//! Selection of the suitable nodes to tetrahedralize, by the expected cost of rays.
 //!
-//! `profile` holds what tracing costs on a machine; `rays`, `bvh_walk` and `tet_walk` sample rays and
-//! count their steps, `estimate` and `area` predict these. `choose` selects: by the paper's rule (`top_down`) or
-//! what saves most time (`gains`, `bottom_up`). `probe` looks again when the tetrahedra are built.
+//! `profile` holds the measured costs of tracing on a machine. `rays`, `bvh_walk` and `tet_walk` sample rays and count
+//! their steps; `estimate` and `area` predict the steps without tracing. `choose` selects nodes, by the paper's rule
+//! (`top_down`) or by greatest saving (`gains`, `bottom_up`). `probe` decides again with sampled rays when the tetrahedra
+//! are built.
 
 mod area;
 mod bottom_up;
@@ -16,7 +17,6 @@ mod options;
 mod prices;
 mod probe;
 mod profile;
-mod random;
 mod rays;
 mod subtree_sums;
 mod tet_walk;
@@ -34,10 +34,9 @@ pub use choose::{Storage, choose};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;
 pub use least_useful::{Weighed, least_useful};
-pub use options::{Choice, Decision, OptimizeFor, Options, Probe, Report, Select, Verdict};
+pub use options::{Choice, OptimizeFor, Options, Probe, Report, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
-pub(crate) use random::RayRng;
 pub use rays::{SampleRay, from_surface, outside};
 pub use tet_walk::{TetWalker, Walked, mean_steps};
 pub use weighting::Weighting;

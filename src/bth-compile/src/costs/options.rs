@@ -1,4 +1,4 @@
-//! Options of the selection, and its verdict on each node.
+//! Options of the selection, and the verdict on each node.
 
 use super::{Estimator, Profile, Weighting};
 use serde::{Serialize, Serializer};
@@ -14,11 +14,11 @@ pub enum Select {
     /// The paper's rule (§3.2): from the root down, the first nodes whose tetrahedra are the cheaper for
     /// rays from outside.
     Paper,
-    /// These nodes of the binary BVH, of which none lies below another: for measurements.
+    /// These nodes of the binary BVH, of which none lies below another. For measurements.
     Nodes(Vec<u32>),
 }
 
-/// Which rays the file is for.
+/// The mixture of rays for which the file is optimized.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum OptimizeFor {
@@ -26,7 +26,7 @@ pub enum OptimizeFor {
     Camera,
     /// Rays that start on known surfaces only.
     Secondary,
-    /// Three rays from surfaces for one from outside.
+    /// Three rays from surfaces to one from outside.
     #[default]
     Balanced,
 }
@@ -42,50 +42,50 @@ impl OptimizeFor {
     }
 }
 
-/// What decides, after the tetrahedra are built, whether they stay.
+/// The criterion by which tetrahedra stay in the file after they are built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Probe {
-    /// Steps of sampled rays, counted and priced by the profile: the same on every machine.
+    /// Steps of sampled rays, counted and priced by the profile, with the same result on every machine.
     #[default]
     Steps,
-    /// Nothing: all that was built stays.
+    /// None: all tetrahedra that were built stay.
     Off,
 }
 
-/// What the structures cost, and which nodes are considered. Times are of one ray on one thread.
+/// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray on one thread.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Options {
     /// How nodes are selected.
     pub select: Select,
-    /// Which rays count.
+    /// The mixture of rays.
     pub optimize_for: OptimizeFor,
     /// How to estimate the steps through a tetrahedralization.
     pub estimator: Estimator,
-    /// What tracing costs. Enters files and keys by its hash.
+    /// Costs of tracing. Files and cache keys contain its hash.
     #[serde(serialize_with = "by_hash")]
     pub profile: Profile,
-    /// Takes a step from one tetrahedron to the next to cost so many nanoseconds, and scales the other costs of
-    /// tetrahedra alike.
+    /// Cost of a step from one tetrahedron to the next, nanoseconds, in place of the profile's; the other costs of
+    /// tetrahedra are scaled by the same factor.
     pub c_tet: Option<f64>,
-    /// Nodes of fewer triangles stay BVH.
+    /// Nodes of fewer triangles are not tetrahedralized.
     pub minimum_triangles: u32,
-    /// Nodes of more triangles are not taken whole.
+    /// Nodes of more triangles are not tetrahedralized as a whole; nodes below them may be.
     pub maximum_triangles: u32,
-    /// Least saving for which any node is chosen, as a share of the cost of the model's BVH: tet leaves
-    /// take several times the memory, and a few small ones in a large scene save next to nothing.
+    /// Least saving of all chosen nodes together, as a share of the cost of the model's BVH; below it no node is chosen,
+    /// because tet leaves take several times the memory of a BVH.
     pub minimum_gain: f64,
     /// Bytes that traversal may read for each triangle of the model, the BVH included. Sizes are estimated before
-    /// tetrahedra are built; what is over the limit then is left out.
+    /// tetrahedra are built; afterwards those beyond the limit are left out.
     pub max_bytes_per_triangle: Option<f64>,
     /// Seconds of one thread that tetrahedralization may take, by the profile's estimate and not by the clock, so
     /// that the same nodes are chosen on every machine.
     pub budget: Option<f64>,
-    /// What decides in the end.
+    /// The criterion by which tetrahedra stay after they are built.
     pub probe: Probe,
-    /// For objects of a scene: take the rays of its cameras, lights and frames.
+    /// For objects of a scene: whether the rays of its cameras, lights and frames weight the nodes.
     pub for_scene: bool,
-    /// The rays of a scene that concern the object, which then count instead of sampled ones. Enter keys by their hash.
+    /// The rays of a scene that reach the object, in place of sampled ones. Cache keys contain their hash.
     #[serde(serialize_with = "rays_by_hash")]
     pub scene: Option<Arc<Weighting>>,
 }
@@ -121,13 +121,13 @@ impl Default for Options {
     }
 }
 
-/// Why a node was or was not chosen.
+/// The reason for which a node was or was not chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Decision {
+pub enum SelectionOutcome {
     /// It becomes a tet leaf.
     Chosen,
-    /// Its BVH is estimated to be the cheaper.
+    /// Its BVH is estimated to cost less.
     RefusedCost,
     /// Nodes below it save more.
     RefusedParts,
@@ -135,49 +135,49 @@ pub enum Decision {
     RefusedSmall,
     /// It has more triangles than the maximum.
     RefusedLarge,
-    /// It would be chosen, but all such nodes together save too small a share of the model's cost.
+    /// It would be chosen, but all such nodes together save less than the least gain.
     RefusedGain,
-    /// It would be chosen, but for the limits on bytes or time.
+    /// It would be chosen without the limits on bytes and time.
     RefusedLimit,
     /// Some of its triangles are in bad contact.
     Unsuitable,
 }
 
-impl std::fmt::Display for Decision {
+impl std::fmt::Display for SelectionOutcome {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Decision::Chosen => "chosen",
-            Decision::RefusedCost => "no: the BVH costs less",
-            Decision::RefusedParts => "no: its parts save more",
-            Decision::RefusedSmall => "no: too few triangles",
-            Decision::RefusedLarge => "no: too many triangles",
-            Decision::RefusedGain => "no: too little gained on the whole",
-            Decision::RefusedLimit => "no: over the limit of bytes or time",
-            Decision::Unsuitable => "no: bad contacts",
+            SelectionOutcome::Chosen => "chosen",
+            SelectionOutcome::RefusedCost => "no: the BVH costs less",
+            SelectionOutcome::RefusedParts => "no: its parts save more",
+            SelectionOutcome::RefusedSmall => "no: too few triangles",
+            SelectionOutcome::RefusedLarge => "no: too many triangles",
+            SelectionOutcome::RefusedGain => "no: too little gained on the whole",
+            SelectionOutcome::RefusedLimit => "no: over the limit of bytes or time",
+            SelectionOutcome::Unsuitable => "no: bad contacts",
         })
     }
 }
 
-/// What was found of one node.
+/// The costs of one node, and the decision on it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Verdict {
     /// Index in the binary BVH.
     pub node: u32,
     /// Triangles below it.
     pub count: u32,
-    /// Whether they are free of bad contacts.
+    /// Whether these triangles are free of bad contacts.
     pub suitable: bool,
-    /// Estimated cost with its tetrahedralization, nanoseconds for each ray that may use it: by the paper's rule one
-    /// that meets its box, else one that starts on it.
+    /// Estimated cost with the node's tetrahedralization, nanoseconds for each ray that may use it: by the paper's rule a
+    /// ray that meets the node's box, else a ray that starts on one of its triangles.
     pub cost_tet: f64,
-    /// The same with its BVH.
+    /// Estimated cost of the same ray with the node's BVH.
     pub cost_bvh: f64,
     /// Estimated steps of a ray through its tetrahedralization.
     pub n_avg: f64,
-    /// What tetrahedra save, nanoseconds for each ray of the model.
+    /// Saving by the tetrahedra, nanoseconds for each ray of the model.
     pub gain: f64,
-    /// What follows.
-    pub decision: Decision,
+    /// The decision.
+    pub decision: SelectionOutcome,
 }
 
 /// The selection.
@@ -185,11 +185,11 @@ pub struct Verdict {
 pub struct Choice {
     /// Nodes that become tet leaves, ascending; none lies below another.
     pub chosen: Vec<u32>,
-    /// The nodes that were examined, ascending: neither below a chosen one nor below a small one.
+    /// The nodes that were examined, ascending; nodes below a chosen or a small node are not examined.
     pub verdicts: Vec<Verdict>,
 }
 
-/// What the selection came to.
+/// Report of the selection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     /// The costs and limits that were used.
@@ -200,13 +200,13 @@ pub struct Report {
     pub chosen: u64,
     /// Triangles in chosen nodes.
     pub triangles: u64,
-    /// Those over all triangles of the BVH, 0 to 1.
+    /// Share of the triangles of the BVH that are in chosen nodes, 0 to 1.
     pub share: f64,
     /// Suitable nodes of fitting size that were refused for their cost.
     pub refused_for_cost: u64,
     /// Expected cost of a ray through the BVH, nanoseconds.
     pub cost_bvh: f64,
-    /// The same with the chosen nodes tetrahedralized.
+    /// Expected cost of a ray with the chosen nodes tetrahedralized, nanoseconds.
     pub cost_with_tets: f64,
     /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,

@@ -4,10 +4,10 @@ use super::profile::{BvhCosts, TetCosts};
 use super::{Options, Start, Walk};
 use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
-/// Tetrahedra and their vertices for each triangle, with free-space points: measured on scans.
-const TETS: f64 = 3.35;
-const VERTICES: f64 = 0.85;
-/// Share of the lines through a node's box that meet a triangle, where it is not known: that of a ball.
+/// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on scans.
+const TETS_PER_TRIANGLE: f64 = 3.35;
+const VERTICES_PER_TRIANGLE: f64 = 0.85;
+/// Assumed share of the lines through a node's box that meet a triangle: that of a ball in its bounding cube.
 pub(super) const LINES_THAT_HIT: f64 = 0.52;
 
 /// Prices under the options.
@@ -36,19 +36,22 @@ impl<'a> Prices<'a> {
     /// Bytes of the tetrahedra, vertices and faces of so many triangles.
     pub(super) fn bytes(&self, triangles: u32) -> f64 {
         let record = self.record.stride() as f64;
-        let a_triangle =
-            TETS * record + VERTICES * size_of::<TetVertex>() as f64 + size_of::<TetFace>() as f64;
+        let a_triangle = TETS_PER_TRIANGLE * record
+            + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64
+            + size_of::<TetFace>() as f64;
         f64::from(triangles) * a_triangle + (size_of::<TetLeaf>() + 12 * size_of::<HullFace>()) as f64
     }
 
-    /// Seconds to make them.
+    /// Seconds to tetrahedralize this many triangles.
     pub(super) fn seconds(&self, triangles: u32) -> f64 {
         f64::from(triangles) * self.options.profile.tetrahedralize * 1e-6
     }
 
-    /// Bytes that walks touch: the records and the vertices.
+    /// Bytes that walks read: the records and the vertices.
     fn walked(&self, triangles: u32) -> f64 {
-        f64::from(triangles) * (TETS * self.record.stride() as f64 + VERTICES * size_of::<TetVertex>() as f64)
+        f64::from(triangles)
+            * (TETS_PER_TRIANGLE * self.record.stride() as f64
+                + VERTICES_PER_TRIANGLE * size_of::<TetVertex>() as f64)
     }
 
     fn cost(&self, walk: &Walk, triangles: u32, steps: f64, hits: f64) -> f64 {
@@ -65,7 +68,7 @@ impl<'a> Prices<'a> {
         self.cost(&self.costs.outside, triangles, steps, hits)
     }
 
-    /// The same for a leaf below a BVH node, where rays enter one by one.
+    /// Nanoseconds of a ray that enters the box of a leaf below a BVH node, where rays enter one by one.
     pub(super) fn alone(&self, triangles: u32, steps: f64, hits: f64) -> f64 {
         self.cost(&self.costs.alone, triangles, steps, hits)
     }

@@ -1,5 +1,5 @@
-//! The probe: with the tetrahedra at hand, rays are traced through them and through the BVH, and what does not win
-//! is dropped.
+//! The probe: rays are traced through the tetrahedra that were built and through the BVH, and tetrahedralizations that are
+//! not faster are dropped.
 //!
 //! Steps are counted in double precision and priced by the profile, so that the outcome, and with it the file, is
 //! the same on every machine.
@@ -20,18 +20,18 @@ use crate::vectors::{corners, double_area};
 use bth_import::Mesh;
 use serde::Serialize;
 
-/// Rays of all leaves together, and of one leaf at least and at most.
-const RAYS: usize = 1 << 16;
+/// Rays of all leaves together, and the least and greatest number of rays of one leaf.
+const RAYS_OF_ALL_LEAVES: usize = 1 << 16;
 const RAYS_OF_LEAF: [usize; 2] = [64, 1024];
 
-/// What the probe found.
+/// Report of the probe.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ProbeReport {
     /// Each tet leaf that was built.
     pub leaves: Vec<ProbedLeaf>,
     /// Expected cost of a ray through the BVH alone, nanoseconds.
     pub cost_bvh: f64,
-    /// The same with the leaves that stay.
+    /// Expected cost of a ray with the tet leaves that stay, nanoseconds.
     pub cost_with_tets: f64,
 }
 
@@ -40,21 +40,22 @@ pub struct ProbeReport {
 pub struct ProbedLeaf {
     /// Index in the binary BVH.
     pub node: u32,
-    /// Its triangles.
+    /// Number of its triangles.
     pub triangles: u32,
     /// Mean steps of rays that start on it.
     pub steps: f64,
-    /// Nanoseconds of a ray that starts on it: with the tetrahedra, and through the BVH alone.
+    /// Nanoseconds of a ray that starts on the leaf, with the tetrahedra.
     pub cost_tet: f64,
-    /// See `cost_tet`.
+    /// Nanoseconds of the same ray through the BVH alone.
     pub cost_bvh: f64,
     /// Nanoseconds saved for each ray of the model.
     pub gain: f64,
-    /// Whether it stays.
+    /// Whether it is kept.
     pub kept: bool,
 }
 
-/// Drops the tetrahedralizations that do not win, and all of them if together they save less than the least gain.
+/// Drops the tetrahedralizations that are not faster than the BVH, and all of them if together they save less than the
+/// least gain of the options.
 ///
 /// # Errors
 /// [`crate::Error::Cancelled`].
@@ -74,7 +75,7 @@ pub fn probe(
     let scene = options.scene.as_deref();
     let weights = scene.map_or(options.optimize_for.weights(), Weighting::shares);
     let all = super::gains::sample(mesh, bvh, options, scene);
-    let count = (RAYS / built.len()).clamp(RAYS_OF_LEAF[0], RAYS_OF_LEAF[1]);
+    let count = (RAYS_OF_ALL_LEAVES / built.len()).clamp(RAYS_OF_LEAF[0], RAYS_OF_LEAF[1]);
     let prober = Prober { mesh, bvh, options, prices: &prices, count };
     let areas = surface_areas(mesh, bvh);
     let mut report =
@@ -83,7 +84,7 @@ pub fn probe(
         monitor.check()?;
         let mut leaf = prober.surface(*node, tets, scene);
         let rows = rows(bvh, *node);
-        // The share of the rays from surfaces that start here.
+        // The share of the rays from surfaces that start on this leaf.
         let share = match scene {
             Some(scene) => share_of(scene, bvh, &rows),
             None => (areas[rows.end] - areas[rows.start]) / areas[bvh.order.len()],
@@ -143,7 +144,7 @@ struct Prober<'a> {
 }
 
 impl Prober<'_> {
-    /// Traces rays that start on the leaf's triangles: the scene's, else sampled ones.
+    /// Traces rays that start on the leaf's triangles: rays of the scene where there are any, else sampled rays.
     fn surface(&self, node: u32, tets: &TetMesh, scene: Option<&Weighting>) -> ProbedLeaf {
         let Self { mesh, bvh, options, prices, count } = *self;
         let (costs, at) = (options.profile.bvh, &bvh.nodes[node as usize]);

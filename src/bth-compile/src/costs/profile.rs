@@ -1,4 +1,4 @@
-//! What tracing costs on a machine, as `bthc calibrate` measures it.
+//! The costs of tracing on a machine, as `bthc calibrate` measures them.
 
 use crate::error::{Error, Place, Result};
 use bth_format::layout::RecordKind;
@@ -10,9 +10,9 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
-    /// Kind of file, and its version.
+    /// Version of the profile format.
     pub profile: u32,
-    /// Vector instructions that were measured; for people.
+    /// Instruction set that was measured; informative only.
     pub isa: String,
     /// The BVH.
     pub bvh: BvhCosts,
@@ -30,16 +30,16 @@ pub struct Profile {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BvhCosts {
-    /// A ray from the call to its answer, by itself.
+    /// Fixed cost of a ray, apart from nodes and leaves.
     pub ray: f64,
-    /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper; several make one visit
-    /// of a wide node or leaf.
+    /// An entered node of the *binary* BVH, for rays from outside: C_t and C_i of the paper. A visit of a wide node or
+    /// leaf stands for several of these.
     pub outside: f64,
-    /// The same for rays from surfaces.
+    /// An entered node of the binary BVH, for rays from surfaces.
     pub surface: f64,
-    /// A wide node, by itself.
+    /// A visit of a wide node.
     pub node: f64,
-    /// A leaf of up to 16 triangles, by itself.
+    /// A visit of a leaf of up to 16 triangles.
     pub block: f64,
 }
 
@@ -55,21 +55,21 @@ pub struct TetCosts {
     pub alone: Walk,
 }
 
-/// A walk.
+/// Costs of a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Walk {
-    /// Setting the ray up, and finding the first tetrahedron.
+    /// Preparation of the ray and search for the first tetrahedron.
     pub entry: f64,
-    /// A triangle where the walk ends: telling that it is hit, and where.
+    /// Intersection of the triangle at which the walk ends.
     pub hit: f64,
-    /// C_tet, a step: in tetrahedra that fit the caches, and in many times as many.
+    /// C_tet, a step: in tetrahedra that fit the caches, and in tetrahedra of many times that size.
     pub step: [f64; 2],
 }
 
 impl Walk {
-    /// Cost of so many steps in tetrahedra of so many bytes, between the two sizes that were measured, if such a share
-    /// of walks ends at a triangle.
+    /// Cost of a walk of `steps` steps in tetrahedra of `bytes` bytes, if the share `hits` of walks ends at a triangle. The
+    /// cost of a step is interpolated by the logarithm of the size between the two measured sizes.
     pub fn cost(&self, steps: f64, hits: f64, bytes: f64, sizes: [f64; 2]) -> f64 {
         let share = (bytes / sizes[0]).max(1.0).log2() / (sizes[1] / sizes[0]).log2();
         let [small, large] = self.step;
@@ -106,7 +106,7 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Whether all costs can be used.
+    /// Fails with a message unless all costs can be used.
     fn check(&self) -> std::result::Result<(), String> {
         if self.profile != 1 {
             return Err(format!("expected profile version 1, found {}", self.profile));
@@ -143,7 +143,7 @@ impl Profile {
         self.tets.get(kind.name()).or_else(|| self.tets.values().next()).expect("checked when it was read")
     }
 
-    /// The same with three decimals: what is beyond them is noise.
+    /// The profile with three decimals; further digits are noise.
     pub fn rounded(mut self) -> Profile {
         let round = |x: &mut f64| *x = (*x * 1e3).round() / 1e3;
         let bvh = &mut self.bvh;
@@ -162,7 +162,7 @@ impl Profile {
         self
     }
 
-    /// BLAKE3 of the numbers, hexadecimal: what of a profile enters a compiled file.
+    /// BLAKE3 of the numbers, hexadecimal; the only part of a profile that compiled files contain.
     pub fn hash(&self) -> String {
         let text = serde_json::to_string(self).expect("numbers and names");
         blake3::hash(text.as_bytes()).to_hex().to_string()

@@ -1,27 +1,27 @@
-//! Sample rays in place of a renderer's: uniform lines from outside, and rays from surfaces.
+//! Sample rays that stand in for those of a renderer: uniform lines from outside, and rays from surfaces.
 
-use super::random::RayRng;
 use crate::bvh::{BinaryBvh, Node};
-use crate::vectors::{corners, double_area, unit};
+use crate::vectors::{corners, double_area, uniform_direction, unit};
 use bth_import::Mesh;
+use bth_random::Rng;
 use glam::DVec3;
 
 /// A sampled ray, object space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleRay {
-    /// Where it starts.
+    /// Origin.
     pub origin: [f64; 3],
     /// A unit vector.
     pub direction: [f64; 3],
-    /// Where it ends, in units of length.
+    /// Length, in the units of the object; infinite for rays without an end.
     pub tmax: f64,
-    /// Triangle that it starts on.
+    /// Triangle on which the ray starts; `None` for rays from outside.
     pub from: Option<u32>,
 }
 
-/// Length of rays that ask for ambient occlusion, relative to the diagonal of the bounds.
+/// Length of rays for ambient occlusion, relative to the diagonal of the bounds.
 const SHORT: f64 = 0.05;
-/// By how much rays are lifted off the surface that they start on, relative to the diagonal.
+/// Offset of ray origins from the surface that they start on, relative to the diagonal of the bounds.
 const LIFT: f64 = 2e-5;
 
 /// The point at `t` on a ray.
@@ -37,18 +37,17 @@ pub(super) fn diagonal(node: &Node) -> f64 {
 /// Lines that are uniform in space (chords of the ball around the box), which start outside of it and
 /// meet it: the rays of the surface area heuristic and of Cauchy and Crofton.
 pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec<SampleRay> {
-    let mut random = RayRng::new(seed);
+    let mut random = Rng::new(seed);
     let ends = [lower, upper].map(|end| DVec3::from(end.map(f64::from)));
     let middle = 0.5 * (ends[0] + ends[1]);
     let radius = (0.5 * (ends[1] - ends[0])).length();
     let mut rays = Vec::with_capacity(count);
-    // A box of zero size is met by no chord at all; one of zero width by few.
+    // No chord meets a box of zero size, and few meet a flat box; hence the limit on attempts.
     for _ in 0..64 * count {
         if rays.len() == count || radius == 0.0 {
             break;
         }
-        let [p, q] = [0; 2].map(|_| random.sphere());
-        let [p, q] = [p, q].map(|p| middle + 1.01 * radius * DVec3::from(p));
+        let [p, q] = [(); 2].map(|()| middle + 1.01 * radius * uniform_direction(&mut random));
         let (origin, direction) = (p.into(), unit(q - p).into());
         let ray = SampleRay { origin, direction, tmax: f64::INFINITY, from: None };
         if ray.direction[0].is_finite() && enters(&ray, lower, upper, f64::INFINITY).is_some() {
@@ -59,9 +58,9 @@ pub fn outside(lower: [f32; 3], upper: [f32; 3], count: usize, seed: u64) -> Vec
 }
 
 /// Rays from the fronts of triangles of these rows of the BVH's order, chosen by area, cosine-weighted
-/// about the normal; every second one as short as rays for ambient occlusion. Fronts are where closed
-/// models and rooms are seen from. They are stratified along the order, so that rays that follow each other start
-/// close together, as a renderer's do.
+/// about the normal; every second one as short as rays for ambient occlusion. Closed models and rooms are seen from the
+/// fronts of their triangles. The rays are stratified along the order, so that consecutive rays start close together, as in
+/// a renderer.
 pub fn from_surface(
     mesh: &Mesh,
     bvh: &BinaryBvh,
@@ -70,7 +69,7 @@ pub fn from_surface(
     seed: u64,
 ) -> Vec<SampleRay> {
     let Some(root) = bvh.nodes.first() else { return Vec::new() };
-    let (mut random, diagonal) = (RayRng::new(seed), diagonal(root));
+    let (mut random, diagonal) = (Rng::new(seed), diagonal(root));
     let triangles = &bvh.order[rows];
     let normal = |triangle: u32| double_area(corners(mesh, triangle));
     let mut total = 0.0;
@@ -86,18 +85,18 @@ pub fn from_surface(
     }
     let mut rays = Vec::with_capacity(count);
     for i in 0..count {
-        let at = (i as f64 + random.unit()) / count as f64 * total;
+        let at = (i as f64 + random.unit_f64()) / count as f64 * total;
         let triangle = triangles[sums.partition_point(|sum| *sum <= at).min(triangles.len() - 1)];
         let [a, b, c] = corners(mesh, triangle);
         let n = unit(normal(triangle));
         // Uniform in the triangle by folding the parallelogram.
-        let (mut u, mut v) = (random.unit(), random.unit());
+        let (mut u, mut v) = (random.unit_f64(), random.unit_f64());
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
         let lift = LIFT * diagonal;
         let origin = a + u * (b - a) + v * (c - a) + lift * n;
-        let direction = unit(n + DVec3::from(random.sphere()));
+        let direction = unit(n + uniform_direction(&mut random));
         let tmax = if i % 2 == 0 { f64::INFINITY } else { SHORT * diagonal };
         if direction.is_finite() && origin.is_finite() {
             let (origin, direction) = (origin.into(), direction.into());
@@ -107,7 +106,8 @@ pub fn from_surface(
     rays
 }
 
-/// Where a ray enters a box, if before `limit`.
+/// The t at which a ray enters a box; `None` if it misses the box or enters it beyond `limit`. The origin may lie in the
+/// box.
 pub(super) fn enters(ray: &SampleRay, lower: [f32; 3], upper: [f32; 3], limit: f64) -> Option<f64> {
     let (mut near, mut far) = (0.0f64, limit.min(ray.tmax));
     for k in 0..3 {

@@ -1,8 +1,8 @@
-//! What the costs need to know of each subtree, gathered in one walk from the leaves to the root.
+//! Areas and depths of every subtree, the inputs of the cost model, summed in one pass from the leaves to the root.
 
 use crate::bvh::{BinaryBvh, Node};
 
-/// Sums over the nodes below and including one.
+/// Sums over the subtree of a node, the node included.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sums {
     /// Surface areas of the inner nodes, object space squared.
@@ -13,8 +13,8 @@ pub(super) struct Sums {
     pub(super) depth: u64,
 }
 
-/// Half the surface area of a node's box. Never zero: a triangle that has an area has two extents,
-/// and f64 holds the product of any two. (The sums below are of halves, too.)
+/// Half the surface area of a node's box; the sums above are of half areas too. Never zero: a triangle of non-zero area
+/// extends along two axes, and f64 holds the product of any two extents.
 pub(super) fn half_area(node: &Node) -> f64 {
     let side = |k: usize| f64::from(node.upper[k]) - f64::from(node.lower[k]);
     side(0) * side(1) + side(1) * side(2) + side(2) * side(0)

@@ -1,4 +1,4 @@
-//! The selection and its parts against plain recursion and meshes whose steps are known.
+//! Tests of the selection and its parts against plain recursion and against meshes with known numbers of steps.
 
 use super::testing::{marks_beyond, tree};
 use super::*;
@@ -40,7 +40,7 @@ fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &Options, cho
     let (sah, depths) = cost_and_depths(bvh, i, 0, options.profile.bvh.outside);
     let depth = f64::from(depths) / f64::from(node.count);
     let steps = options.estimator.steps(Start::Outside, node.count, depth);
-    // Small enough for the caches, so that a step costs what it costs there.
+    // The tetrahedra fit the caches, so the first cost of a step applies.
     let walk = options.profile.record(RecordKind::Link32).outside;
     if marks.suitable[i]
         && node.count <= options.maximum_triangles
@@ -87,7 +87,7 @@ fn costs_of_the_papers_rule_are_those_of_the_definition() {
     for v in &choice.verdicts {
         let (sah, _) = cost_and_depths(&bvh, v.node as usize, 0, 2.0);
         assert!((v.cost_bvh - sah).abs() < 1e-9 * sah);
-        assert_eq!(v.decision, Decision::RefusedCost);
+        assert_eq!(v.decision, SelectionOutcome::RefusedCost);
     }
 }
 
@@ -98,7 +98,7 @@ fn nothing_is_chosen_for_a_gain_below_the_least_one() {
     let options = Options { minimum_triangles: 2, c_tet: Some(1e-3), minimum_gain: 1.1, ..paper() };
     let (choice, report) = chosen(&bvh, &marks, &options);
     assert!(choice.chosen.is_empty() && report.triangles == 0);
-    assert!(choice.verdicts.iter().any(|v| v.decision == Decision::RefusedGain));
+    assert!(choice.verdicts.iter().any(|v| v.decision == SelectionOutcome::RefusedGain));
     assert_eq!(report.cost_with_tets, report.cost_bvh);
 }
 
@@ -113,7 +113,7 @@ fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
     }
 }
 
-/// A closed model, its BVH, and marks that call all of it suitable.
+/// A closed model, its BVH, and marks in which every node is suitable.
 fn blob() -> (Mesh, BinaryBvh, Marks) {
     let model = bth_scenes::blob::blob(6000);
     let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
@@ -161,7 +161,7 @@ fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
     assert!(choice(1e3, Options::default(), KEPT).0.chosen.is_empty());
 
-    // With a BVH beside them, tetrahedra are of no use to rays from outside; without one they are.
+    // With a BVH beside the tetrahedra, rays from outside use the BVH only; without one they walk through the tetrahedra.
     let camera = Options { optimize_for: OptimizeFor::Camera, ..Options::default() };
     assert!(choice(1e-3, camera.clone(), KEPT).0.chosen.is_empty());
     assert_eq!(choice(1e-3, camera, PRUNED).0.chosen, [0]);
@@ -204,8 +204,8 @@ fn rays_of_a_scene_decide_which_nodes_count() {
     assert!(found.iter().all(|&n| bvh.nodes[n as usize].first as usize >= rows.start || n == 0), "{found:?}");
 }
 
-/// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box, which no walk
-/// minds.
+/// Two tetrahedra over the triangle (0, 1, 2), which is a constrained face; the hull is not a box, which walks do not
+/// require.
 fn two_tets() -> TetMesh {
     let face = crate::tets::Face { triangle: 9, vertex: [0, 1, 2], tet: [0, 1] };
     TetMesh {

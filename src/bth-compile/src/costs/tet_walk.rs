@@ -1,7 +1,7 @@
 //! Rays through a tetrahedralization in double precision, to count their steps.
 //!
 //! Sampling is the first of the paper's three ways to find N_avg (§3.3), the only one that needs the
-//! tetrahedra. A ray through an edge may take a step more or less here than in the runtime.
+//! tetrahedra. A ray through an edge may take one step more or less than in the runtime.
 
 use super::bvh_walk::crosses;
 use super::rays::SampleRay;
@@ -12,11 +12,11 @@ use glam::DVec3;
 /// Result of a walk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Walked {
-    /// Tetrahedra on the way.
+    /// Tetrahedra that the ray passes through.
     pub steps: u32,
     /// Whether the ray ended at a triangle.
     pub hit: bool,
-    /// Whether the ray left the box; the traversal of the BVH goes on beyond it.
+    /// Whether the ray left the box; the traversal of the BVH then continues.
     pub left: bool,
 }
 
@@ -73,7 +73,7 @@ impl<'a> TetWalker<'a> {
         Some(self.go(ray, tet, k))
     }
 
-    /// The tetrahedron and face through which a ray comes in from outside: the nearest of the hull.
+    /// The tetrahedron and hull face at which a ray from outside enters: the nearest that it meets.
     fn entry(&self, ray: &SampleRay) -> Option<(u32, usize)> {
         let mut best: Option<(f64, (u32, usize))> = None;
         for &(tet, k) in &self.hull {
@@ -88,7 +88,7 @@ impl<'a> TetWalker<'a> {
     fn go(&self, ray: &SampleRay, mut tet: u32, mut entered: usize) -> Walked {
         let (origin, direction) = (DVec3::from(ray.origin), DVec3::from(ray.direction));
         for steps in 1..=self.mesh.tets.len() as u32 {
-            // Out through the nearest of the planes that the ray crosses outwards.
+            // The ray leaves through the nearest of the planes that it crosses outwards.
             let mut out = (f64::INFINITY, entered);
             for k in (0..4).filter(|k| *k != entered) {
                 let [a, b, c] = self.face(tet, k);
@@ -116,7 +116,7 @@ impl<'a> TetWalker<'a> {
     }
 }
 
-/// Mean steps of these rays, of those that meet the box at all; `None` if none does.
+/// Mean steps of the rays that meet the box; `None` if none does.
 pub fn mean_steps(mesh: &TetMesh, rays: &[SampleRay]) -> Option<f64> {
     let walker = TetWalker::new(mesh);
     let steps: Vec<u32> = rays.iter().filter_map(|ray| walker.walk(ray)).map(|w| w.steps).collect();

@@ -1,7 +1,7 @@
 //! The paper's selection (§3.2, §3.3): top-down, the first suitable nodes for which tetrahedra are the cheaper
 //! structure for rays from outside.
 
-use super::options::{Choice, Decision, Options, Verdict};
+use super::options::{Choice, Options, SelectionOutcome, Verdict};
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::subtree_sums::{half_area, subtree_sums};
 use super::{Estimator, Start};
@@ -21,9 +21,9 @@ pub(super) struct PaperCosts {
     pub(super) visit: f64,
 }
 
-/// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if
-/// `C_tet N_avg` (the paper's equation 2), and here the cost of getting in, is below the cost of
-/// its BVH, and else its children are examined; also when its triangles alone do not fit the limits.
+/// Chooses nodes from the root down: a suitable node of fitting size becomes a tet leaf if `C_tet N_avg` (the paper's
+/// equation 2) plus the cost of entering the tetrahedra is below the cost of its BVH. Otherwise, and where its triangles
+/// alone exceed the limits, its children are examined.
 pub(super) fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,
@@ -38,7 +38,7 @@ pub(super) fn choose(
     let mut saved = 0.0;
     let Some(root) = bvh.nodes.first() else { return Ok((choice, 0.0, 0.0)) };
     let mut i = 0;
-    // In preorder, what lies below a node follows it: leaving a subtree out is a jump.
+    // In preorder the nodes below a node follow it, so a subtree is skipped by advancing the index.
     while i < bvh.nodes.len() {
         if choice.verdicts.len().is_multiple_of(NODES_BETWEEN_CHECKS) {
             monitor.check()?;
@@ -50,17 +50,17 @@ pub(super) fn choose(
         let cost_tet = prices.outside(node.count, n_avg, LINES_THAT_HIT);
         let cost_bvh = paper.visit * (sum.inner_area + sum.leaf_area) / half_area(node);
         let decision = if node.count < options.minimum_triangles {
-            Decision::RefusedSmall
+            SelectionOutcome::RefusedSmall
         } else if !suitable {
-            Decision::Unsuitable
+            SelectionOutcome::Unsuitable
         } else if node.count > options.maximum_triangles {
-            Decision::RefusedLarge
+            SelectionOutcome::RefusedLarge
         } else if cost_tet < cost_bvh && !fits(node.count) {
-            Decision::RefusedLimit
+            SelectionOutcome::RefusedLimit
         } else if cost_tet < cost_bvh {
-            Decision::Chosen
+            SelectionOutcome::Chosen
         } else {
-            Decision::RefusedCost
+            SelectionOutcome::RefusedCost
         };
         let gain = half_area(node) / half_area(root) * (cost_bvh - cost_tet);
         let verdict = Verdict {
@@ -74,12 +74,12 @@ pub(super) fn choose(
             decision,
         };
         choice.verdicts.push(verdict);
-        if decision == Decision::Chosen {
+        if decision == SelectionOutcome::Chosen {
             choice.chosen.push(i as u32);
             saved += gain;
         }
         i += match decision {
-            Decision::Chosen | Decision::RefusedSmall => 2 * node.count as usize - 1,
+            SelectionOutcome::Chosen | SelectionOutcome::RefusedSmall => 2 * node.count as usize - 1,
             _ => 1,
         };
     }

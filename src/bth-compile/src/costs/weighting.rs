@@ -1,13 +1,13 @@
-//! Rays of a scene, in the space of one of its objects: what weighs the object's nodes.
+//! Rays of a scene in the space of one of its objects; they weight the nodes of the object.
 
 use super::rays::SampleRay;
 
 /// The rays of a scene's cameras, lights and frames that concern an object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Weighting {
-    /// Those that enter its box from outside.
+    /// Rays that enter the object's box from outside.
     pub outside: Vec<SampleRay>,
-    /// Those that start on its triangles.
+    /// Rays that start on the object's triangles.
     pub surface: Vec<SampleRay>,
 }
 

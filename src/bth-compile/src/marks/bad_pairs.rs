@@ -28,7 +28,7 @@ pub fn bad_pairs(mesh: &Mesh, bvh: &BinaryBvh, monitor: &dyn Monitor) -> Result<
     monitor.stage("bad contacts", Some(bvh.nodes.len() as u64));
     let gathered = Gathered::new(mesh, bvh);
     let involved: Vec<AtomicBool> = bvh.order.iter().map(|_| AtomicBool::new(false)).collect();
-    // Two different triangles part ways at exactly one node.
+    // The paths from the root to two different triangles separate at exactly one node.
     let (pairs, tested) = (0..bvh.nodes.len())
         .into_par_iter()
         .with_min_len(256)

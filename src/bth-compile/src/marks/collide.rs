@@ -12,10 +12,10 @@ use rayon::prelude::*;
 const STEPS_BETWEEN_CHECKS: u64 = 1 << 16;
 /// Triangles of two siblings beyond which their collision is worth several threads.
 const PARALLEL_COLLISION: u32 = 1 << 15;
-/// Parts of a collision that several threads take on. A constant: the number of threads must not
-/// show in the report.
+/// Parts of a collision that several threads process. A constant, because the counts of the report must not depend on the
+/// number of threads.
 const PARTS: usize = 256;
-/// Rounds of splitting after which fewer parts must do.
+/// Greatest number of rounds of splitting, even if there are fewer parts then.
 const SPLITTING_ROUNDS: usize = 24;
 
 /// A BVH with its triangles gathered in the order of its leaves, which keeps traversals local.
@@ -24,21 +24,21 @@ pub(super) struct Gathered<'a> {
     triangles: Vec<Triangle>,
 }
 
-/// What a collision found.
+/// Counts of a collision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Contacts {
     /// Pairs of triangles with overlapping boxes.
     pub(super) tested: u64,
-    /// Those in bad contact.
+    /// Pairs of triangles in bad contact.
     pub(super) bad: u64,
 }
 
-/// Whether a traversal goes on after a bad contact.
+/// Whether a traversal continues after a bad contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum After {
-    /// The answer is known.
+    /// One bad contact suffices.
     Stop,
-    /// All are wanted.
+    /// All bad contacts are to be found.
     GoOn,
 }
 
@@ -52,8 +52,8 @@ impl<'a> Gathered<'a> {
         Self { bvh, triangles }
     }
 
-    /// Tests the triangles of one node against those of another, on this thread. `found` learns
-    /// the rows in `order` of each bad pair and says whether to go on.
+    /// Tests the triangles of one node against those of another, on this thread. `found` is called
+    /// with the rows in `order` of each bad pair and returns whether to go on.
     pub(super) fn collide(
         &self,
         left: u32,
@@ -88,8 +88,8 @@ impl<'a> Gathered<'a> {
         Ok(contacts)
     }
 
-    /// The same on several threads, when the nodes are large. What is counted does not depend on
-    /// the number of threads, also when a bad contact stops the traversal.
+    /// As [`Gathered::collide`], on several threads when the nodes are large. The counts do not depend on the number of
+    /// threads, even when a bad contact stops the traversal.
     pub(super) fn collide_in_parallel(
         &self,
         left: u32,
@@ -100,7 +100,8 @@ impl<'a> Gathered<'a> {
         if self.node(left).count.saturating_add(self.node(right).count) < PARALLEL_COLLISION {
             return self.collide(left, right, monitor, found);
         }
-        // Breadth first until there are enough parts; pairs of boxes that do not overlap go.
+        // Pairs of nodes are split breadth first until there are enough parts; pairs whose boxes do not overlap are
+        // dropped.
         let mut parts = vec![(left, right)];
         for _ in 0..SPLITTING_ROUNDS {
             parts = parts
@@ -148,7 +149,7 @@ impl<'a> Gathered<'a> {
         &self.bvh.nodes[i as usize]
     }
 
-    /// Descends into the node with more triangles: its box is the more likely to be too coarse.
+    /// Splits the node with more triangles, whose box is more likely to be too coarse.
     #[inline]
     fn split(&self, i: u32, j: u32) -> [(u32, u32); 2] {
         if self.node(i).count >= self.node(j).count {

@@ -1,4 +1,4 @@
-//! Contact within a plane, decided exactly in a projection that keeps the plane two-dimensional.
+//! Contact of coplanar triangles, decided exactly in a projection onto a coordinate plane.
 
 use robust::{Coord, orient2d};
 
@@ -12,7 +12,7 @@ pub(super) struct Projection {
 
 impl Projection {
     /// The first coordinate plane in which the triangle keeps an area, with the sign of that area;
-    /// none for a triangle of zero area.
+    /// `None` for a triangle of zero area.
     pub(super) fn of(triangle: [Point; 3]) -> Option<(Projection, f64)> {
         [[0, 1], [1, 2], [2, 0]].into_iter().find_map(|axes| {
             let projection = Projection { axes };
@@ -50,7 +50,7 @@ impl Projection {
 pub(super) fn segment_meets_coplanar_triangle(p: Point, q: Point, triangle: [Point; 3]) -> bool {
     let Some((projection, area)) = Projection::of(triangle) else { return false };
     let edges = [(0, 1), (1, 2), (2, 0)];
-    // A segment that crosses no edge has both ends inside, or none.
+    // A segment that crosses no edge has both ends inside or both outside.
     edges.iter().all(|&(i, j)| projection.orient(triangle[i], triangle[j], p) * area.signum() >= 0.0)
         || edges.iter().any(|&(i, j)| projection.segments_meet(p, q, triangle[i], triangle[j]))
 }

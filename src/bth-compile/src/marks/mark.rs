@@ -9,10 +9,10 @@ use bth_import::Mesh;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Triangles of a subtree that one thread marks alone.
+/// Greatest number of triangles of a subtree that one thread marks.
 const GRAIN: u32 = 4096;
 
-/// What marking found.
+/// Report of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Triangles in the BVH; those of zero area are not.
@@ -25,9 +25,9 @@ pub struct Report {
     pub largest: u64,
     /// Pairs of triangles that were tested.
     pub pairs_tested: u64,
-    /// Those in bad contact; marking stops at a node's first.
+    /// Tested pairs in bad contact; the test of a node stops at the first one.
     pub pairs_bad: u64,
-    /// Share of the triangles in maximal suitable nodes of at least so many triangles.
+    /// Share of the triangles in maximal suitable nodes of at least some sizes.
     pub coverage: Vec<Coverage>,
     /// Wall-clock time of the stage as the pipeline measures it, seconds; 0 where the stage is called on its own.
     pub seconds: f64,
@@ -38,14 +38,14 @@ pub struct Report {
 pub struct Coverage {
     /// Least size of a node that counts, triangles.
     pub at_least: u32,
-    /// Maximal suitable nodes (suitable, the parent not) of that size.
+    /// Maximal suitable nodes (suitable nodes whose parent is not) of at least that size.
     pub nodes: u64,
-    /// Their triangles over all triangles, 0 to 1.
+    /// Share of all triangles that are in these nodes, 0 to 1.
     pub share: f64,
 }
 
-/// Marks the nodes whose triangles are free of bad contacts, by children before parents: a node is
-/// suitable when both children are and no triangle of one is in bad contact with one of the other.
+/// Marks the nodes whose triangles are free of bad contacts, children before parents. A node is suitable when both children
+/// are and no triangle of one is in bad contact with one of the other.
 ///
 /// # Errors
 /// Only [`crate::Error::Cancelled`].
@@ -54,7 +54,7 @@ pub fn mark(mesh: &Mesh, bvh: &BinaryBvh, monitor: &dyn Monitor) -> Result<(Mark
     let gathered = Gathered::new(mesh, bvh);
     let mut suitable = vec![false; bvh.nodes.len()];
 
-    // Small subtrees, each a range of nodes, side by side.
+    // Small subtrees, each a range of nodes, in parallel.
     let (upper, roots) = split_at_grain(bvh);
     let mut parts = Vec::with_capacity(roots.len());
     let (mut rest, mut at) = (suitable.as_mut_slice(), 0);
@@ -70,7 +70,7 @@ pub fn mark(mesh: &Mesh, bvh: &BinaryBvh, monitor: &dyn Monitor) -> Result<(Mark
         .map(|(root, marks)| mark_subtree(&gathered, root, marks, monitor))
         .try_reduce(Contacts::default, |a, b| Ok(sum(a, b)))?;
 
-    // Then what lies above them, level by level from below.
+    // Then the nodes above them, level by level from the bottom.
     for level in levels_from_below(bvh, &upper) {
         monitor.check()?;
         let results = level
@@ -144,7 +144,7 @@ fn mark_subtree(
     Ok(contacts)
 }
 
-/// Marks one node, whose children have been marked.
+/// Marks one inner node whose children have been marked.
 fn mark_inner(
     gathered: &Gathered<'_>,
     i: u32,

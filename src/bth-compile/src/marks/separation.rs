@@ -1,5 +1,5 @@
-//! A cheap proof that two triangles touch only where they must: a separating direction, with a
-//! bound on the rounding of its dot products. Saves the exact tests for most neighbours.
+//! A cheap proof that two triangles that share a vertex touch only there: a separating plane, with a bound on the rounding
+//! of the dot products. Makes the exact tests unnecessary for most neighbours.
 
 type Point = [f32; 3];
 type Vector = [f64; 3];
@@ -36,7 +36,7 @@ fn unit(v: Vector) -> Vector {
 /// nothing. Any direction is a valid witness; the one tried runs between the corners' bisectors.
 #[inline]
 pub(super) fn fans_are_apart(s: Point, a: [Point; 2], b: [Point; 2]) -> bool {
-    // Written out: `map` on arrays of arrays is not always inlined, and this runs for most pairs.
+    // Written out because `map` on arrays of arrays is not always inlined and this code runs for most pairs.
     let (a0, a1, b0, b1) = (minus(a[0], s), minus(a[1], s), minus(b[0], s), minus(b[1], s));
     let (ua0, ua1, ub0, ub1) = (unit(a0), unit(a1), unit(b0), unit(b1));
     let between = |k: usize| (ua0[k] + ua1[k]) - (ub0[k] + ub1[k]);

@@ -1,4 +1,4 @@
-//! What the tests of this stage share: meshes, planted contacts and a plain BVH.
+//! Meshes, planted contacts and a plain BVH for the tests of this stage.
 
 use crate::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
@@ -60,7 +60,7 @@ fn split(mesh: &Mesh, nodes: &mut Vec<Node>, order: &mut [u32], first: u32) {
     }
 }
 
-/// A random mesh on a small grid: some connected fans, some loose triangles, many touching.
+/// A random mesh on a small grid of points: connected fans and loose triangles, many of which touch.
 pub(crate) fn patch(seed: u64, triangles: usize) -> Mesh {
     let mut random = Rng::new(seed);
     let side = 3 + random.below(12);
@@ -69,7 +69,7 @@ pub(crate) fn patch(seed: u64, triangles: usize) -> Mesh {
     while corners.len() < triangles {
         let (a, b, c) = (point(), point(), point());
         corners.push([a, b, c]);
-        // A neighbour across an edge, and one at a corner.
+        // Add a neighbour across an edge and one at a corner.
         let (d, e) = (point(), point());
         corners.extend([[b, a, d], [a, d, e]]);
     }
@@ -110,7 +110,7 @@ pub(crate) struct Planted {
     pub(crate) pairs: u64,
 }
 
-/// The list that the cross-check with other programs uses, too.
+/// The planted contacts of `tools/crosscheck/planted.json`, which the cross-check with other programs uses too.
 pub(crate) fn planted() -> Vec<Planted> {
     #[derive(serde::Deserialize)]
     struct Case {

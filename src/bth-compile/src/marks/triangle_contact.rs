@@ -36,7 +36,7 @@ pub fn in_bad_contact(a: &Triangle, b: &Triangle) -> bool {
             vertex_neighbours_meet(a, b)
         }
         2 => {
-            // Rotated so that the corner that is not shared comes first.
+            // The triangles are rotated so that the corner that is not shared comes first.
             let a = from_corner(a.corners, (!shared_a).trailing_zeros());
             let b = from_corner(b.corners, (!shared_b).trailing_zeros());
             orient3d(a[1], a[2], a[0], b[0]) == 0.0 && on_same_side(a[1], a[2], a[0], b[0])
@@ -144,7 +144,7 @@ mod tests {
                     assert_eq!(in_bad_contact(&b, &a), expected, "swapped: {a:?} {b:?}");
                     verdicts[usize::from(expected)] += 1;
                 }
-                // Both answers are exercised, but that duplicates are always bad.
+                // Both answers occur, except that duplicates are always in bad contact.
                 let always_bad = shared == 3;
                 assert!(
                     verdicts[1] > 500 && (always_bad || verdicts[0] > 500),
@@ -173,8 +173,8 @@ mod tests {
 
     #[test]
     fn one_ulp_decides_between_contact_and_gap() {
-        // Vertices of the second triangle on, or one ulp above, the first one's plane, which no
-        // coordinate plane is parallel to.
+        // Vertices of the second triangle lie on the plane of the first or one ulp above it; no coordinate plane is
+        // parallel to that plane.
         let mut random = Rng::new(13);
         for _ in 0..2000 {
             let [x, y] = [0; 2].map(|_: i32| 1.0 + random.below(1000) as f32 / 1024.0);

@@ -1,5 +1,5 @@
-//! The limit on the bytes that tracing reads: what the BVH takes before nodes are chosen, and which tetrahedralizations are
-//! left out when they turn out larger than estimated.
+//! The limit on the bytes that tracing reads: the size of the BVH, which is determined before nodes are chosen, and the
+//! selection of the tetrahedralizations to leave out when they are larger than estimated.
 
 use super::object::{TracedMesh, TracedRef, collapse};
 use super::{FileReport, Options, Structure};
@@ -10,7 +10,7 @@ use crate::{bvh, tets};
 use bth_format::layout::Object as Header;
 use bth_import::Mesh;
 
-/// How the tetrahedra of a mesh will be stored; under a limit on bytes, with the size of the BVH beside them.
+/// How the tetrahedra of a mesh will be stored; under a limit on bytes also the size of the object without them.
 ///
 /// # Errors
 /// A limit of the format, cancellation.
@@ -36,13 +36,13 @@ pub(super) fn storage_of(
     Ok(storage)
 }
 
-/// The limit that applies to tet leaves. A whole tetrahedralization that was asked for is not limited.
+/// The limit that applies to tet leaves. The tetrahedralization of a whole model is not limited.
 pub(super) fn bytes_per_triangle(options: &Options) -> Option<f64> {
     options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
 }
 
 /// Leaves out tetrahedralizations, those of least gain for a byte first, until tracing reads at most `most` bytes a
-/// triangle; all of them if the rest saves less than the least gain. The probe's report follows.
+/// triangle; all of them if the rest saves less than the least gain. The probe's report is updated.
 pub(super) fn fit(
     traced: &TracedMesh,
     most: f64,
@@ -104,8 +104,8 @@ fn bytes(
     Ok((rest + face_of_triangle) as u64 + tets.sum::<u64>())
 }
 
-/// The gain of a tet leaf: as probed, else as estimated when it was chosen. A cell of a chosen node that could not be built
-/// whole has its share of the node's gain.
+/// The gain of a tet leaf as probed, or without a probe as estimated when the node was chosen. A cell of a chosen node that
+/// could not be built whole is assigned a share of the node's gain by its triangles.
 fn gain(tree: &bvh::BinaryBvh, choice: &Choice, probe: Option<&ProbeReport>, node: u32) -> f64 {
     if let Some(probe) = probe {
         return probe.leaves.iter().find(|leaf| leaf.node == node).map_or(0.0, |leaf| leaf.gain);

@@ -84,7 +84,7 @@ pub(crate) fn compile_mesh(
     Ok((object, StageReports::new(coordinates, bvh, tets, collapse)))
 }
 
-/// Tetrahedralizes the nodes that pay: marks → costs → tets → probe → limit.
+/// Tetrahedralizes the nodes for which that saves time: marks → costs → tets → probe → limit.
 fn tet_leaves(
     source: &Path,
     traced: &TracedMesh,

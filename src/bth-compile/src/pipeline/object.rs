@@ -1,4 +1,4 @@
-//! An object from the results of the stages, and the file with one object.
+//! Assembles an object from the results of the stages, and the file with one object.
 
 use super::clock::timed;
 use super::{FileReport, Options};
@@ -12,11 +12,11 @@ use bth_import::Mesh;
 /// A compiled file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compiled {
-    /// Its bytes. They depend on the source's content and the options only.
+    /// The bytes of the file. They depend on the source's content and the options only.
     pub bytes: Vec<u8>,
 }
 
-/// A mesh as it is traced, with its binary BVH.
+/// A mesh with the vertices that are traced, and its binary BVH.
 pub(crate) struct TracedMesh {
     /// The mesh; its vertices are on the grid, if there is one.
     pub(crate) mesh: Mesh,
@@ -50,7 +50,7 @@ pub(crate) struct Object {
     pub(crate) tet_triangles: u64,
 }
 
-/// Puts an object together: collapses the BVH with tet leaves in place of their nodes, and encodes the tet leaves.
+/// Assembles an object: collapses the BVH with tet leaves in place of their nodes, and encodes the tet leaves.
 pub(super) fn join(
     traced: TracedMesh,
     leaves: Vec<tets::Leaf>,
@@ -110,7 +110,7 @@ pub fn assemble(
 }
 
 impl Object {
-    /// The file with this object only, checked as a reader will.
+    /// The file with this object only, after the checks of a reader.
     pub(super) fn file(&self, provenance: String, options: &Options) -> Result<(Compiled, FileReport)> {
         let parts = self.parts(options);
         let mut builder = write::FileBuilder::new();

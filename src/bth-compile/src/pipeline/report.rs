@@ -19,7 +19,7 @@ pub struct Report {
     pub coordinates: Option<coordinates::Report>,
     /// Binary BVH.
     pub bvh: bvh::Report,
-    /// Marking; absent when no tetrahedra were asked for, as the next two.
+    /// Marking; absent, as the next two, for structures without tetrahedra.
     pub marks: Option<marks::Report>,
     /// Selection.
     pub costs: Option<costs::Report>,
@@ -44,7 +44,7 @@ pub struct FileReport {
     pub tet_triangles: u64,
     /// Bytes of the sections that traversal reads.
     pub resident_bytes: u64,
-    /// The same for each triangle of the source; 0 when it has none.
+    /// Resident bytes for each triangle of the source; 0 when it has none.
     pub resident_bytes_per_triangle: f64,
 }
 

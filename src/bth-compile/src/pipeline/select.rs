@@ -1,4 +1,4 @@
-//! Selection of the nodes to tetrahedralize, by structure: none, those that pay, or the root.
+//! Selection of the nodes to tetrahedralize, by structure: none, those with a gain, or the root.
 
 use super::clock::timed;
 use super::limit;
@@ -45,7 +45,7 @@ pub(super) fn choose(
     }
 }
 
-/// The tetrahedralizations that save time according to sample rays; a whole one that was asked for always stays.
+/// The tetrahedralizations that save time according to sample rays; that of a whole model is always kept.
 pub(super) fn probe(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
@@ -59,7 +59,7 @@ pub(super) fn probe(
     }
 }
 
-/// Fails when a whole tetrahedralization was asked for and failed.
+/// Fails where the whole model had to be tetrahedralized and was not.
 pub(super) fn check_built(
     source: &Path,
     tree: &bvh::BinaryBvh,

@@ -1,13 +1,13 @@
-//! The compilation of a manifest into a file: the objects that may be seen, then the scene.
+//! The compilation of a manifest into a file: first the objects that may be visible, then the scene.
 
 use super::context::Context;
 use super::file_index::FileIndex;
 use super::objects::{self, Objects};
-use super::plan::Plan;
+use super::plan::ScenePlan;
 use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
 use super::{encode, meshes, sources, weights};
-use crate::cached::{self, Cache, DryRun, Outcome};
+use crate::cached::{self, Cache, CachedCompilation, DryRun};
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
@@ -22,7 +22,7 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Compiles a scene; paths of the manifest count from `folder`, `name` stands for the scene in messages.
+/// Compiles a scene; paths of the manifest count from `folder`, `name` names the scene in messages.
 ///
 /// # Errors
 /// Those of the objects; `BTH-I050` when its first frame cannot be shown.
@@ -36,29 +36,31 @@ pub fn compile(
     let cache = Cache::none();
     let context = Context::of(options, &cache, None, monitor);
     let mut clock = Clock::default();
-    let plan = Plan::of(manifest, folder, &mut clock)?;
+    let plan = ScenePlan::of(manifest, folder, &mut clock)?;
     let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
     warn_over_limit(&report.objects, options, monitor);
     Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
 }
 
-/// Where a scene is.
+/// The folder and the name of a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<'a> {
+pub struct SceneSource<'a> {
     /// The folder that its paths count from.
     pub folder: &'a Path,
-    /// What stands for it in messages.
+    /// Name of the scene in messages.
     pub name: &'a Path,
 }
 
-/// What the cache keeps of a scene besides its objects, and what the caller needs of it.
+/// The contents that the cache keeps of a scene besides its objects, and those that the caller needs.
 #[derive(Clone, Copy)]
-pub struct Keep<'a> {
-    /// Whether the cache keeps the whole file, to be mapped. Else it is put together from its objects when it is needed.
+pub struct CachePolicy<'a> {
+    /// Whether the cache keeps the whole file, so that it can be mapped. Else the file is assembled from its objects when
+    /// it is needed.
     pub whole: bool,
     /// Whether the bytes of a file that the cache has are needed.
     pub needed: &'a dyn Fn(&Record) -> bool,
-    /// Where the file will be written: objects that have not changed are copied from the file that is there.
+    /// The path to which the file will be written. Objects that have not changed are copied from an existing file of that
+    /// path.
     pub target: Option<&'a Path>,
 }
 
@@ -68,23 +70,23 @@ pub struct Keep<'a> {
 /// As [`compile`]; `BTH-O002` when a source changes meanwhile.
 pub fn compile_cached(
     manifest: &Manifest,
-    place: Place<'_>,
+    source: SceneSource<'_>,
     options: &Options,
     cache: &Cache<'_>,
-    keep: Keep<'_>,
+    policy: CachePolicy<'_>,
     monitor: &dyn Monitor,
-) -> Result<Outcome<SceneReport>> {
+) -> Result<CachedCompilation<SceneReport>> {
     let mut context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let plan = Plan::of(manifest, place.folder, &mut clock)?;
+    let plan = ScenePlan::of(manifest, source.folder, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
-    let outcome = cached::compile_or_fetch(cache, key.as_ref(), keep.needed, monitor, || {
-        context.previous = previous(keep.target, &context);
-        let (content, report, index) = build(manifest, &plan, place.name, &context, clock)?;
-        if keep.target.is_some() && !options.costs.for_scene {
+    let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, || {
+        context.previous = previous(policy.target, &context);
+        let (content, report, index) = build(manifest, &plan, source.name, &context, clock)?;
+        if policy.target.is_some() && !options.costs.for_scene {
             keep_index(&content.name(), &index, &context);
         }
-        Ok((content, report, keep.whole))
+        Ok((content, report, policy.whole))
     })?;
     let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
     warn_over_limit(&objects, options, monitor);
@@ -107,13 +109,14 @@ fn warn_over_limit(objects: &[ObjectReport], options: &Options, monitor: &dyn Mo
     ));
 }
 
-/// Compiles part `shard.0` of `shard.1` (from 1) of a scene's objects into the cache; how many there are in this part.
+/// Compiles part `shard.0` (from 1) of `shard.1` parts of a scene's objects into the cache. Returns the number of objects
+/// in this part.
 ///
 /// # Errors
 /// As [`compile_cached`].
 pub fn compile_objects(
     manifest: &Manifest,
-    place: Place<'_>,
+    source: SceneSource<'_>,
     options: &Options,
     cache: &Cache<'_>,
     shard: (u32, u32),
@@ -121,12 +124,12 @@ pub fn compile_objects(
 ) -> Result<u64> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let mut plan = Plan::of(manifest, place.folder, &mut clock)?;
-    let mut place = 0;
+    let mut plan = ScenePlan::of(manifest, source.folder, &mut clock)?;
+    let mut row = 0;
     for file in &mut plan.sources {
         file.parts.retain(|_| {
-            place += 1;
-            !file.compiled && (place - 1) % shard.1 == shard.0 - 1
+            row += 1;
+            !file.compiled && (row - 1) % shard.1 == shard.0 - 1
         });
     }
     plan.sources.retain(|file| !file.parts.is_empty());
@@ -134,13 +137,13 @@ pub fn compile_objects(
     Ok(objects.reports.len() as u64)
 }
 
-/// What [`compile_cached`] would do; `target` as in [`Keep`]. Reads and hashes all sources, and does nothing else.
+/// What [`compile_cached`] would do; `target` as in [`CachePolicy`]. Only reads and hashes the sources.
 ///
 /// # Errors
 /// When a source cannot be read.
 pub fn dry_run(
     manifest: &Manifest,
-    place: Place<'_>,
+    source: SceneSource<'_>,
     options: &Options,
     cache: &Cache<'_>,
     target: Option<&Path>,
@@ -148,7 +151,7 @@ pub fn dry_run(
 ) -> Result<DryRun> {
     let mut context = Context::new(options, cache, monitor)?;
     context.previous = previous(target, &context);
-    let plan = Plan::of(manifest, place.folder, &mut Clock::default())?;
+    let plan = ScenePlan::of(manifest, source.folder, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
@@ -164,7 +167,8 @@ pub fn dry_run(
     Ok(found)
 }
 
-/// The file of an earlier compilation at the target. Of no use with the scene's rays: then an object depends on all others.
+/// The file of an earlier compilation at the target. Not used where the scene's rays weight the costs, because an object
+/// then depends on all others.
 fn previous(target: Option<&Path>, context: &Context<'_>) -> Option<Arc<Previous>> {
     let target = target.filter(|_| !context.options.costs.for_scene)?;
     let tetgen = context.tetgen.as_ref()?;
@@ -180,17 +184,17 @@ fn keep_index(named: &Digest, index: &FileIndex, context: &Context<'_>) {
 }
 
 /// The key of a scene, if it may be kept.
-fn key(manifest: &Manifest, plan: &Plan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
+fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
     Ok(Some(cached::scene(&parts, &sources::contents(manifest, &plan.sources), context.options, tetgen)))
 }
 
-/// Compiles the objects and puts the file together.
+/// Compiles the objects and assembles the file.
 fn build(
     manifest: &Manifest,
-    plan: &Plan<'_>,
+    plan: &ScenePlan<'_>,
     name: &Path,
     context: &Context<'_>,
     mut clock: Clock,
@@ -231,7 +235,7 @@ fn build(
 /// The report on a compiled scene.
 fn report(
     manifest: &Manifest,
-    plan: &Plan<'_>,
+    plan: &ScenePlan<'_>,
     (objects, clock): (Objects, Clock),
     parts: &SceneParts,
     bytes: u64,
@@ -258,14 +262,14 @@ fn report(
     }
 }
 
-/// Checks the first frame as a reader will. The sections of the objects have been checked one by one before, so the check
+/// Checks the first frame as a reader does. The sections of the objects have been checked one by one before, so the check
 /// reads a file with their OBJECT rows only.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
     write::scene(&mut rows_only, parts)?;
     let first_frame = |bytes: &[u8]| bth::check_first_frame(&bth_format::File::from_bytes(bytes)?);
-    // Offsets in messages are those in the whole file.
+    // The error is replaced by that of the whole file, so that offsets in messages are those of the whole file.
     let whole = |error| content.bytes().ok().and_then(|bytes| first_frame(&bytes).err()).unwrap_or(error);
     first_frame(&rows_only.finish()).map_err(|e| refused(name, &whole(e)))
 }
@@ -273,7 +277,7 @@ fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) 
 /// The rays of the scene that reach each object of the file, traced through a file with BVHs only.
 fn rays(
     manifest: &Manifest,
-    plan: &Plan<'_>,
+    plan: &ScenePlan<'_>,
     name: &Path,
     context: &Context<'_>,
 ) -> Result<Vec<Arc<costs::Weighting>>> {

@@ -19,7 +19,7 @@ pub(super) struct Context<'a> {
     pub(super) monitor: &'a dyn Monitor,
     /// The scene's rays for each object of the file, if they weight the costs.
     pub(super) weights: Option<Vec<Arc<costs::Weighting>>>,
-    /// The file of an earlier compilation where this one will write.
+    /// The file of an earlier compilation at the path of this one's output.
     pub(super) previous: Option<Arc<Previous>>,
 }
 
@@ -32,7 +32,7 @@ impl<'a> Context<'a> {
         Ok(Self::of(options, cache, cached::tetgen_in_keys(options, cache, monitor)?, monitor))
     }
 
-    /// The context with a known tetrahedralizer.
+    /// The context of a compilation whose tetrahedralizer is known.
     pub(super) fn of(
         options: &'a Options,
         cache: &'a Cache<'a>,
@@ -43,7 +43,7 @@ impl<'a> Context<'a> {
         Self { options, cache, tetgen, keys, monitor, weights: None, previous: None }
     }
 
-    /// The same with another monitor.
+    /// The same context with another monitor.
     pub(super) fn with_monitor<'b>(&'b self, monitor: &'b dyn Monitor) -> Context<'b> {
         let Self { options, cache, ref tetgen, ref keys, ref weights, ref previous, .. } = *self;
         Context {

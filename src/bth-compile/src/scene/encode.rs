@@ -7,7 +7,7 @@ use bth_format::layout::NONE;
 use bth_scene::{Lens, LightKind, Manifest, Transform};
 use std::collections::HashMap;
 
-/// The nodes with parents before children: as they stand where that holds, else by depth.
+/// The order of the nodes with parents before children: that of the manifest where it has this property, else by depth.
 pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     let nodes = &manifest.nodes;
     let mut order: Vec<usize> = (0..nodes.len()).collect();
@@ -32,7 +32,7 @@ pub(super) fn order(manifest: &Manifest) -> Vec<usize> {
     order
 }
 
-/// What stands in NAMES: each name once.
+/// The bytes of the section NAMES, which contains each name once.
 #[derive(Default)]
 struct Names<'a> {
     bytes: Vec<u8>,
@@ -40,7 +40,7 @@ struct Names<'a> {
 }
 
 impl<'a> Names<'a> {
-    /// First byte and length.
+    /// Adds a name. Returns its first byte and its length.
     fn add(&mut self, name: &'a str) -> (u32, u32) {
         let bytes = &mut self.bytes;
         let first = *self.found.entry(name).or_insert_with(|| {
@@ -52,7 +52,7 @@ impl<'a> Names<'a> {
     }
 }
 
-/// The sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
+/// Encodes the scene sections. `objects` gives the object of the file for each of the manifest, `None` for those that no
 /// instance uses; `visible` tells for each node whether it may be seen; instances at other nodes are left out.
 ///
 /// # Errors

@@ -1,5 +1,5 @@
-//! The index of a scene file: its objects, their sections and what each was made from. With it the next compilation copies
-//! from the file what has not changed.
+//! The index of a scene file: its objects, their sections, and the hashes of the sources of each. By it the next
+//! compilation copies unchanged objects from the file.
 
 use super::report::ObjectReport;
 use crate::cached::{Codec, RowReader, RowWriter};
@@ -9,7 +9,7 @@ use bth_format::layout::ALIGNMENT;
 use std::collections::HashMap;
 use zerocopy::{FromBytes, Immutable, IntoBytes};
 
-/// BLAKE3 of an object's content or of what identifies a part of a source.
+/// BLAKE3 of an object's content, or of the identity of a part of a source.
 pub(super) type Hash = [u8; 32];
 
 /// An object of the file.
@@ -24,7 +24,7 @@ pub(super) struct ObjectRow {
     pub(super) tet_triangles: u64,
     /// Its OBJECT row.
     pub(super) object: on_disk::Object,
-    /// Its sections: rows of the index.
+    /// First row of its sections in the index.
     pub(super) first: u32,
     pub(super) sections: u32,
     /// Row of the workers.
@@ -38,13 +38,13 @@ pub(super) struct ObjectRow {
 pub(super) struct SectionRow {
     pub(super) kind: u32,
     pub(super) stride: u32,
-    /// Place and length in the file, bytes.
+    /// Offset and length in the file, bytes.
     pub(super) offset: u64,
     pub(super) length: u64,
     pub(super) hash: [u8; 16],
 }
 
-/// A part of a source, which became an object.
+/// A part of a source from which an object was made.
 #[derive(Clone, Copy, Debug, FromBytes, IntoBytes, Immutable)]
 #[repr(C)]
 pub(super) struct PartRow {
@@ -64,14 +64,14 @@ pub(super) struct FileIndex {
     pub(super) parts: Vec<PartRow>,
     /// Formats of sources.
     pub(super) formats: Vec<String>,
-    /// Status of the worker, for the objects that needed one.
+    /// Statuses of the worker; objects that needed no worker refer to `None`.
     pub(super) workers: Vec<Option<WorkerStatus>>,
     by_content: HashMap<Hash, u32>,
     by_part: HashMap<Hash, u32>,
 }
 
 impl FileIndex {
-    /// The row of a word in a list, to which it is added if it is not there.
+    /// The row of a value in a list; the value is added if the list does not have it.
     pub(super) fn row_of<T: PartialEq + Clone>(words: &mut Vec<T>, word: &T) -> u32 {
         let there = words.iter().position(|known| known == word);
         there.unwrap_or_else(|| {
@@ -139,7 +139,7 @@ impl Codec for FileIndex {
         to.add(&self.objects);
         to.add(&self.sections);
         to.add(&self.parts);
-        // Names and states: there is nothing in them that is no JSON.
+        // Names and statuses can always be expressed in JSON.
         to.add(&serde_json::to_vec(&(&self.formats, &self.workers)).unwrap_or_default());
     }
 

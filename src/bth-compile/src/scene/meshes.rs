@@ -1,4 +1,4 @@
-//! The meshes of a source file: known from the cache, or imported.
+//! The meshes of a source file, from the cache or imported.
 
 use super::context::Context;
 use super::sources::File;
@@ -8,7 +8,7 @@ use bth_cache::Key;
 use bth_files::Digest;
 use bth_import::{self as mesh, Mesh};
 
-/// A mesh of a source; only its summary as long as the cache has the mesh.
+/// A mesh of a source. The mesh itself is absent while the cache has it; the summary is always present.
 pub(super) struct SourceMesh {
     pub(super) summary: MeshSummary,
     /// Number of the mesh; `None` for the whole file.
@@ -65,7 +65,7 @@ fn known(key: &Key, context: &Context<'_>) -> Option<MeshSummary> {
     serde_json::from_value(record.report).ok()
 }
 
-/// The objects of a file that neither the previous file nor the cache has, and why.
+/// The objects of a file that neither the previous file nor the cache has, with the reasons.
 pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |number: Option<u32>| {
         let part = file.name_of(number);
@@ -92,13 +92,13 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     file.parts.iter().filter_map(|(number, _)| one(*number)).collect()
 }
 
-/// A hash that is equal for meshes of equal content, whatever file they are from.
+/// A hash of a mesh's content, which does not depend on the file of the mesh.
 pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let shading = mesh.shading.as_ref().map(Digest::hex);
     blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
 }
 
-/// Imports meshes of a file and keeps them.
+/// Imports meshes of a file and keeps them in the cache.
 fn import(
     file: &File<'_>,
     numbers: &[Option<u32>],

@@ -1,7 +1,7 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is on top; `objects` compiles all objects and `object` one; `meshes` and `sources` read what they are made
-//! from; `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
+//! `compile` is the entry; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
+//! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
 mod compile;
 mod context;
@@ -19,5 +19,5 @@ mod sources;
 mod visible;
 mod weights;
 
-pub use compile::{Keep, Place, compile, compile_cached, compile_objects, dry_run};
+pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use report::{ObjectReport, SceneReport};

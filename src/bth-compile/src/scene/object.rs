@@ -14,12 +14,12 @@ use crate::write::{self, FileBuilder, object};
 use bth_cache::Key;
 use serde::{Deserialize, Serialize};
 
-/// Bytes that building takes for each triangle (measured: 14 for each byte of a binary mesh)...
+/// Bytes of memory that building an object takes for each triangle (measured: 14 for each byte of a binary mesh).
 const MEMORY_PER_TRIANGLE: u64 = 320;
-/// ...and in any case.
+/// Bytes of memory that building an object takes in addition.
 const MEMORY_AT_LEAST: u64 = 4 << 20;
 
-/// An object with its sections, every index of which has been checked.
+/// An object with its sections, of which every index has been checked.
 pub(super) struct BuiltObject {
     pub(super) file: bth_format::File,
     pub(super) record: ObjectRecord,
@@ -32,7 +32,7 @@ pub(super) struct ObjectRecord {
     pub(super) worker: Option<tets::WorkerStatus>,
 }
 
-/// Bytes that building an object takes, by an estimate.
+/// Estimated bytes of memory that building an object takes.
 pub(super) fn memory(triangles: u64) -> u64 {
     triangles.saturating_mul(MEMORY_PER_TRIANGLE).saturating_add(MEMORY_AT_LEAST)
 }

@@ -20,7 +20,7 @@ use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
-/// Objects with more triangles keep all threads busy by themselves, and are compiled one after another.
+/// Objects with more triangles use all threads by themselves and are compiled one after another.
 const LARGE: u64 = 1 << 17;
 
 /// The objects of the file.
@@ -62,7 +62,7 @@ pub(super) fn build(
 ) -> Result<Objects> {
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
     let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
-    // Copied objects are there at once, the others when they are built.
+    // Copied objects are filled in at once, the others when they are built.
     let mut places: Vec<Option<(ObjectSections, ObjectReport)>> = Vec::new();
     let mut tasks = Vec::new();
     let mut taken = 0;
@@ -129,12 +129,12 @@ pub(super) fn build(
     Ok(objects)
 }
 
-/// The parts of all files, in order; none of compiled ones.
+/// The parts of all files, in order; a compiled file has no parts.
 fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
     let mut all: Vec<Option<Vec<Part>>> =
         sources.iter().map(|file| parts_without_reading(file, context)).collect();
     let bytes = |file: &&File<'_>| std::fs::metadata(&file.full).map_or(0, |m| m.len());
-    // The file and what is made of it.
+    // Memory for the file and for the mesh that is made from it.
     let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
     let unknown =
         sources.iter().zip(&all).filter(|(_, known)| known.is_none()).map(|(file, _)| file).collect();
@@ -164,7 +164,7 @@ pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> O
     file.parts.iter().map(|(number, _)| part(*number)).collect()
 }
 
-/// Where the previous file has an object, and the hash by which equal objects are found.
+/// The object in the previous file, if it has it, and the hash by which equal objects are found.
 fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>, u32)>, blake3::Hash) {
     let previous = context.previous.as_ref();
     match part {
@@ -239,7 +239,7 @@ fn copy(
         hasher.update(b"compiled");
         for section in read.sections().filter(|s| s.entry.object == object) {
             hasher.update(&section.entry.kind.to_le_bytes()).update(&section.entry.stride.to_le_bytes());
-            // Not the hash in the section table, which an untrusted file may give at will.
+            // The hash is computed here; that of the section table is untrusted.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
         let number = *of_content.entry(hasher.finalize()).or_insert_with(|| {
@@ -275,7 +275,7 @@ impl Objects {
         Ok(())
     }
 
-    /// Adds the OBJECT rows only: all that placing instances needs.
+    /// Adds the OBJECT rows only, which suffice to place instances.
     pub(super) fn write_rows(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
             if let Some(row) = stored.row() {

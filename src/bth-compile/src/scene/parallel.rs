@@ -7,8 +7,8 @@ use crate::monitor::Monitor;
 use crate::pipeline::Clock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs `work` on all items in parallel, as many as there are threads and as the `estimate` of their memory in bytes allows.
-/// Fails with the first failure in the order of the items.
+/// Runs `work` on all items, at most as many at a time as there are threads and as fit in memory by the `estimate` in
+/// bytes. Fails with the first failure in the order of the items.
 pub(super) fn run_parallel<J: Send, T: Send>(
     items: Vec<J>,
     context: &Context<'_>,
@@ -45,15 +45,16 @@ pub(super) fn run_parallel<J: Send, T: Send>(
     results.collect()
 }
 
-/// A pool of one thread for one item. In the shared pool an item that waits for another process could block the item that
+/// A pool of one thread for one item at a time; `None` where a single item runs at a time. In the shared pool an item that
+/// waits for another process could block the item that
 /// this process waits for.
 fn own_pool(threads: usize) -> Option<rayon::ThreadPool> {
     let pool = || rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    // Without one the work goes to the global pool, which only takes more threads.
+    // If no pool can be made, the work runs in the global pool, which only uses more threads.
     (threads > 1).then(pool)?.ok()
 }
 
-/// A monitor for one of several items: shows no stages.
+/// A monitor for one of several items, which shows no stages.
 struct WithoutStages<'a>(&'a dyn Monitor);
 
 impl Monitor for WithoutStages<'_> {

@@ -1,4 +1,4 @@
-//! Which nodes, objects and source files of a manifest are compiled.
+//! The nodes, objects and source files of a manifest that are compiled.
 
 use super::{encode, sources, visible};
 use crate::error::Result;
@@ -7,18 +7,18 @@ use bth_scene::Manifest;
 use std::path::Path;
 
 /// The part of a manifest that is compiled.
-pub(super) struct Plan<'a> {
+pub(super) struct ScenePlan<'a> {
     /// Nodes with parents before children.
     pub(super) order: Vec<usize>,
-    /// For each node whether it may be seen.
+    /// For each node whether it may be visible.
     pub(super) visible: Vec<bool>,
-    /// For each object of the manifest whether a visible node has it.
+    /// For each object of the manifest whether a visible node has an instance of it.
     pub(super) used: Vec<bool>,
     /// The files of the used objects.
     pub(super) sources: Vec<sources::File<'a>>,
 }
 
-impl<'a> Plan<'a> {
+impl<'a> ScenePlan<'a> {
     /// Finds the visible nodes and hashes the files of their objects.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-//! The file of an earlier compilation of a scene at the place where this one will write. Its objects need be neither read
-//! from the cache nor written from memory.
+//! The file of an earlier compilation of a scene at the path of this one's output. Its unchanged objects are copied by the
+//! operating system, without being read from the cache or written from memory.
 
 use super::file_index::{FileIndex, SectionRow};
 use crate::cached::{self, Cache};
@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub(super) struct Previous {
     pub(super) index: FileIndex,
     file: Arc<OpenFile>,
-    /// Whether the file is known to be unchanged since it was written. Else each section is read and checked.
+    /// Whether the file is known to be unchanged since it was written; else each section is read and checked.
     untouched: bool,
 }
 
@@ -66,7 +66,7 @@ impl Previous {
         })
     }
 
-    /// Where the bytes of a section are.
+    /// Range of a section's bytes in the file.
     pub(super) fn bytes(&self, section: &SectionRow) -> Bytes<'static> {
         Bytes::OnDisk(self.file.clone(), section.offset..section.offset + section.length)
     }

@@ -20,7 +20,7 @@ pub struct ObjectReport {
     /// Bytes of its sections that tracing reads.
     #[serde(default)]
     pub resident_bytes: u64,
-    /// Whether it was taken from a compiled file as it is.
+    /// Whether it was copied unchanged from a compiled file.
     pub copied: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct SceneReport {
     pub unused: Vec<String>,
     /// Nodes.
     pub nodes: u64,
-    /// Instances that may be seen.
+    /// Instances that may be visible.
     pub instances: u64,
     /// Tracks.
     pub tracks: u64,

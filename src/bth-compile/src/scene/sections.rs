@@ -1,4 +1,4 @@
-//! Where the sections of a scene's objects are, before they go into the file.
+//! The sections of a scene's objects in memory or in the previous file, before they are added to the new file.
 
 use super::file_index::Hash;
 use super::previous::Previous;
@@ -9,14 +9,14 @@ use bth_format::layout::{self, SectionEntry, kind};
 use std::sync::Arc;
 use zerocopy::FromBytes;
 
-/// The sections of an object, every index of which has been checked.
+/// The sections of an object, of which every index has been checked.
 pub(super) enum ObjectSections {
     /// In a file in memory.
     InFile {
         file: Arc<bth_format::File>,
         object: u32,
-        /// Hash by which equal objects are found and status of the worker. Absent for objects copied from compiled files:
-        /// those are untrusted, so the hashes of their sections are computed again.
+        /// Hash by which equal objects are found and status of the worker. Absent for objects copied from compiled files,
+        /// which are untrusted, so that the hashes of their sections are computed again.
         made: Option<(blake3::Hash, Option<tets::WorkerStatus>)>,
     },
     /// In the previous file.
@@ -24,7 +24,8 @@ pub(super) enum ObjectSections {
 }
 
 impl ObjectSections {
-    /// Its sections in a file in memory. Unknown kinds are left out: their meaning could depend on what changes.
+    /// Its sections in a file in memory. Sections of unknown kinds are left out, because their meaning could depend on
+    /// other parts of the file.
     fn sections(
         file: &bth_format::File,
         object: u32,
@@ -84,7 +85,7 @@ impl ObjectSections {
         }
     }
 
-    /// Bytes of those that tracing reads.
+    /// Bytes of the sections that tracing reads.
     pub(super) fn resident_bytes(&self) -> u64 {
         let resident = |kind: u32, length: u64| if kind <= kind::TRIANGLE_FACES { length } else { 0 };
         match self {

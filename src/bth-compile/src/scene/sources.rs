@@ -1,4 +1,4 @@
-//! The files that a scene's objects come from.
+//! The source files of a scene's objects.
 
 use crate::cached;
 use crate::error::Result;
@@ -11,12 +11,12 @@ use std::path::{Path, PathBuf};
 
 /// A source file and its parts that are used.
 pub(super) struct File<'a> {
-    /// As the manifest has it.
+    /// Path as in the manifest.
     pub(super) path: &'a str,
-    /// Where it is.
+    /// Full path.
     pub(super) full: PathBuf,
     pub(super) compiled: bool,
-    /// Mesh or object (`None` for the whole file), and the manifest's objects that are that.
+    /// Number of a mesh or object in the file (`None` for the whole file), and the manifest's objects that refer to it.
     pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
     pub(super) digest: SourceDigest,
 }
@@ -28,7 +28,7 @@ impl File<'_> {
         part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
     }
 
-    /// Identifies a part by content, wherever the file lies.
+    /// Identity of a part by content, which does not depend on the path of the file.
     pub(super) fn content(&self, part: Option<u32>) -> String {
         format!("{} {} {}", self.digest.text(), self.part(part), cached::extension(&self.full))
     }
@@ -51,7 +51,7 @@ pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String>
     contents
 }
 
-/// The files of the used objects, in order of first use, hashed.
+/// Hashes the files of the used objects; the files are in order of first use.
 ///
 /// # Errors
 /// When one cannot be read.
@@ -66,7 +66,7 @@ pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) ->
             Source::Compiled { object, .. } => (true, Some(*object)),
         };
         let path = object.source.path();
-        // The whole of a glTF file and single meshes are read in different ways.
+        // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
         let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
             let full = folder.join(path);
             files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing() });
@@ -79,7 +79,7 @@ pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) ->
         });
         parts[place].1.push(row);
     }
-    // Errors are taken in the order of the files, so that the message does not depend on timing.
+    // The first error in the order of the files is returned, so that the message does not depend on timing.
     let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full)).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;

@@ -1,9 +1,9 @@
-//! Which nodes may be seen between the first frame and the last.
+//! The nodes that may be visible between the first frame and the last.
 
 use bth_scene::{Manifest, Property, Track, Transform};
 
-/// For each node whether it may be seen: true where one frame may show it, and perhaps where none does (when
-/// a node and its parent are seen at different times).
+/// For each node whether it may be visible. True for every node that some frame shows; also true for some that no frame
+/// shows, when a node and its parent are visible at different times.
 pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     let frames = manifest.frames;
     let range = [frames.first, frames.last].map(|f| f64::from(f) / frames.rate);
@@ -12,7 +12,8 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     for track in &manifest.tracks {
         match track.property {
             Property::Visible => shown[track.node] = some_value(track, range, |v| v[0] != 0.0),
-            // Between two keys without a zero a scale may still pass through it, for an instant.
+            // A scale track is assumed to give the node a size at some time. Where it passes through zero between two keys,
+            // it does so for an instant only.
             Property::Scale => scaled[track.node] = true,
             Property::Translation | Property::Rotation => {}
         }
@@ -32,7 +33,7 @@ fn has_size(transform: &Transform) -> bool {
     }
 }
 
-/// Whether a track in steps has such a value at some time of a range.
+/// Whether a track with step interpolation has a value that satisfies the condition at some time of a range.
 fn some_value(track: &Track, [from, to]: [f64; 2], holds: impl Fn(&[f64]) -> bool) -> bool {
     let first = track.times.partition_point(|t| *t <= from).saturating_sub(1);
     let end = track.times.partition_point(|t| *t <= to).max(first + 1);

@@ -1,21 +1,23 @@
 //! The objects and triangles that the rays of a scene hit (`--for-scene`): rays from its cameras at some of its frames,
 //! bounces from what they hit, and rays from there to its lights.
 
-use crate::costs::{RayRng, SampleRay, Weighting};
+use crate::costs::{SampleRay, Weighting};
 use crate::error::{Error, Place, Result};
-use crate::vectors::{double_area, unit};
+use crate::vectors::{double_area, uniform_direction, unit};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_format::layout::{Camera, Light};
+use bth_random::Rng;
 use glam::DVec3;
 use std::path::Path;
 
-/// Frames at most, evenly over the range, and rays of a camera at each, in a grid of so many columns and rows.
+/// Greatest number of frames, which are spread evenly over the range, and columns and rows of the grid of camera rays at
+/// each frame.
 const FRAMES: i64 = 8;
 const GRID: [u32; 2] = [96, 54];
 /// Bounces after a camera ray.
 const BOUNCES: usize = 2;
-/// By how much rays are lifted off the surface that they start on, relative to the size of the coordinates there.
+/// Offset of ray origins from the surface that they start on, relative to the magnitude of the coordinates there.
 const LIFT: f64 = 1e-5;
 
 type Rows = [[f64; 4]; 3];
@@ -30,10 +32,10 @@ pub(super) fn weights(scene: &mut Scene, name: &Path) -> Result<Vec<Weighting>> 
     let (first, last) = (view.scene[0].first_frame, view.scene[0].last_frame);
     let (cameras, lights) = (view.cameras.to_vec(), view.lights.to_vec());
     let count = (i64::from(last) - i64::from(first)).clamp(0, FRAMES - 1);
-    let mut random = RayRng::new(51);
+    let mut random = Rng::new(51);
     for k in 0..=count {
         let frame = i64::from(first) + (i64::from(last) - i64::from(first)) * k / count.max(1);
-        // A frame at which something cannot be placed shows nothing.
+        // A frame at which a node has no usable transform is skipped.
         if scene.set_frame(i32::try_from(frame).unwrap_or(first)).is_err() {
             continue;
         }
@@ -67,7 +69,7 @@ fn vector(rows: &Rows, v: DVec3) -> DVec3 {
     rows.map(|row| linear(row).dot(v)).into()
 }
 
-/// The inverse of the linear part; `None` if there is none.
+/// The inverse of the linear part; `None` if it is singular.
 fn inverse(rows: &Rows) -> Option<[DVec3; 3]> {
     let [a, b, c] = rows.map(linear);
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
@@ -76,8 +78,8 @@ fn inverse(rows: &Rows) -> Option<[DVec3; 3]> {
     inverse.iter().all(|row| row.is_finite()).then_some(inverse)
 }
 
-/// Jittered rays of a camera, in the world.
-fn camera_rays(scene: &Scene, camera: &Camera, random: &mut RayRng) -> Vec<Ray> {
+/// Jittered rays of a camera, world space.
+fn camera_rays(scene: &Scene, camera: &Camera, random: &mut Rng) -> Vec<Ray> {
     let (rows, visible) = scene.node(camera.node);
     if !visible {
         return Vec::new();
@@ -91,8 +93,8 @@ fn camera_rays(scene: &Scene, camera: &Camera, random: &mut RayRng) -> Vec<Ray> 
     for y in 0..GRID[1] {
         for x in 0..GRID[0] {
             let at = |i: u32, of: u32, jitter: f64| 2.0 * (f64::from(i) + jitter) / f64::from(of) - 1.0;
-            let u = half * aspect * at(x, GRID[0], random.unit());
-            let v = half * at(y, GRID[1], random.unit());
+            let u = half * aspect * at(x, GRID[0], random.unit_f64());
+            let v = half * at(y, GRID[1], random.unit_f64());
             let (origin, direction) = match camera.projection {
                 0 => (DVec3::ZERO, DVec3::new(u, v, -1.0)),
                 _ => (DVec3::new(u, v, 0.0), DVec3::NEG_Z),
@@ -116,7 +118,7 @@ fn follow(
     scene: &Scene,
     camera_rays: Vec<Ray>,
     lights: &[Light],
-    random: &mut RayRng,
+    random: &mut Rng,
     weights: &mut [Weighting],
 ) {
     let mut rays: Vec<(Ray, Surface)> = camera_rays.into_iter().map(|ray| (ray, Surface::NONE)).collect();
@@ -141,7 +143,7 @@ fn follow(
                 }
             }
             if bounce < BOUNCES {
-                let bounced = self::ray(start, normal + DVec3::from(random.sphere()), f64::INFINITY);
+                let bounced = self::ray(start, normal + uniform_direction(random), f64::INFINITY);
                 next.extend(bounced.map(|ray| (ray, hit.surface)));
             }
         }
@@ -149,7 +151,7 @@ fn follow(
     }
 }
 
-/// Start of the rays that follow a hit, lifted off the surface, and the normal on that side; world space.
+/// Origin of the rays that follow a hit, offset from the surface, and the normal on that side; world space.
 fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
     if !hit.is_hit() {
         return None;
@@ -174,7 +176,7 @@ fn record(scene: &Scene, ray: &Ray, from: Surface, hit: &Hit, weights: &mut [Wei
     {
         weights[scene.object_of(from.instance) as usize].surface.push(sample);
     }
-    // Rays that come from elsewhere; those that pass an object by are left out.
+    // A ray from elsewhere is recorded only at the object that it hits, not at objects that it misses.
     if hit.is_hit()
         && hit.surface.instance != from.instance
         && let Some(sample) = local(scene, ray, hit.surface.instance, None)

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use bth_import::Mesh;
 
-use super::node::{BuildAll, NodeJob, NodeResult, NodeRunner, tetrahedralize};
+use super::node::{NodeJob, NodeResult, NodeRunner, TimedNodes, tetrahedralize};
 use super::pool::{WorkerSlot, find};
 use super::report::{NodeReport, Outcome, Report, WorkerStatus};
 use super::worker::Setup;
@@ -18,7 +18,7 @@ use super::{Leaf, Options, TetMesh};
 /// built: chosen nodes, or cells below them where they failed; the rest stays in the BVH. It is
 /// the same for any number of workers, as long as no deadline passes.
 ///
-/// A missing worker is no error: nothing is built then, and the report has a hint how to get one.
+/// A missing worker is not an error: nothing is built then, and the report contains a hint on how to install one.
 ///
 /// # Errors
 /// [`Error::Cancelled`]; [`Error::Limit`] when the object exceeds a limit of the format;
@@ -68,7 +68,7 @@ pub(crate) fn build_through(
         }
     };
     let setup = Setup { program, memory: options.memory };
-    // The first worker tells whether workers work at all, before there are many.
+    // One worker is started first: where it does not work, no others are started.
     let mut first = WorkerSlot::new(&setup);
     let version = match first.tetgen(monitor)? {
         Ok(tetgen) => tetgen.to_owned(),
@@ -160,7 +160,7 @@ struct Results {
 }
 
 impl Results {
-    /// Adds the result of a node; returns the cells that replace it if it failed.
+    /// Adds the result of a node. Returns the cells that replace the node if it failed.
     fn take(
         &mut self,
         NodeResult { built, mut report, no_worker, .. }: NodeResult,
@@ -213,7 +213,7 @@ fn replace(bvh: &BinaryBvh, node: u32, options: &Options) -> (Vec<u32>, u32) {
     (cells, left)
 }
 
-/// Nodes to do, the largest first so that the last one to end is a small one.
+/// Queue of nodes, the largest first so that the last one to finish is small.
 struct Queue {
     state: Mutex<State>,
     changed: Condvar,
@@ -222,7 +222,7 @@ struct Queue {
 struct State {
     /// Size and node.
     waiting: BinaryHeap<(u32, u32)>,
-    /// Nodes being worked on, which may bring more.
+    /// Nodes in work, each of which may add smaller ones when it fails.
     running: usize,
     stopped: bool,
 }
@@ -232,7 +232,7 @@ impl Queue {
         let state = State { waiting: nodes.collect(), running: 0, stopped: false };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
-    /// The next node; waits while others may still bring some. `None` when all is done or stopped.
+    /// The next node. Waits while nodes in work may still add some; `None` when all nodes are done or the queue is stopped.
     fn next(&self) -> Option<u32> {
         let mut state = lock(&self.state);
         loop {

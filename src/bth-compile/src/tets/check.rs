@@ -3,7 +3,7 @@
 //! Decided by topology and exact predicates. If all tetrahedra have the same strict orientation,
 //! every face is shared by exactly two that lie on opposite sides of it, except for twelve that
 //! make up the box's surface, then the tetrahedra fill the box once: no point of it is missed
-//! or covered twice. The sum of the volumes is looked at as well, since it costs nothing.
+//! or covered twice. The sum of the volumes is compared as well, since that costs next to nothing.
 
 use super::faces::{Faces, NONE, even, face};
 use super::failure::Defect;
@@ -12,7 +12,7 @@ use super::nudge;
 use super::orientation::orientation;
 use bth_tetgen_protocol::Tetrahedra;
 
-/// A tetrahedralization that holds, in the worker's order.
+/// A tetrahedralization that passes the check, in the worker's order.
 #[derive(Clone, Debug)]
 pub(super) struct Checked {
     /// Positions: the input's vertices, the box's corners, free-space points, TetGen's points.
@@ -21,14 +21,14 @@ pub(super) struct Checked {
     pub(super) tets: Vec<[u32; 4]>,
     /// Per side (`4 * tet + k`) the side behind it, `NONE` at the hull.
     pub(super) behind: Vec<u32>,
-    /// Per triangle of the input its two sides.
+    /// Per triangle of the input the two sides of its face.
     pub(super) sides: Vec<[u32; 2]>,
     /// Points that had to be moved after rounding.
     pub(super) nudged: u32,
 }
 
-/// Rounds, repairs what rounding broke, and checks. `sent` are the points that the worker got,
-/// plus `origin`; what it returned for them must be the same bits.
+/// Rounds, repairs what rounding broke, and checks. `sent` are the points that were sent to the worker, relative to
+/// `origin`; it must return them bit for bit.
 ///
 /// # Errors
 /// The first defect found.
@@ -100,7 +100,7 @@ fn fills_box(
         halves[plane].push(here);
     }
     for (quad, halves) in SIDES.iter().zip(&halves) {
-        // Two halves along a diagonal leave out one corner each, and these are opposite corners.
+        // A side of the box is two triangles along a diagonal: each omits one corner, and these two are opposite corners.
         let &[a, b] = halves.as_slice() else { return Err(Defect::Hull) };
         let without = |half: [u32; 3]| quad.iter().position(|&c| !half.contains(&(c + first)));
         match (without(a), without(b)) {
@@ -111,7 +111,7 @@ fn fills_box(
     let total: f64 = tets.iter().map(|t| orientation(vertices, *t)).sum();
     let extent = |k: usize| f64::from(input.upper[k]) - f64::from(input.lower[k]);
     let expected = 6.0 * extent(0) * extent(1) * extent(2);
-    // Underflow of the product aside, sums of a few million terms are good to 1e-9.
+    // Unless the product underflows, sums of a few million terms have relative errors below 1e-9.
     if expected > 0.0 && (total - expected).abs() > 1e-6 * expected {
         return Err(Defect::Volume);
     }

@@ -88,7 +88,7 @@ pub fn encoded_bytes(mesh: &TetMesh, kind: RecordKind) -> u64 {
     bytes as u64
 }
 
-/// First rows of a leaf.
+/// First rows of a leaf in each section.
 struct Base {
     tet: u32,
     vertex: u32,
@@ -96,7 +96,7 @@ struct Base {
 }
 
 impl Base {
-    /// What lies behind the face of tetrahedron `t` opposite to its vertex `k`.
+    /// Link of tetrahedron `t` across the face opposite to its vertex `k`.
     fn link(&self, mesh: &TetMesh, t: usize, k: usize) -> Link {
         let (next, beyond) = match mesh.behind[t][k] {
             Behind::Hull => return Link { next: NONE, opposite: NONE },
@@ -112,7 +112,7 @@ impl Base {
     }
 }
 
-/// The vertex of a tetrahedron that is not of its face.
+/// The vertex of a tetrahedron that does not belong to a face of it.
 fn apex(tet: [u32; 4], face: [u32; 3]) -> u32 {
     tet.into_iter().fold(0, |x, v| x ^ v) ^ face[0] ^ face[1] ^ face[2]
 }

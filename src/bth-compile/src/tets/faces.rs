@@ -1,6 +1,6 @@
-//! The faces of tetrahedra, matched: which side of which tetrahedron meets which.
+//! Matches the faces of tetrahedra: finds for every face the sides of the tetrahedra that meet in it.
 
-/// No side.
+/// Marks the absence of a side.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// Every face of every tetrahedron by its vertices. A side is `4 * tet + k`, the face opposite
@@ -13,7 +13,7 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Collects and sorts the faces. Tetrahedra number less than 2^30 and name vertices below `vertices`.
+    /// Collects and sorts the faces. There are less than 2^30 tetrahedra, whose vertices are below `vertices`.
     pub(super) fn new(vertices: usize, tets: &[[u32; 4]]) -> Self {
         let mut starts = vec![0u32; vertices + 1];
         let sides = || (0..4 * tets.len() as u32).map(|side| (key(face(tets, side)), side));

@@ -1,4 +1,4 @@
-//! Reasons for which an attempt at a node fails.
+//! Reasons for which an attempt to tetrahedralize a node fails.
 
 use bth_tetgen_protocol::Failure;
 
@@ -44,8 +44,8 @@ impl AttemptError {
         matches!(self, AttemptError::Failed(..) | AttemptError::Unfit(_) | AttemptError::Defect(_))
     }
 
-    /// Whether another attempt with other points may succeed. TetGen hangs on some points and not
-    /// on others, but time spent on a large node is better spent on its parts.
+    /// Whether another attempt with other free-space points may succeed. TetGen exceeds its time on some points and not on
+    /// others, but after that a large node is better replaced by its parts.
     pub(super) fn retry(&self, triangles: u32) -> bool {
         match self {
             AttemptError::Died(_) | AttemptError::Answer(_) => true,
@@ -81,7 +81,7 @@ pub(super) enum Defect {
     Moved,
     /// There are more tetrahedra than rows can number.
     TooMany,
-    /// Tetrahedra are flat or inside out, this many.
+    /// This many tetrahedra are flat or inverted.
     Orientation(usize),
     /// A face has more than two tetrahedra, or two on the same side.
     Manifold,
@@ -89,7 +89,7 @@ pub(super) enum Defect {
     Hull,
     /// The volumes do not add up to the box's.
     Volume,
-    /// Triangles are no faces (this many), or lie on the hull.
+    /// This many triangles are not faces, or are faces of the hull.
     Missing(usize),
     /// Two triangles are the same face.
     Duplicate,

@@ -1,8 +1,8 @@
 //! Points in free space, so that rays cross few tetrahedra where there is nothing to hit.
 //!
 //! The box is split as an octree until a cell holds few vertices; every empty leaf cell gets one
-//! point near its centre. On the bunny this halves the steps of a ray with fewer tetrahedra than
-//! without, because the points break up the slivers between far surfaces.
+//! point near its centre. On the bunny the points halve the steps of a ray, and there are fewer tetrahedra, because the
+//! points break up the slivers between distant surfaces.
 
 use std::collections::HashSet;
 
@@ -14,11 +14,11 @@ const DEPTH: u32 = 11;
 /// How far a point may lie off its cell's centre, relative to the cell's size; the jitter keeps
 /// points of neighbouring cells from being cospherical.
 const JITTER: f64 = 0.15;
-/// Points nearer to the box's sides than this (relative to its extent) are left out: they only make slivers.
+/// Points nearer to the box's sides than this, relative to its extent, are left out because they make slivers.
 const MARGIN: f64 = 0.02;
 
-/// The points, inside the box and different from every vertex and from each other. The same for
-/// the same input and seed. `most` vertices may share a cell; 0 gives no points.
+/// The free-space points, inside the box and different from every vertex and from each other. They depend on the input and
+/// the seed only. At most `most` vertices share a cell; 0 gives no points.
 pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
     if most == 0 {
         return Vec::new();
@@ -64,7 +64,7 @@ pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
             let half = cell.half / 2.0;
             let end = first + order[first..cell.end].partition_point(|&v| octant(v) <= o);
             let centre = std::array::from_fn(|k| cell.centre[k] + if o >> k & 1 == 1 { half } else { -half });
-            // A cell outside a long box holds nothing and would only be thrown away.
+            // The root cell is a cube; cells outside a long box are skipped.
             if (0..3).all(|k| centre[k] - half < upper[k] && centre[k] + half > lower[k]) {
                 let path = cell.path << 3 | u64::from(o);
                 stack.push(Cell { centre, half, first, end, depth: cell.depth + 1, path });
@@ -72,7 +72,7 @@ pub(super) fn points(input: &NodeInput, most: u32, seed: u64) -> Vec<[f32; 3]> {
             first = end;
         }
     }
-    // Far from the origin cells can be finer than the numbers.
+    // Far from the origin cells can be smaller than the spacing of f32, so that centres coincide.
     let mut seen: HashSet<[u32; 3]> = input.vertices.iter().map(bits).collect();
     found.retain(|p| seen.insert(bits(p)));
     found
@@ -84,11 +84,11 @@ struct Cell {
     first: usize,
     end: usize,
     depth: u32,
-    /// The octants from the root, three bits each after a leading 1.
+    /// The octants on the path from the root, three bits each after a leading 1.
     path: u64,
 }
 
-/// The position's bits, with one zero.
+/// The bits of a position, with -0 as +0.
 fn bits(p: &[f32; 3]) -> [u32; 3] {
     p.map(|x| (x + 0.0).to_bits())
 }

@@ -88,7 +88,7 @@ mod tests {
         for (i, side) in SIDES.iter().enumerate() {
             let (axis, upper) = (i / 2, i % 2);
             assert!(side.iter().all(|&c| (c as usize >> axis & 1) == upper));
-            // Going around: neighbours differ in one axis.
+            // Around the quad, neighbouring corners differ on one axis.
             for k in 0..4 {
                 assert_eq!((side[k] ^ side[(k + 1) % 4]).count_ones(), 1);
             }

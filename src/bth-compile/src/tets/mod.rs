@@ -24,7 +24,7 @@ pub use build::build;
 pub(crate) use build::build_through;
 pub use encode::{Encoded, encode, encoded_bytes};
 pub(crate) use gather::NodeInput;
-pub(crate) use node::{NodeJob, NodeResult, NodeRunner};
+pub(crate) use node::{NodeJob, NodeResult, NodeRunner, TimedNodes};
 pub use options::Options;
 pub(crate) use pool::version;
 pub use report::{NodeReport, Outcome, Report, WorkerStatus};
@@ -59,7 +59,7 @@ pub enum Behind {
     Tet(u32),
     /// This constrained face (and beyond it its other tetrahedron).
     Face(u32),
-    /// Nothing: a face of the hull.
+    /// Nothing, because it is a face of the hull.
     Hull,
 }
 

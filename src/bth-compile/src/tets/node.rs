@@ -1,4 +1,4 @@
-//! The tetrahedralization of one node: attempts with different points until one passes the checks.
+//! The tetrahedralization of one node: attempts with different free-space points until one passes the checks.
 
 use std::time::{Duration, Instant};
 
@@ -70,16 +70,16 @@ pub(crate) struct NodeResult {
 struct Attempt {
     /// Vertices that an octree cell may hold; 0 for no free-space points.
     free_space: u32,
-    /// Changes the free-space points.
+    /// Seed of the free-space points.
     seed: u64,
-    /// Whether TetGen sees coordinates relative to the box.
+    /// Whether TetGen is given coordinates relative to the box.
     local: bool,
     /// As [`Options::inflation`]: TetGen takes points that nearly touch the box for coplanar with it.
     inflation: f32,
 }
 
-/// Attempts in order. Near the origin TetGen first sees the coordinates as they are. A node that can be replaced
-/// by smaller cells gets two: on models that defeat TetGen, cells succeed more often than further attempts.
+/// Attempts in order. Near the origin TetGen is first given the coordinates as they are. A node that can be replaced by
+/// smaller cells gets two attempts, because on models on which TetGen fails cells succeed more often than further attempts.
 fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
     let m = options.free_space;
     let more = if m == 0 { 64 } else { m.saturating_mul(4) };
@@ -97,7 +97,7 @@ fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
     attempts
 }
 
-/// Tetrahedralizes a node; the reasons are in the report when every attempt failed.
+/// Tetrahedralizes a node. When every attempt fails, the report contains the reasons.
 ///
 /// # Errors
 /// Cancelled.
@@ -164,10 +164,10 @@ fn far(node: &Node) -> bool {
     away > 16.0 * size
 }
 
-/// A tetrahedralization, its number of free-space points and of nudged points.
+/// A tetrahedralization, its number of free-space points, and the number of points moved by `nudge`.
 type AttemptResult = (TetMesh, u32, u32);
 
-/// Makes one attempt. The inner error is that of the attempt.
+/// Makes one attempt. The inner error is the reason for which the attempt failed.
 fn run(
     slot: &mut WorkerSlot<'_>,
     job: &NodeJob<'_>,
@@ -207,8 +207,8 @@ fn run(
     })
 }
 
-/// The points relative to an origin, which becomes zero where the difference of coordinates of very
-/// different magnitudes is no `f64`: TetGen must see the very points.
+/// The points relative to an origin. On an axis where a difference would be rounded the origin becomes zero, because TetGen
+/// must be given the exact points.
 fn relative(points: &[[f32; 3]], origin: [f32; 3]) -> ([f64; 3], Vec<[f64; 3]>) {
     let origin: [f64; 3] = std::array::from_fn(|k| {
         let o = f64::from(origin[k]);
@@ -231,7 +231,7 @@ fn switches(version: &str) -> &'static str {
     if version.starts_with("1.5") {
         "pzYMQJT1e-15"
     } else {
-        // By default 1.6 splits and merges facets by angle.
+        // TetGen 1.6 by default splits and merges facets by angle; these switches disable that.
         "pzYMQJT1e-15p179.9/0.1/15/179.9999"
     }
 }

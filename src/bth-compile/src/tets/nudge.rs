@@ -3,9 +3,9 @@
 
 use super::orientation::orientation;
 
-/// More bad tetrahedra than this share of all is no matter of rounding.
+/// If more than 16 and one in this many tetrahedra are bad, rounding is not the cause and nothing is repaired.
 const SHARE: usize = 100;
-/// Passes over the tetrahedra that are still bad.
+/// Most passes over the tetrahedra that are still bad.
 const PASSES: usize = 4;
 
 /// Moves vertices at `fixed` and above until every tetrahedron has positive orientation. Returns
@@ -21,7 +21,7 @@ pub(super) fn repair(vertices: &mut [[f32; 3]], fixed: usize, tets: &[[u32; 4]])
         if left.is_empty() || left.len() > 16 + tets.len() / SHARE {
             break;
         }
-        // The tetrahedra around every vertex that may have to move.
+        // The tetrahedra around every vertex that may be moved.
         let mut around = std::collections::BTreeMap::<u32, Vec<u32>>::new();
         for &v in left.iter().flat_map(|&t| &tets[t as usize]).filter(|&&v| v as usize >= fixed) {
             around.entry(v).or_default();
@@ -52,7 +52,7 @@ pub(super) fn repair(vertices: &mut [[f32; 3]], fixed: usize, tets: &[[u32; 4]])
     if left.is_empty() { Ok(moved.len() as u32) } else { Err(left.len()) }
 }
 
-/// Moves one vertex to the nearby position with the fewest bad tetrahedra around it; whether it moved.
+/// Moves one vertex to the nearby position with the fewest bad tetrahedra around it. Returns whether it moved.
 fn improve(
     vertices: &mut [[f32; 3]],
     v: u32,
@@ -63,7 +63,7 @@ fn improve(
     let count = |vertices: &[[f32; 3]]| around.iter().filter(|&&t| bad(vertices, t)).count();
     let mut best = (count(vertices), at);
     let mut steps: Vec<[i32; 3]> = (0..125).map(|i| [i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2]).collect();
-    // Stable: ties keep their order, so the result is the same everywhere.
+    // The sort is stable, so ties keep their order and the result is the same on every machine.
     steps.sort_by_key(|s| s.iter().map(|x| x * x).sum::<i32>());
     for step in steps {
         if best.0 == 0 {

@@ -1,4 +1,4 @@
-//! On which side of a plane a point lies, exactly.
+//! Exact tests of the side of a plane on which a point lies.
 
 use robust::{Coord3D, orient3d};
 

@@ -15,14 +15,14 @@ use super::worker::{Setup, Worker};
 /// File name of the worker program.
 const PROGRAM: &str = if cfg!(windows) { "bth-tetgen.exe" } else { "bth-tetgen" };
 
-/// The worker program: as the options or `BTH_TETGEN` say, else beside this program, else on the `PATH`.
+/// The worker program: named by the options or by `BTH_TETGEN`, else beside this program, else on the `PATH`.
 ///
 /// # Errors
-/// A hint for the user, when there is none.
+/// A hint for the user when there is no worker.
 pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
     let named = options.worker.clone().or_else(|| std::env::var_os("BTH_TETGEN").map(PathBuf::from));
     if let Some(named) = named {
-        // The worker starts in another folder, so a relative path must not stay one.
+        // The worker starts in another folder, so a relative path is made absolute.
         return std::path::absolute(&named).ok().filter(|p| p.is_file()).ok_or_else(|| {
             format!(
                 "the tetrahedralization worker {} does not exist; everything stays in the BVH",

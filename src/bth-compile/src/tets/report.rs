@@ -49,22 +49,22 @@ pub struct Report {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WorkerStatus {
-    /// No node was chosen, so none was looked for.
+    /// No node was chosen, so no worker was searched for.
     #[default]
     NotNeeded,
-    /// It works.
+    /// The worker works.
     Ready {
         /// TetGen's version.
         tetgen: String,
     },
-    /// None was found; all triangles stay in the BVH.
+    /// No worker was found; all triangles stay in the BVH.
     Missing {
-        /// How to get one.
+        /// How to install one.
         hint: String,
     },
-    /// One was found that does not work; all triangles stay in the BVH.
+    /// The worker that was found does not work; all triangles stay in the BVH.
     Unusable {
-        /// Which, and why.
+        /// The program and the error.
         reason: String,
     },
 }
@@ -76,7 +76,7 @@ pub struct NodeReport {
     pub node: u32,
     /// Triangles below it.
     pub triangles: u32,
-    /// How it ended.
+    /// Outcome.
     pub outcome: Outcome,
     /// Why attempts failed, in order.
     pub failures: Vec<String>,
@@ -94,7 +94,7 @@ pub struct NodeReport {
     pub seconds: f64,
 }
 
-/// How a node ended.
+/// Outcome of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {

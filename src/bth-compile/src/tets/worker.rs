@@ -1,4 +1,4 @@
-//! One worker process: start, requests, and end when it dies, hangs or is not needed.
+//! One worker process: its start, requests to it, and its end after a failure, a deadline or the last request.
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -29,7 +29,7 @@ const CANCEL_INTERVAL: Duration = Duration::from_millis(100);
 /// Time limit for the greeting of a worker.
 const START: Duration = Duration::from_secs(20);
 
-/// A running worker. It ends with this value, or with this process, however that ends.
+/// A running worker. It ends when this value is dropped, or with this process, however that ends.
 pub(super) struct Worker {
     child: Child,
     /// TetGen's version.
@@ -40,10 +40,10 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    /// Starts a worker and waits for its hello. The worker dies with the thread that calls.
+    /// Starts a worker and waits for its greeting. The worker ends with the calling thread.
     ///
     /// # Errors
-    /// Outer: cancelled. Inner: why it did not start.
+    /// The outer error is cancellation, the inner one the reason for which the worker did not start.
     pub(super) fn start(
         setup: &Setup,
         monitor: &dyn Monitor,
@@ -53,13 +53,14 @@ impl Worker {
         };
         let mut command = Command::new(&setup.program);
         command.args(["--memory", &setup.memory.to_string(), "--parent", &std::process::id().to_string()]);
-        // Its TetGen opens no files; one that did would leave them where others look after them.
+        // TetGen opens no files here; a version that did would leave them in the folder for temporary files, not in the
+        // user's.
         command
             .current_dir(std::env::temp_dir())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null());
-        // An interrupt from the terminal is for the compiler, which then ends its workers.
+        // The worker does not receive interrupts from the terminal; the compiler receives them and ends its workers.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = match command.spawn() {
@@ -70,7 +71,7 @@ impl Worker {
         let (inbox, replies) = channel();
         let mut to = child.stdin.take().expect("stdin was piped");
         let mut from = child.stdout.take().expect("stdout was piped");
-        // A thread of its own may block on the pipes; killing the process unblocks it.
+        // The pipes are served by a separate thread, which may block; killing the process unblocks it.
         let io_thread = std::thread::spawn(move || {
             let mut receive = || Reply::from_bytes(&read_frame(&mut from)?);
             if inbox.send(receive()).is_err() {
@@ -106,7 +107,7 @@ impl Worker {
     /// Sends a request and waits for the answer. After any failure the worker must be dropped.
     ///
     /// # Errors
-    /// Outer: cancelled. Inner: what went wrong.
+    /// The outer error is cancellation, the inner one the failure of the attempt.
     pub(super) fn ask(
         &mut self,
         request: &Request,
@@ -159,7 +160,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may be busy or hang; it has no state that would be lost.
+        // The process may be busy or hang. It is killed at once because it has no state that would be lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
         self.requests = None;

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes a file that is whole or absent, replacing one of that name.
+/// Writes a file atomically: the file of that name is replaced by the whole content or not at all.
 ///
 /// # Errors
 /// `BTH-O020` with the message of the system; the target is then unchanged.
@@ -24,7 +24,7 @@ pub fn write_atomically_with(
     bth_files::replace(path, write).map_err(|e| cannot(path, &e))
 }
 
-/// As [`write_atomically`], for a content whose pieces may be in other files, which the system copies.
+/// As [`write_atomically`], for a content with pieces in other files, which the operating system copies.
 ///
 /// # Errors
 /// As [`write_atomically`]; also when such a file cannot be read or has changed.

@@ -36,7 +36,7 @@ impl<'a> FileBuilder<'a> {
     /// Sections that tracing reads or that describe the scene are flagged as required.
     ///
     /// # Errors
-    /// `BTH-X031` when the bytes are not whole elements or the section is there already.
+    /// `BTH-X031` when the bytes are not whole elements or the section exists already.
     pub fn section(
         &mut self,
         kind: u32,

@@ -43,7 +43,7 @@ impl Bytes<'_> {
 pub struct Content {
     pieces: Vec<Bytes<'static>>,
     length: u64,
-    /// Zeros at the end that are part of the length and of no piece.
+    /// Zeros at the end that are counted in the length but are not in a piece yet.
     pad: usize,
 }
 
@@ -54,7 +54,7 @@ impl From<Vec<u8>> for Content {
 }
 
 impl Content {
-    /// From the first bytes.
+    /// A content that starts with these bytes.
     pub(super) fn new(bytes: Vec<u8>) -> Self {
         Self { length: bytes.len() as u64, pieces: vec![Bytes::Owned(bytes.into())], pad: 0 }
     }
@@ -63,7 +63,7 @@ impl Content {
     pub(super) fn pad_to(&mut self, end: u64) {
         self.pad += (end - self.length) as usize;
         self.length = end;
-        // The file in memory often has the same zeros.
+        // A source in memory often has the same zeros, so the range is extended instead of starting a new piece.
         if let Some(Bytes::InFile(file, range)) = self.pieces.last_mut()
             && file.bytes().get(range.end..range.end + self.pad).is_some_and(are_zeros)
         {
@@ -81,7 +81,8 @@ impl Content {
             {
                 old.end = new.end;
             }
-            // Between the sections of a compiled file there are zeros, so that they are copied along.
+            // Sections of a compiled file are separated by zeros, so the zeros between adjacent ranges are copied with
+            // them.
             (Some(Bytes::OnDisk(file, old)), Bytes::OnDisk(other, new))
                 if Arc::ptr_eq(file, &other) && old.end + pad as u64 == new.start =>
             {
@@ -126,7 +127,7 @@ impl Content {
         name(head)
     }
 
-    /// Writes it.
+    /// Writes the content.
     ///
     /// # Errors
     /// Those of the writer, and when an old file that it takes sections from cannot be read or has changed.

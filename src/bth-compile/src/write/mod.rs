@@ -1,4 +1,4 @@
-//! Sections into the bytes of a file, and bytes into a file that is whole or absent.
+//! Encodes sections into the bytes of a file, and writes the bytes to a file atomically.
 
 mod atomic;
 mod builder;
@@ -19,10 +19,10 @@ pub(crate) use whole::{HEADER, are_zeros, name};
 
 use crate::error::{Error, Result};
 
-/// The file in bytes that were just written, checked as a reader will: header, table and every index.
+/// The file in newly encoded bytes, after the checks of a reader: header, table and every index.
 ///
 /// # Errors
-/// `BTH-X030`: what was written is not what the format demands, a defect of the compiler.
+/// `BTH-X030` when the bytes violate the format, which is a defect of the compiler.
 pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     let file = bth_format::File::from_bytes(bytes).map_err(defect)?;
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;

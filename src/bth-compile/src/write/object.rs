@@ -20,7 +20,7 @@ pub struct ObjectParts<'a> {
     pub dropped: u32,
     /// Grid of the coordinates in triangle leaves, and the greatest distance that a vertex moved; `None` for `f32`.
     pub grid: Option<(Grid, f32)>,
-    /// Whether all nodes are packed; else none is.
+    /// Whether the nodes are packed: all of them or none.
     pub packed_nodes: bool,
     /// Nodes and triangle leaves.
     pub lines: &'a [CacheLine],
@@ -72,7 +72,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         );
         return Err(Error::Limit { code: "BTH-L031", message });
     }
-    // Without tet leaves there are neither records nor faces to map triangles to.
+    // Without tet leaves the sections of tetrahedra and faces are left out.
     let record = parts.record.filter(|_| !parts.tet_leaves.is_empty());
     let (lower, upper) = parts.bounds.unwrap_or_default();
     let (coordinates, grid_origin) = parts.grid.map_or_else(Default::default, |(grid, _)| grid.fields());
@@ -129,7 +129,7 @@ fn depth(parts: &ObjectParts) -> Result<u32> {
                 let children = children.ok_or_else(missing)?;
                 deepest = deepest.max(above + 1);
                 visits += 1;
-                // In a tree every node has lines of its own.
+                // In a tree no two nodes share lines.
                 if visits > parts.lines.len() {
                     return Err(defect("the hierarchy is no tree".into()));
                 }

@@ -13,11 +13,11 @@ pub struct SceneParts {
     pub nodes: Vec<Node>,
     /// Objects at nodes.
     pub instances: Vec<Instance>,
-    /// By node and property.
+    /// Tracks, ordered by node and property.
     pub tracks: Vec<Track>,
-    /// Seconds of their keys.
+    /// Times of the tracks' keys, seconds.
     pub times: Vec<f64>,
-    /// Values of their keys.
+    /// Values of the tracks' keys.
     pub values: Vec<f64>,
     /// Cameras.
     pub cameras: Vec<Camera>,
@@ -30,7 +30,7 @@ pub struct SceneParts {
 /// Adds the sections of a scene; those without rows are left out.
 ///
 /// # Errors
-/// `BTH-X031` when one is there already.
+/// `BTH-X031` when one exists already.
 pub fn scene<'a>(builder: &mut FileBuilder<'a>, parts: &'a SceneParts) -> Result<()> {
     builder.rows(kind::SCENE, NONE, std::slice::from_ref(&parts.scene))?;
     builder.rows(kind::NODES, NONE, &parts.nodes)?;

@@ -1,4 +1,4 @@
-//! Workers that die, hang, devour memory or are not there.
+//! Workers that crash, hang, exceed their memory or do not exist.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};

@@ -1,6 +1,6 @@
-//! The tets stage with a real worker: `cargo build -p bth-tetgen` first, else these tests say
-//! that they are skipped.
-#![allow(clippy::print_stdout, reason = "tests say what they skip and what they measured")]
+//! The tets stage with a real worker, which `cargo build -p bth-tetgen` builds. Without it these tests are skipped and print
+//! that.
+#![allow(clippy::print_stdout, reason = "tests print what they skip and what they measured")]
 
 mod faults;
 mod meshes;

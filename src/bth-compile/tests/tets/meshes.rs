@@ -4,20 +4,7 @@ use std::collections::HashMap;
 
 use bth_compile::bvh::{BinaryBvh, Node};
 use bth_import::Mesh;
-
-/// A small generator of random numbers (PCG).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn below(&mut self, n: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (((self.0 >> 33) * u64::from(n)) >> 31) as u32
-    }
-    /// From 0 to 1.
-    pub(crate) fn unit(&mut self) -> f32 {
-        self.below(1 << 24) as f32 / (1 << 24) as f32
-    }
-}
+use bth_random::Rng;
 
 /// A mesh of triangles given by their corners, welded.
 pub(crate) fn weld(corners: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Mesh {
@@ -57,8 +44,8 @@ pub(crate) fn torus(n: u32, m: u32) -> Mesh {
 
 /// A bumpy height field: open, and without self-intersection because it is a graph.
 pub(crate) fn bumps(n: u32, seed: u64, offset: [f32; 3], scale: f32) -> Mesh {
-    let mut random = Random(seed);
-    let heights: Vec<f32> = (0..(n + 1) * (n + 1)).map(|_| random.unit() * 2.0).collect();
+    let mut random = Rng::new(seed);
+    let heights: Vec<f32> = (0..(n + 1) * (n + 1)).map(|_| random.unit_f32() * 2.0).collect();
     grid(n, n, |i, j| {
         let p = [i as f32, j as f32, heights[(i * (n + 1) + j) as usize]];
         std::array::from_fn(|k| offset[k] + scale * p[k])

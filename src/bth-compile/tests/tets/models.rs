@@ -1,4 +1,4 @@
-//! Real models, where they are at hand.
+//! Downloaded models, where they exist.
 
 use std::path::{Path, PathBuf};
 

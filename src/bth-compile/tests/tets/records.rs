@@ -81,7 +81,7 @@ fn assert_decodes(meshes: &[TetMesh], kind: RecordKind, encoded: &Encoded) {
                 RecordKind::Tet16 => {
                     let record = Tet16::read_from_bytes(bytes).unwrap();
                     assert_eq!(record.xor, xor);
-                    // Any one known link gives the others; here the fourth.
+                    // The other links follow from any one of them; here from the fourth.
                     let last = code(mesh.behind[t][3], leaf.first_tet, leaf.first_face);
                     [record.next[0] ^ last, record.next[1] ^ last, record.next[2] ^ last, last]
                 }

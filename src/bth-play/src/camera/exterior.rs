@@ -12,7 +12,7 @@ const YAW: f64 = 35.0;
 /// Degrees above the horizon.
 const PITCH: f64 = 20.0;
 /// Share of the width or height of the picture that the model fills.
-const FILL: f64 = 0.86;
+const FILLED_SHARE: f64 = 0.86;
 
 /// The camera of `--camera` with eye and target, or else of `--yaw` and `--pitch` around the whole model.
 pub(super) fn exterior_camera(args: &Args, bounds: &SceneBounds) -> Camera {
@@ -29,7 +29,7 @@ pub(super) fn exterior_camera(args: &Args, bounds: &SceneBounds) -> Camera {
     };
     let towards = (side * yaw.sin() + front * yaw.cos()) * pitch.cos() + vertical * pitch.sin();
     let mut camera = Camera::look_along(bounds.center(), -towards, vertical, half_extent);
-    camera.eye = fitted_eye(&camera, bounds, half_extent * FILL);
+    camera.eye = fitted_eye(&camera, bounds, half_extent * FILLED_SHARE);
     camera.half_extent /= args.zoom;
     camera
 }

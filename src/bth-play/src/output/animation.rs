@@ -17,7 +17,7 @@ enum Encoder {
     Apng(Box<png::Writer<SharedBytes>>, SharedBytes),
     /// With the duration of a frame in hundredths of a second.
     Gif(Box<gif::Encoder<Vec<u8>>>, u16),
-    Y4m(Box<y4m::Encoder<Vec<u8>>>),
+    Y4m(Box<y4m::Y4mEncoder<Vec<u8>>>),
 }
 
 /// Bytes shared with the PNG writer, which does not return the output that it was given.
@@ -50,7 +50,7 @@ impl Animation {
         let encoder = match extension.as_deref() {
             Some("apng") => apng(size, frames, rate).map_err(|e| failed(path, &e))?,
             Some("gif") => gif(path, size, rate)?,
-            Some("y4m") => Encoder::Y4m(Box::new(y4m::Encoder::new(Vec::new(), size, rate)?)),
+            Some("y4m") => Encoder::Y4m(Box::new(y4m::Y4mEncoder::new(Vec::new(), size, rate)?)),
             _ => return Ok(None),
         };
         Ok(Some(Animation { path: path.into(), size, encoder }))

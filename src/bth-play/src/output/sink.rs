@@ -17,7 +17,7 @@ pub(crate) enum Sink {
     /// An animation, which is written after the last frame.
     Animation(Animation),
     /// YUV4MPEG2 on standard output.
-    Stream(y4m::Encoder<BufWriter<std::io::Stdout>>),
+    Stream(y4m::Y4mEncoder<BufWriter<std::io::Stdout>>),
 }
 
 impl Sink {
@@ -28,7 +28,7 @@ impl Sink {
     pub(crate) fn new(output: &Path, size: (u32, u32), frames: usize, rate: f64) -> Result<Self, Failure> {
         if output == Path::new("-") {
             let out = BufWriter::with_capacity(1 << 20, std::io::stdout());
-            return Ok(Sink::Stream(y4m::Encoder::new(out, size, rate)?));
+            return Ok(Sink::Stream(y4m::Y4mEncoder::new(out, size, rate)?));
         }
         if let Some(animation) = Animation::new(output, size, frames, rate)? {
             return Ok(Sink::Animation(animation));

@@ -4,11 +4,11 @@ use super::picture::Picture;
 use std::io::{Result, Write};
 
 /// Writes the stream header, then one frame after another.
-pub(crate) struct Encoder<W> {
+pub(crate) struct Y4mEncoder<W> {
     out: W,
 }
 
-impl<W: Write> Encoder<W> {
+impl<W: Write> Y4mEncoder<W> {
     pub(super) fn new(mut out: W, (width, height): (u32, u32), rate: f64) -> Result<Self> {
         // Whole rates are written exactly, others to a thousandth.
         let (rate, over) =

@@ -8,7 +8,7 @@ const MAX_COSINE: f64 = 0.999;
 /// Radians that a drag over the height of the window turns the camera.
 const TURN: f64 = 3.0;
 /// Logarithm of the factor by which a notch of the wheel shortens the distance.
-const NOTCH: f64 = 0.15;
+const ZOOM_PER_NOTCH: f64 = 0.15;
 
 /// A camera that the user moves.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +49,7 @@ impl CameraController {
 
     /// Moves towards the target by notches of a wheel, or away from it by negative ones.
     pub(super) fn dolly(&mut self, notches: f64) {
-        let factor = (-NOTCH * notches).exp();
+        let factor = (-ZOOM_PER_NOTCH * notches).exp();
         let target = self.camera.eye + self.camera.forward * self.distance;
         self.distance *= factor;
         self.camera = self.camera.zoomed(factor);

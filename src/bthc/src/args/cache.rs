@@ -42,7 +42,7 @@ pub(crate) struct Keeping {
 #[command(after_help = EXIT_CODES)]
 pub(crate) struct Cache {
     #[command(subcommand)]
-    pub(crate) command: Command,
+    pub(crate) command: CacheCommand,
     #[command(flatten)]
     pub(crate) location: CacheLocation,
     /// Print one JSON object.
@@ -51,7 +51,7 @@ pub(crate) struct Cache {
 }
 
 #[derive(Clone, Debug, Subcommand)]
-pub(crate) enum Command {
+pub(crate) enum CacheCommand {
     /// Hits, misses and why, evictions, bytes.
     Stats,
     /// All entries, by stage and time of use.

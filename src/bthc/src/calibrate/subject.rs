@@ -20,9 +20,9 @@ const RAYS_TO_LARGE: usize = 16384;
 const COUNTED: usize = 4096;
 
 /// Triangles of the largest small model.
-const SMALL: usize = 20_000;
+const SMALL_TRIANGLES: usize = 20_000;
 /// Number of times that small models are tetrahedralized to measure the time.
-const AGAIN: usize = 16;
+const REPETITIONS: usize = 16;
 
 /// Number of times that models and rays are copied to new addresses during the rounds, since the addresses decide which data
 /// share a set of a cache.
@@ -129,7 +129,7 @@ impl Subject {
             }
             .into());
         };
-        let small = mesh.triangles.len() <= SMALL;
+        let small = mesh.triangles.len() <= SMALL_TRIANGLES;
         let seconds = match small {
             true => repeated_seconds(mesh, &tree, &options, monitor)?,
             false => report.nodes.iter().map(|n| n.seconds).sum(),
@@ -257,7 +257,7 @@ pub(crate) fn measure(
     Ok((times, least[0]))
 }
 
-/// Seconds of one tetrahedralization of a small model, as the mean of [`AGAIN`]: CPU seconds of the worker where the system
+/// Seconds of one tetrahedralization of a small model, as the mean of [`REPETITIONS`]: CPU seconds of the worker where the system
 /// counts them, else wall clock.
 fn repeated_seconds(
     mesh: &Mesh,
@@ -266,11 +266,11 @@ fn repeated_seconds(
     monitor: &dyn Monitor,
 ) -> Result<f64, Failure> {
     let (before, start) = (worker_seconds(), Instant::now());
-    for _ in 0..AGAIN {
+    for _ in 0..REPETITIONS {
         tets::build(mesh, tree, &[0], &options.tets, monitor)?;
     }
     let spent = before.and_then(|before| Some(worker_seconds()? - before));
-    Ok(spent.unwrap_or(start.elapsed().as_secs_f64()) / AGAIN as f64)
+    Ok(spent.unwrap_or(start.elapsed().as_secs_f64()) / REPETITIONS as f64)
 }
 
 /// CPU seconds of the child processes that this one has waited for, which exclude the time of other processes. `None` where

@@ -1,6 +1,6 @@
 //! `bthc cache`: shows and maintains the cache.
 
-use crate::args::cache::{Cache, Command};
+use crate::args::cache::{Cache, CacheCommand};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
@@ -15,12 +15,12 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
         return Err(Failure::Usage { message, hint: "name one with --cache-dir or BTH_CACHE_DIR" });
     };
     let (value, text) = match &args.command {
-        Command::Stats => {
+        CacheCommand::Stats => {
             let inventory = store.inventory();
             (json!(inventory), stats(&inventory))
         }
-        Command::List { stage } => list(&store, stage.as_deref()),
-        Command::Gc => {
+        CacheCommand::List { stage } => list(&store, stage.as_deref()),
+        CacheCommand::Gc => {
             let evicted = store.evict(store.cap());
             let text = format!(
                 "removed {} contents ({}), {} left by killed programs; {} left, {} in use\n",
@@ -32,9 +32,9 @@ pub(crate) fn run(args: &Cache) -> Result<(), Failure> {
             );
             (json!(evicted), text)
         }
-        Command::Verify => return verify(&store, args.json),
-        Command::Path { key } => path(&store, key.as_deref())?,
-        Command::Clear => {
+        CacheCommand::Verify => return verify(&store, args.json),
+        CacheCommand::Path { key } => path(&store, key.as_deref())?,
+        CacheCommand::Clear => {
             let (removed, in_use) = store.clear();
             let text = format!("removed {} contents; {} in use\n", count(removed), count(in_use));
             (json!({"removed": removed, "in_use": in_use}), text)

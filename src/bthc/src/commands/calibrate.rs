@@ -16,16 +16,19 @@ use bth_scenes::{Model, blob, gyroid};
 use serde_json::json;
 
 /// Faces of the generated models: their tetrahedra take a quarter of a megabyte, and many times the caches.
-const SMALL: u32 = 2_400;
-const LARGE: u32 = 220_000;
+const SMALL_FACES: u32 = 2_400;
+const LARGE_FACES: u32 = 220_000;
 /// Bytes of tetrahedra from which a model counts as large.
-const BETWEEN: f64 = 6e6;
+const LARGE_BYTES: f64 = 6e6;
 
 pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     let progress = Progress::new(args.json);
     let mut measured = Measured { small: Vec::new(), large: Vec::new(), leaf: 0.0 };
-    let own =
-        [("blob", blob::blob(SMALL)), ("gyroid", gyroid::gyroid(SMALL)), ("large blob", blob::blob(LARGE))];
+    let own = [
+        ("blob", blob::blob(SMALL_FACES)),
+        ("gyroid", gyroid::gyroid(SMALL_FACES)),
+        ("large blob", blob::blob(LARGE_FACES)),
+    ];
     let mut models: Vec<(String, Mesh)> =
         own.into_iter().map(|(name, model)| (name.to_owned(), of(model))).collect();
     for path in &args.models {
@@ -42,7 +45,7 @@ pub(crate) fn run(args: &Calibrate) -> Result<(), Failure> {
     let (all, leaf) = measure(&subjects, beside, args.rounds, || progress.cancelled())?;
     measured.leaf = leaf;
     for times in all {
-        let kind = if times.bytes[0] < BETWEEN { &mut measured.small } else { &mut measured.large };
+        let kind = if times.bytes[0] < LARGE_BYTES { &mut measured.small } else { &mut measured.large };
         kind.push(times);
     }
     drop(progress);

@@ -4,7 +4,7 @@ use super::job::{Job, JobContext, JobReport, Target};
 use crate::failure::Failure;
 use crate::table::{bytes, seconds};
 use bth_cache::{Record, Store};
-use bth_compile::cached::{Cache, Outcome};
+use bth_compile::cached::{Cache, CachedCompilation};
 use bth_compile::write::{self, Content};
 use serde_json::json;
 use std::fs::File;
@@ -19,7 +19,7 @@ use std::time::{Instant, SystemTime};
 pub(super) fn deliver<R>(
     context: &JobContext<'_>,
     job: &Job,
-    outcome: &Outcome<R>,
+    outcome: &CachedCompilation<R>,
     cache: &Cache<'_>,
     inputs: &dyn Fn() -> bth_compile::Result<Vec<PathBuf>>,
 ) -> Result<JobReport, Failure> {

@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::table::{Table, bytes, count, seconds};
 use bth_compile::Monitor;
 use bth_compile::cached::{Cache, DryRun};
-use bth_compile::scene::{self, Keep, Place, SceneReport};
+use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
 use bth_compile::source;
 use bth_import::gltf::scene::{ImportReport, import};
 use bth_scene::Manifest;
@@ -60,17 +60,17 @@ pub(super) fn compile(
 ) -> Result<JobReport, Failure> {
     let (manifest, import) = read(&job.model, &context.args.gltf, monitor)?;
     let cache = job::cache(context, &job.model);
-    let place = Place { folder: folder(&job.model), name: &job.model };
+    let source = SceneSource { folder: folder(&job.model), name: &job.model };
     if let Some(shard) = context.args.jobs.shard {
-        let built = scene::compile_objects(&manifest, place, &context.options, &cache, shard, monitor)?;
+        let built = scene::compile_objects(&manifest, source, &context.options, &cache, shard, monitor)?;
         return Ok(shard_report(job, &cache, built));
     }
-    let keep = Keep {
+    let policy = CachePolicy {
         whole: job.target == Target::Cache,
         needed: &|record| job.target.needs(record, context.store.as_ref()),
         target: job.target.path(),
     };
-    let outcome = scene::compile_cached(&manifest, place, &context.options, &cache, keep, monitor)?;
+    let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
     let mut report = deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
     report.json["scene"] = outcome.report;
     report.json["import"] = json!(import);
@@ -103,8 +103,8 @@ pub(super) fn dry_run(
     monitor: &dyn Monitor,
 ) -> Result<DryRun, Failure> {
     let (manifest, _) = read(&job.model, &context.args.gltf, monitor)?;
-    let place = Place { folder: folder(&job.model), name: &job.model };
-    Ok(scene::dry_run(&manifest, place, &context.options, cache, job.target.path(), monitor)?)
+    let source = SceneSource { folder: folder(&job.model), name: &job.model };
+    Ok(scene::dry_run(&manifest, source, &context.options, cache, job.target.path(), monitor)?)
 }
 
 /// All files that a scene is made from.

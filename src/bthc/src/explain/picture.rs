@@ -3,7 +3,7 @@
 use super::Explained;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::Result;
-use bth_compile::costs::Decision;
+use bth_compile::costs::SelectionOutcome;
 use glam::Vec3;
 
 /// Pixels of each half.
@@ -104,8 +104,10 @@ fn kinds(of: &Explained<'_>) -> Vec<Vec3> {
     // Descendants come after their ancestors and overwrite them.
     for verdict in &of.choice.verdicts {
         match verdict.decision {
-            Decision::RefusedSmall if verdict.suitable => paint(verdict.node, [0.62, 0.62, 0.62]),
-            Decision::RefusedSmall | Decision::Unsuitable => paint(verdict.node, [0.85, 0.42, 0.08]),
+            SelectionOutcome::RefusedSmall if verdict.suitable => paint(verdict.node, [0.62, 0.62, 0.62]),
+            SelectionOutcome::RefusedSmall | SelectionOutcome::Unsuitable => {
+                paint(verdict.node, [0.85, 0.42, 0.08])
+            }
             _ => paint(verdict.node, [0.42, 0.47, 0.55]),
         }
     }

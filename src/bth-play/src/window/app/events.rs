@@ -14,7 +14,7 @@ use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
 /// Pixels that count as a notch of the wheel, for devices that scroll by pixels.
-const NOTCH: f64 = 40.0;
+const PIXELS_PER_NOTCH: f64 = 40.0;
 
 impl App<'_> {
     fn key(&mut self, event: &KeyEvent, events: &ActiveEventLoop) {
@@ -107,7 +107,7 @@ impl ApplicationHandler for App<'_> {
             WindowEvent::MouseWheel { delta, .. } => {
                 let notches = match delta {
                     MouseScrollDelta::LineDelta(_, y) => f64::from(y),
-                    MouseScrollDelta::PixelDelta(by) => by.y / NOTCH,
+                    MouseScrollDelta::PixelDelta(by) => by.y / PIXELS_PER_NOTCH,
                 };
                 self.controller().dolly(notches);
                 self.renderer.restart(true);

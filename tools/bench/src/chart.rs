@@ -25,11 +25,11 @@ pub enum Scale {
 pub struct BarChart {
     /// Title.
     pub title: String,
-    /// What the values are.
+    /// The unit of the values, or what they are.
     pub unit: String,
     /// Names below the groups.
     pub groups: Vec<String>,
-    /// What stands side by side in each group.
+    /// The bars side by side in each group.
     pub series: Vec<Series>,
     /// How values become heights.
     pub scale: Scale,
@@ -37,7 +37,7 @@ pub struct BarChart {
     pub line: Option<f64>,
 }
 
-/// Tells up to nine colours apart, also with common defects of colour vision (after Okabe and Ito 2008).
+/// Nine colours that people with common defects of colour vision can distinguish, too (after Okabe and Ito 2008).
 pub(crate) const COLOURS: [&str; 9] =
     ["#0072b2", "#56b4e9", "#009e73", "#7fcdbb", "#e69f00", "#d55e00", "#cc79a7", "#999999", "#4d4d4d"];
 
@@ -93,7 +93,7 @@ impl Axis {
     }
 }
 
-/// The next of 1, 2 and 5 times a power of ten.
+/// The value rounded up to 1, 2 or 5 times a power of ten.
 fn tidy(value: f64) -> f64 {
     let power = 10f64.powf(value.log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|t| *t >= value * (1.0 - 1e-9)).unwrap_or(power)

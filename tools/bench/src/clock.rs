@@ -1,11 +1,11 @@
-//! Clocks. The CPU clock of a thread leaves out the time in which other jobs run, so it is what one
-//! thread is timed by; several threads are timed by the wall clock.
+//! Clocks. One thread is timed by its CPU clock, which leaves out the time in which other jobs run; several threads are timed by
+//! the wall clock.
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 use std::time::Instant;
 
-/// What a time was measured by.
+/// A clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Clock {
@@ -21,7 +21,7 @@ impl Clock {
         if threads <= 1 { Clock::ThreadCpu } else { Clock::Wall }
     }
 
-    /// What a table calls a second of this clock.
+    /// The name of a second of this clock in tables.
     pub fn second(self) -> &'static str {
         match self {
             Clock::ThreadCpu => "CPU second",

@@ -3,15 +3,15 @@
 use anyhow::Result;
 use bth::Isa;
 
-/// Chooses what all tracing in this process uses, and returns its name: what is wanted, else what the
-/// runtime library would take.
+/// Chooses the vector instructions that all tracing in this process uses, and returns their name: those that are wanted, else
+/// those that the runtime library takes by default.
 ///
 /// # Errors
 /// If there is no such instruction set or this machine lacks it.
 pub fn select(wanted: Option<&str>) -> Result<String> {
     match wanted {
         Some(name) => name.parse::<Isa>()?.choose()?,
-        // A name that the library would pass over is a mistake here.
+        // The library ignores an unknown name in the environment; here it is an error.
         None => {
             Isa::from_environment()?;
         }

@@ -1,7 +1,8 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
-//! `rays` makes the seeded sets, `ours` and `rivals` the [`tracer::Contender`]s; `speed`, `accuracy`, `load`, `stress`, `costs`, `paper`, `quality` and `scenes` are
-//! the measurements, each of which fills a record that `output` writes as Markdown, JSON and SVG.
+//! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
+//! `stress`, `costs`, `paper`, `quality` and `scenes` are the measurements; `output` writes their records as Markdown, JSON and
+//! SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
 pub mod accuracy;
@@ -16,7 +17,6 @@ pub mod machine;
 pub mod markdown;
 pub mod model;
 pub mod names;
-pub mod ours;
 pub mod output;
 pub mod paper;
 pub mod progress;
@@ -29,4 +29,6 @@ pub mod scatter;
 pub mod scenes;
 pub mod speed;
 pub mod stress;
+pub mod structures;
 pub mod tracer;
+pub mod triangle_tests;

@@ -1,4 +1,4 @@
-//! What a record says of where and when it was taken: never a host name or a path.
+//! Day, commit and type of machine for records, which hold no host names and no paths.
 
 use serde::Serialize;
 use std::process::Command;

@@ -15,6 +15,11 @@ pub fn table(head: &[String], rows: &[Vec<String>]) -> String {
     text
 }
 
+/// Cells of a row or of the head of a table.
+pub fn cells(texts: &[&str]) -> Vec<String> {
+    texts.iter().map(|text| (*text).to_owned()).collect()
+}
+
 /// A count with thousands separated: `1,234,567`.
 pub fn count(n: u64) -> String {
     let digits = n.to_string();
@@ -49,8 +54,7 @@ mod tests {
 
     #[test]
     fn tables_align_numbers_right() {
-        let cells = |c: [&str; 2]| c.map(str::to_owned).to_vec();
-        let text = table(&cells(["tracer", "ao"]), &[cells(["bth", "1.00"])]);
+        let text = table(&cells(&["tracer", "ao"]), &[cells(&["bth", "1.00"])]);
         assert_eq!(text, "| tracer | ao |\n|---|---:|\n| bth | 1.00 |\n");
     }
 

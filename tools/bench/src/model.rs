@@ -1,6 +1,6 @@
 //! The models that are measured: files, or models that `bth-scenes` makes by name.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 use bth_import::{self, Mesh};
 use bth_scenes::{catalogue, write};
 use glam::DVec3;
@@ -21,7 +21,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Imports a file, or makes the model `NAME` or `NAME:FACES` of `bth-scenes list`.
+    /// Imports a file, or generates the model `NAME` or `NAME:FACES` of `bth-scenes list`.
     ///
     /// # Errors
     /// If there is neither, or the file cannot be imported or has no triangles.
@@ -50,11 +50,31 @@ impl Model {
 
     fn import(name: String, path: PathBuf, folder: Option<TempDir>) -> Result<Model> {
         let (mesh, _) = bth_import::import(&path, bth_import::Keep::None, &bth_compile::Silent)?;
-        anyhow::ensure!(!mesh.triangles.is_empty(), "{name}: no triangles");
+        ensure!(!mesh.triangles.is_empty(), "{name}: no triangles");
         Ok(Model { name, path, mesh, _folder: folder })
     }
 
-    /// Triangles.
+    /// The model of a compiled file, with the triangles of its source.
+    ///
+    /// # Errors
+    /// If the file holds a scene, no triangles, or not the triangles of its source.
+    pub fn of_compiled(path: &Path, scene: &bth::Scene) -> Result<Model> {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let is_scene = scene.description().is_some() || scene.object_count() != 1;
+        ensure!(!is_scene, "{}: a compiled scene: expected a compiled model", path.display());
+        let object = scene.object(0);
+        ensure!(object.header.triangles > 0, "{}: no triangles", path.display());
+        ensure!(
+            object.triangles.len() == object.header.triangles as usize,
+            "{}: compiled with --no-geometry: rays that start on surfaces need the triangles of the source",
+            path.display()
+        );
+        let (positions, triangles) = (object.positions.to_vec(), object.triangles.to_vec());
+        let mesh = Mesh { positions, triangles, attributes: None };
+        Ok(Model { name, path: path.to_owned(), mesh, _folder: None })
+    }
+
+    /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.mesh.triangles.len()
     }
@@ -64,7 +84,7 @@ impl Model {
         self.mesh.corners(triangle).map(position)
     }
 
-    /// Unit normal of a triangle, counter-clockwise seen from its front; zero if it has no area.
+    /// Unit normal of a triangle, on the side from which its corners run counterclockwise; zero if it has no area.
     pub fn normal(&self, triangle: u32) -> DVec3 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero()

@@ -20,7 +20,7 @@ impl Names {
         self.0.is_empty() || self.0.iter().any(|pattern| matches(pattern, name))
     }
 
-    /// Those that are none of `all`: misspelled, most likely.
+    /// Selected names that match none of `all`, most likely because they are misspelled.
     pub fn unknown<'a>(&'a self, all: &[&str]) -> Vec<&'a str> {
         let known = |pattern: &&String| all.iter().any(|name| matches(pattern, name));
         self.0.iter().filter(|p| !known(p)).map(String::as_str).collect()

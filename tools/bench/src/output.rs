@@ -1,4 +1,4 @@
-//! Where results go: standard output, and the files that were asked for.
+//! Writes reports to standard output and to the files of `--json`, `--svg` and `--out`.
 
 use crate::args::Output;
 use crate::machine::{self, Machine};
@@ -8,10 +8,10 @@ use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
 
-/// What every record begins with.
+/// When, where and how a record was measured: the first part of every record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Head {
-    /// Which measurement.
+    /// Name of the measurement, such as `speed`.
     pub measurement: &'static str,
     /// Day, UTC.
     pub date: String,
@@ -26,13 +26,13 @@ pub struct Head {
 }
 
 impl Head {
-    /// Of a measurement that is made now.
+    /// The head of a measurement that is made now.
     pub fn now(measurement: &'static str, isa: String, options: Value) -> Head {
         let (date, commit, machine) = (machine::today(), machine::commit(), Machine::this());
         Head { measurement, date, commit, machine, isa, options }
     }
 
-    /// A paragraph of Markdown.
+    /// The head as a paragraph of Markdown.
     pub fn markdown(&self) -> String {
         let commit = self.commit.as_deref().unwrap_or("unknown");
         let machine = &self.machine;
@@ -62,11 +62,11 @@ pub struct Chart {
 /// A finished record.
 #[derive(Clone, Debug)]
 pub struct Record<'a> {
-    /// What it begins with.
+    /// When, where and how it was measured.
     pub head: &'a Head,
     /// Title of the page.
     pub title: &'a str,
-    /// Tables and what is said of them.
+    /// Tables and the text around them, in Markdown.
     pub body: String,
     /// Everything that was measured.
     pub json: Value,
@@ -89,7 +89,7 @@ impl Record<'_> {
         format!("# {}, {}\n\n{}\n{charts}{}", self.title, self.head.date, self.head.markdown(), self.body)
     }
 
-    /// Writes the files alone.
+    /// Writes the files and prints nothing.
     ///
     /// # Errors
     /// If something cannot be written.
@@ -125,7 +125,7 @@ fn write(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).with_context(|| path.display().to_string())
 }
 
-/// Says something that the user should know on standard error.
+/// Prints a message to standard error.
 pub fn note(what: &str) {
     // Nothing can be done when standard error is closed.
     let _ = writeln!(std::io::stderr().lock(), "{what}");

@@ -2,19 +2,19 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// One line that says what is being done.
+/// A line that names the current step.
 pub struct Progress(ProgressBar);
 
 impl Progress {
-    /// Shows nothing until [`Self::say`].
+    /// Shows nothing until [`Self::show`].
     pub fn new() -> Self {
         let bar = ProgressBar::new_spinner();
         bar.set_style(ProgressStyle::with_template("{elapsed} {msg}").expect("a fixed template"));
         Progress(bar)
     }
 
-    /// Says what is being done now.
-    pub fn say(&self, what: impl Into<String>) {
+    /// Replaces the line.
+    pub fn show(&self, what: impl Into<String>) {
         self.0.set_message(what.into());
         self.0.tick();
     }

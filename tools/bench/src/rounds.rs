@@ -1,8 +1,7 @@
-//! Interleaved rounds: what is compared is measured in turn, so that a busy moment of the machine does
-//! not fall on one of them alone.
+//! Interleaved rounds: what is compared is measured in turn, so that other work of the machine affects all alike.
 
 /// Runs each measurement once per round, in turn, after a round that warms up and is not kept. Returns
-/// the median of each; a measurement gives nothing when it does not apply.
+/// the median of each; `measure` returns `None` where a measurement does not apply.
 pub fn medians<T>(
     items: &[T],
     rounds: usize,
@@ -11,7 +10,7 @@ pub fn medians<T>(
     interleaved(items, rounds, measure).into_iter().map(median).collect()
 }
 
-/// As [`medians`], but the least of each: what else the machine does can only add to a time.
+/// As [`medians`], but the least of each, as other work of the machine can only add to a time.
 pub fn least<T>(
     items: &[T],
     rounds: usize,

@@ -5,12 +5,12 @@ use std::fmt::Write;
 
 /// Points of one colour.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cloud {
+pub struct PointSeries {
     /// Its name in the legend.
     pub name: String,
     /// Positive x and y.
     pub points: Vec<(f64, f64)>,
-    /// What stands beside each; of none, where there are too many points.
+    /// The label of each point, or empty.
     pub labels: Vec<String>,
 }
 
@@ -24,10 +24,10 @@ pub struct Scatter {
     /// What y is.
     pub y: String,
     /// What is drawn.
-    pub clouds: Vec<Cloud>,
+    pub series: Vec<PointSeries>,
     /// Whether to draw the line of equal x and y.
     pub diagonal: bool,
-    /// Whether to join the points that none is below and left of (Pareto).
+    /// Whether to draw the Pareto front: the points that no other is both left of and below of.
     pub front: bool,
     /// Radius of a point.
     pub radius: f64,
@@ -56,7 +56,7 @@ fn ticks((low, high): (f64, f64)) -> Vec<f64> {
         .collect()
 }
 
-/// A tick as it is written: short also where it is tiny.
+/// The text of a tick; tiny numbers have an exponent.
 fn written(tick: f64) -> String {
     if tick < 1e-3 { format!("{tick:.0e}") } else { tick.to_string() }
 }
@@ -83,7 +83,7 @@ fn stairs(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
 impl Scatter {
     /// The picture.
     pub fn svg(&self) -> String {
-        let all = || self.clouds.iter().flat_map(|c| &c.points);
+        let all = || self.series.iter().flat_map(|c| &c.points);
         let (mut xs, mut ys) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
         if self.diagonal {
             xs = (xs.0.min(ys.0), xs.1.max(ys.1));
@@ -141,7 +141,7 @@ impl Scatter {
         text(&mut svg, LEFT + SIZE / 2.0, TOP + SIZE + 40.0, "text-anchor=\"middle\"", &self.x);
         let turned = format!("text-anchor=\"middle\" transform=\"rotate(-90 16 {0:.0})\"", TOP + SIZE / 2.0);
         text(&mut svg, 16.0, TOP + SIZE / 2.0, &turned, &self.y);
-        for (row, cloud) in self.clouds.iter().enumerate() {
+        for (row, cloud) in self.series.iter().enumerate() {
             let colour = COLOURS[row % COLOURS.len()];
             let mut dot = |(x, y): (f64, f64), radius: f64| {
                 let _ = writeln!(
@@ -171,12 +171,12 @@ mod tests {
     #[test]
     fn every_point_lies_in_the_plot_and_ticks_in_the_range() {
         let cloud =
-            Cloud { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)], labels: vec!["c".into()] };
+            PointSeries { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)], labels: vec!["c".into()] };
         let plot = Scatter {
             title: "t".into(),
             x: "x".into(),
             y: "y".into(),
-            clouds: vec![cloud],
+            series: vec![cloud],
             diagonal: true,
             front: false,
             radius: 3.0,

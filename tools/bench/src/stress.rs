@@ -1,4 +1,4 @@
-//! `bth-bench stress`: the large version of the stress tests, with a record.
+//! The large version of the stress tests, with a report (`bth-bench stress`).
 
 use crate::args::Stress;
 use crate::markdown::{count, table};
@@ -12,15 +12,15 @@ use serde_json::{Value, json};
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
 const ROUND: usize = 12 * 1024;
 
-/// A shape on its way.
-struct Run {
+/// A shape, its compiled structures and what was found so far.
+struct ShapeRun {
     shape: Shape,
     structures: Vec<Traced>,
-    tally: Statistics,
+    statistics: Statistics,
 }
 
-/// Traces rounds of all shapes until enough rays are traced of each, and writes the record after every round: what was
-/// traced is told whenever the run ends.
+/// Traces rounds of all shapes until enough rays of each are traced. The record is written after every round, so that it is
+/// there also if the run is stopped.
 ///
 /// # Errors
 /// If anything was wrong with any answer, or the record cannot be written.
@@ -30,17 +30,17 @@ pub fn run(arguments: &Stress) -> Result<()> {
     let shapes = shapes(arguments.size);
     let share = arguments.millions.saturating_mul(1_000_000).div_ceil(shapes.len() as u64);
     let compiled = shapes.into_iter().map(|shape| {
-        progress.say(format!("{}: compiling", shape.name));
+        progress.show(format!("{}: compiling", shape.name));
         let structures = every_structure(&shape.grid.model(), shape.whole);
-        Run { shape, structures, tally: Statistics::default() }
+        ShapeRun { shape, structures, statistics: Statistics::default() }
     });
-    let mut runs: Vec<Run> = compiled.collect();
+    let mut runs: Vec<ShapeRun> = compiled.collect();
     let mut round = 0;
     loop {
         let mut traced = false;
-        for (number, run) in runs.iter_mut().enumerate().filter(|(_, run)| run.tally.traced < share) {
+        for (number, run) in runs.iter_mut().enumerate().filter(|(_, run)| run.statistics.traced < share) {
             let seed = arguments.seed.wrapping_mul(1 << 40).wrapping_add((number as u64) << 32 | round);
-            trace(&run.shape, &run.structures, ROUND, arguments.one_in, seed, &mut run.tally);
+            trace(&run.shape, &run.structures, ROUND, arguments.one_in, seed, &mut run.statistics);
             traced = true;
         }
         let all = total(&runs);
@@ -50,37 +50,37 @@ pub fn run(arguments: &Stress) -> Result<()> {
             return record(arguments, &runs, &all, seconds, true);
         }
         record(arguments, &runs, &all, seconds, false)?;
-        progress.say(format!("{} of {} rays", count(all.traced), count(share * runs.len() as u64)));
+        progress.show(format!("{} of {} rays", count(all.traced), count(share * runs.len() as u64)));
         ensure!(all.defects() == 0, "{} wrong answers, such as {:#?}", all.defects(), all.examples);
         round += 1;
     }
 }
 
-fn total(runs: &[Run]) -> Statistics {
+fn total(runs: &[ShapeRun]) -> Statistics {
     let mut all = Statistics::default();
-    runs.iter().for_each(|run| all.add(&run.tally));
+    runs.iter().for_each(|run| all.add(&run.statistics));
     all
 }
 
-fn record(arguments: &Stress, runs: &[Run], all: &Statistics, seconds: u64, is_last: bool) -> Result<()> {
+fn record(arguments: &Stress, runs: &[ShapeRun], all: &Statistics, seconds: u64, is_last: bool) -> Result<()> {
     let mut rows: Vec<_> = runs
         .iter()
-        .map(|run| row(run.shape.name, run.triangles(), run.structures.len(), &run.tally))
+        .map(|run| row(run.shape.name, run.triangles(), run.structures.len(), &run.statistics))
         .collect();
-    rows.push(row("**all**", runs.iter().map(Run::triangles).sum(), 0, all));
+    rows.push(row("**all**", runs.iter().map(ShapeRun::triangles).sum(), 0, all));
     let isas: Vec<String> =
         bth::Isa::ALL.iter().filter(|isa| isa.is_available()).map(|isa| isa.to_string()).collect();
     let options = json!({
         "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed, "seconds": seconds
     });
     let head = Head::now("stress", isas.join(", in turn "), options);
-    let found: Vec<_> = runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.tally)).collect();
+    let found: Vec<_> = runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.statistics)).collect();
     let json = json!({ "head": head, "shapes": found, "examples": all.examples });
     let record = Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() };
     if is_last { record.write(&arguments.output) } else { record.save(&arguments.output) }
 }
 
-impl Run {
+impl ShapeRun {
     fn triangles(&self) -> usize {
         self.shape.grid.triangles.len()
     }
@@ -116,41 +116,41 @@ fn body(rows: &[Vec<String>]) -> String {
     )
 }
 
-fn row(name: &str, triangles: usize, structures: usize, tally: &Statistics) -> Vec<String> {
+fn row(name: &str, triangles: usize, structures: usize, statistics: &Statistics) -> Vec<String> {
     let mut cells = vec![name.to_owned(), count(triangles as u64)];
     cells.push(if structures == 0 { String::new() } else { structures.to_string() });
     let numbers = [
-        tally.rays,
-        tally.traced,
-        tally.hits,
-        tally.misses,
-        tally.leaks,
-        tally.ghosts,
-        tally.different,
-        tally.compared,
-        tally.wrong,
+        statistics.rays,
+        statistics.traced,
+        statistics.hits,
+        statistics.misses,
+        statistics.leaks,
+        statistics.ghosts,
+        statistics.different,
+        statistics.compared,
+        statistics.wrong,
     ];
     cells.extend(numbers.map(count));
-    cells.push(format!("{:.3}", tally.error_at_99_percent()));
-    cells.push(format!("{:.3}", tally.worst));
+    cells.push(format!("{:.3}", statistics.error_at_99_percent()));
+    cells.push(format!("{:.3}", statistics.worst));
     cells
 }
 
-fn json(shape: &Shape, structures: usize, tally: &Statistics) -> Value {
+fn json(shape: &Shape, structures: usize, statistics: &Statistics) -> Value {
     json!({
         "name": shape.name,
         "triangles": shape.grid.triangles.len(),
         "structures": structures,
-        "rays": tally.rays,
-        "traced": tally.traced,
-        "hits": tally.hits,
-        "missed": tally.misses,
-        "leaked": tally.leaks,
-        "ghosts": tally.ghosts,
-        "bits_differ": tally.different,
-        "compared": tally.compared,
-        "wrong": tally.wrong,
-        "t_error_ulp_99": tally.error_at_99_percent(),
-        "t_error_ulp_worst": tally.worst,
+        "rays": statistics.rays,
+        "traced": statistics.traced,
+        "hits": statistics.hits,
+        "missed": statistics.misses,
+        "leaked": statistics.leaks,
+        "ghosts": statistics.ghosts,
+        "bits_differ": statistics.different,
+        "compared": statistics.compared,
+        "wrong": statistics.wrong,
+        "t_error_ulp_99": statistics.error_at_99_percent(),
+        "t_error_ulp_worst": statistics.worst,
     })
 }

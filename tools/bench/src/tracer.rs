@@ -1,21 +1,21 @@
-//! What all tracers have in common: one interface for batches of rays.
+//! The interface of all tracers, ours and rivals: batches of rays.
 
 use bth::rays::{Hit, Ray, Surface};
 use std::sync::Mutex;
 
-/// Rays to trace, and what a tracer may know about them.
+/// Rays to trace, and hints that a tracer may use.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
     /// The rays, model space.
     pub rays: &'a [Ray],
-    /// The surface that each starts on, where the set knows.
+    /// The triangle that each ray starts on, in sets that start on triangles.
     pub from: Option<&'a [Surface]>,
-    /// Whether neighbours are alike; a rival may be told.
+    /// Whether neighbouring rays have similar origins and directions; Embree takes this as a flag.
     pub coherent: bool,
 }
 
 impl<'a> Batch<'a> {
-    /// The same in pieces of at most `most` rays.
+    /// The batch in pieces of at most `most` rays.
     pub fn chunks(self, most: usize) -> impl Iterator<Item = Batch<'a>> {
         (0..self.rays.len()).step_by(most).map(move |first| {
             let part = first..self.rays.len().min(first + most);
@@ -24,14 +24,13 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Traces rays through one model. What it takes to turn our rays into its own and its hits into ours
-/// belongs to the time of a tracer.
+/// Traces rays through one model. The time of a tracer includes converting our rays into its own and its hits into ours.
 pub trait Tracer: Send + Sync {
     /// Nearest hit of every ray; the instance in a surface is 0.
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
     /// Whether anything lies within [tmin, tmax] of every ray.
     fn any(&self, batch: Batch<'_>, found: &mut [bool]);
-    /// Whether it is the same as another tracer where a set has no hints, and so need not be measured.
+    /// Whether the tracer need not be measured on sets without hints, because without them it is the same as another one.
     fn needs_hints(&self) -> bool {
         false
     }
@@ -43,7 +42,7 @@ pub struct Contender {
     pub name: String,
     /// Whether it is one of ours, whose answers have to be the same to the last bit.
     pub ours: bool,
-    /// What traces.
+    /// Traces the rays.
     pub tracer: Box<dyn Tracer>,
     /// Wall-clock seconds to compile or build the structure.
     pub build_s: f64,

@@ -5,13 +5,13 @@ use bth_bench::model::Model;
 use bth_bench::rays::{Finder, Options, RaySet, View, sets};
 use bth_bench::rivals::RIVALS;
 use bth_bench::tracer::{BLOCK, Batch, Contender, spread};
-use bth_bench::{ours, rays};
+use bth_bench::{rays, structures};
 
 const OPTIONS: Options = Options { size: (128, 72), most: usize::MAX, view: None };
 
 fn knot() -> (Model, bth::Scene) {
     let model = Model::load("torus-knot:720").unwrap();
-    let compiled = ours::compile(&model, &ours::BVH).unwrap();
+    let compiled = structures::compile(&model, &structures::BVH).unwrap();
     let scene = bth::from_bytes(&compiled.bytes).unwrap();
     (model, scene)
 }
@@ -72,7 +72,7 @@ fn ray_sets_are_what_their_names_say() {
 #[test]
 fn rooms_are_seen_from_inside() {
     let model = Model::load("torus-knots-in-a-box:10000").unwrap();
-    let compiled = ours::compile(&model, &ours::BVH).unwrap();
+    let compiled = structures::compile(&model, &structures::BVH).unwrap();
     let scene = bth::from_bytes(&compiled.bytes).unwrap();
     let (view, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
     assert_eq!(view, View::Inside);
@@ -99,9 +99,9 @@ fn thinned_sets_keep_hints_with_their_rays() {
 fn our_structures_answer_with_the_same_bits_in_every_use() {
     let (model, scene) = knot();
     let (_, sets) = sets(&Finder::new(&model, &scene), &OPTIONS);
-    for kind in [ours::BTH, ours::BVH] {
-        let compiled = ours::compile(&model, &kind).unwrap();
-        for contender in ours::contenders(&kind, &compiled).unwrap() {
+    for kind in [structures::BTH, structures::BVH] {
+        let compiled = structures::compile(&model, &kind).unwrap();
+        for contender in structures::contenders(&kind, &compiled).unwrap() {
             for set in &sets {
                 let (hits, found) = traced(&contender, set, 1);
                 assert_eq!((hits, found), exact(&scene, set), "{} on {}", contender.name, set.name);

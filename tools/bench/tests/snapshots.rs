@@ -5,8 +5,8 @@ use bth_bench::load::{self, LoadRecord, ModelStarts, Times};
 use bth_bench::machine::Machine;
 use bth_bench::output::Head;
 use bth_bench::rays::View;
-use bth_bench::speed::record::{LeftOut, Measured, Structure};
-use bth_bench::speed::{self, ModelRecord, SpeedRecord};
+use bth_bench::speed::record::{LeftOut, TracerSpeeds, CompiledFile};
+use bth_bench::speed::{self, ModelSpeeds, SpeedRecord};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -26,8 +26,8 @@ fn head(measurement: &'static str) -> Head {
     }
 }
 
-fn tracer(name: &str, ours: bool, rates: &[(&'static str, f64)]) -> Measured {
-    Measured {
+fn tracer(name: &str, ours: bool, rates: &[(&'static str, f64)]) -> TracerSpeeds {
+    TracerSpeeds {
         name: name.to_owned(),
         ours,
         build_s: 0.25,
@@ -47,14 +47,14 @@ fn speed_record() -> SpeedRecord {
         if tets {
             tracers.insert(2, tracer("tets link32", true, &[("primary", 1.0), ("diffuse", 0.5)]));
         }
-        ModelRecord {
+        ModelSpeeds {
             name: name.to_owned(),
             triangles: 1200,
             view,
             rays: BTreeMap::from([("primary", 2000), ("diffuse", 1100)]),
-            structures: vec![Structure { name: "bth", compile_s: 0.25, file_bytes: 50_000, in_tets: 0.5 }],
+            structures: vec![CompiledFile { name: "bth", compile_s: 0.25, file_bytes: 50_000, in_tets: 0.5 }],
             left_out: vec![LeftOut { name: "tinybvh bvh8 hq".to_owned(), why: "not installed".to_owned() }],
-            runs: vec![speed::Run { threads: 1, clock: Clock::ThreadCpu, tracers }],
+            runs: vec![speed::ThreadsRun { threads: 1, clock: Clock::ThreadCpu, tracers }],
         }
     };
     let models = vec![model("a", View::Outside, 1.0, false), model("b", View::Inside, 4.0, true)];
@@ -82,7 +82,7 @@ fn load_record() -> LoadRecord {
         view: View::Outside,
         file_bytes: BTreeMap::from([("bth", 3 << 20), ("bvh", 1 << 20)]),
         left_out: vec![("embree robust".to_owned(), "not wanted".to_owned())],
-        runs: vec![load::Run { threads: 2, starts }],
+        runs: vec![load::StartsRun { threads: 2, starts }],
     };
     LoadRecord { head: head("load"), rays: 1000, models: vec![model] }
 }

@@ -1,27 +1,27 @@
 //! The charts of `accuracy`: what is paid, in time or bytes, against what is wrong.
 
-use super::record::{AccuracyRecord, Summary};
-use super::subjects::GROUPS;
+use super::record::{AccuracyRecord, TracerSummary};
+use super::contenders::GROUPS;
 use crate::output::Chart;
-use crate::scatter::{Cloud, Scatter};
+use crate::scatter::{PointSeries, Scatter};
 
-/// What a chart shows across and up; nothing where it is not known.
+/// The two quantities of a chart; tracers of which one is not known are left out.
 struct Axes {
     name: &'static str,
     title: &'static str,
-    x: (&'static str, fn(&Summary<'_>) -> Option<f64>),
-    y: (&'static str, fn(&Summary<'_>) -> f64),
+    x: (&'static str, fn(&TracerSummary<'_>) -> Option<f64>),
+    y: (&'static str, fn(&TracerSummary<'_>) -> f64),
 }
 
-fn time(s: &Summary<'_>) -> Option<f64> {
+fn time(s: &TracerSummary<'_>) -> Option<f64> {
     Some(s.nanoseconds)
 }
 
-fn bytes(s: &Summary<'_>) -> Option<f64> {
+fn bytes(s: &TracerSummary<'_>) -> Option<f64> {
     s.bytes_per_triangle
 }
 
-fn aimed(s: &Summary<'_>) -> f64 {
+fn aimed(s: &TracerSummary<'_>) -> f64 {
     s.aimed.all() as f64 * 1e6 / s.aimed.rays.max(1) as f64
 }
 
@@ -59,8 +59,8 @@ pub fn draw(record: &AccuracyRecord) -> Vec<Chart> {
     CHARTS.iter().map(chart).collect()
 }
 
-fn scatter(axes: &Axes, summaries: &[Summary<'_>]) -> Scatter {
-    // No error at all has no place on a logarithmic axis: it gets the lowest line, well below the least error.
+fn scatter(axes: &Axes, summaries: &[TracerSummary<'_>]) -> Scatter {
+    // Zero has no place on a logarithmic axis: it is drawn on the lowest line, well below the least error.
     let least = summaries.iter().map(axes.y.1).filter(|y| *y > 0.0).fold(f64::INFINITY, f64::min);
     let floor = if least.is_finite() { least / 10.0 } else { 1.0 };
     let cloud = |group: &&str| {
@@ -69,13 +69,13 @@ fn scatter(axes: &Axes, summaries: &[Summary<'_>]) -> Scatter {
             .filter_map(|s| Some((s.name.to_owned(), ((axes.x.1)(s)?, (axes.y.1)(s).max(floor)))))
             .collect();
         let (labels, points) = placed.into_iter().unzip();
-        Cloud { name: (*group).to_owned(), points, labels }
+        PointSeries { name: (*group).to_owned(), points, labels }
     };
     Scatter {
         title: axes.title.to_owned(),
         x: axes.x.0.to_owned(),
         y: axes.y.0.to_owned(),
-        clouds: GROUPS.iter().map(cloud).filter(|c| !c.points.is_empty()).collect(),
+        series: GROUPS.iter().map(cloud).filter(|c| !c.points.is_empty()).collect(),
         diagonal: false,
         front: true,
         radius: 5.0,

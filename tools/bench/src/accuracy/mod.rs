@@ -1,16 +1,16 @@
 //! Run time and bytes against every kind of error, ours and rivals', on identical rays.
 //!
-//! `truth` has the exact answers, `judge` compares, `aimed` makes the rays that tracers lose and `picture` what a
-//! person would see of it all; `subjects` are compared.
+//! `contenders` lists and builds what is compared, `aimed_rays` makes rays through vertices and edges, `exact_answers`
+//! has the right answers, `defects` classifies the others, and `picture` measures how far an image is from the exact one.
 
-pub mod aimed;
+pub mod aimed_rays;
 mod charts;
-pub mod judge;
+mod contenders;
+pub mod defects;
+pub mod exact_answers;
 pub mod picture;
 pub mod record;
-mod subjects;
 mod tables;
-pub mod truth;
 
 pub use charts::draw;
 pub use tables::markdown;
@@ -22,18 +22,18 @@ use crate::output::{Head, Record, note};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::medians;
-use crate::{isa, ours};
-use aimed::Target;
+use crate::{isa, structures};
+use aimed_rays::Target;
 use anyhow::{Result, bail, ensure};
 use bth::Isa;
 use bth::rays::Hit;
-use judge::{Defects, Neighbours, Spread};
-use picture::Motif;
+use defects::{Defects, Neighbours, ErrorQuantiles};
+use picture::PictureSetup;
 use record::{AIMED, AccuracyRecord, Errors, ModelErrors, ORDINARY};
 use serde_json::json;
 use std::collections::BTreeMap;
-use subjects::{Subject, Subjects};
-use truth::Exact;
+use contenders::{MeasuredTracer, MeasuredTracers};
+use exact_answers::Exact;
 
 /// Pixels of the cameras that rays are taken from, and of the pictures; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
@@ -48,7 +48,7 @@ const QUICK_RAYS: usize = 2000;
 /// If an option or model cannot be used or a file cannot be written, and, when all is written, if one of our own
 /// answers was wrong that has to be right.
 pub fn run(arguments: &Accuracy) -> Result<()> {
-    let names = subjects::names();
+    let names = contenders::names();
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     if let Some(name) = arguments.tracers.unknown(&known).first() {
         bail!("--tracer {name}: there are {}", names.join(", "));
@@ -85,13 +85,14 @@ pub fn run(arguments: &Accuracy) -> Result<()> {
     Ok(())
 }
 
-/// A set, its exact answers by geometry, and whether it is aimed.
-struct Question {
+/// A ray set and its exact answers for each geometry.
+struct AnsweredSet {
     set: RaySet,
-    truths: Vec<Vec<Exact>>,
+    /// For each geometry.
+    exact_answers: Vec<Vec<Exact>>,
 }
 
-impl Question {
+impl AnsweredSet {
     fn is_aimed(&self) -> bool {
         AIMED.contains(&self.set.name)
     }
@@ -105,99 +106,99 @@ fn measure(
     progress: &Progress,
     wrong: &mut Vec<String>,
 ) -> Result<ModelErrors> {
-    progress.say(format!("{}: compiling the BVH", model.name));
-    let bvh = ours::compile(model, &ours::BVH)?;
+    progress.show(format!("{}: compiling the BVH", model.name));
+    let bvh = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
     let finder = Finder::new(model, &scene);
-    let all = Subjects::build(model, &bvh, &arguments.tracers, progress)?;
+    let all = MeasuredTracers::build(model, &bvh, &arguments.tracers, progress)?;
 
-    progress.say(format!("{}: making rays", model.name));
+    progress.show(format!("{}: making rays", model.name));
     let size = if arguments.quick { QUICK_SIZE } else { SIZE };
     let (_, mut sets) =
-        rays::sets(&finder, &rays::Options { size, most: rays, view: arguments.models.view() });
+        rays::sets(&finder, &rays::Options { size, most: rays, view: arguments.models.seen_from.view() });
     sets.retain(|set| ORDINARY.contains(&set.name));
-    sets.extend([Target::Vertices, Target::Edges].map(|target| aimed::set(model, target, rays)));
-    let mut questions = Vec::new();
+    sets.extend([Target::Vertices, Target::Edges].map(|target| aimed_rays::set(model, target, rays)));
+    let mut answered_sets = Vec::new();
     for set in sets.into_iter().filter(|set| !set.rays.is_empty()) {
-        progress.say(format!("{}: exact answers to {}", model.name, set.name));
-        let truths =
+        progress.show(format!("{}: exact answers to {}", model.name, set.name));
+        let exact_answers =
             all.geometries.iter().map(|g| g.answers(&set, arguments.one_in)).collect::<Result<_>>()?;
-        questions.push(Question { set, truths });
+        answered_sets.push(AnsweredSet { set, exact_answers });
     }
 
-    let mut times: Vec<BTreeMap<&'static str, f64>> = vec![BTreeMap::new(); all.subjects.len()];
-    for question in &questions {
-        progress.say(format!("{}: timing {}", model.name, question.set.name));
-        for (times, seconds) in times.iter_mut().zip(time(&all.subjects, &question.set, rounds)) {
-            let count = question.set.rays.len() as f64;
-            times.extend(seconds.map(|s| (question.set.name, s * 1e9 / count)));
+    let mut times: Vec<BTreeMap<&'static str, f64>> = vec![BTreeMap::new(); all.tracers.len()];
+    for answered_set in &answered_sets {
+        progress.show(format!("{}: timing {}", model.name, answered_set.set.name));
+        for (times, seconds) in times.iter_mut().zip(time(&all.tracers, &answered_set.set, rounds)) {
+            let count = answered_set.set.rays.len() as f64;
+            times.extend(seconds.map(|s| (answered_set.set.name, s * 1e9 / count)));
         }
     }
-    let motif = Motif::new(&finder, model, if arguments.quick { QUICK_SIZE } else { PICTURE });
-    let expected = motif.draw(model, &all.geometries[0]);
-    let mut tracers = Vec::new();
-    for (subject, nanoseconds) in all.subjects.iter().zip(times) {
-        progress.say(format!("{}: errors of {}", model.name, subject.name));
-        let mut errors = errors(model, subject, &all, &questions)?;
+    let picture_setup = PictureSetup::new(&finder, model, if arguments.quick { QUICK_SIZE } else { PICTURE });
+    let expected = picture_setup.draw(model, &all.geometries[0]);
+    let mut rows = Vec::new();
+    for (tracer, nanoseconds) in all.tracers.iter().zip(times) {
+        progress.show(format!("{}: errors of {}", model.name, tracer.name));
+        let mut errors = errors(model, tracer, &all, &answered_sets)?;
         errors.nanoseconds = nanoseconds;
-        let picture = motif.draw(model, &*subject.contender.tracer);
+        let picture = picture_setup.draw(model, &*tracer.contender.tracer);
         errors.rmse = expected.rmse(&picture);
         errors.dissimilarity = expected.dissimilarity(&picture);
-        if subject.exact && errors.ordinary.all() + errors.aimed.all() > 0 {
-            wrong.push(format!("{} on {}", subject.name, model.name));
+        if tracer.exact && errors.ordinary.all() + errors.aimed.all() > 0 {
+            wrong.push(format!("{} on {}", tracer.name, model.name));
         }
-        tracers.push(errors);
+        rows.push(errors);
     }
     Isa::best().choose()?;
-    let rays = questions.iter().map(|q| (q.set.name, q.set.rays.len())).collect();
+    let rays = answered_sets.iter().map(|q| (q.set.name, q.set.rays.len())).collect();
     Ok(ModelErrors {
         name: model.name.clone(),
         triangles: model.triangles(),
         rays,
-        tracers,
+        tracers: rows,
         left_out: all.left_out,
     })
 }
 
 /// Seconds that the nearest hits of a set take, in interleaved rounds.
-fn time(subjects: &[Subject], set: &RaySet, rounds: usize) -> Vec<Option<f64>> {
+fn time(tracers: &[MeasuredTracer], set: &RaySet, rounds: usize) -> Vec<Option<f64>> {
     let clock = Clock::for_threads(1);
     let mut hits = vec![Hit::MISS; set.rays.len()];
-    medians(subjects, rounds, |_, subject| {
-        subject.isa.map_or(Ok(()), Isa::choose).ok()?;
-        Some(clock.time(|| subject.contender.nearest(set.batch(), &mut hits, 1)))
+    medians(tracers, rounds, |_, tracer| {
+        tracer.isa.map_or(Ok(()), Isa::choose).ok()?;
+        Some(clock.time(|| tracer.contender.nearest(set.batch(), &mut hits, 1)))
     })
 }
 
 /// Everything but run time and picture.
-fn errors(model: &Model, subject: &Subject, all: &Subjects, questions: &[Question]) -> Result<Errors> {
-    subject.isa.map_or(Ok(()), Isa::choose)?;
+fn errors(model: &Model, tracer: &MeasuredTracer, all: &MeasuredTracers, answered_sets: &[AnsweredSet]) -> Result<Errors> {
+    tracer.isa.map_or(Ok(()), Isa::choose)?;
     let neighbours = Neighbours(&model.mesh.triangles);
     let [mut ordinary, mut aimed] = [Defects::default(); 2];
     let [mut relative, mut ulp] = [Vec::new(), Vec::new()];
-    for question in questions {
-        let rays = &question.set.rays;
+    for answered_set in answered_sets {
+        let rays = &answered_set.set.rays;
         let mut hits = vec![Hit::MISS; rays.len()];
-        subject.contender.nearest(question.set.batch(), &mut hits, 1);
-        let geometry = &all.geometries[subject.geometry];
-        let truth = &question.truths[subject.geometry];
-        let found = judge::defects(geometry, &neighbours, rays, truth, &hits);
-        if question.is_aimed() { &mut aimed } else { &mut ordinary }.add(&found);
-        // Displacement of the stored triangles shows against the source.
-        let [r, u] = judge::errors_of_t(&neighbours, &question.truths[0], &hits);
+        tracer.contender.nearest(answered_set.set.batch(), &mut hits, 1);
+        let geometry = &all.geometries[tracer.geometry];
+        let truth = &answered_set.exact_answers[tracer.geometry];
+        let found = defects::defects(geometry, &neighbours, rays, truth, &hits);
+        if answered_set.is_aimed() { &mut aimed } else { &mut ordinary }.add(&found);
+        // Errors of t are relative to the source, so that moved vertices count as errors.
+        let [r, u] = defects::errors_of_t(&neighbours, &answered_set.exact_answers[0], &hits);
         relative.extend(r);
         ulp.extend(u);
     }
-    let bytes = subject.contender.bytes;
+    let bytes = tracer.contender.bytes;
     Ok(Errors {
-        name: subject.name.clone(),
-        group: subject.group,
+        name: tracer.name.clone(),
+        group: tracer.group,
         bytes_per_triangle: bytes.map(|bytes| bytes as f64 / model.triangles() as f64),
         nanoseconds: BTreeMap::new(),
         ordinary,
         aimed,
-        t_relative: Spread::of(relative),
-        t_ulp: Spread::of(ulp),
+        t_relative: ErrorQuantiles::of(relative),
+        t_ulp: ErrorQuantiles::of(ulp),
         rmse: 0.0,
         dissimilarity: 0.0,
     })

@@ -6,8 +6,8 @@ use crate::tracer::{Batch, Tracer};
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
 
-/// What is drawn: the camera's rays in tiles of 4×4 pixels, and the light.
-pub struct Motif {
+/// The camera's rays in tiles of 4×4 pixels, and the light.
+pub struct PictureSetup {
     rays: Vec<Ray>,
     size: (u32, u32),
     light: DVec3,
@@ -23,23 +23,23 @@ pub struct Picture {
 
 /// Brightness of the sky.
 const SKY: f64 = 1.0;
-/// Squares of the pattern on the surfaces along the diagonal of the model: it makes errors of t visible.
+/// Squares along the diagonal of the model: errors of t show in this pattern.
 const SQUARES: f64 = 150.0;
 
-impl Motif {
+impl PictureSetup {
     /// The view of the `primary` rays, in so many pixels, multiples of 4.
-    pub fn new(finder: &Finder<'_>, model: &Model, size: (u32, u32)) -> Motif {
+    pub fn new(finder: &Finder<'_>, model: &Model, size: (u32, u32)) -> PictureSetup {
         let options = rays::Options { size, most: usize::MAX, view: None };
         let (_, [rays, _]) = rays::cameras(finder, &options);
         let bounds = model.bounds();
         let eye = position(rays[0].origin);
         // Besides the camera, so that there are shadows both in rooms and around objects.
         let light = eye + DVec3::new(0.05, 0.21, -0.13) * bounds.diagonal();
-        Motif { rays, size, light, diagonal: bounds.diagonal() }
+        PictureSetup { rays, size, light, diagonal: bounds.diagonal() }
     }
 
-    /// Lambert's law, a shadow and squares of two shades: what is seen, where, and what hides the light are all told by
-    /// the tracer.
+    /// Draws with Lambert's law, a shadow and squares of two shades. What is visible, where it is, and whether it is lit are
+    /// the tracer's answers.
     pub fn draw(&self, model: &Model, tracer: &dyn Tracer) -> Picture {
         let mut hits = vec![Hit::MISS; self.rays.len()];
         tracer.nearest(Batch { rays: &self.rays, from: None, coherent: true }, &mut hits);
@@ -59,7 +59,7 @@ impl Motif {
         Picture { width, values }
     }
 
-    /// A ray to the light and what it brings; for a miss a ray that meets nothing and the sky.
+    /// The shadow ray of a hit and its brightness if it is lit; for a miss a ray that hits nothing and the brightness of the sky.
     fn light_at(&self, model: &Model, ray: &Ray, hit: &Hit) -> (Ray, f64) {
         if !hit.is_hit() {
             return (Ray { tmin: 1.0, tmax: 0.0, ..*ray }, SKY);

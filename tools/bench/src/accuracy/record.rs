@@ -1,6 +1,6 @@
 //! What `accuracy` measured, as it is written to JSON.
 
-use super::judge::{Defects, Spread};
+use super::defects::{Defects, ErrorQuantiles};
 use crate::output::Head;
 use crate::rounds::geometric_mean;
 use crate::speed::record::LeftOut;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// Ordinary sets: the run time of a tracer is the geometric mean over these.
 pub const ORDINARY: [&str; 3] = ["primary", "diffuse", "random"];
-/// Sets that are aimed at what tracers lose.
+/// Sets of rays that pass exactly through vertices and edges.
 pub const AIMED: [&str; 2] = ["vertices", "edges"];
 
 /// Everything that was measured.
@@ -42,7 +42,7 @@ pub struct ModelErrors {
 pub struct Errors {
     /// Its name.
     pub name: String,
-    /// Whose it is.
+    /// Its group, which has a colour in the charts.
     pub group: &'static str,
     /// Bytes that traversal reads, per triangle, where that is known.
     pub bytes_per_triangle: Option<f64>,
@@ -53,9 +53,9 @@ pub struct Errors {
     /// Wrong answers to aimed rays.
     pub aimed: Defects,
     /// Errors of t against the source, relative to t.
-    pub t_relative: Spread,
-    /// In units of the last place.
-    pub t_ulp: Spread,
+    pub t_relative: ErrorQuantiles,
+    /// The same errors in units of the last place.
+    pub t_ulp: ErrorQuantiles,
     /// Root mean square error of the picture, of a brightness from 0 to 1.
     pub rmse: f64,
     /// 1 - SSIM of the picture.
@@ -72,10 +72,10 @@ impl Errors {
 
 /// A tracer over all models that it ran on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Summary<'a> {
+pub struct TracerSummary<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Whose it is.
+    /// Its group, which has a colour in the charts.
     pub group: &'static str,
     /// Number of models.
     pub models: usize,
@@ -83,9 +83,9 @@ pub struct Summary<'a> {
     pub nanoseconds: f64,
     /// Geometric mean, where known on all.
     pub bytes_per_triangle: Option<f64>,
-    /// Sums.
+    /// Sums over the models.
     pub ordinary: Defects,
-    /// Sums.
+    /// Sums over the models.
     pub aimed: Defects,
     /// The greatest of the models' 99 %.
     pub t_relative: f64,
@@ -99,7 +99,7 @@ pub struct Summary<'a> {
 
 impl AccuracyRecord {
     /// Every tracer over all models, in the order of the first that has it.
-    pub fn summaries(&self) -> Vec<Summary<'_>> {
+    pub fn summaries(&self) -> Vec<TracerSummary<'_>> {
         let mut names: Vec<&str> = Vec::new();
         for tracer in self.models.iter().flat_map(|m| &m.tracers) {
             if !names.contains(&tracer.name.as_str()) {
@@ -109,7 +109,7 @@ impl AccuracyRecord {
         names.into_iter().filter_map(|name| self.summary(name)).collect()
     }
 
-    fn summary<'a>(&'a self, name: &'a str) -> Option<Summary<'a>> {
+    fn summary<'a>(&'a self, name: &'a str) -> Option<TracerSummary<'a>> {
         let rows: Vec<&Errors> =
             self.models.iter().flat_map(|m| &m.tracers).filter(|t| t.name == name).collect();
         let most = |value: fn(&Errors) -> f64| rows.iter().map(|r| value(r)).fold(0.0, f64::max);
@@ -119,7 +119,7 @@ impl AccuracyRecord {
             sum
         };
         let bytes: Option<Vec<f64>> = rows.iter().map(|r| r.bytes_per_triangle).collect();
-        Some(Summary {
+        Some(TracerSummary {
             name,
             group: rows.first()?.group,
             models: rows.len(),

@@ -1,8 +1,8 @@
 //! The tables of `accuracy`.
 
-use super::judge::Defects;
-use super::record::{AccuracyRecord, Errors, ModelErrors, ORDINARY, Summary};
-use crate::markdown::{count, table};
+use super::defects::Defects;
+use super::record::{AccuracyRecord, Errors, ModelErrors, ORDINARY, TracerSummary};
+use crate::markdown::{cells, count, table};
 
 /// All tables of a record.
 pub fn markdown(record: &AccuracyRecord) -> String {
@@ -24,10 +24,6 @@ triangle that the ray does not meet; *neighbour*: the same, but it shares a vert
 exact arithmetic, against the triangles as they are stored. *|Δt|*: error of t against the source in exact arithmetic \
 (median, 99 %, greatest), over all sets. *RMSE*, *1-SSIM*: of a picture with shadows, brightness 0 to 1, against the exact \
 one. Chart points on the lowest line have no error at all.\n\n";
-
-fn head(names: &[&str]) -> Vec<String> {
-    names.iter().map(|n| (*n).to_owned()).collect()
-}
 
 /// Per million; in full where it is less than ten.
 fn per_million(n: u64, of: u64) -> String {
@@ -53,7 +49,7 @@ fn bytes(value: Option<f64>) -> String {
 }
 
 fn summary(record: &AccuracyRecord) -> String {
-    let row = |s: &Summary<'_>| {
+    let row = |s: &TracerSummary<'_>| {
         let name = if s.models < record.models.len() {
             format!("{} ({})", s.name, s.models)
         } else {
@@ -77,7 +73,7 @@ fn summary(record: &AccuracyRecord) -> String {
         "## All models\n\nGeometric means of ns and bytes, wrong answers of all kinds per million, the worst of the other \
          errors; in brackets: over how many of the {} models, if not all.\n\n{}\n",
         record.models.len(),
-        table(&head(&names), &rows)
+        table(&cells(&names), &rows)
     )
 }
 
@@ -109,7 +105,7 @@ fn page(model: &ModelErrors) -> String {
         "neighbour",
     ];
     let rows: Vec<Vec<String>> = model.tracers.iter().map(wrong).collect();
-    text.push_str(&table(&head(&names), &rows));
+    text.push_str(&table(&cells(&names), &rows));
     text.push('\n');
     let errors = |e: &Errors| {
         let mut row = vec![e.name.clone()];
@@ -120,7 +116,7 @@ fn page(model: &ModelErrors) -> String {
     let names =
         ["tracer", "Δt/t: median", "99 %", "greatest", "ulp: median", "99 %", "greatest", "RMSE", "1-SSIM"];
     let rows: Vec<Vec<String>> = model.tracers.iter().map(errors).collect();
-    text.push_str(&table(&head(&names), &rows));
+    text.push_str(&table(&cells(&names), &rows));
     text.push('\n');
     let sets: Vec<String> = model.rays.iter().map(|(set, n)| format!("{} {set}", count(*n as u64))).collect();
     text.push_str(&format!("Rays: {}.\n\n", sets.join(", ")));

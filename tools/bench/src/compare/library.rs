@@ -32,7 +32,8 @@ impl Build {
     /// If the file is no shared library, or lacks one of the functions.
     pub(super) fn load(path: &Path) -> Result<Build> {
         let path = path.canonicalize().with_context(|| format!("{}: no such file", path.display()))?;
-        // SAFETY: the user names a build of libbth, whose initializers are those of Rust's standard library.
+        // SAFETY: by the documentation of `compare` the user names a build of libbth, whose initializers are those of Rust's
+        // standard library.
         let library = unsafe { Library::new(&path) }.with_context(|| path.display().to_string())?;
         let library: &'static Library = Box::leak(Box::new(library));
         let lacks =
@@ -54,7 +55,7 @@ impl Build {
     ///
     /// # Errors
     /// What the build reports.
-    pub(super) fn open(&self, file: &Path) -> Result<Opened<'_>> {
+    pub(super) fn open(&self, file: &Path) -> Result<OpenedByBuild<'_>> {
         let name = CString::new(file.as_os_str().as_encoded_bytes()).context("a path without zero bytes")?;
         let mut scene = std::ptr::null_mut();
         // SAFETY: a zero-terminated path and a place for the scene, as bth.h demands.
@@ -65,17 +66,17 @@ impl Build {
             bail!("{}: {}", file.display(), text.to_string_lossy());
         }
         ensure!(!scene.is_null(), "{}: bth_open returned no scene", file.display());
-        Ok(Opened { build: self, scene })
+        Ok(OpenedByBuild { build: self, scene })
     }
 }
 
 /// A file that a build has opened; closed when it is dropped.
-pub(super) struct Opened<'a> {
+pub(super) struct OpenedByBuild<'a> {
     build: &'a Build,
     scene: *mut c_void,
 }
 
-impl Opened<'_> {
+impl OpenedByBuild<'_> {
     /// Nearest hits, in calls of `batch` rays, without hints.
     pub(super) fn nearest(&self, rays: &[Ray], hits: &mut [Hit], batch: usize) {
         for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
@@ -103,7 +104,7 @@ impl Opened<'_> {
     }
 }
 
-impl Drop for Opened<'_> {
+impl Drop for OpenedByBuild<'_> {
     fn drop(&mut self) {
         // SAFETY: the scene was opened by this build and is closed once.
         unsafe { (self.build.close)(self.scene) }

@@ -1,36 +1,38 @@
-//! `compare`: whether one build of `libbth.so` is faster than another, in one interleaved run.
+//! Whether one build of `libbth.so` is faster than another, measured in one interleaved run.
 //!
-//! Both builds are loaded into this process and answer the same rays from the same file in turn, so that what else the
-//! machine does falls on both. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
+//! Both builds are loaded into this process and trace the same rays through the same file in turn, so that other work of the
+//! machine affects both alike. The ratio of a round is the new build's CPU time over the old one's; a set's figure is the
 //! median over the rounds. The verdict is that of the geometric mean over the models, by the interval in which it lies with 95 %
 //! confidence (bootstrap over the rounds): builds that are the same must not be told apart by noise.
 
+mod compiled_model;
 mod library;
 mod report;
 
 pub use report::{Comparison, ModelComparison, SetComparison, Verdict};
 
-use self::library::{Build, Opened};
+use self::compiled_model::CompiledModel;
+use self::library::{Build, OpenedByBuild};
 use crate::args::Compare;
 use crate::clock::Clock;
-use crate::model::Model;
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::quartiles;
-use crate::{isa, ours};
+use crate::isa;
 use anyhow::{Context, Result, bail, ensure};
 use bth::rays::Hit;
 use std::io::Write;
 
-/// Smaller sets are not timed: that would measure the clock.
+/// Smaller sets are not timed, as the clock is too coarse for them.
 const FEWEST: usize = 1024;
-/// Seconds of CPU time that a turn takes at least: short sets are traced several times, as shorter turns measure the clock.
+/// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
+/// shorter ones.
 const TURN_SECONDS: f64 = 0.02;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
 const QUICK_SIZE: (u32, u32) = (128, 72);
 
-/// Measures, prints and writes the comparison; tells whether a set is slower than was allowed.
+/// Measures, prints and writes the comparison; returns whether a set is slower than `--worse` allows.
 ///
 /// # Errors
 /// If a library, model or option cannot be used, or if the builds give different answers.
@@ -42,7 +44,7 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     let [old, new] = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
     let progress = Progress::new();
     let mut comparison = Comparison { batch: arguments.batch, worse: arguments.worse, models: Vec::new() };
-    for which in &arguments.models.models {
+    for which in &arguments.models {
         comparison.models.push(model(which, arguments, [&old, &new], &progress)?);
     }
     drop(progress);
@@ -62,30 +64,26 @@ fn model(
     builds: [&Build; 2],
     progress: &Progress,
 ) -> Result<ModelComparison> {
-    let model = Model::load(which)?;
-    progress.say(format!("{}: compiling", model.name));
-    let compiled = ours::compile(&model, &ours::BTH)?;
-    let scene = bth::from_bytes(&compiled.bytes)?;
-    progress.say(format!("{}: making rays", model.name));
+    progress.show(format!("{which}: compiling"));
+    let compiled = CompiledModel::load(which)?;
+    let model = &compiled.model;
+    progress.show(format!("{}: making rays", model.name));
     let size = if arguments.quick { QUICK_SIZE } else { SIZE };
-    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
-    let (_, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
+    let options = rays::Options { size, most: arguments.rays, view: arguments.seen_from.view() };
+    let (_, mut sets) = rays::sets(&Finder::new(model, &compiled.scene), &options);
     sets.retain(|set| set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= FEWEST);
 
-    let folder = tempfile::tempdir()?;
-    let file = folder.path().join("model.bth");
-    std::fs::write(&file, &compiled.bytes)?;
-    let opened = [builds[0].open(&file)?, builds[1].open(&file)?];
+    let opened = [builds[0].open(&compiled.file)?, builds[1].open(&compiled.file)?];
     let mut out = ModelComparison { name: model.name.clone(), sets: Vec::new() };
     for set in &sets {
-        progress.say(format!("{}: {}", model.name, set.name));
+        progress.show(format!("{}: {}", model.name, set.name));
         out.sets.push(compare(set, &opened, arguments));
     }
     Ok(out)
 }
 
 /// Times one set with both builds, round by round.
-fn compare(set: &RaySet, builds: &[Opened<'_>; 2], arguments: &Compare) -> SetComparison {
+fn compare(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], arguments: &Compare) -> SetComparison {
     let (batch, rounds) = (arguments.batch, if arguments.quick { 1 } else { arguments.rounds });
     let rays = &set.rays;
     let mut hits = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
@@ -107,7 +105,7 @@ fn compare(set: &RaySet, builds: &[Opened<'_>; 2], arguments: &Compare) -> SetCo
                 }
             }) / passes as f64;
         }
-        // The first round warms up the caches and tells how long a pass takes.
+        // The first round warms up the caches; its time decides how many passes later turns take.
         if round > 0 {
             seconds[0].push(of_round[0]);
             seconds[1].push(of_round[1]);

@@ -1,6 +1,6 @@
 //! What `compare` found, as JSON and as tables.
 
-use crate::markdown::table;
+use crate::markdown::{cells, table};
 use crate::rounds::{geometric_mean, median};
 use bth_random::Rng;
 use serde::Serialize;
@@ -151,7 +151,6 @@ impl Comparison {
 
     /// A row for each model and set, and the means with their verdicts.
     pub fn markdown(&self) -> String {
-        let cells = |texts: &[&str]| texts.iter().map(|t| (*t).to_owned()).collect::<Vec<_>>();
         let mut rows = Vec::new();
         for model in &self.models {
             for set in &model.sets {

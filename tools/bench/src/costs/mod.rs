@@ -1,13 +1,16 @@
-//! How well the cost model predicts: estimators against measured steps and times, and what selections lose.
+//! How well the cost model predicts: the estimators' errors against measured steps and times, and by how much the rules' selections
+//! are slower than the best ones.
 
-mod judge;
+mod estimator_errors;
+mod fit;
 mod nodes;
 pub mod record;
-mod regret;
+mod selection_regret;
 mod statistics;
 mod tables;
 
-pub use judge::{constants, judge};
+pub use estimator_errors::estimator_errors;
+pub use fit::constants;
 #[cfg(test)]
 pub(crate) use nodes::rays;
 pub use tables::{charts, markdown};
@@ -18,7 +21,7 @@ use crate::model::Model;
 use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::Result;
-use nodes::Which;
+use nodes::NodeChoice;
 use record::CostsRecord;
 use serde_json::json;
 
@@ -44,7 +47,7 @@ pub fn run(arguments: &Costs) -> Result<()> {
 /// If a model cannot be used.
 pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
     let isa = isa::select(arguments.isa.as_deref())?;
-    let which = Which {
+    let which = NodeChoice {
         least: arguments.least,
         most: arguments.most,
         nodes: arguments.nodes,
@@ -63,7 +66,7 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
         let (mut names, mut found) = (Vec::new(), Vec::new());
         for name in models {
             let model = Model::load(name)?;
-            found.extend(nodes::candidates(&model, &Which { nodes, ..which }, &progress)?);
+            found.extend(nodes::candidates(&model, &NodeChoice { nodes, ..which }, &progress)?);
             names.push(model.name);
         }
         Ok((names, found))
@@ -78,14 +81,14 @@ pub fn measure(arguments: &Costs) -> Result<CostsRecord> {
     let constants = constants(&fitted)?;
     let mut regrets = Vec::new();
     for name in &arguments.small {
-        regrets.push(regret::measure(&Model::load(name)?, arguments.rounds, &progress)?);
+        regrets.push(selection_regret::measure(&Model::load(name)?, arguments.rounds, &progress)?);
     }
     Ok(CostsRecord {
         head: Head::now("costs", isa, options),
         fitted_on,
         judged_on,
         constants,
-        judged: judge(&constants, &judged_nodes),
+        judged: estimator_errors(&constants, &judged_nodes),
         regrets,
         fitted,
         nodes: judged_nodes,

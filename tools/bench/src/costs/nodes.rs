@@ -1,9 +1,10 @@
-//! Candidate nodes of models, each as an object of its own: what the estimators say of it, and what rays measure.
+//! Candidate nodes of models, each as an object of its own: the predictions of the estimators, and the measured steps and times
+//! of rays.
 
-use super::record::{ESTIMATORS, Node};
+use super::record::{ESTIMATORS, MeasuredNode};
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::ours::{self, Use};
+use crate::structures::{self, Use};
 use crate::progress::Progress;
 use crate::rounds::least;
 use crate::tracer::{Batch, Tracer};
@@ -17,13 +18,14 @@ use bth_import::Mesh;
 use std::collections::HashMap;
 use std::time::Instant;
 
-/// Rays whose steps the sampling estimator counts, and rays that are measured.
+/// Rays whose steps the sampling estimator counts.
 const SAMPLES: usize = 1024;
+/// Rays that are measured.
 const RAYS: usize = 8192;
 
 /// What to measure of each model.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Which {
+pub(super) struct NodeChoice {
     /// Nodes of fewer triangles are left out.
     pub(super) least: u32,
     /// Nodes of more triangles are left out.
@@ -36,8 +38,8 @@ pub(super) struct Which {
 
 /// A candidate node as an object of its own, ready to be measured.
 pub(super) struct Candidate {
-    /// All that is known of it without a clock.
-    node: Node,
+    /// All figures but the times.
+    node: MeasuredNode,
     tracer: Box<dyn Tracer>,
     /// Rays from outside and from surfaces.
     sets: [(Vec<Ray>, Vec<Surface>); 2],
@@ -47,8 +49,8 @@ pub(super) struct Candidate {
 ///
 /// # Errors
 /// If the model cannot be used.
-pub(super) fn candidates(model: &Model, which: &Which, progress: &Progress) -> Result<Vec<Candidate>> {
-    progress.say(format!("{}: marks", model.name));
+pub(super) fn candidates(model: &Model, which: &NodeChoice, progress: &Progress) -> Result<Vec<Candidate>> {
+    progress.show(format!("{}: marks", model.name));
     let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent)?;
     let (marks, _) = marks::mark(&model.mesh, &tree, &Silent)?;
     let count = |i: &u32| tree.nodes[*i as usize].count;
@@ -60,7 +62,7 @@ pub(super) fn candidates(model: &Model, which: &Which, progress: &Progress) -> R
     let mut built = Vec::new();
     for k in 0..keep {
         let node = candidates[k * candidates.len() / keep];
-        progress.say(format!("{}: node {} of {keep}", model.name, k + 1));
+        progress.show(format!("{}: node {} of {keep}", model.name, k + 1));
         let first = tree.nodes[node as usize].first as usize;
         let rows = &tree.order[first..first + tree.nodes[node as usize].count as usize];
         built.extend(candidate(&model.name, node, &part(&model.mesh, rows))?);
@@ -96,7 +98,7 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
     let (built, _) = tets::build(mesh, &tree, &[0], &options.tets, &Silent)?;
     let [(0, tets)] = &built[..] else { return Ok(None) };
     let file = pipeline::assemble(mesh, &tree, &built, &options, &Silent)?;
-    let tracer = ours::tracer(&file.bytes, Use::Hinted)?;
+    let tracer = structures::tracer(&file.bytes, Use::Hinted)?;
     let root = &tree.nodes[0];
     let outside = costs::outside(root.lower, root.upper, RAYS, 21);
     let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * RAYS, 22);
@@ -122,7 +124,7 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
                 let outside = costs::outside(root.lower, root.upper, SAMPLES, 23);
                 let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLES, 24);
                 let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
-                // The walker is part of what sampling takes.
+                // Making the walker belongs to the time of sampling.
                 let walker = TetWalker::new(tets);
                 let counted = [outside, surface].map(|rays| count(&walker, &rays));
                 sampled_hits = counted.map(|c| c[1]);
@@ -131,7 +133,7 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
         };
         micros[row] = 1e6 * clock.elapsed().as_secs_f64();
     }
-    let node = Node {
+    let node = MeasuredNode {
         model: model.to_owned(),
         node,
         triangles,
@@ -172,15 +174,15 @@ fn average_depth(tree: &bvh::BinaryBvh) -> f64 {
     sum / leaves.max(1.0)
 }
 
-/// Measures candidates in batches with hints, all of them in turn: whatever keeps the machine busy for a while falls on all.
-/// Each comes with what it needs in the caches, as one more batch goes before.
-pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progress) -> Vec<Node> {
+/// Measures candidates in batches with hints, all of them in turn, so that other work of the machine affects all alike.
+/// Each batch is traced once before it is timed, so that what it reads is in the caches.
+pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progress) -> Vec<MeasuredNode> {
     let mut hits = vec![Hit::MISS; RAYS];
     let items: Vec<(&Candidate, usize)> = candidates.iter().flat_map(|c| [(c, 0), (c, 1)]).collect();
     let mut said = usize::MAX;
     let seconds = least(&items, rounds, |round, (candidate, set)| {
         if round != said {
-            progress.say(format!("round {round} of {rounds}: {} nodes", candidates.len()));
+            progress.show(format!("round {round} of {rounds}: {} nodes", candidates.len()));
             said = round;
         }
         let (rays, from) = &candidate.sets[*set];
@@ -193,12 +195,12 @@ pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progres
     let mut nodes = Vec::new();
     for (row, Candidate { node, sets, .. }) in candidates.into_iter().enumerate() {
         let nanoseconds = [0, 1].map(|set| nanoseconds((2 * row + set, sets[set].0.len())));
-        nodes.push(Node { nanoseconds, ..node });
+        nodes.push(MeasuredNode { nanoseconds, ..node });
     }
     nodes
 }
 
-/// Sampled rays as the library takes them.
+/// Sampled rays and the triangles that they start on, as the runtime library takes them.
 pub(crate) fn rays(samples: &[SampleRay]) -> (Vec<Ray>, Vec<Surface>) {
     let ray = |s: &SampleRay| Ray {
         origin: s.origin.map(|x| x as f32),

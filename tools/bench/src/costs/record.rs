@@ -3,8 +3,8 @@
 use crate::output::Head;
 use serde::Serialize;
 
-/// The estimators of N_avg. The first two need no tetrahedra and are affine in the octree's levels, the others need
-/// them.
+/// The estimators of N_avg, the mean number of steps. The first two need no tetrahedra and are affine in the octree's levels; the
+/// others need tetrahedra.
 pub const ESTIMATORS: [&str; 4] = ["face count", "average depth", "area", "sampling"];
 
 /// Where rays start; pairs of numbers in a record are in this order.
@@ -12,7 +12,7 @@ pub const STARTS: [&str; 2] = ["outside", "surface"];
 
 /// A node of a model, tetrahedralized.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Node {
+pub struct MeasuredNode {
     /// Its model.
     pub model: String,
     /// Index in the binary BVH.
@@ -27,11 +27,11 @@ pub struct Node {
     pub hits: [f64; 2],
     /// Measured nanoseconds of a ray.
     pub nanoseconds: [f64; 2],
-    /// What each estimator says: levels of the first two, steps of the others.
+    /// Predictions of each estimator: levels for the first two, steps for the others.
     pub estimates: [[f64; 2]; ESTIMATORS.len()],
     /// Share of the rays that end at a triangle, as the sampling estimator finds it.
     pub sampled_hits: [f64; 2],
-    /// Microseconds that it takes to say so.
+    /// Microseconds that each estimator takes.
     pub micros: [f64; ESTIMATORS.len()],
 }
 
@@ -44,15 +44,15 @@ pub struct Constants {
     pub area: [f64; 2],
     /// Nanoseconds: entry, the triangle where a ray ends, a step in the smaller size, in the larger.
     pub walk: [[f64; 4]; 2],
-    /// Mean share of the rays that end at a triangle: for estimators that don't tell.
+    /// Mean share of the rays that end at a triangle: for estimators that do not predict it.
     pub hits: [f64; 2],
-    /// Those sizes, bytes.
+    /// The smaller and the larger size, in bytes.
     pub sizes: [[f64; 2]; 2],
 }
 
-/// How an estimator does on models that it was not fitted on.
+/// How well an estimator predicts on models that its constants were not fitted on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Judged {
+pub struct EstimatorError {
     /// The estimator; `measured steps` for the cost of the steps themselves.
     pub name: String,
     /// Where rays start.
@@ -74,7 +74,7 @@ pub struct Selection {
     pub nodes: Vec<u32>,
     /// Nanoseconds of a ray, a quarter of the camera's, the others from surfaces.
     pub nanoseconds: f64,
-    /// By how much it is slower than the best.
+    /// By which share it is slower than the best selection.
     pub regret: f64,
 }
 
@@ -91,7 +91,7 @@ pub struct Regret {
     pub selections: Vec<Selection>,
 }
 
-/// Everything.
+/// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CostsRecord {
     /// When and where.
@@ -99,16 +99,16 @@ pub struct CostsRecord {
     pub head: Head,
     /// Models that constants were fitted on.
     pub fitted_on: Vec<String>,
-    /// Models that estimators were judged on.
+    /// Models that the estimators' errors were measured on.
     pub judged_on: Vec<String>,
     /// The constants.
     pub constants: Constants,
-    /// The judgement.
-    pub judged: Vec<Judged>,
+    /// How well each estimator predicts.
+    pub judged: Vec<EstimatorError>,
     /// Selections on small models.
     pub regrets: Vec<Regret>,
-    /// Nodes that were fitted on, and others.
-    pub fitted: Vec<Node>,
-    /// Nodes that were judged on.
-    pub nodes: Vec<Node>,
+    /// Nodes that the constants were fitted on.
+    pub fitted: Vec<MeasuredNode>,
+    /// Nodes that the errors were measured on.
+    pub nodes: Vec<MeasuredNode>,
 }

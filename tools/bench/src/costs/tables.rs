@@ -1,13 +1,9 @@
 //! The tables and plots of `costs`.
 
-use super::record::{CostsRecord, ESTIMATORS, Node, STARTS};
-use crate::markdown::{count, table};
+use super::record::{Constants, CostsRecord, ESTIMATORS, EstimatorError, MeasuredNode, Regret, STARTS, Selection};
+use crate::markdown::{cells, count, table};
 use crate::output::Chart;
-use crate::scatter::{Cloud, Scatter};
-
-fn row(cells: &[&str]) -> Vec<String> {
-    cells.iter().map(|c| (*c).to_owned()).collect()
-}
+use crate::scatter::{PointSeries, Scatter};
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".to_owned(), |v| format!("{v:.digits$}"))
@@ -28,26 +24,42 @@ pub fn markdown(record: &CostsRecord) -> String {
         record.judged_on.join(", "),
         record.nodes.len(),
     );
-    let head =
-        row(&["estimator", "rays from", "µs a node", "steps: rank", "steps: error", "ns: rank", "ns: error"]);
-    let rows: Vec<Vec<String>> = record
-        .judged
-        .iter()
-        .map(|j| {
-            vec![
-                j.name.clone(),
-                j.start.to_owned(),
-                if j.micros > 0.0 { format!("{:.2}", j.micros) } else { "-".to_owned() },
-                number(j.steps[0], 3),
-                percent(j.steps[1]),
-                number(j.nanoseconds[0], 3),
-                percent(j.nanoseconds[1]),
-            ]
-        })
-        .collect();
-    text.push_str(&table(&head, &rows));
+    text.push_str(&estimators(record));
     text.push_str("\n## Constants\n\n");
-    let c = &record.constants;
+    text.push_str(&constants(&record.constants));
+    text.push_str(
+        "\nSizes are those of the tetrahedra and their vertices; in between what the logarithm of the size says.\n",
+    );
+    if !record.regrets.is_empty() {
+        text.push_str(
+            "\n## Regret\n\nEvery selection of the suitable nodes in the three topmost levels of small models was measured: \
+             a quarter camera rays, the others bounces and ambient occlusion with hints.\n\n",
+        );
+        text.push_str(&regrets(&record.regrets));
+    }
+    text
+}
+
+/// How well each estimator predicts.
+fn estimators(record: &CostsRecord) -> String {
+    let head =
+        cells(&["estimator", "rays from", "µs a node", "steps: rank", "steps: error", "ns: rank", "ns: error"]);
+    let cells = |j: &EstimatorError| {
+        vec![
+            j.name.clone(),
+            j.start.to_owned(),
+            if j.micros > 0.0 { format!("{:.2}", j.micros) } else { "-".to_owned() },
+            number(j.steps[0], 3),
+            percent(j.steps[1]),
+            number(j.nanoseconds[0], 3),
+            percent(j.nanoseconds[1]),
+        ]
+    };
+    table(&head, &record.judged.iter().map(cells).collect::<Vec<_>>())
+}
+
+/// The fitted constants, a row for each place where rays start.
+fn constants(c: &Constants) -> String {
     let mut rows = Vec::new();
     for (start, name) in STARTS.iter().enumerate() {
         let levels =
@@ -65,45 +77,35 @@ pub fn markdown(record: &CostsRecord) -> String {
             ),
         ]);
     }
-    let head = row(&["rays from", "steps by face count", "by average depth", "factor of the area", "ns"]);
-    text.push_str(&table(&head, &rows));
-    text.push_str(
-        "\nSizes are those of the tetrahedra and their vertices; in between what the logarithm of the size says.\n",
-    );
-    if !record.regrets.is_empty() {
-        text.push_str(
-            "\n## Regret\n\nEvery selection of the suitable nodes in the three topmost levels of small models was measured: \
-             a quarter camera rays, the others bounces and ambient occlusion with hints.\n\n",
-        );
-        let head = row(&["model", "triangles", "tried", "selection", "tet leaves", "ns a ray", "regret"]);
-        let rows: Vec<Vec<String>> = record
-            .regrets
-            .iter()
-            .flat_map(|r| {
-                r.selections.iter().map(|s| {
-                    vec![
-                        r.model.clone(),
-                        count(r.triangles as u64),
-                        r.tried.to_string(),
-                        s.name.clone(),
-                        s.nodes.len().to_string(),
-                        format!("{:.1}", s.nanoseconds),
-                        percent(Some(s.regret)),
-                    ]
-                })
-            })
-            .collect();
-        text.push_str(&table(&head, &rows));
-        for name in ["default", "paper's rule", "plain BVH"] {
-            let of = record.regrets.iter().flat_map(|r| &r.selections).filter(|s| s.name == name);
-            let regrets: Vec<f64> = of.map(|s| s.regret).collect();
-            if !regrets.is_empty() {
-                let mean = regrets.iter().sum::<f64>() / regrets.len() as f64;
-                text.push_str(&format!("\n- Mean regret of {name}: {:.1} %.", 100.0 * mean));
-            }
+    let head = cells(&["rays from", "steps by face count", "by average depth", "factor of the area", "ns"]);
+    table(&head, &rows)
+}
+
+/// The selections of each small model, and the mean regret of each rule.
+fn regrets(regrets: &[Regret]) -> String {
+    let head = cells(&["model", "triangles", "tried", "selection", "tet leaves", "ns a ray", "regret"]);
+    let cells = |r: &Regret, s: &Selection| {
+        vec![
+            r.model.clone(),
+            count(r.triangles as u64),
+            r.tried.to_string(),
+            s.name.clone(),
+            s.nodes.len().to_string(),
+            format!("{:.1}", s.nanoseconds),
+            percent(Some(s.regret)),
+        ]
+    };
+    let selections = regrets.iter().flat_map(|r| r.selections.iter().map(move |s| (r, s)));
+    let mut text = table(&head, &selections.map(|(r, s)| cells(r, s)).collect::<Vec<_>>());
+    for name in ["default", "paper's rule", "plain BVH"] {
+        let of = regrets.iter().flat_map(|r| &r.selections).filter(|s| s.name == name);
+        let values: Vec<f64> = of.map(|s| s.regret).collect();
+        if !values.is_empty() {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            text.push_str(&format!("\n- Mean regret of {name}: {:.1} %.", 100.0 * mean));
         }
-        text.push('\n');
     }
+    text.push('\n');
     text
 }
 
@@ -111,8 +113,8 @@ pub fn markdown(record: &CostsRecord) -> String {
 pub fn charts(record: &CostsRecord) -> Vec<Chart> {
     let mut charts = Vec::new();
     for (start, start_name) in STARTS.iter().enumerate() {
-        let predicted = |e: usize, n: &Node| record.constants.predict(e, start, n);
-        let cloud = |e: usize| Cloud {
+        let predicted = |e: usize, n: &MeasuredNode| record.constants.predict(e, start, n);
+        let cloud = |e: usize| PointSeries {
             name: ESTIMATORS[e].to_owned(),
             points: record.nodes.iter().map(|n| (n.nanoseconds[start], predicted(e, n))).collect(),
             labels: Vec::new(),
@@ -121,7 +123,7 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
             title: format!("Predicted against measured, rays from {start_name}"),
             x: "measured ns a ray".to_owned(),
             y: "predicted ns a ray".to_owned(),
-            clouds: (0..ESTIMATORS.len()).map(cloud).collect(),
+            series: (0..ESTIMATORS.len()).map(cloud).collect(),
             diagonal: true,
             front: false,
             radius: 2.5,
@@ -135,9 +137,9 @@ pub fn charts(record: &CostsRecord) -> Vec<Chart> {
         title: "Error against run time".to_owned(),
         x: "µs a node".to_owned(),
         y: "median relative error of ns".to_owned(),
-        clouds: ESTIMATORS
+        series: ESTIMATORS
             .iter()
-            .map(|e| Cloud { name: (*e).to_owned(), points: judged(e).collect(), labels: Vec::new() })
+            .map(|e| PointSeries { name: (*e).to_owned(), points: judged(e).collect(), labels: Vec::new() })
             .collect(),
         diagonal: false,
         front: false,

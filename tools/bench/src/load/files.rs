@@ -1,6 +1,6 @@
-//! The files that a start reads, and what of them is in memory.
+//! The files that a start reads, and the state of the page cache.
 
-use crate::rivals::embree::Place;
+use crate::rivals::embree::InstancePlace;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Ray;
 use bth_import::Mesh;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// A folder that goes away with this value.
+/// A folder that is deleted when this value is dropped.
 pub(super) struct Scratch(TempDir);
 
 impl Scratch {
@@ -35,17 +35,17 @@ impl Scratch {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum PageCache {
-    /// Nothing: the system was asked to drop it.
+    /// None of it: the system dropped its pages.
     Cold,
-    /// All: it was just read.
+    /// All of it: it was just read.
     Warm,
 }
 
 impl PageCache {
-    /// Both.
+    /// Both states.
     pub(super) const ALL: [PageCache; 2] = [PageCache::Warm, PageCache::Cold];
 
-    /// A word for tables.
+    /// The name in tables.
     pub(super) fn name(self) -> &'static str {
         match self {
             PageCache::Cold => "cold",
@@ -75,19 +75,19 @@ fn drop_pages(_: &File) -> Result<()> {
     anyhow::bail!("a cold page cache can be had on Linux only")
 }
 
-/// Rays as they are in memory.
+/// Encodes rays.
 pub(super) fn ray_bytes(rays: &[Ray]) -> &[u8] {
     rays.as_bytes()
 }
 
-/// Reads what [`ray_bytes`] gave.
+/// Decodes a file of [`ray_bytes`].
 pub(super) fn read_rays(path: &Path) -> Result<Vec<Ray>> {
     let bytes = std::fs::read(path)?;
     let rays = bytes.chunks(size_of::<Ray>()).map(|b| Ray::read_from_bytes(b).ok());
     rays.collect::<Option<_>>().context("not a file of rays")
 }
 
-/// The number of positions and those, then the triangles.
+/// Encodes a mesh: the number of positions, the positions, the triangles.
 pub(super) fn mesh_bytes(mesh: &Mesh) -> Vec<u8> {
     let mut bytes = (mesh.positions.len() as u64).to_le_bytes().to_vec();
     bytes.extend_from_slice(mesh.positions.as_slice().as_bytes());
@@ -98,7 +98,7 @@ pub(super) fn mesh_bytes(mesh: &Mesh) -> Vec<u8> {
 /// Positions and triangles.
 pub(super) type Triangles = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
-/// Reads what [`mesh_bytes`] gave.
+/// Decodes a file of [`mesh_bytes`].
 pub(super) fn read_mesh(path: &Path) -> Result<Triangles> {
     mesh(&std::fs::read(path)?)
 }
@@ -114,7 +114,7 @@ fn mesh(bytes: &[u8]) -> Result<Triangles> {
     Ok((positions.chunks(12).map(position).collect(), triangles.chunks(12).map(triangle).collect()))
 }
 
-/// The objects of an opened scene with their lengths before them, and the places of what can be seen.
+/// Encodes a scene: the objects, each after its length, then object and transform of each visible instance.
 pub(super) fn scene_bytes(scene: &bth::Scene) -> Vec<u8> {
     let mut bytes = u64::from(scene.object_count()).to_le_bytes().to_vec();
     for object in (0..scene.object_count()).map(|object| scene.object(object)) {
@@ -131,8 +131,8 @@ pub(super) fn scene_bytes(scene: &bth::Scene) -> Vec<u8> {
     bytes
 }
 
-/// Reads what [`scene_bytes`] gave: the objects, and of each instance the object and the place.
-pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<u32>, Vec<Place>)> {
+/// Decodes a file of [`scene_bytes`]: the objects, and the object and transform of each instance.
+pub(super) fn read_scene(path: &Path) -> Result<(Vec<Triangles>, Vec<u32>, Vec<InstancePlace>)> {
     const BROKEN: &str = "not a file of a scene";
     let bytes = std::fs::read(path)?;
     let mut rest = bytes.as_slice();

@@ -3,10 +3,10 @@
 #![allow(unsafe_code)]
 
 use super::files;
-use crate::args::Probe;
+use crate::args::{Probe, Start};
 use crate::clock::process_cpu;
 use crate::isa;
-use crate::ours::BATCH;
+use crate::structures::BATCH;
 use crate::rivals::embree;
 use crate::tracer::{Batch, Tracer, spread};
 use anyhow::Result;
@@ -15,41 +15,9 @@ use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::time::Instant;
 
-/// How a program comes to a structure that it can trace.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Start {
-    /// `bth::map`.
-    Map,
-    /// `bth::open`: reads and checks.
-    Read,
-    /// Embree builds from triangles in memory, as by default.
-    Embree,
-    /// As above, for its robust mode.
-    EmbreeRobust,
-    /// Embree builds the objects of a scene and their instances.
-    EmbreeScene,
-    /// As above, for its robust mode.
-    EmbreeSceneRobust,
-}
-
-impl Start {
-    /// As on the command line and in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Start::Map => "map",
-            Start::Read => "read",
-            Start::Embree => "embree",
-            Start::EmbreeRobust => "embree-robust",
-            Start::EmbreeScene => "embree-scene",
-            Start::EmbreeSceneRobust => "embree-scene-robust",
-        }
-    }
-}
-
-/// What a start took; wall-clock seconds since before the file was opened or the build began.
+/// The times of a start: wall-clock seconds since the file was about to be opened or the build was about to begin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Probed {
+pub struct StartTimes {
     /// Until rays could be traced.
     pub ready_s: f64,
     /// Until the first hit.
@@ -58,7 +26,7 @@ pub struct Probed {
     pub total_s: f64,
     /// CPU seconds of all threads until then.
     pub cpu_s: f64,
-    /// Bytes that came from storage meanwhile, where the system tells.
+    /// Bytes that were read from storage until then, where the system counts them.
     pub storage_bytes: Option<u64>,
     /// Rays that hit.
     pub hits: usize,
@@ -66,7 +34,7 @@ pub struct Probed {
     pub frame_s: Option<f64>,
 }
 
-/// Starts and prints what it took.
+/// Starts once and prints the times as JSON.
 ///
 /// # Errors
 /// If the file or library cannot be used.
@@ -77,8 +45,8 @@ pub fn run(arguments: &Probe) -> Result<()> {
     let first = arguments.first.unwrap_or(rays.len()).min(rays.len());
     let probed = match arguments.start {
         // SAFETY: `load` wrote the file into a folder of its own and does not touch it while we run.
-        Start::Map => probe(&rays, first, threads, || Ok(Opened(unsafe { bth::map(file)? })))?,
-        Start::Read => probe(&rays, first, threads, || Ok(Opened(bth::open(file)?)))?,
+        Start::Map => probe(&rays, first, threads, || Ok(OpenedFile(unsafe { bth::map(file)? })))?,
+        Start::Read => probe(&rays, first, threads, || Ok(OpenedFile(bth::open(file)?)))?,
         Start::EmbreeScene | Start::EmbreeSceneRobust => {
             embree::available()?;
             let (objects, object_of, places) = files::read_scene(file)?;
@@ -106,9 +74,9 @@ pub fn run(arguments: &Probe) -> Result<()> {
 }
 
 /// An opened file.
-struct Opened(bth::Scene);
+struct OpenedFile(bth::Scene);
 
-impl Tracer for Opened {
+impl Tracer for OpenedFile {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
             self.0.nearest_batch(batch.rays, None, hits);
@@ -125,7 +93,7 @@ fn probe<T: Tracer>(
     first: usize,
     threads: usize,
     start: impl FnOnce() -> Result<T>,
-) -> Result<Probed> {
+) -> Result<StartTimes> {
     let rays = &all[..first];
     let mut hits = vec![Hit::MISS; rays.len()];
     let batch = |rays| Batch { rays, from: None, coherent: true };
@@ -148,7 +116,7 @@ fn probe<T: Tracer>(
         clock.elapsed().as_secs_f64()
     };
     let frame_s = (first < all.len()).then(|| frame_s().min(frame_s()));
-    Ok(Probed {
+    Ok(StartTimes {
         ready_s,
         first_hit_s,
         total_s,

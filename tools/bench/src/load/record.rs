@@ -1,7 +1,8 @@
 //! What `load` measured, as it is written to JSON.
 
 use super::files::PageCache;
-use super::probe::{Probed, Start};
+use super::probe::StartTimes;
+use crate::args::Start;
 use crate::output::Head;
 use crate::rays::View;
 use crate::rounds::median;
@@ -31,26 +32,26 @@ pub struct ModelStarts {
     pub name: String,
     /// Triangles.
     pub triangles: usize,
-    /// Where it was seen from.
+    /// Where the camera stood.
     pub view: View,
     /// Bytes of our compiled files.
     pub file_bytes: BTreeMap<&'static str, usize>,
     /// What could not be measured, and why.
     pub left_out: Vec<(String, String)>,
     /// One for each number of threads.
-    pub runs: Vec<Run>,
+    pub runs: Vec<StartsRun>,
 }
 
 /// All starts on so many threads.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Run {
+pub struct StartsRun {
     /// Threads that built, where a build can use them, and traced.
     pub threads: usize,
     /// By name, in the order of the tables.
     pub starts: Vec<(String, Times)>,
 }
 
-/// Medians of a start's times and bytes; see [`Probed`].
+/// Medians of a start's times and bytes; see [`StartTimes`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Times {
     /// Seconds until rays could be traced.
@@ -61,17 +62,17 @@ pub struct Times {
     pub total_s: f64,
     /// CPU seconds of all threads until then.
     pub cpu_s: f64,
-    /// Bytes that came from storage, where the system tells.
+    /// Bytes that were read from storage, where the system counts them.
     pub storage_bytes: Option<u64>,
-    /// Seconds for a whole picture, where that was asked for.
+    /// Seconds for a whole picture, where one is traced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_s: Option<f64>,
 }
 
 impl Times {
-    /// Of at least one start.
-    pub(super) fn medians(probed: &[Probed]) -> Times {
-        let of = |field: fn(&Probed) -> f64| median(probed.iter().map(field).collect()).unwrap_or(f64::NAN);
+    /// The medians over at least one start.
+    pub(super) fn medians(probed: &[StartTimes]) -> Times {
+        let of = |field: fn(&StartTimes) -> f64| median(probed.iter().map(field).collect()).unwrap_or(f64::NAN);
         let storage: Option<Vec<f64>> = probed.iter().map(|p| p.storage_bytes.map(|b| b as f64)).collect();
         Times {
             ready_s: of(|p| p.ready_s),
@@ -84,8 +85,8 @@ impl Times {
     }
 }
 
-impl Run {
-    /// How many times faster than Embree's build a start is, first rays included.
+impl StartsRun {
+    /// The time of Embree's build over that of a start; both include the first rays.
     pub(super) fn faster(&self, name: &str) -> Option<f64> {
         let total = |name: &str| self.starts.iter().find(|(n, _)| n == name).map(|(_, t)| t.total_s);
         Some(total(BASE)? / total(name)?)
@@ -94,36 +95,36 @@ impl Run {
 
 /// A way to start.
 #[derive(Clone, Debug)]
-pub(super) struct Case {
+pub(super) struct StartCase {
     /// Its name in tables.
     pub(super) name: String,
-    /// Our structure, or empty.
+    /// The name of our structure; empty for rivals.
     pub(super) structure: &'static str,
-    /// What is started.
+    /// How the program starts.
     pub(super) start: Start,
-    /// State of the file's pages before.
+    /// The state of the page cache before the start.
     pub(super) cache: PageCache,
-    /// What is read.
+    /// The file that it reads.
     pub(super) file: PathBuf,
-    /// Its bytes, if it is a compiled file.
+    /// Size of the file in bytes, if it is a compiled file; else 0.
     pub(super) file_bytes: usize,
 }
 
-impl Case {
+impl StartCase {
     pub(super) fn of_file(
         structure: &'static str,
         start: Start,
         cache: PageCache,
         file: PathBuf,
         file_bytes: usize,
-    ) -> Case {
+    ) -> StartCase {
         let name = format!("{structure} {} {}", start.name(), cache.name());
-        Case { name, structure, start, cache, file, file_bytes }
+        StartCase { name, structure, start, cache, file, file_bytes }
     }
 
-    /// The triangles are in memory before the clock starts, so the cache does not matter.
-    pub(super) fn of_rival(start: Start, file: PathBuf) -> Case {
+    /// A rival's build. Its triangles are in memory before the clock starts, so the page cache does not matter.
+    pub(super) fn of_rival(start: Start, file: PathBuf) -> StartCase {
         let name = start.name().replace('-', " ");
-        Case { name, structure: "", start, cache: PageCache::Warm, file, file_bytes: 0 }
+        StartCase { name, structure: "", start, cache: PageCache::Warm, file, file_bytes: 0 }
     }
 }

@@ -1,7 +1,7 @@
 //! Tables and chart of `load-scenes`.
 
-use super::record::{BASE, Run, Times};
-use super::scenes::{SceneLoadRecord, SceneStarts};
+use super::record::{BASE, StartsRun, Times};
+use super::scene_record::{SceneLoadRecord, SceneStarts};
 use super::tables::{factor, on_threads, row};
 use crate::chart::{BarChart, Scale, Series};
 use crate::markdown::{count, seconds, table};
@@ -59,7 +59,7 @@ fn page(scene: &SceneStarts) -> String {
     text
 }
 
-fn cells(scene: &SceneStarts, run: &Run, name: &str, times: &Times) -> Vec<String> {
+fn cells(scene: &SceneStarts, run: &StartsRun, name: &str, times: &Times) -> Vec<String> {
     let base = run.starts.iter().find(|(name, _)| name == BASE).map(|(_, times)| times);
     let ours = scene.compile_s.iter().find(|(kind, _)| name.starts_with(&format!("{kind} ")));
     let compared = base
@@ -102,7 +102,7 @@ pub(super) fn draw(record: &SceneLoadRecord) -> Vec<Chart> {
     let mut charts = Vec::new();
     for threads in threads {
         let run = |scene: &'_ SceneStarts| scene.runs.iter().find(|r| r.threads == threads).cloned();
-        let runs: Vec<(String, Run)> =
+        let runs: Vec<(String, StartsRun)> =
             record.scenes.iter().filter_map(|s| Some((s.name.clone(), run(s)?))).collect();
         if runs.iter().any(|(_, run)| run.faster(BASE).is_none()) {
             continue;

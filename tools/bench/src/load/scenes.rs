@@ -1,10 +1,12 @@
 //! Opening a compiled scene and tracing the first rays, against building all its objects at the start.
 
 use super::files::{self, PageCache, Scratch};
-use super::probe::Start;
-use super::record::{Case, Run};
-use super::{SIZE, first_of, runs, scene_tables};
-use crate::args::LoadScenes;
+use super::first_rays::{SIZE, first_of};
+use super::record::StartCase;
+use super::scene_record::{SceneLoadRecord, SceneStarts};
+use super::scene_tables;
+use super::starts::StartRounds;
+use crate::args::{LoadScenes, Start};
 use crate::isa;
 use crate::model::position;
 use crate::output::{Head, Record, note};
@@ -18,45 +20,11 @@ use bth_compile::pipeline::{Options, Structure};
 use bth_compile::scene;
 use bth_scenes::{catalogue, write};
 use glam::DVec3;
-use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// Everything that was measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SceneLoadRecord {
-    /// When and where.
-    #[serde(flatten)]
-    pub head: Head,
-    /// First rays that were traced.
-    pub rays: usize,
-    /// Rays of a picture.
-    pub picture: usize,
-    /// In the order of the command line.
-    pub scenes: Vec<SceneStarts>,
-}
-
-/// What was measured on a scene.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SceneStarts {
-    /// Name without folder.
-    pub name: String,
-    /// Objects.
-    pub objects: u32,
-    /// Instances.
-    pub instances: u32,
-    /// Triangles of all objects.
-    pub triangles: u64,
-    /// Seconds that compiling without a cache took, by structure.
-    pub compile_s: BTreeMap<&'static str, f64>,
-    /// Bytes of our compiled files.
-    pub file_bytes: BTreeMap<&'static str, usize>,
-    /// One for each number of threads.
-    pub runs: Vec<Run>,
-}
 
 /// Measures, prints and writes the record.
 ///
@@ -93,7 +61,7 @@ fn measure(which: &str, arguments: &LoadScenes, isa: &str, progress: &Progress) 
     let (mut cases, mut compile_s, mut file_bytes) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
     let mut opened = None;
     for (kind, structure) in [("bth", Structure::Bth), ("bvh", Structure::Bvh)] {
-        progress.say(format!("{name}: compiling {kind}"));
+        progress.show(format!("{name}: compiling {kind}"));
         let clock = Instant::now();
         let bytes = compile(&source, structure)?;
         compile_s.insert(kind, clock.elapsed().as_secs_f64());
@@ -101,7 +69,7 @@ fn measure(which: &str, arguments: &LoadScenes, isa: &str, progress: &Progress) 
         let file = scratch.write(&format!("{kind}.bth"), &bytes)?;
         for start in [Start::Map, Start::Read] {
             for cache in PageCache::ALL {
-                cases.push(Case::of_file(kind, start, cache, file.clone(), bytes.len()));
+                cases.push(StartCase::of_file(kind, start, cache, file.clone(), bytes.len()));
             }
         }
         opened = Some(bth::from_bytes(&bytes)?);
@@ -112,7 +80,7 @@ fn measure(which: &str, arguments: &LoadScenes, isa: &str, progress: &Progress) 
             let file = scratch.write("objects", &files::scene_bytes(&opened))?;
             for (name, start) in [("embree", Start::EmbreeScene), ("embree robust", Start::EmbreeSceneRobust)]
             {
-                cases.push(Case { name: name.to_owned(), ..Case::of_rival(start, file.clone()) });
+                cases.push(StartCase { name: name.to_owned(), ..StartCase::of_rival(start, file.clone()) });
             }
         }
         Err(error) => note(&format!("{name}: embree: not measured: {error:#}")),
@@ -120,7 +88,9 @@ fn measure(which: &str, arguments: &LoadScenes, isa: &str, progress: &Progress) 
     let rays = picture(&opened, arguments.starts.rays).with_context(|| format!("{name}: nothing is seen"))?;
     let rays = scratch.write("rays", files::ray_bytes(&rays))?;
     let first = Some(arguments.starts.rays);
-    let runs = runs(&name, &cases, &arguments.starts, first, isa, &rays, progress)?;
+    let starts = &arguments.starts;
+    let rounds = StartRounds { name: &name, cases: &cases, starts, first, isa, rays: &rays };
+    let runs = rounds.run(progress)?;
     let objects = opened.object_count();
     let triangles = (0..objects).map(|object| u64::from(opened.object(object).header.triangles)).sum();
     Ok(SceneStarts {

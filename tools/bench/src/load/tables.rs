@@ -2,7 +2,7 @@
 
 use super::record::{BASE, LoadRecord, ModelStarts};
 use crate::chart::{BarChart, Scale, Series};
-use crate::markdown::{count, seconds, table};
+use crate::markdown::{cells, count, seconds, table};
 use crate::output::Chart;
 
 /// What the summary and the charts show.
@@ -16,11 +16,7 @@ fn threads(record: &LoadRecord) -> Vec<usize> {
     record.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())
 }
 
-pub(super) fn row(cells: &[&str]) -> Vec<String> {
-    cells.iter().map(|c| (*c).to_owned()).collect()
-}
-
-/// All tables of a record.
+pub(super) /// All tables of a record.
 pub fn markdown(record: &LoadRecord) -> String {
     let mut text = format!(
         "Wall-clock time from before the file is opened, or from before the build begins with the triangles in memory, \
@@ -46,8 +42,8 @@ pub(super) fn factor(value: Option<f64>) -> String {
 }
 
 fn summary(record: &LoadRecord, threads: usize) -> String {
-    let mut head = row(&["model", "triangles", "Embree"]);
-    head.extend(row(&SHOWN));
+    let mut head = cells(&["model", "triangles", "Embree"]);
+    head.extend(cells(&SHOWN));
     let mut rows = Vec::new();
     for model in &record.models {
         let Some(run) = model.runs.iter().find(|r| r.threads == threads) else { continue };
@@ -72,7 +68,7 @@ fn page(model: &ModelStarts) -> String {
         sizes.join(", ")
     );
     let head =
-        row(&["start", "ready", "first hit", "all rays", "CPU", "than Embree's build", "MiB from storage"]);
+        cells(&["start", "ready", "first hit", "all rays", "CPU", "than Embree's build", "MiB from storage"]);
     for run in &model.runs {
         let mut rows = Vec::new();
         for (name, times) in &run.starts {

@@ -1,10 +1,10 @@
-//! Costs of the scalar traversals, measured on camera rays to two models: what the paper's rule compares.
+//! Costs of the scalar traversals, which the paper's rule compares: measured on camera rays to two models.
 
-use super::records::{Record, Tet20, Tet32};
-use super::tree::Tree;
+use super::tet_records::{Tet20, Tet32, TetRecord};
+use super::tree::{self, PaperTree};
 use crate::clock::Clock;
 use crate::model::{Model, position};
-use crate::ours;
+use crate::structures;
 use crate::rays::{self, Finder};
 use crate::rounds::least;
 use crate::tracer::{Batch, Tracer};
@@ -13,7 +13,7 @@ use bth::rays::{Hit, Ray};
 use bth_compile::costs::{Profile, SampleRay, TetCosts, TetWalker, Walk};
 use bth_compile::{Silent, bvh, tets};
 
-/// Models whose tetrahedra fit the caches, and whose don't.
+/// A model whose tetrahedra fit the caches, and one whose tetrahedra do not.
 const MODELS: [&str; 2] = ["blob:6000", "blob:150000"];
 /// Pixels of the camera.
 const SIZE: (u32, u32) = (256, 144);
@@ -38,7 +38,7 @@ pub(super) fn profile() -> Result<Profile> {
     Ok(profile)
 }
 
-struct Found {
+struct MeasuredCosts {
     /// Nanoseconds for each node of the binary BVH.
     visit: f64,
     /// Entry and step of each record.
@@ -46,8 +46,8 @@ struct Found {
     bytes: f64,
 }
 
-fn measure(model: &Model) -> Result<Found> {
-    let (tree, _) = bvh::build(&model.mesh, &super::bvh_options(), &Silent)?;
+fn measure(model: &Model) -> Result<MeasuredCosts> {
+    let (tree, _) = bvh::build(&model.mesh, &tree::bvh_options(), &Silent)?;
     let (built, _) = tets::build(&model.mesh, &tree, &[0], &tets::Options::default(), &Silent)?;
     let [(0, tets)] = &built[..] else { bail!("{} could not be tetrahedralized", model.name) };
     let rays = camera(model)?;
@@ -60,7 +60,7 @@ fn measure(model: &Model) -> Result<Found> {
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0);
     let (few, many): (Vec<_>, Vec<_>) = steps.into_iter().partition(|s| s.0 <= median);
     let mean = |part: &[(u32, Ray)]| part.iter().map(|p| f64::from(p.0)).sum::<f64>() / part.len() as f64;
-    let plain = Tree::<Tet32>::new(&model.mesh, &tree, &[]);
+    let plain = PaperTree::<Tet32>::new(&model.mesh, &tree, &[]);
     let bvh_time = times(&plain, &[&rays])[0];
     let walks = |tracer: &dyn Tracer| {
         let sets = [&few, &many].map(|part| part.iter().map(|p| p.1).collect::<Vec<Ray>>());
@@ -68,10 +68,10 @@ fn measure(model: &Model) -> Result<Found> {
         let step = ((times[1] - times[0]) / (mean(&many) - mean(&few))).max(0.0);
         ((times[0] - step * mean(&few)).max(0.0), step)
     };
-    fn tracer<R: Record>(model: &Model, tree: &bvh::BinaryBvh, built: &[(u32, tets::TetMesh)]) -> Tree<R> {
-        Tree::new(&model.mesh, tree, built)
+    fn tracer<R: TetRecord>(model: &Model, tree: &bvh::BinaryBvh, built: &[(u32, tets::TetMesh)]) -> PaperTree<R> {
+        PaperTree::new(&model.mesh, tree, built)
     }
-    Ok(Found {
+    Ok(MeasuredCosts {
         visit: bvh_time / expected_visits(&tree),
         walks: [walks(&tracer::<Tet32>(model, &tree, &built)), walks(&tracer::<Tet20>(model, &tree, &built))],
         bytes: (tets.tets.len() * 32 + tets.vertices.len() * 16) as f64,
@@ -80,7 +80,7 @@ fn measure(model: &Model) -> Result<Found> {
 
 /// The camera's rays that enter the model's box, neighbours together.
 fn camera(model: &Model) -> Result<Vec<Ray>> {
-    let plain = ours::compile(model, &ours::BVH)?;
+    let plain = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&plain.bytes)?;
     let options = rays::Options { size: SIZE, most: usize::MAX, view: None };
     let (_, [mut far, _]) = rays::cameras(&Finder::new(model, &scene), &options);

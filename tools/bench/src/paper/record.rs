@@ -5,7 +5,7 @@ use crate::rays::View;
 use bth_compile::costs::Profile;
 use serde::Serialize;
 
-/// Everything.
+/// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PaperRecord {
     /// When and where.
@@ -14,27 +14,27 @@ pub struct PaperRecord {
     /// Costs of the scalar traversals.
     pub profile: Profile,
     /// In the order of the command line.
-    pub scenes: Vec<SceneRecord>,
+    pub scenes: Vec<PaperScene>,
 }
 
-/// A scene.
+/// What was measured on a model, which the paper calls a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SceneRecord {
+pub struct PaperScene {
     /// Name without folder.
     pub name: String,
     /// Triangles.
     pub triangles: usize,
-    /// Where it is seen from.
+    /// Where the cameras stand.
     pub view: View,
     /// The structures.
-    pub rows: Vec<Row>,
+    pub rows: Vec<StructureRow>,
     /// What could not be built, and why.
     pub left_out: Vec<String>,
 }
 
-/// A structure.
+/// What was measured of a structure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct StructureRow {
     /// Its name.
     pub structure: String,
     /// Seconds to construct it on one thread.
@@ -51,9 +51,9 @@ pub struct Row {
     pub leaves: usize,
 }
 
-impl SceneRecord {
+impl PaperScene {
     /// The row of a structure.
-    pub fn row(&self, structure: &str) -> Option<&Row> {
+    pub fn row(&self, structure: &str) -> Option<&StructureRow> {
         self.rows.iter().find(|r| r.structure == structure)
     }
 

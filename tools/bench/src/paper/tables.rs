@@ -1,12 +1,8 @@
 //! The page of `paper`.
 
 use super::published;
-use super::record::{PaperRecord, SceneRecord};
-use crate::markdown::{count, table, two_decimals};
-
-fn row(cells: &[&str]) -> Vec<String> {
-    cells.iter().map(|c| (*c).to_owned()).collect()
-}
+use super::record::{PaperRecord, PaperScene};
+use crate::markdown::{cells, count, table, two_decimals};
 
 /// The page below its head.
 pub fn markdown(record: &PaperRecord) -> String {
@@ -38,7 +34,7 @@ pub fn markdown(record: &PaperRecord) -> String {
 
 /// Ours beside the paper's.
 fn ratios(record: &PaperRecord) -> String {
-    let head = row(&[
+    let head = cells(&[
         "scene",
         "BTH20/BVH far",
         "close",
@@ -76,7 +72,7 @@ fn ratios(record: &PaperRecord) -> String {
     table(&head, &rows)
 }
 
-fn page(scene: &SceneRecord) -> String {
+fn page(scene: &PaperScene) -> String {
     let paper = published::of(&scene.name);
     let seen =
         serde_json::to_value(scene.view).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
@@ -85,7 +81,7 @@ fn page(scene: &SceneRecord) -> String {
     if let Some(paper) = paper {
         text.push_str(&format!("Paper: {} of {} faces.\n\n", paper.name, count(paper.faces)));
     }
-    let head = row(&[
+    let head = cells(&[
         "structure",
         "construction s",
         "paper s",

@@ -4,13 +4,19 @@
 //! Nodes take 32 bytes, the first child follows its parent, traversal visits the nearer child by the sign of the
 //! direction along the axis of the split (Pharr, Jakob and Humphreys 2016, §4.3.4), leaves hold up to four triangles.
 
-use super::records::{Record, Tets};
-use super::walk::{End, Plane, crosses};
+use super::tet_records::{TetRecord, Tets};
+use super::tet_walk::{End, Plane};
 use crate::tracer::{Batch, Tracer};
+use crate::triangle_tests::moller_trumbore;
 use bth::rays::{Hit, Ray, Surface};
-use bth_compile::bvh::BinaryBvh;
+use bth_compile::bvh::{self, BinaryBvh};
 use bth_compile::tets::TetMesh;
 use bth_import::Mesh;
+
+/// How the binary BVH is built: binned and top-down, as the paper has it.
+pub(super) fn bvh_options() -> bvh::Options {
+    bvh::Options { quality: bvh::Quality::Fast }
+}
 
 /// Most triangles of a leaf (pbrt's default).
 const LEAF: u32 = 4;
@@ -35,7 +41,7 @@ struct Node {
 const _: () = assert!(size_of::<Node>() == 32);
 
 /// The structure.
-pub(super) struct Tree<R> {
+pub(super) struct PaperTree<R> {
     nodes: Vec<Node>,
     /// Corners in the order of the leaves, as pbrt's leaves hold them, with the triangle's id.
     triangles: Vec<([[f32; 3]; 3], u32)>,
@@ -44,10 +50,10 @@ pub(super) struct Tree<R> {
     cameras: Vec<([f32; 3], Vec<Option<u32>>)>,
 }
 
-impl<R: Record> Tree<R> {
+impl<R: TetRecord> PaperTree<R> {
     /// Flattens a binary BVH of single triangles; `built` are nodes in ascending order that become tet leaves.
-    pub(super) fn new(mesh: &Mesh, bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> Tree<R> {
-        let mut tree = Tree {
+    pub(super) fn new(mesh: &Mesh, bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> PaperTree<R> {
+        let mut tree = PaperTree {
             nodes: Vec::new(),
             triangles: Vec::new(),
             leaves: built.iter().map(|(_, tets)| Tets::new(tets)).collect(),
@@ -91,7 +97,7 @@ impl<R: Record> Tree<R> {
         self.flatten(mesh, bvh, built, cost, second);
     }
 
-    /// Finds, once for a camera, the tetrahedra that hold its eye.
+    /// Finds the tetrahedra that hold the eye of a camera, once for all of its rays.
     pub(super) fn look_from(&mut self, eye: [f32; 3]) {
         let holding = self.leaves.iter().map(|tets| tets.holding(eye)).collect();
         self.cameras.push((eye, holding));
@@ -118,7 +124,7 @@ impl<R: Record> Tree<R> {
             let node = &self.nodes[at];
             if meets(node, ray, &inverse, &negative, best.t) {
                 if node.count == 0 {
-                    // The nearer child now, the other later.
+                    // Visit the nearer child first.
                     let (near, far) = (at as u32 + 1, node.offset);
                     let (now, later) =
                         if negative[usize::from(node.axis)] { (far, near) } else { (near, far) };
@@ -133,8 +139,8 @@ impl<R: Record> Tree<R> {
                 } else {
                     let first = node.offset as usize;
                     for (corners, id) in &self.triangles[first..first + usize::from(node.count)] {
-                        if let Some(t) = crosses(ray, *corners, best.t) {
-                            best = Hit { t, surface: Surface { instance: 0, triangle: *id }, ..best };
+                        if let Some(hit) = moller_trumbore(ray, *corners, best.t) {
+                            best = Hit { t: hit.t, surface: Surface { instance: 0, triangle: *id }, ..best };
                         }
                     }
                 }
@@ -160,10 +166,10 @@ impl<R: Record> Tree<R> {
             End::Face(row, t) => Some((row, t)),
             End::Left => None,
             End::Lost => {
-                // Rounding: then all faces are tried.
+                // A walk that rounding errors led astray: all faces are tested instead.
                 let corners = |row: usize| tets.faces[row].1.map(|v| tets.vertices[v as usize]);
                 let found =
-                    (0..tets.faces.len()).filter_map(|r| Some((r as u32, crosses(ray, corners(r), best.t)?)));
+                    (0..tets.faces.len()).filter_map(|r| Some((r as u32, moller_trumbore(ray, corners(r), best.t)?.t)));
                 found.min_by(|a, b| a.1.total_cmp(&b.1))
             }
         };
@@ -210,7 +216,7 @@ fn costs(bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> Vec<f64> {
     cost
 }
 
-impl<R: Record> Tracer for Tree<R> {
+impl<R: TetRecord> Tracer for PaperTree<R> {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (ray, hit) in batch.rays.iter().zip(hits) {
             *hit = self.trace(ray);
@@ -226,17 +232,17 @@ impl<R: Record> Tracer for Tree<R> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::records::{Tet20, Tet32};
+    use super::super::tet_records::{Tet20, Tet32};
     use super::*;
     use crate::costs::rays;
     use bth_compile::{Silent, bvh, costs, tets};
 
     /// Hits of a structure against those of trying all triangles; `eye`: rays from one point within.
-    fn agrees<R: Record>(mesh: &Mesh, tree: &Tree<R>, rays: &[Ray]) {
+    fn agrees<R: TetRecord>(mesh: &Mesh, tree: &PaperTree<R>, rays: &[Ray]) {
         let mut hits = 0;
         for ray in rays {
             let all = (0..mesh.triangles.len() as u32)
-                .filter_map(|t| crosses(ray, mesh.corners(t), f32::INFINITY))
+                .filter_map(|t| moller_trumbore(ray, mesh.corners(t), f32::INFINITY)).map(|hit| hit.t)
                 .fold(f32::INFINITY, f32::min);
             let found = tree.trace(ray);
             assert_eq!(found.is_hit(), all.is_finite(), "{ray:?}");
@@ -257,7 +263,7 @@ mod tests {
         let (outside, _) = rays(&costs::outside(root.lower, root.upper, 150, 1));
         let eye: [f32; 3] = std::array::from_fn(|k| 0.43 * root.lower[k] + 0.57 * root.upper[k]);
         let inside: Vec<Ray> = outside.iter().map(|r| Ray { origin: eye, ..*r }).collect();
-        agrees(&mesh, &Tree::<Tet20>::new(&mesh, &bvh, &[]), &outside);
+        agrees(&mesh, &PaperTree::<Tet20>::new(&mesh, &bvh, &[]), &outside);
 
         let parts = [1, bvh.nodes[0].right];
         for chosen in [&[0][..], &parts[..]] {
@@ -268,8 +274,8 @@ mod tests {
                 return;
             }
             assert_eq!(built.len(), chosen.len());
-            let mut wide = Tree::<Tet32>::new(&mesh, &bvh, &built);
-            let mut small = Tree::<Tet20>::new(&mesh, &bvh, &built);
+            let mut wide = PaperTree::<Tet32>::new(&mesh, &bvh, &built);
+            let mut small = PaperTree::<Tet20>::new(&mesh, &bvh, &built);
             wide.look_from(eye);
             small.look_from(eye);
             for rays in [&outside, &inside] {

@@ -1,7 +1,7 @@
 //! Axis-aligned boxes of `f32`, and the boxes of the parts of a triangle on either side of a plane.
 //!
 //! A triangle in several leaves is found through any of them, so every point of it must lie in the box of
-//! at least one: boxes are rounded outwards, and both sides of a plane contain it.
+//! at least one leaf. Hence boxes are rounded outwards, and points in the plane belong to both sides.
 
 /// A box; empty where a lower end is above the upper.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +68,8 @@ pub(super) fn bounds(references: &[Reference]) -> Box3 {
     all
 }
 
-/// Boxes around the parts of a triangle within a box at or below and at or above a plane across an axis;
-/// one is empty where there is no such part.
+/// Boxes around the two parts of a triangle within a box: at or below a plane across an axis, and at or above it. A box is
+/// empty where there is no such part.
 pub(super) fn parts(corners: &[[f32; 3]; 3], within: &Box3, axis: usize, plane: f32) -> [Box3; 2] {
     let [mut left, mut right] = [Box3::EMPTY; 2];
     for (a, b) in [(0, 1), (1, 2), (2, 0)] {

@@ -1,5 +1,5 @@
 //! What each step of the BVH builder is worth: binning, sweep, reinsertion, collapse, the order of blocks, and
-//! what files are not made with because it does not pay: spatial splits, narrower nodes, smaller leaves.
+//! what the compiler leaves out because it does not pay: spatial splits, narrower nodes, smaller leaves.
 
 mod block_order;
 mod boxes;
@@ -11,7 +11,7 @@ mod tables;
 mod variations;
 
 use record::STEPS_OF;
-pub use record::{ModelRecord, QualityRecord, Row};
+pub use record::{ModelQuality, QualityRecord, VariationRow};
 pub use tables::markdown;
 
 use crate::args::Quality;
@@ -21,15 +21,15 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::speed::Answers;
-use crate::{isa, ours};
+use crate::{isa, structures};
 use anyhow::{Result, bail, ensure};
 use bth::Scene;
 use bth::rays::{Hit, Surface};
 use serde_json::json;
 use std::collections::BTreeMap;
-use variations::Built;
+use variations::BuiltVariation;
 
-/// Smaller sets are not timed: that would measure the clock.
+/// Smaller sets are not timed, as the clock is too coarse for them.
 const FEWEST: usize = 1024;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
@@ -73,7 +73,7 @@ pub fn measure(arguments: &Quality) -> Result<QualityRecord> {
         "rays": arguments.rays,
         "rounds": rounds,
         "quick": arguments.quick,
-        "rays_per_batch": ours::BATCH,
+        "rays_per_batch": structures::BATCH,
     });
     let mut record = QualityRecord { head: Head::now("bvh-quality", isa, options), models: Vec::new() };
     let progress = Progress::new();
@@ -88,17 +88,17 @@ fn measure_model(
     arguments: &Quality,
     rounds: usize,
     progress: &Progress,
-) -> Result<ModelRecord> {
+) -> Result<ModelQuality> {
     let model = Model::load(which)?;
     let mut built = Vec::new();
     for variation in variations::all() {
-        progress.say(format!("{}: building {}", model.name, variation.name));
+        progress.show(format!("{}: building {}", model.name, variation.name));
         built.push((variation.name, variation.build(&model.mesh)?));
     }
-    progress.say(format!("{}: making rays", model.name));
+    progress.show(format!("{}: making rays", model.name));
     let plain = bth::from_bytes(&built[0].1.bytes)?;
     let size = if arguments.quick { QUICK_SIZE } else { SIZE };
-    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &plain), &options);
     let counted: Vec<RaySet> = sets.iter().filter(|s| STEPS_OF.contains(&s.name)).cloned().collect();
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
@@ -112,11 +112,11 @@ fn measure_model(
         row.differ = sets.iter().zip(&expected).map(|(set, expected)| differ(&scene, set, expected)).sum();
         rows.push(row);
     }
-    progress.say(format!("{}: tracing", model.name));
+    progress.show(format!("{}: tracing", model.name));
     let mut times = vec![vec![Vec::new(); sets.len()]; built.len()];
     for round in 0..rounds {
         for i in (0..built.len()).map(|i| (i + round) % built.len()) {
-            // Opened anew, so that luck with pages of memory differs from round to round.
+            // Opened anew, so that the file lies on other pages of memory in every round.
             let scene = bth::from_bytes(&built[i].1.bytes)?;
             for (set, times) in sets.iter().zip(&mut times[i]) {
                 times.push(1e9 * time(&scene, set) / set.rays.len() as f64);
@@ -124,19 +124,19 @@ fn measure_model(
         }
     }
     for (row, times) in rows.iter_mut().zip(times) {
-        // The least: what else the machine does can only add to a time.
+        // The least time, as other work of the machine can only add to it.
         let least = |times: Vec<f64>| times.into_iter().min_by(f64::total_cmp);
         row.nanoseconds =
             sets.iter().zip(times).filter_map(|(set, times)| Some((set.name, least(times)?))).collect();
     }
-    Ok(ModelRecord { name: model.name.clone(), triangles: model.triangles(), view, rows })
+    Ok(ModelQuality { name: model.name.clone(), triangles: model.triangles(), view, rows })
 }
 
-/// What is known without tracing.
-fn row(name: &str, built: &Built, scene: &Scene, triangles: usize) -> Row {
+/// The figures that are known without tracing.
+fn row(name: &str, built: &BuiltVariation, scene: &Scene, triangles: usize) -> VariationRow {
     let collapse = &built.collapse;
     let leaves = (collapse.indexed_leaves + collapse.raw_leaves).max(1);
-    Row {
+    VariationRow {
         name: name.to_owned(),
         seconds: built.seconds,
         visits: built.visits,
@@ -163,14 +163,14 @@ fn steps(scene: &Scene, rays: &[bth::rays::Ray]) -> [f64; 2] {
     [sum.nodes, sum.leaves].map(|n| f64::from(n) / f64::from(count.max(1)))
 }
 
-/// How many answers to a set differ.
+/// How many answers to a set differ from the expected ones in any bit.
 fn differ(scene: &Scene, set: &RaySet, expected: &Answers) -> usize {
     let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
     trace(scene, set, &mut hits, &mut found);
     expected.differ(true, &hits, &found)
 }
 
-/// CPU seconds of a set, traced once before.
+/// CPU seconds that a set takes; it is traced once before, to warm up the caches.
 fn time(scene: &Scene, set: &RaySet) -> f64 {
     let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
     trace(scene, set, &mut hits, &mut found);
@@ -178,8 +178,8 @@ fn time(scene: &Scene, set: &RaySet) -> f64 {
 }
 
 fn trace(scene: &Scene, set: &RaySet, hits: &mut [Hit], found: &mut [bool]) {
-    for first in (0..set.rays.len()).step_by(ours::BATCH) {
-        let part = first..set.rays.len().min(first + ours::BATCH);
+    for first in (0..set.rays.len()).step_by(structures::BATCH) {
+        let part = first..set.rays.len().min(first + structures::BATCH);
         if set.any {
             scene.any_batch(&set.rays[part.clone()], None, &mut found[part]);
         } else {

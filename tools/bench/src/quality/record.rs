@@ -9,39 +9,39 @@ use std::collections::BTreeMap;
 /// Ray sets of which the visited nodes and leaves are counted.
 pub(super) const STEPS_OF: [&str; 2] = ["primary", "diffuse"];
 
-/// Everything.
+/// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QualityRecord {
     /// When and where.
     #[serde(flatten)]
     pub head: Head,
     /// In the order of the command line.
-    pub models: Vec<ModelRecord>,
+    pub models: Vec<ModelQuality>,
 }
 
-/// A model.
+/// What was measured on a model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ModelRecord {
+pub struct ModelQuality {
     /// Name without folder.
     pub name: String,
     /// Triangles.
     pub triangles: usize,
-    /// From where it is seen.
+    /// Where the cameras stand.
     pub view: View,
-    /// The variations; first what files are made with.
-    pub rows: Vec<Row>,
+    /// The variations; the first is the builder that compiled files are made with.
+    pub rows: Vec<VariationRow>,
 }
 
-/// A variation of the builder.
+/// What was measured of a variation of the builder.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct VariationRow {
     /// Its name.
     pub name: String,
     /// CPU seconds to build and collapse, on one thread.
     pub seconds: f64,
     /// Nodes of the binary BVH that a random line through the box meets.
     pub visits: f64,
-    /// The same of wide nodes, and of leaves.
+    /// Wide nodes and leaves that a random line through the box meets.
     pub wide_visits: [f64; 2],
     /// Children of a wide node, on average.
     pub children: f64,
@@ -70,9 +70,9 @@ impl QualityRecord {
         all
     }
 
-    /// Geometric mean over the models of what a row has over what the first has.
-    pub fn ratio(&self, row: usize, of: impl Fn(&Row) -> Option<f64>) -> Option<f64> {
-        let ratio = |m: &ModelRecord| Some(of(m.rows.get(row)?)? / of(m.rows.first()?)?);
+    /// Geometric mean over the models of a figure of a row, divided by that of the first row.
+    pub fn ratio(&self, row: usize, of: impl Fn(&VariationRow) -> Option<f64>) -> Option<f64> {
+        let ratio = |m: &ModelQuality| Some(of(m.rows.get(row)?)? / of(m.rows.first()?)?);
         geometric_mean(self.models.iter().filter_map(ratio))
     }
 

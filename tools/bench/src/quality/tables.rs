@@ -1,11 +1,7 @@
 //! The page of `quality`.
 
-use super::record::{ModelRecord, QualityRecord, STEPS_OF};
-use crate::markdown::{count, table, two_decimals};
-
-fn row(cells: &[&str]) -> Vec<String> {
-    cells.iter().map(|c| (*c).to_owned()).collect()
-}
+use super::record::{ModelQuality, QualityRecord, STEPS_OF};
+use crate::markdown::{cells, count, table, two_decimals};
 
 fn three_decimals(value: Option<f64>) -> String {
     value.map_or("-".to_owned(), |v| format!("{v:.3}"))
@@ -20,7 +16,7 @@ pub fn markdown(record: &QualityRecord) -> String {
          Times below 1 are faster. SAH: wide nodes and leaves that a random line through the box meets.\n\n",
     );
     let sets = record.sets();
-    let mut head = row(&["", "SAH", "B/tri", "building"]);
+    let mut head = cells(&["", "SAH", "B/tri", "building"]);
     head.extend(sets.iter().map(|s| (*s).to_owned()));
     head.push("all".to_owned());
     let names = record.models.first().map_or(&[][..], |m| &m.rows[..]);
@@ -45,7 +41,7 @@ pub fn markdown(record: &QualityRecord) -> String {
     text
 }
 
-fn page(model: &ModelRecord, sets: &[&str]) -> String {
+fn page(model: &ModelQuality, sets: &[&str]) -> String {
     let seen =
         serde_json::to_value(model.view).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
     let mut text = format!(
@@ -53,7 +49,7 @@ fn page(model: &ModelRecord, sets: &[&str]) -> String {
         model.name,
         count(model.triangles as u64)
     );
-    let mut head = row(&[
+    let mut head = cells(&[
         "",
         "building",
         "binary visits",

@@ -1,6 +1,6 @@
-//! What is varied, one step of the builder at a time.
+//! The variations of the builder: each changes one step.
 
-use super::block_order::{Order, reordered};
+use super::block_order::{BlockOrder, reordered};
 use super::{greedy_collapse, spatial_splits};
 use crate::clock::Clock;
 use anyhow::Result;
@@ -11,25 +11,25 @@ use bth_compile::write::{self, FileBuilder, ObjectParts};
 use bth_import::Mesh;
 use std::collections::HashSet;
 
-/// How the binary BVH is made.
-enum Tree {
-    Built(Effort),
-    /// With spatial splits (exponent of the cost), then reinsertion as in files.
+/// How the binary BVH is built.
+enum BinaryTree {
+    BuiltVariation(Effort),
+    /// With spatial splits (the exponent of their cost), then reinsertion as in compiled files.
     Spatial(f64),
 }
 
 /// A way to build.
 pub(super) struct Variation {
     pub(super) name: &'static str,
-    tree: Tree,
+    tree: BinaryTree,
     plan: Plan,
     /// Whether wide nodes are chosen greedily, not at least cost.
     greedy: bool,
     costs: Costs,
-    order: Order,
+    order: BlockOrder,
 }
 
-/// The name of what files are made with, which all else is compared with.
+/// The name of the builder that compiled files are made with: all variations are compared with it.
 pub(super) const AS_IN_FILES: &str = "as in files";
 
 /// All variations.
@@ -37,11 +37,11 @@ pub(super) fn all() -> Vec<Variation> {
     let effort = Quality::Balanced.effort();
     let built = |effort: Effort| Variation {
         name: "",
-        tree: Tree::Built(effort),
+        tree: BinaryTree::BuiltVariation(effort),
         plan: Plan::default(),
         greedy: false,
         costs: Costs::default(),
-        order: Order::DepthFirst,
+        order: BlockOrder::DepthFirst,
     };
     let with = |bins, sweep_count, reinsertion: &[f64]| {
         built(Effort { bins, sweep_count, reinsertion: reinsertion.to_vec() })
@@ -55,7 +55,7 @@ pub(super) fn all() -> Vec<Variation> {
     let priced = |costs| Variation { costs, ..built(Quality::Balanced.effort()) };
     let leaves = |by| priced(Costs { indexed: costs.indexed.map(|c| by * c), ..costs });
     let ordered = |order| Variation { order, ..built(Quality::Balanced.effort()) };
-    let spatial = |exponent| Variation { tree: Tree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
+    let spatial = |exponent| Variation { tree: BinaryTree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
     let sweep = effort.sweep_count;
     let named = |name, variation| Variation { name, ..variation };
     vec![
@@ -71,9 +71,9 @@ pub(super) fn all() -> Vec<Variation> {
         named("lines for nothing", priced(Costs { line: 0.0, ..costs })),
         named("leaves at 0.7 of their cost", leaves(0.7)),
         named("leaves at 1.3 of their cost", leaves(1.3)),
-        named("leaves beside nodes", ordered(Order::LeavesBesideNodes)),
-        named("breadth first", ordered(Order::BreadthFirst)),
-        named("random order", ordered(Order::Random)),
+        named("leaves beside nodes", ordered(BlockOrder::LeavesBesideNodes)),
+        named("breadth first", ordered(BlockOrder::BreadthFirst)),
+        named("random order", ordered(BlockOrder::Random)),
         named("spatial splits", spatial(1.0)),
         named("spatial splits, n^0.4", spatial(0.4)),
         named("8 children", planned(false, 8, 16)),
@@ -82,8 +82,8 @@ pub(super) fn all() -> Vec<Variation> {
     ]
 }
 
-/// A file, and how it came about.
-pub(super) struct Built {
+/// A file that a variation has built, and figures of its building.
+pub(super) struct BuiltVariation {
     pub(super) bytes: Vec<u8>,
     pub(super) collapse: CollapseReport,
     /// Nodes of the binary BVH that a random line through the box meets.
@@ -95,8 +95,8 @@ pub(super) struct Built {
 }
 
 impl Variation {
-    /// Builds so.
-    pub(super) fn build(&self, mesh: &Mesh) -> Result<Built> {
+    /// Builds a file with this variation.
+    pub(super) fn build(&self, mesh: &Mesh) -> Result<BuiltVariation> {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
         let mut made = None;
         let clock = Clock::ThreadCpu;
@@ -115,7 +115,7 @@ impl Variation {
         };
         let mut file = FileBuilder::new();
         write::object(&mut file, 0, &parts)?;
-        Ok(Built {
+        Ok(BuiltVariation {
             bytes: file.finish(),
             visits: bvh::visits(&tree),
             references: tree.order.len() as f64 / distinct.len().max(1) as f64,
@@ -126,8 +126,8 @@ impl Variation {
 
     fn make(&self, mesh: &Mesh) -> Result<(bvh::BinaryBvh, bvh::Wide, CollapseReport)> {
         let tree = match &self.tree {
-            Tree::Built(effort) => bvh::build_with(mesh, effort, &Silent)?.0,
-            Tree::Spatial(exponent) => {
+            BinaryTree::BuiltVariation(effort) => bvh::build_with(mesh, effort, &Silent)?.0,
+            BinaryTree::Spatial(exponent) => {
                 let tree = spatial_splits::build(mesh, *exponent);
                 let passes = Quality::Balanced.effort().reinsertion;
                 bvh::reinsert(tree, &passes, &mut bvh::Report::default(), &Silent)?

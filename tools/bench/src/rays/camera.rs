@@ -1,18 +1,27 @@
 //! Pinhole cameras.
 
-use super::ray;
 use bth::rays::Ray;
 use glam::DVec3;
 
 /// Pixels of a tile's side. Neighbours in a camera's rays come from one tile.
 const TILE: u32 = 4;
 
+/// A ray in single precision from t = 0; the direction is a unit vector.
+pub(crate) fn ray(origin: DVec3, direction: DVec3, tmax: f64) -> Ray {
+    Ray {
+        origin: origin.to_array().map(|x| x as f32),
+        tmin: 0.0,
+        direction: direction.to_array().map(|x| x as f32),
+        tmax: tmax as f32,
+    }
+}
+
 /// A pinhole camera; up is +y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it stands.
+    /// The point from which all rays start.
     pub eye: DVec3,
-    /// What it looks at.
+    /// The point in the middle of the picture.
     pub target: DVec3,
     /// Tangent of half the vertical field of view.
     pub tangent: f64,
@@ -59,7 +68,7 @@ impl Camera {
             .collect()
     }
 
-    /// A camera in this direction from the middle, as near as all of the points allow.
+    /// The camera in the direction `from` of the middle that is as near as possible while all points are in the picture.
     pub fn framing(points: &[DVec3], middle: DVec3, diagonal: f64, from: DVec3, size: (u32, u32)) -> Camera {
         let from = from.normalize();
         let at = |distance: f64| Camera {
@@ -68,7 +77,7 @@ impl Camera {
             tangent: 20f64.to_radians().tan(),
             size,
         };
-        // Whether the camera sees everything changes once only on the way out, so bisect.
+        // Beyond some distance the camera sees all points, and nearer it does not: bisection finds that distance.
         let (mut near, mut far) = (0.0, 20.0 * diagonal);
         for _ in 0..30 {
             let half = 0.5 * (near + far);

@@ -7,6 +7,10 @@ use bth::Scene;
 use bth::rays::{Hit, Ray};
 use glam::DVec3;
 
+/// By how much secondary rays are lifted off the surface that they start on, relative to the diagonal of the model, as
+/// renderers do it. On models far from the origin it is less than the resolution of f32.
+pub const LIFT: f64 = 2e-5;
+
 /// A model and the compiled scene of it.
 pub struct Finder<'a> {
     pub(super) model: &'a Model,
@@ -19,7 +23,7 @@ impl<'a> Finder<'a> {
     /// For a model and its compiled scene; uses all processors.
     pub fn new(model: &'a Model, scene: &'a Scene) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-        Finder { model, scene, threads, lift: super::LIFT * model.bounds().diagonal() }
+        Finder { model, scene, threads, lift: LIFT * model.bounds().diagonal() }
     }
 
     /// Nearest hits.

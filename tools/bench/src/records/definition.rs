@@ -10,7 +10,7 @@ use std::path::Path;
 pub struct Definition {
     /// Name of the benchmark, as rows have it.
     pub benchmark: String,
-    /// What it shows, in a sentence.
+    /// What the benchmark measures, in a sentence.
     pub about: String,
     /// How it is measured.
     pub measurement: Measurement,
@@ -32,7 +32,7 @@ pub struct Definition {
     /// Numbers of threads.
     #[serde(default = "threads")]
     pub threads: Vec<usize>,
-    /// What has to be reached.
+    /// The figures that have to be reached.
     #[serde(default)]
     pub bars: Vec<Bar>,
 }
@@ -47,7 +47,7 @@ pub enum Measurement {
     External,
 }
 
-/// A bar: the least, or with `at_most` the greatest, value of the newest rows.
+/// A bar: the least value that the newest row may have, or with `at_most` the greatest.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bar {

@@ -2,7 +2,7 @@
 
 use super::definition::{Definition, Measurement};
 use super::row::Row;
-use crate::args::{Models, Output, Speed};
+use crate::args::{Models, Output, SeenFrom, Speed};
 use crate::machine;
 use crate::names::Names;
 use crate::rounds::geometric_mean;
@@ -32,8 +32,7 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
     let arguments = Speed {
         models: Models {
             models: definition.models.iter().map(model).collect(),
-            inside: false,
-            outside: false,
+            seen_from: SeenFrom::default(),
         },
         rays: definition.rays,
         rounds: definition.rounds,

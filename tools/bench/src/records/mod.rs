@@ -1,4 +1,4 @@
-//! The records of `benchmarks/`: definitions say what is measured, rows hold what was measured, and the summary shows the newest.
+//! The records of `benchmarks/`: definitions name what is measured, rows hold the figures, and the summary has the newest ones.
 //!
 //! A row is one figure; a file holds the rows of one kind of processor and one day, and is only ever appended to.
 
@@ -44,7 +44,7 @@ pub fn record(arguments: &RecordRows) -> Result<()> {
     Ok(())
 }
 
-/// Writes SUMMARY.md from all records, and the charts that were asked for.
+/// Writes SUMMARY.md from all records, and the charts if `--charts` is given.
 ///
 /// # Errors
 /// If a record or definition cannot be read or a file cannot be written; with `--check`, if SUMMARY.md is not what it would be.

@@ -88,7 +88,7 @@ fn section(page: &mut SummaryPage, cpu: &str, definition: &Definition, rows: &[&
         |row: &Row| selected(&definition.sets, &row.set) && selected(&definition.tracers, &row.engine);
     let rows: Vec<&Dated> = rows.iter().copied().filter(|(_, row)| shows(row)).collect();
     let means: Vec<&Dated> = rows.iter().copied().filter(|(_, row)| row.model.starts_with("mean")).collect();
-    // Where there are means the models are in the record only: the page would be long, and nobody compares them by eye.
+    // Where there are means over the models, the figures of single models stay in the record: the page would become long.
     let shown = if means.is_empty() { rows } else { means };
     let cells = |row: &Row, day: &str| {
         let range = match (row.low, row.high) {

@@ -19,7 +19,7 @@ pub(super) unsafe fn load(variable: &str, file: &str) -> Result<&'static Library
         None => installed(file)
             .ok_or_else(|| anyhow!("not installed (run tools/bench/rivals, or set {variable})"))?,
     };
-    // A library looks for those that it needs beside its real place.
+    // The path is made canonical, as a library finds others that it needs in its own folder, not in that of a link.
     let path = path.canonicalize().with_context(|| format!("{variable} names no file"))?;
     // SAFETY: handed on to the caller.
     let library = unsafe { Library::new(path) }?;

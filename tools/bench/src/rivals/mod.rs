@@ -1,6 +1,7 @@
 //! The rivals. One that is missing on a machine is left out, with the reason.
 
 pub mod embree;
+mod f32_tests;
 pub mod kd_tree;
 mod library;
 mod obvhs;
@@ -9,6 +10,7 @@ mod tinybvh;
 use crate::model::Model;
 use crate::tracer::Contender;
 use anyhow::Result;
+use f32_tests::TriangleTest;
 
 /// A rival that can be measured.
 pub struct Rival {
@@ -30,8 +32,17 @@ pub const RIVALS: [Rival; 9] = [
     Rival { name: "k-d tree", build: |m, n, _| kd_tree::contender(m, n) },
 ];
 
+/// Triangle tests in single precision over one BVH; `accuracy` measures their errors beside ours.
+pub const F32_TESTS: [Rival; 2] = [
+    Rival {
+        name: "f32 moller-trumbore",
+        build: |m, n, _| f32_tests::contender(m, n, TriangleTest::MollerTrumbore),
+    },
+    Rival { name: "f32 watertight", build: |m, n, _| f32_tests::contender(m, n, TriangleTest::Watertight) },
+];
+
 impl Rival {
-    /// Builds it; where it can be told, on so many threads.
+    /// Builds the structure; on `threads` threads where the rival supports that.
     ///
     /// # Errors
     /// If its library is missing or fails.

@@ -14,7 +14,7 @@ use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use std::time::{Duration, Instant};
 
-/// What the two have in common.
+/// The operations that both structures have.
 trait Bvh: Send + Sync {
     fn triangles(&self) -> &[u32];
     fn bytes_of_nodes(&self) -> usize;

@@ -20,7 +20,7 @@ pub(super) enum Width {
     Eight = 8,
 }
 
-/// What the shim answers: t is infinite, and the triangle [`NONE`], for a miss.
+/// An answer of the shim; for a miss t is infinite and the triangle [`NONE`].
 #[derive(Clone, Copy)]
 #[repr(C)]
 struct Answer {
@@ -63,7 +63,7 @@ impl Api {
 struct TinyBvh {
     api: &'static Api,
     bvh: *mut c_void,
-    /// The structure refers to these.
+    /// The structure keeps pointers into these.
     _corners: Vec<[f32; 4]>,
 }
 

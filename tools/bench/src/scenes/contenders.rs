@@ -1,8 +1,8 @@
-//! What traces scenes: our compiled files, and Embree's instances.
+//! The contenders of `scenes`: our compiled files, and Embree's instances.
 
-use super::Source;
-use crate::ours::BATCH;
-use crate::rivals::embree::{self, Place, Variant};
+use super::source::Source;
+use crate::structures::BATCH;
+use crate::rivals::embree::{self, InstancePlace, Variant};
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Context, Result, anyhow};
 use bth::Scene;
@@ -12,40 +12,40 @@ use bth_compile::pipeline::{Options, Structure};
 use std::path::Path;
 use std::time::Instant;
 
-/// What can be measured.
-pub(super) struct Kind {
+/// A contender that can be built.
+pub(super) struct ContenderKind {
     pub(super) name: &'static str,
     how: How,
 }
 
 enum How {
-    /// Compiled like this, traced in batches with hints.
+    /// CompiledScene like this, traced in batches with hints.
     Ours(fn(&mut Options)),
     Embree(Variant),
 }
 
-/// All of them; the second is the plain BVH, which finds the rays and against which others are compared.
-pub(super) const KINDS: [Kind; 6] = [
-    Kind { name: "bth", how: How::Ours(|_| {}) },
-    Kind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh) },
-    Kind { name: "bth, paper's rule", how: How::Ours(by_the_paper) },
-    Kind { name: "embree", how: How::Embree(embree::DEFAULT) },
-    Kind { name: "embree robust", how: How::Embree(embree::ROBUST) },
-    Kind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
+/// All contenders. The second is the plain BVH: its hits are what later rays start from, and others are compared with it.
+pub(super) const CONTENDERS: [ContenderKind; 6] = [
+    ContenderKind { name: "bth", how: How::Ours(|_| {}) },
+    ContenderKind { name: "bvh", how: How::Ours(|options| options.structure = Structure::Bvh) },
+    ContenderKind { name: "bth, paper's rule", how: How::Ours(by_the_paper) },
+    ContenderKind { name: "embree", how: How::Embree(embree::DEFAULT) },
+    ContenderKind { name: "embree robust", how: How::Embree(embree::ROBUST) },
+    ContenderKind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
 ];
 
 fn by_the_paper(options: &mut Options) {
     options.costs.select = Select::Paper;
 }
 
-/// A scene at a frame.
+/// A frame, and the transforms of all instances in it.
 pub(super) struct Frame {
     number: i32,
-    places: Vec<Place>,
+    places: Vec<InstancePlace>,
 }
 
 impl Frame {
-    /// What a scene shows now.
+    /// The transforms of all instances of a scene at its current time.
     pub(super) fn of(scene: &Scene, number: i32) -> Frame {
         let place = |i: u32| {
             let rows = Some(scene.instance(i)).filter(|v| v.visible).map(|v| v.to_world);
@@ -55,18 +55,18 @@ impl Frame {
     }
 }
 
-/// A scene that moves, and traces.
+/// A scene that can be set to a frame and traced.
 pub(super) trait Moving {
-    /// Shows something else, so that the next frame is an update in full.
+    /// Sets another time, so that the next frame needs a whole update.
     fn hide(&mut self) -> Result<()>;
-    /// Shows a frame.
+    /// Sets a frame.
     fn show(&mut self, frame: &Frame) -> Result<()>;
     /// Nearest hits.
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]);
 }
 
 /// A contender.
-pub(super) struct Contender {
+pub(super) struct MovingContender {
     pub(super) name: &'static str,
     pub(super) ours: bool,
     pub(super) moving: Box<dyn Moving>,
@@ -76,14 +76,14 @@ pub(super) struct Contender {
 }
 
 /// A compiled scene.
-pub(super) struct Compiled {
+pub(super) struct CompiledScene {
     pub(super) bytes: Vec<u8>,
     in_tets: f64,
     seconds: f64,
 }
 
 /// Compiles a scene.
-pub(super) fn compile(source: &Source, kind: &Kind) -> Result<Compiled> {
+pub(super) fn compile(source: &Source, kind: &ContenderKind) -> Result<CompiledScene> {
     let How::Ours(set) = kind.how else { return Err(anyhow!("not one of ours")) };
     let mut options = Options::default();
     set(&mut options);
@@ -98,11 +98,11 @@ pub(super) fn compile(source: &Source, kind: &Kind) -> Result<Compiled> {
     let seconds = start.elapsed().as_secs_f64();
     let triangles: u64 = report.objects.iter().map(|o| o.triangles).sum();
     let in_tets: u64 = report.objects.iter().map(|o| o.tet_triangles).sum();
-    Ok(Compiled { bytes: compiled.bytes, in_tets: in_tets as f64 / triangles.max(1) as f64, seconds })
+    Ok(CompiledScene { bytes: compiled.bytes, in_tets: in_tets as f64 / triangles.max(1) as f64, seconds })
 }
 
-/// Builds a contender; `shown` has the geometry of the objects.
-pub(super) fn build(source: &Source, kind: &Kind, shown: &Scene) -> Result<Contender> {
+/// Builds a contender; Embree takes the geometry of the objects from `shown`.
+pub(super) fn build(source: &Source, kind: &ContenderKind, shown: &Scene) -> Result<MovingContender> {
     let start = Instant::now();
     if let How::Embree(variant) = &kind.how {
         let objects = (0..shown.object_count()).map(|i| {
@@ -112,19 +112,19 @@ pub(super) fn build(source: &Source, kind: &Kind, shown: &Scene) -> Result<Conte
         let object_of: Vec<u32> = (0..shown.instance_count()).map(|i| shown.object_of(i)).collect();
         let instances = embree::build_instances(objects.collect(), &object_of, variant, 1)?;
         let (build_s, moving) = (start.elapsed().as_secs_f64(), Box::new(instances));
-        return Ok(Contender { name: kind.name, ours: false, moving, build_s, in_tets: 0.0 });
+        return Ok(MovingContender { name: kind.name, ours: false, moving, build_s, in_tets: 0.0 });
     }
     let compiled = compile(source, kind)?;
     let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
     let (build_s, in_tets) = (compiled.seconds, compiled.in_tets);
-    Ok(Contender { name: kind.name, ours: true, moving: Box::new(Ours(scene)), build_s, in_tets })
+    Ok(MovingContender { name: kind.name, ours: true, moving: Box::new(Ours(scene)), build_s, in_tets })
 }
 
 struct Ours(Scene);
 
 impl Moving for Ours {
     fn hide(&mut self) -> Result<()> {
-        // A time that no frame shows.
+        // A time before the first frame.
         self.0.set_seconds(-1e3)?;
         Ok(())
     }
@@ -141,7 +141,7 @@ impl Moving for Ours {
     }
 }
 
-impl Moving for embree::Scene {
+impl Moving for embree::EmbreeScene {
     fn hide(&mut self) -> Result<()> {
         Ok(())
     }

@@ -1,13 +1,14 @@
 //! Scenes that move, frame by frame: the paper's Table 3 on our animations, and Embree with the same instances.
 //!
-//! `shots` makes the rays of a frame, `contenders` what traces them.
+//! `source` loads scenes, `frame_rays` makes the rays of a frame, and `contenders` traces them.
 
 mod contenders;
 mod record;
-mod shots;
+mod frame_rays;
+mod source;
 mod tables;
 
-pub use record::{Row, SceneRecord, ScenesRecord};
+pub use record::{ContenderRow, SceneTimes, ScenesRecord};
 pub use tables::markdown;
 
 use crate::args::Scenes;
@@ -18,11 +19,10 @@ use crate::progress::Progress;
 use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Hit;
-use bth_scene::Manifest;
-use contenders::{Contender, Frame, KINDS};
+use contenders::{MovingContender, Frame, CONTENDERS};
 use serde_json::json;
-use shots::Shots;
-use std::path::PathBuf;
+use frame_rays::FrameRays;
+use source::Source;
 
 /// Sets of rays of a frame.
 pub const SETS: [&str; 3] = ["camera", "diffuse", "later"];
@@ -36,7 +36,7 @@ pub fn run(arguments: &Scenes) -> Result<()> {
     let size = if arguments.quick { (96, 64) } else { arguments.size() };
     let progress = Progress::new();
     let options = json!({
-        "pixels": size, "frames": arguments.frames, "rounds": arguments.rounds, "bounces": shots::BOUNCES,
+        "pixels": size, "frames": arguments.frames, "rounds": arguments.rounds, "bounces": frame_rays::BOUNCES,
         "threads": 1, "quick": arguments.quick,
     });
     let mut record = ScenesRecord { head: Head::now("scenes", isa, options), scenes: Vec::new() };
@@ -57,66 +57,28 @@ pub fn run(arguments: &Scenes) -> Result<()> {
     Ok(())
 }
 
-/// A manifest and where its models are.
-pub(crate) struct Source {
-    name: String,
-    manifest: Manifest,
-    folder: PathBuf,
-    /// Of our own scenes, until the end.
-    _models: Option<tempfile::TempDir>,
-}
-
-impl Source {
-    /// A scene of our own by name, or a manifest.
-    fn load(name: &str) -> Result<Source> {
-        if let Some(animation) = bth_scenes::animations::find(name) {
-            let scene = (animation.make)();
-            let folder = tempfile::tempdir()?;
-            for (path, model) in &scene.models {
-                let path = folder.path().join(path);
-                std::fs::create_dir_all(path.parent().context("models lie in a folder")?)?;
-                bth_scenes::write::file(model, &path)?;
-            }
-            let (name, manifest) = (name.to_owned(), scene.manifest);
-            return Ok(Source { name, manifest, folder: folder.path().into(), _models: Some(folder) });
-        }
-        let path = PathBuf::from(name);
-        let manifest = bth_scene::read(&path).with_context(|| format!("no scene or manifest `{name}`"))?;
-        let folder = path.parent().map_or_else(|| PathBuf::from("."), PathBuf::from);
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Source { name, manifest, folder, _models: None })
-    }
-}
-
-/// So many frames, evenly over the range.
-fn frames(manifest: &Manifest, count: usize) -> Vec<i32> {
-    let (first, last) = (i64::from(manifest.frames.first), i64::from(manifest.frames.last));
-    let count = (count as i64).min(last - first + 1);
-    (0..count).map(|i| (first + (last - first) * (2 * i + 1) / (2 * count)) as i32).collect()
-}
-
-fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progress) -> Result<SceneRecord> {
-    progress.say(format!("{}: compiling", source.name));
-    let plain = contenders::compile(source, &KINDS[1])?;
+fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progress) -> Result<SceneTimes> {
+    progress.show(format!("{}: compiling", source.name));
+    let plain = contenders::compile(source, &CONTENDERS[1])?;
     let mut shown = bth::from_bytes(&plain.bytes).context("a file that was just compiled")?;
-    let mut record = SceneRecord {
+    let mut record = SceneTimes {
         name: source.name.clone(),
         instances: shown.instance_count(),
         objects: shown.object_count(),
         triangles: (0..shown.instance_count())
             .map(|i| u64::from(shown.object(shown.object_of(i)).header.triangles))
             .sum(),
-        frames: frames(&source.manifest, arguments.frames),
+        frames: source.frames(arguments.frames),
         rays: [0; 3],
         rows: Vec::new(),
         left_out: Vec::new(),
     };
     let mut contenders = Vec::new();
-    for kind in &KINDS {
+    for kind in &CONTENDERS {
         if !arguments.tracers.select(kind.name) {
             continue;
         }
-        progress.say(format!("{}: {}", source.name, kind.name));
+        progress.show(format!("{}: {}", source.name, kind.name));
         match contenders::build(source, kind, &shown) {
             Ok(contender) => contenders.push(contender),
             Err(why) => record.left_out.push(format!("{}: {why:#}", kind.name)),
@@ -125,21 +87,21 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
     let mut taken = vec![[0.0; 4]; contenders.len()];
     let mut differ = vec![0; contenders.len()];
     for (i, number) in record.frames.clone().into_iter().enumerate() {
-        progress.say(format!("{}: frame {} of {}", source.name, i + 1, record.frames.len()));
+        progress.show(format!("{}: frame {} of {}", source.name, i + 1, record.frames.len()));
         shown.set_frame(number)?;
         let frame = Frame::of(&shown, number);
-        let shots = Shots::of(&shown, size)?;
-        for (sum, set) in record.rays.iter_mut().zip(&shots.sets) {
+        let frame_rays = FrameRays::of(&shown, size)?;
+        for (sum, set) in record.rays.iter_mut().zip(&frame_rays.sets) {
             *sum += set.rays.len() as u64;
         }
-        let times = measure(&mut contenders, &frame, &shots, arguments.rounds, &mut differ)?;
+        let times = measure(&mut contenders, &frame, &frame_rays, arguments.rounds, &mut differ)?;
         for (sums, times) in taken.iter_mut().zip(times) {
             sums.iter_mut().zip(times).for_each(|(sum, time)| *sum += time);
         }
     }
     let count = record.frames.len() as f64;
     for ((contender, taken), differ) in contenders.iter().zip(&taken).zip(differ) {
-        record.rows.push(Row {
+        record.rows.push(ContenderRow {
             name: contender.name.to_owned(),
             ours: contender.ours,
             build_s: contender.build_s,
@@ -154,9 +116,9 @@ fn scene(source: &Source, arguments: &Scenes, size: (u32, u32), progress: &Progr
 /// Median seconds of each contender: for the update of a frame and for each set of its rays. Rounds are interleaved: every
 /// contender comes once in each.
 fn measure(
-    contenders: &mut [Contender],
+    contenders: &mut [MovingContender],
     frame: &Frame,
-    shots: &Shots,
+    frame_rays: &FrameRays,
     rounds: usize,
     differ: &mut [u64],
 ) -> Result<Vec<[f64; 4]>> {
@@ -169,7 +131,7 @@ fn measure(
             let update = Clock::ThreadCpu.time(|| result = contender.moving.show(frame));
             result?;
             let mut all = vec![update];
-            for set in &shots.sets {
+            for set in &frame_rays.sets {
                 let mut hits = vec![Hit::MISS; set.rays.len()];
                 all.push(Clock::ThreadCpu.time(|| contender.moving.nearest(set.batch(), &mut hits)));
                 if round == 0 {

@@ -1,11 +1,7 @@
 //! The page of `scenes`.
 
-use super::record::{PARTS, SceneRecord, ScenesRecord};
-use crate::markdown::{count, table, two_decimals};
-
-fn row(cells: &[&str]) -> Vec<String> {
-    cells.iter().map(|c| (*c).to_owned()).collect()
-}
+use super::record::{PARTS, SceneTimes, ScenesRecord};
+use crate::markdown::{cells, count, table, two_decimals};
 
 /// The page below its head.
 pub fn markdown(record: &ScenesRecord) -> String {
@@ -22,7 +18,7 @@ pub fn markdown(record: &ScenesRecord) -> String {
     let head: Vec<String> = std::iter::once("scene".to_owned())
         .chain(pairs.iter().flat_map(|(of, over)| PARTS.map(|part| format!("{of} / {over}: {part}"))))
         .collect();
-    let ratios = |scene: &SceneRecord| {
+    let ratios = |scene: &SceneTimes| {
         let ratio = |of: &str, over: &str, part: usize| two_decimals(scene.speedup(of, over, part));
         std::iter::once(scene.name.clone())
             .chain(pairs.iter().flat_map(|(of, over)| [0, 1, 2].map(|part| ratio(of, over, part))))
@@ -33,7 +29,7 @@ pub fn markdown(record: &ScenesRecord) -> String {
     text
 }
 
-fn page(scene: &SceneRecord) -> String {
+fn page(scene: &SceneTimes) -> String {
     let frames: Vec<String> = scene.frames.iter().map(i32::to_string).collect();
     let [camera, diffuse, later] = scene.rays.map(|n| count(n / scene.frames.len().max(1) as u64));
     let mut text = format!(
@@ -45,7 +41,7 @@ fn page(scene: &SceneRecord) -> String {
         count(scene.triangles),
         frames.join(", "),
     );
-    let head = row(&[
+    let head = cells(&[
         "",
         "build s",
         "in tets",

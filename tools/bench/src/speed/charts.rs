@@ -1,12 +1,11 @@
 //! The charts of `speed`: ratios to Embree's single rays; where it did not run, rays per second.
 
-use super::record::{BASE, Run, SpeedRecord};
+use super::record::{BASE, ThreadsRun, SpeedRecord};
 use super::tables::sets_of;
 use crate::chart::{BarChart, Scale, Series};
 use crate::output::Chart;
 
-/// What a chart shows, of what there is: more would not be read. The table has all. Embree's single rays
-/// are the line at 1.
+/// The tracers that a chart has, if they were measured; the table has all. Embree's single rays are the line at 1.
 const SHOWN: [&str; 8] = [
     "bth",
     "bth from",
@@ -28,7 +27,7 @@ pub fn draw(record: &SpeedRecord) -> Vec<Chart> {
         let ratios = tracers.contains(&BASE);
         let mut shown: Vec<&str> = tracers.iter().copied().filter(|t| SHOWN.contains(t)).collect();
         if shown.is_empty() {
-            // The selection was another: the first few then.
+            // None of these was selected: the first few tracers are shown instead.
             shown = tracers.into_iter().take(SHOWN.len()).collect();
         }
         if record.models.len() > 1 && ratios {
@@ -50,7 +49,7 @@ pub fn draw(record: &SpeedRecord) -> Vec<Chart> {
     charts
 }
 
-fn figure(run: &Run, ratios: bool, tracer: &str, set: &str) -> Option<f64> {
+fn figure(run: &ThreadsRun, ratios: bool, tracer: &str, set: &str) -> Option<f64> {
     if ratios {
         run.ratio(tracer, set)
     } else {

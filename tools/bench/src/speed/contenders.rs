@@ -1,45 +1,45 @@
-//! Compiles and builds all that is to be measured on a model.
+//! Compiles and builds the tracers that are measured on a model.
 
 use crate::model::Model;
 use crate::names::Names;
-use crate::ours::{self, Compiled, KINDS, Kind};
+use crate::structures::{self, Compiled, KINDS, Kind};
 use crate::progress::Progress;
 use crate::rivals::RIVALS;
-use crate::speed::record::{LeftOut, Structure};
+use crate::speed::record::{LeftOut, CompiledFile};
 use crate::tracer::Contender;
 use anyhow::Result;
 
-/// What there is to say besides the figures.
-pub(super) struct Notes {
-    pub(super) structures: Vec<Structure>,
+/// What was compiled, and what could not be built.
+pub(super) struct BuildNotes {
+    pub(super) structures: Vec<CompiledFile>,
     pub(super) left_out: Vec<LeftOut>,
 }
 
-/// Builds the selected ones. What cannot be built is left out and noted.
+/// Builds the selected tracers; lists those that cannot be built.
 pub(super) fn build(
     model: &Model,
     bvh: Compiled,
     names: &Names,
     threads: usize,
     progress: &Progress,
-) -> Result<(Vec<Contender>, Notes)> {
+) -> Result<(Vec<Contender>, BuildNotes)> {
     let mut built = Vec::new();
-    let mut notes = Notes { structures: Vec::new(), left_out: Vec::new() };
+    let mut notes = BuildNotes { structures: Vec::new(), left_out: Vec::new() };
     let selected = |k: &&Kind| k.uses().any(|(name, _)| names.select(&name));
-    // A model without one tetrahedralization of the whole has it with no record.
+    // A model that cannot be tetrahedralized as a whole cannot with any record.
     let mut no_tets = None;
     for kind in KINDS.iter().filter(selected) {
-        progress.say(format!("{}: compiling {}", model.name, kind.name));
+        progress.show(format!("{}: compiling {}", model.name, kind.name));
         let compiled = match (&no_tets, kind.is_tets()) {
             (Some(why), true) => Err(anyhow::anyhow!("{why}")),
-            _ if kind.name == ours::BVH.name => Ok(bvh.clone()),
-            _ => ours::compile(model, kind),
+            _ if kind.name == structures::BVH.name => Ok(bvh.clone()),
+            _ => structures::compile(model, kind),
         };
         match compiled {
             Ok(compiled) => {
-                notes.structures.push(Structure::of(kind, &compiled));
+                notes.structures.push(CompiledFile::of(kind, &compiled));
                 built
-                    .extend(ours::contenders(kind, &compiled)?.into_iter().filter(|c| names.select(&c.name)));
+                    .extend(structures::contenders(kind, &compiled)?.into_iter().filter(|c| names.select(&c.name)));
             }
             Err(error) => {
                 let why = format!("{error:#}");
@@ -51,7 +51,7 @@ pub(super) fn build(
         }
     }
     for rival in RIVALS.iter().filter(|r| names.select(r.name)) {
-        progress.say(format!("{}: building {}", model.name, rival.name));
+        progress.show(format!("{}: building {}", model.name, rival.name));
         match rival.build(model, threads) {
             Ok(contender) => built.push(contender),
             Err(error) => {

@@ -6,7 +6,7 @@ pub mod record;
 mod tables;
 
 pub use charts::draw;
-pub use record::{ModelRecord, Run, SpeedRecord};
+pub use record::{ModelSpeeds, ThreadsRun, SpeedRecord};
 pub use tables::markdown;
 
 use crate::args::Speed;
@@ -17,13 +17,13 @@ use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::medians;
 use crate::tracer::Contender;
-use crate::{isa, ours, rivals};
+use crate::{isa, rivals, structures};
 use anyhow::{Result, bail, ensure};
 use bth::rays::{Hit, Surface};
 use serde_json::json;
 use std::collections::BTreeMap;
 
-/// Smaller sets are not timed: that would measure the clock.
+/// Smaller sets are not timed, as the clock is too coarse for them.
 const FEWEST: usize = 1024;
 /// Pixels of the cameras; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
@@ -69,7 +69,7 @@ pub fn measure(arguments: &Speed) -> Result<SpeedRecord> {
         "rays": arguments.rays,
         "rounds": rounds,
         "quick": arguments.quick,
-        "rays_per_batch": ours::BATCH,
+        "rays_per_batch": structures::BATCH,
     });
     let mut record = SpeedRecord { head: Head::now("speed", isa, options), models: Vec::new() };
     let progress = Progress::new();
@@ -80,7 +80,7 @@ pub fn measure(arguments: &Speed) -> Result<SpeedRecord> {
 }
 
 fn check_names(arguments: &Speed) -> Result<()> {
-    let own = ours::KINDS.iter().flat_map(|k| k.uses().map(|(name, _)| name));
+    let own = structures::KINDS.iter().flat_map(|k| k.uses().map(|(name, _)| name));
     let all: Vec<String> = own.chain(rivals::RIVALS.iter().map(|r| r.name.to_owned())).collect();
     let all: Vec<&str> = all.iter().map(String::as_str).collect();
     if let Some(name) = arguments.tracers.unknown(&all).first() {
@@ -92,15 +92,15 @@ fn check_names(arguments: &Speed) -> Result<()> {
     Ok(())
 }
 
-fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progress) -> Result<ModelRecord> {
+fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progress) -> Result<ModelSpeeds> {
     let model = Model::load(which)?;
-    progress.say(format!("{}: compiling the BVH", model.name));
-    let bvh = ours::compile(&model, &ours::BVH)?;
+    progress.show(format!("{}: compiling the BVH", model.name));
+    let bvh = structures::compile(&model, &structures::BVH)?;
     let scene = bth::from_bytes(&bvh.bytes)?;
 
-    progress.say(format!("{}: making rays", model.name));
+    progress.show(format!("{}: making rays", model.name));
     let size = if arguments.quick { QUICK_SIZE } else { SIZE };
-    let options = rays::Options { size, most: arguments.rays, view: arguments.models.view() };
+    let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
     let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&scene, s)).collect();
@@ -109,14 +109,14 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     let (contenders, notes) = contenders::build(&model, bvh, &arguments.tracers, most_threads, progress)?;
     let mut runs = Vec::new();
     for &threads in &arguments.threads {
-        let mut run = Run::new(threads, &contenders);
+        let mut run = ThreadsRun::new(threads, &contenders);
         for (set, expected) in sets.iter().zip(&expected) {
-            progress.say(format!("{}: {} on {threads} thread(s)", model.name, set.name));
+            progress.show(format!("{}: {} on {threads} thread(s)", model.name, set.name));
             measure_set(set, expected, &contenders, rounds, &mut run);
         }
         runs.push(run);
     }
-    Ok(ModelRecord {
+    Ok(ModelSpeeds {
         name: model.name.clone(),
         triangles: model.triangles(),
         view,
@@ -127,7 +127,7 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     })
 }
 
-fn measure_set(set: &RaySet, expected: &Answers, contenders: &[Contender], rounds: usize, run: &mut Run) {
+fn measure_set(set: &RaySet, expected: &Answers, contenders: &[Contender], rounds: usize, run: &mut ThreadsRun) {
     let clock = Clock::for_threads(run.threads);
     let mut hits = vec![Hit::MISS; set.rays.len()];
     let mut found = vec![false; set.rays.len()];

@@ -1,7 +1,7 @@
 //! What `speed` measured, as it is written to JSON.
 
 use crate::clock::Clock;
-use crate::ours::{Compiled, Kind};
+use crate::structures::{Compiled, Kind};
 use crate::output::Head;
 use crate::rays::View;
 use crate::rounds::geometric_mean;
@@ -19,31 +19,31 @@ pub struct SpeedRecord {
     #[serde(flatten)]
     pub head: Head,
     /// In the order of the command line.
-    pub models: Vec<ModelRecord>,
+    pub models: Vec<ModelSpeeds>,
 }
 
 /// What was measured on a model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ModelRecord {
+pub struct ModelSpeeds {
     /// Name without folder.
     pub name: String,
     /// Triangles.
     pub triangles: usize,
-    /// Where it was seen from.
+    /// Where the cameras stood.
     pub view: View,
     /// Rays of each set that was timed.
     pub rays: BTreeMap<&'static str, usize>,
     /// Our compiled files.
-    pub structures: Vec<Structure>,
+    pub structures: Vec<CompiledFile>,
     /// What could not be measured, and why.
     pub left_out: Vec<LeftOut>,
     /// One for each number of threads.
-    pub runs: Vec<Run>,
+    pub runs: Vec<ThreadsRun>,
 }
 
 /// A compiled file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Structure {
+pub struct CompiledFile {
     /// Its name in the tables.
     pub name: &'static str,
     /// Wall-clock seconds of the compiler, all cores.
@@ -54,10 +54,10 @@ pub struct Structure {
     pub in_tets: f64,
 }
 
-impl Structure {
-    pub(super) fn of(kind: &Kind, compiled: &Compiled) -> Structure {
+impl CompiledFile {
+    pub(super) fn of(kind: &Kind, compiled: &Compiled) -> CompiledFile {
         let (compile_s, in_tets) = (compiled.seconds, compiled.in_tets);
-        Structure { name: kind.name, compile_s, file_bytes: compiled.bytes.len(), in_tets }
+        CompiledFile { name: kind.name, compile_s, file_bytes: compiled.bytes.len(), in_tets }
     }
 }
 
@@ -72,18 +72,18 @@ pub struct LeftOut {
 
 /// All tracers on so many threads.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Run {
+pub struct ThreadsRun {
     /// Threads that traced.
     pub threads: usize,
     /// What a second is.
     pub clock: Clock,
     /// In the order of the tables.
-    pub tracers: Vec<Measured>,
+    pub tracers: Vec<TracerSpeeds>,
 }
 
 /// A tracer's figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Measured {
+pub struct TracerSpeeds {
     /// Its name.
     pub name: String,
     /// Whether it is ours.
@@ -99,10 +99,10 @@ pub struct Measured {
     pub differ: BTreeMap<&'static str, usize>,
 }
 
-impl Run {
-    /// Without figures yet.
-    pub(super) fn new(threads: usize, contenders: &[Contender]) -> Run {
-        let row = |c: &Contender| Measured {
+impl ThreadsRun {
+    /// The contenders, without figures yet.
+    pub(super) fn new(threads: usize, contenders: &[Contender]) -> ThreadsRun {
+        let row = |c: &Contender| TracerSpeeds {
             name: c.name.clone(),
             ours: c.ours,
             build_s: c.build_s,
@@ -110,7 +110,7 @@ impl Run {
             mrays_per_s: BTreeMap::new(),
             differ: BTreeMap::new(),
         };
-        Run { threads, clock: Clock::for_threads(threads), tracers: contenders.iter().map(row).collect() }
+        ThreadsRun { threads, clock: Clock::for_threads(threads), tracers: contenders.iter().map(row).collect() }
     }
 
     fn rate(&self, tracer: &str, set: &str) -> Option<f64> {
@@ -122,7 +122,7 @@ impl Run {
         Some(self.rate(tracer, set)? / self.rate(BASE, set)?)
     }
 
-    /// Those of ours with wrong answers.
+    /// Names of our tracers with wrong answers.
     pub(super) fn wrong(&self) -> impl Iterator<Item = &str> {
         self.tracers.iter().filter(|t| t.ours && t.differ.values().any(|n| *n > 0)).map(|t| t.name.as_str())
     }
@@ -135,7 +135,7 @@ impl SpeedRecord {
     }
 
     /// Runs of all models on so many threads.
-    pub(super) fn runs(&self, threads: usize) -> impl Iterator<Item = &Run> {
+    pub(super) fn runs(&self, threads: usize) -> impl Iterator<Item = &ThreadsRun> {
         self.models.iter().flat_map(|m| &m.runs).filter(move |r| r.threads == threads)
     }
 
@@ -143,7 +143,7 @@ impl SpeedRecord {
     pub(super) fn tracers(&self, threads: usize) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for run in self.runs(threads) {
-            // A tracer that earlier models lack goes behind the one before it.
+            // A tracer that earlier models lack comes after the one that precedes it here.
             let mut place = 0;
             for tracer in &run.tracers {
                 match names.iter().position(|n| *n == tracer.name) {

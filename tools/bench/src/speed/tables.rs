@@ -1,6 +1,6 @@
 //! The tables of `speed`.
 
-use super::record::{BASE, ModelRecord, Run, SpeedRecord};
+use super::record::{BASE, ModelSpeeds, ThreadsRun, SpeedRecord};
 use crate::markdown::{count, table, two_decimals};
 use crate::rays::{NAMES, View};
 
@@ -19,7 +19,7 @@ pub fn markdown(record: &SpeedRecord) -> String {
 }
 
 /// Sets that have figures, in order.
-pub(super) fn sets_of<'a>(models: impl Iterator<Item = &'a ModelRecord> + Clone) -> Vec<&'static str> {
+pub(super) fn sets_of<'a>(models: impl Iterator<Item = &'a ModelSpeeds> + Clone) -> Vec<&'static str> {
     NAMES.into_iter().filter(|set| models.clone().any(|m| m.rays.contains_key(set))).collect()
 }
 
@@ -57,13 +57,13 @@ fn means(record: &SpeedRecord, threads: usize) -> String {
     )
 }
 
-fn page(model: &ModelRecord) -> String {
+fn page(model: &ModelSpeeds) -> String {
     let view = match model.view {
         View::Outside => "seen from outside",
         View::Inside => "seen from inside",
     };
     let mut text = format!("## {} ({} triangles, {view})\n\n", model.name, count(model.triangles as u64));
-    let share = |s: &super::record::Structure| {
+    let share = |s: &super::record::CompiledFile| {
         format!("{} {:.2} s, {:.0} % of the triangles in tets", s.name, s.compile_s, 100.0 * s.in_tets)
     };
     if !model.structures.is_empty() {
@@ -82,7 +82,7 @@ fn page(model: &ModelRecord) -> String {
     text
 }
 
-fn rates(model: &ModelRecord, run: &Run) -> String {
+fn rates(model: &ModelSpeeds, run: &ThreadsRun) -> String {
     let sets = sets_of(std::iter::once(model));
     let mut rows: Vec<Vec<String>> = Vec::new();
     for tracer in &run.tracers {

@@ -3,7 +3,7 @@
 mod api;
 mod scene;
 
-pub use self::scene::{Mesh, Place, Scene, build, build_instances};
+pub use self::scene::{EmbreeMesh, InstancePlace, EmbreeScene, build, build_instances};
 
 use self::api::Api;
 use crate::model::Model;
@@ -25,7 +25,7 @@ const QUALITY_HIGH: c_int = 2;
 const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
-/// What a caller gets who sets nothing; one ray a call.
+/// The library's defaults; one ray a call.
 pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false };
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
@@ -34,7 +34,7 @@ pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
 
-/// Loads the library, so that a build that is timed does not.
+/// Loads the library, so that the time of a build does not include loading it.
 ///
 /// # Errors
 /// If it is missing.
@@ -56,7 +56,7 @@ pub fn contender(model: &Model, name: &str, variant: &Variant, threads: usize) -
     Ok(Contender { name: name.to_owned(), ours: false, tracer: Box::new(scene), build_s, bytes })
 }
 
-/// Positions as [`Mesh`] wants them.
+/// Positions with the padding that [`EmbreeMesh`] needs.
 pub fn padded(positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     positions.iter().copied().chain([[0.0; 3]]).collect()
 }

@@ -10,44 +10,44 @@ use std::ffi::c_void;
 use std::sync::atomic::{AtomicI64, AtomicPtr, AtomicUsize, Ordering};
 
 /// A built scene.
-pub struct Scene {
+pub struct EmbreeScene {
     api: &'static Api,
     device: Handle,
     scene: Handle,
     packets: bool,
-    /// Scenes that instances in `scene` show.
+    /// The scenes of the objects that `scene` has instances of.
     objects: Vec<Handle>,
     /// The geometries of `scene` that are instances.
     instances: Vec<Handle>,
-    /// The library refers to these.
-    _meshes: Vec<Mesh>,
+    /// The library keeps pointers into these.
+    _meshes: Vec<EmbreeMesh>,
     allocated: Box<AtomicI64>,
 }
 
 /// Positions and triangles. The positions must end with one more than the triangles use: the library may read 16 bytes at
 /// the last.
-pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+pub type EmbreeMesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
-/// From an object to the world: rows of four; `None` where nothing is to be seen.
-pub type Place = Option<[[f32; 4]; 3]>;
+/// The transform from object to world of an instance, in rows of four; `None` for one that is not visible.
+pub type InstancePlace = Option<[[f32; 4]; 3]>;
 
 // SAFETY: the library's queries may run on any number of threads at once, and everything else is done by those who have
 // the scene for themselves.
-unsafe impl Send for Scene {}
+unsafe impl Send for EmbreeScene {}
 // SAFETY: as above.
-unsafe impl Sync for Scene {}
+unsafe impl Sync for EmbreeScene {}
 
-/// Adds up what the library allocates and frees.
+/// Called by the library for each allocation and release: adds up the bytes.
 ///
 /// # Safety
 /// `total` must point to an `AtomicI64`.
-unsafe extern "C" fn count(total: Handle, bytes: isize, _after: bool) -> bool {
+unsafe extern "C" fn count_bytes(total: Handle, bytes: isize, _after: bool) -> bool {
     // SAFETY: by the contract.
     unsafe { &*total.cast::<AtomicI64>() }.fetch_add(bytes as i64, Ordering::Relaxed);
     true
 }
 
-/// Builds a scene on so many threads; see [`Mesh`].
+/// Builds a scene on so many threads; see [`EmbreeMesh`].
 ///
 /// # Errors
 /// If the library is missing or reports an error.
@@ -56,25 +56,25 @@ pub fn build(
     triangles: Vec<[u32; 3]>,
     variant: &Variant,
     threads: usize,
-) -> Result<Scene> {
-    let mut scene = Scene::new(vec![(positions, triangles)], variant, threads)?;
+) -> Result<EmbreeScene> {
+    let mut scene = EmbreeScene::new(vec![(positions, triangles)], variant, threads)?;
     scene.scene = scene.object(&scene._meshes[0], variant);
     scene.finished()
 }
 
-/// Builds the objects of a scene, several at once; instance i shows the object `object_of[i]`, once it has a place
-/// ([`Scene::place`]).
+/// Builds the objects of a scene, several at once; instance i is an instance of `object_of[i]`, once it has a transform
+/// ([`EmbreeScene::place`]).
 ///
 /// # Errors
-/// As [`build`]; if an instance shows no object.
+/// As [`build`]; if an index of `object_of` is too large.
 pub fn build_instances(
-    objects: Vec<Mesh>,
+    objects: Vec<EmbreeMesh>,
     object_of: &[u32],
     variant: &Variant,
     threads: usize,
-) -> Result<Scene> {
+) -> Result<EmbreeScene> {
     ensure!(object_of.iter().all(|o| (*o as usize) < objects.len()), "an instance of no object");
-    let mut scene = Scene::new(objects, variant, threads)?;
+    let mut scene = EmbreeScene::new(objects, variant, threads)?;
     let handles: Vec<AtomicPtr<c_void>> = scene._meshes.iter().map(|_| AtomicPtr::default()).collect();
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {
@@ -90,7 +90,7 @@ pub fn build_instances(
     });
     scene.objects = handles.into_iter().map(AtomicPtr::into_inner).collect();
     let api = scene.api;
-    // SAFETY: as for `object`; the objects are committed, and live as long as the scene that shows them.
+    // SAFETY: as for `object`; the objects are committed, and live as long as the scene of their instances.
     unsafe {
         scene.scene = scene.empty(variant);
         for (row, object) in object_of.iter().enumerate() {
@@ -107,11 +107,11 @@ pub fn build_instances(
     scene.finished()
 }
 
-impl Scene {
-    /// Nothing but a device for these meshes.
-    fn new(meshes: Vec<Mesh>, variant: &Variant, threads: usize) -> Result<Scene> {
+impl EmbreeScene {
+    /// A device for these meshes, without scenes yet.
+    fn new(meshes: Vec<EmbreeMesh>, variant: &Variant, threads: usize) -> Result<EmbreeScene> {
         let api = Api::get()?;
-        let fits = |(positions, triangles): &Mesh| {
+        let fits = |(positions, triangles): &EmbreeMesh| {
             let count = positions.len().saturating_sub(1);
             triangles.iter().flatten().all(|v| (*v as usize) < count)
         };
@@ -119,17 +119,17 @@ impl Scene {
         let allocated = Box::new(AtomicI64::new(0));
         let total: *const AtomicI64 = &raw const *allocated;
         let config = std::ffi::CString::new(format!("threads={threads}"))?;
-        // SAFETY: the counter lives in the `Scene` until after the device is released: moving a `Box` does not move what
+        // SAFETY: the counter lives in the `EmbreeScene` until after the device is released: moving a `Box` does not move what
         // it points to.
         let device = unsafe {
             let device = (api.new_device)(config.as_ptr());
             ensure!(!device.is_null(), "the library makes no device");
-            (api.monitor)(device, count, total.cast_mut().cast());
+            (api.monitor)(device, count_bytes, total.cast_mut().cast());
             device
         };
         let (scene, packets) = (std::ptr::null_mut(), variant.packets);
         let (objects, instances) = (Vec::new(), Vec::new());
-        Ok(Scene { api, device, scene, packets, objects, instances, _meshes: meshes, allocated })
+        Ok(EmbreeScene { api, device, scene, packets, objects, instances, _meshes: meshes, allocated })
     }
 
     /// A scene without geometries.
@@ -147,11 +147,11 @@ impl Scene {
     }
 
     /// A committed scene of a mesh of this one.
-    fn object(&self, (positions, triangles): &Mesh, variant: &Variant) -> Handle {
+    fn object(&self, (positions, triangles): &EmbreeMesh, variant: &Variant) -> Handle {
         let (api, count_of_positions) = (self.api, positions.len().saturating_sub(1));
         // SAFETY: the calls are in the order and with the constants that the library's documentation asks for, which allows
         // them from several threads for different scenes. The buffers hold as many items as is said, plus the padding
-        // that it asks for, every index is below the number of positions (`new` looked), and all of it lives in the `Scene`
+        // that it asks for, every index is below the number of positions (checked by `new`), and all of it lives in the `EmbreeScene`
         // until after the device is released: moving a `Vec` does not move what it points to.
         unsafe {
             let scene = self.empty(variant);
@@ -170,7 +170,7 @@ impl Scene {
     }
 
     /// Places all instances and builds the scene over them.
-    pub fn place(&mut self, places: &[Place]) {
+    pub fn place(&mut self, places: &[InstancePlace]) {
         for (instance, place) in self.instances.iter().zip(places) {
             // SAFETY: the instance is a geometry of the scene; the library copies twelve numbers in rows.
             unsafe {
@@ -184,7 +184,7 @@ impl Scene {
                 (self.api.commit_geometry)(*instance);
             }
         }
-        // SAFETY: nobody traces: `self` is borrowed mutably.
+        // SAFETY: no other thread traces, as `self` is borrowed mutably.
         unsafe { (self.api.commit_scene)(self.scene) };
     }
 
@@ -193,7 +193,7 @@ impl Scene {
         u64::try_from(self.allocated.load(Ordering::Relaxed)).ok()
     }
 
-    fn finished(self) -> Result<Scene> {
+    fn finished(self) -> Result<EmbreeScene> {
         // SAFETY: the device is there.
         let error = unsafe { (self.api.device_error)(self.device) };
         ensure!(error == 0, "the library reports error {error}");
@@ -201,9 +201,9 @@ impl Scene {
     }
 }
 
-impl Drop for Scene {
+impl Drop for EmbreeScene {
     fn drop(&mut self) {
-        // SAFETY: all were made above and are released once; the library knows of none that is null.
+        // SAFETY: all were made above and are released once; none is null.
         unsafe {
             for scene in std::iter::once(&self.scene).chain(&self.objects).filter(|s| !s.is_null()) {
                 (self.api.release_scene)(*scene);
@@ -213,7 +213,7 @@ impl Drop for Scene {
     }
 }
 
-impl Tracer for Scene {
+impl Tracer for EmbreeScene {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         let instances = !self.objects.is_empty();
         if self.packets {

@@ -12,15 +12,15 @@ const EMPTY: f32 = 0.5;
 const BAD_SPLITS: u32 = 3;
 
 #[derive(Clone, Copy)]
-struct Bounds {
+struct Cell {
     lower: [f32; 3],
     upper: [f32; 3],
 }
 
-impl Bounds {
-    fn of<'a>(points: impl Iterator<Item = &'a [f32; 3]>) -> Bounds {
-        let empty = Bounds { lower: [f32::INFINITY; 3], upper: [f32::NEG_INFINITY; 3] };
-        points.fold(empty, |b, p| Bounds {
+impl Cell {
+    fn of<'a>(points: impl Iterator<Item = &'a [f32; 3]>) -> Cell {
+        let empty = Cell { lower: [f32::INFINITY; 3], upper: [f32::NEG_INFINITY; 3] };
+        points.fold(empty, |b, p| Cell {
             lower: std::array::from_fn(|k| b.lower[k].min(p[k])),
             upper: std::array::from_fn(|k| b.upper[k].max(p[k])),
         })
@@ -32,12 +32,12 @@ impl Bounds {
         x * y + y * z + z * x
     }
 
-    fn below(mut self, axis: usize, split: f32) -> Bounds {
+    fn below(mut self, axis: usize, split: f32) -> Cell {
         self.upper[axis] = split;
         self
     }
 
-    fn above(mut self, axis: usize, split: f32) -> Bounds {
+    fn above(mut self, axis: usize, split: f32) -> Cell {
         self.lower[axis] = split;
         self
     }
@@ -51,15 +51,15 @@ struct Event {
     triangle: u32,
 }
 
-struct Plane {
+struct KdPlane {
     cost: f32,
     axis: usize,
     /// Row of the event in the sorted list of its axis.
     event: usize,
 }
 
-struct Builder {
-    bounds: Vec<Bounds>,
+struct KdBuilder {
+    bounds: Vec<Cell>,
     nodes: Vec<Node>,
     lists: Vec<u32>,
 }
@@ -67,18 +67,18 @@ struct Builder {
 impl KdTree {
     /// Builds the tree of these triangles.
     pub(super) fn build(corners: Vec<[[f32; 3]; 3]>) -> KdTree {
-        let bounds: Vec<Bounds> = corners.iter().map(|c| Bounds::of(c.iter())).collect();
-        let all = Bounds::of(corners.iter().flatten());
+        let bounds: Vec<Cell> = corners.iter().map(|c| Cell::of(c.iter())).collect();
+        let all = Cell::of(corners.iter().flatten());
         let depth = (8.0 + 1.3 * (corners.len().max(1) as f32).log2()).round() as u32;
-        let mut builder = Builder { bounds, nodes: Vec::new(), lists: Vec::new() };
+        let mut builder = KdBuilder { bounds, nodes: Vec::new(), lists: Vec::new() };
         builder.node((0..corners.len() as u32).collect(), all, depth, 0);
-        let Builder { nodes, lists, .. } = builder;
+        let KdBuilder { nodes, lists, .. } = builder;
         KdTree { nodes, lists, corners, lower: all.lower, upper: all.upper }
     }
 }
 
-impl Builder {
-    fn node(&mut self, triangles: Vec<u32>, bounds: Bounds, depth: u32, bad: u32) {
+impl KdBuilder {
+    fn node(&mut self, triangles: Vec<u32>, bounds: Cell, depth: u32, bad: u32) {
         let leaf_cost = TEST * triangles.len() as f32;
         let events = [0, 1, 2].map(|axis| self.events(&triangles, axis));
         let best = if triangles.len() <= 1 || depth == 0 { None } else { best_plane(&events, &bounds) };
@@ -89,7 +89,7 @@ impl Builder {
             return self.leaf(&triangles);
         }
 
-        // What lies in the plane goes to one side only: to that on which its event was counted.
+        // A triangle that lies in the plane goes to the one side on which its event was counted.
         let (axis, events) = (plane.axis, &events[plane.axis]);
         let split = events[plane.event].at;
         let below = events[..plane.event].iter().filter(|e| !e.ends).map(|e| e.triangle).collect();
@@ -128,21 +128,21 @@ impl Builder {
 }
 
 /// The plane of least cost inside the bounds, if there is any.
-fn best_plane(events: &[Vec<Event>; 3], bounds: &Bounds) -> Option<Plane> {
+fn best_plane(events: &[Vec<Event>; 3], bounds: &Cell) -> Option<KdPlane> {
     let whole = bounds.area();
-    let mut best: Option<Plane> = None;
+    let mut best: Option<KdPlane> = None;
     for (axis, events) in events.iter().enumerate() {
         let (mut below, mut above) = (0usize, events.len() / 2);
         for (i, event) in events.iter().enumerate() {
             above -= usize::from(event.ends);
             if event.at > bounds.lower[axis] && event.at < bounds.upper[axis] {
-                let share = |b: Bounds| b.area() / whole;
+                let share = |b: Cell| b.area() / whole;
                 let empty = if below == 0 || above == 0 { EMPTY } else { 0.0 };
                 let tests = share(bounds.below(axis, event.at)) * below as f32
                     + share(bounds.above(axis, event.at)) * above as f32;
                 let cost = STEP + TEST * (1.0 - empty) * tests;
                 if best.as_ref().is_none_or(|b| cost < b.cost) {
-                    best = Some(Plane { cost, axis, event: i });
+                    best = Some(KdPlane { cost, axis, event: i });
                 }
             }
             below += usize::from(!event.ends);

@@ -1,6 +1,6 @@
 //! A k-d tree, the structure that the BTH paper compares itself with: built by the surface area heuristic
 //! (Wald and Havran 2006, "On building fast kd-trees for ray tracing, and on doing that in O(N log N)",
-//! costs of their equation 8), walked as by Havran (2000) with a stack of far children. Plain on purpose.
+//! costs of their equation 8), traversed with a stack of far children (Havran 2000). It is not optimized further.
 
 mod build;
 mod walk;
@@ -68,8 +68,9 @@ const _: () = assert!(size_of::<Node>() == 12);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rays::Random;
+    use crate::rays::on_sphere;
     use bth::rays::Ray;
+    use bth_random::Rng;
 
     fn soup(count: usize, rng: &mut Rng) -> Vec<[[f32; 3]; 3]> {
         let mut corner = |middle: [f64; 3]| middle.map(|x| (x + 0.1 * (rng.unit_f64() - 0.5)) as f32);
@@ -106,7 +107,7 @@ mod tests {
         for _ in 0..3000 {
             let point = |r: &mut Rng| [r.unit_f64(), r.unit_f64(), r.unit_f64()].map(|x| (x * extent) as f32);
             let origin = point(&mut rng);
-            let direction = on_sphere(rng).to_array().map(|x| x as f32);
+            let direction = on_sphere(&mut rng).to_array().map(|x| x as f32);
             let tmax =
                 if rng.unit_f64() < 0.5 { f32::INFINITY } else { (0.5 * extent * rng.unit_f64()) as f32 };
             let ray = Ray { origin, tmin: 0.0, direction, tmax };

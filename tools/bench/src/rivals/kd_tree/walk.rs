@@ -1,14 +1,15 @@
 //! Walks the tree: front to back, far children on a stack, done at a hit within the current cell.
 
 use super::{KdTree, Node};
+use crate::triangle_tests::{Intersection, moller_trumbore};
 use bth::rays::{Hit, Ray, Surface};
 
-/// A child to be looked at later, and the part of the ray in it.
-pub(super) type Later = (u32, f32, f32);
+/// A child that is visited later, and the interval of the ray in it.
+pub(super) type Postponed = (u32, f32, f32);
 
 impl KdTree {
     /// Nearest hit, or with `ANY` whichever is found first.
-    pub(super) fn walk<const ANY: bool>(&self, ray: &Ray, stack: &mut Vec<Later>) -> Hit {
+    pub(super) fn walk<const ANY: bool>(&self, ray: &Ray, stack: &mut Vec<Postponed>) -> Hit {
         let mut best = Hit { t: ray.tmax, ..Hit::MISS };
         let reciprocal = ray.direction.map(|d| 1.0 / d);
         let Some((mut near, mut far)) = self.clip(ray, &reciprocal) else { return Hit::MISS };
@@ -46,7 +47,7 @@ impl KdTree {
             }
             match stack.pop() {
                 Some((node, start, end)) if start <= best.t => (at, near, far) = (node, start, end),
-                // Those below on the stack begin no nearer.
+                // Those below on the stack begin at no smaller t.
                 _ => break,
             }
         }
@@ -71,26 +72,13 @@ impl KdTree {
         (near <= far).then_some((near, far))
     }
 
-    /// Möller and Trumbore 1997. Keeps the hit if it is nearer.
+    /// Tests a triangle, and keeps the hit if it is nearer.
     fn test(&self, ray: &Ray, triangle: u32, best: &mut Hit) -> bool {
-        let [a, b, c] = self.corners[triangle as usize];
-        let (edge1, edge2) = (sub(b, a), sub(c, a));
-        let p = cross(ray.direction, edge2);
-        let determinant = dot(edge1, p);
-        if determinant == 0.0 {
-            return false;
-        }
-        let inverse = 1.0 / determinant;
-        let from = sub(ray.origin, a);
-        let u = dot(from, p) * inverse;
-        let q = cross(from, edge1);
-        let v = dot(ray.direction, q) * inverse;
-        let t = dot(edge2, q) * inverse;
-        let hit = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t >= ray.tmin && t <= best.t;
-        if hit {
+        let hit = moller_trumbore(ray, self.corners[triangle as usize], best.t);
+        if let Some(Intersection { t, u, v }) = hit {
             *best = Hit { t, u, v, surface: Surface { instance: 0, triangle } };
         }
-        hit
+        hit.is_some()
     }
 
     /// Nearest hit among these triangles.
@@ -102,16 +90,4 @@ impl KdTree {
         }
         if best.surface == Surface::NONE { Hit::MISS } else { best }
     }
-}
-
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

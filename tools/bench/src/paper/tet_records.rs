@@ -8,7 +8,7 @@ pub(super) const FACE: u32 = 1 << 31;
 pub(super) const HULL: u32 = u32::MAX;
 
 /// A record: the fourth vertex from three, and what lies behind the face opposite to a vertex.
-pub(super) trait Record: Copy + Send + Sync {
+pub(super) trait TetRecord: Copy + Send + Sync {
     /// From vertices in ascending order and the links opposite to them.
     fn new(vertex: [u32; 4], next: [u32; 4]) -> Self;
     /// Exclusive or of all four vertices.
@@ -34,7 +34,7 @@ pub(super) struct Tet20 {
     next: [u32; 4],
 }
 
-impl Record for Tet32 {
+impl TetRecord for Tet32 {
     fn new(vertex: [u32; 4], next: [u32; 4]) -> Self {
         let [a, b, c, d] = vertex;
         Tet32 { vertex: [a, b, c], xor: a ^ b ^ c ^ d, next }
@@ -49,7 +49,7 @@ impl Record for Tet32 {
     }
 }
 
-impl Record for Tet20 {
+impl TetRecord for Tet20 {
     fn new(vertex: [u32; 4], next: [u32; 4]) -> Self {
         Tet20 { xor: vertex.iter().fold(0, |x, v| x ^ v), next }
     }
@@ -82,7 +82,7 @@ pub(super) struct Tets<R> {
     pub(super) corners: Vec<[u32; 4]>,
 }
 
-impl<R: Record> Tets<R> {
+impl<R: TetRecord> Tets<R> {
     pub(super) fn new(mesh: &TetMesh) -> Tets<R> {
         let mut hull = Vec::new();
         let mut records = Vec::with_capacity(mesh.tets.len());

@@ -1,46 +1,11 @@
-//! The paper's walk through tetrahedra, one ray at a time: the vertices of the face entered stay projected on a plane
-//! across the ray, the fourth is projected, and signs of cross products name the exit.
+//! The paper's walk through tetrahedra, one ray at a time. The three vertices of the entry face are kept in projection on a plane
+//! perpendicular to the ray; the fourth vertex is projected, and signs of cross products give the exit face.
 
-use super::records::{FACE, HULL, Record, Tets};
+use super::tet_records::{FACE, HULL, TetRecord, Tets};
+use crate::triangle_tests::{cross, dot, moller_trumbore, sub};
 use bth::rays::Ray;
 
-pub(super) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Möller and Trumbore 1997: t within [tmin, best].
-#[inline(always)]
-pub(super) fn crosses(ray: &Ray, [a, b, c]: [[f32; 3]; 3], best: f32) -> Option<f32> {
-    let (e1, e2) = (sub(b, a), sub(c, a));
-    let p = cross(ray.direction, e2);
-    let determinant = dot(e1, p);
-    if determinant == 0.0 {
-        return None;
-    }
-    let inverse = 1.0 / determinant;
-    let from = sub(ray.origin, a);
-    let u = dot(from, p) * inverse;
-    if !(0.0..=1.0).contains(&u) {
-        return None;
-    }
-    let q = cross(from, e1);
-    let v = dot(ray.direction, q) * inverse;
-    if v < 0.0 || u + v > 1.0 {
-        return None;
-    }
-    let t = dot(e2, q) * inverse;
-    (t >= ray.tmin && t <= best).then_some(t)
-}
-
-/// A plane across a ray, with the origin on the ray.
+/// A plane perpendicular to a ray, with the origin on the ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     origin: [f32; 3],
@@ -80,11 +45,11 @@ pub(super) enum End {
     Face(u32, f32),
     /// Outside of the box, or beyond the end of the ray.
     Left,
-    /// In circles, or nowhere: rounding.
+    /// Without a result, because rounding errors led the walk astray.
     Lost,
 }
 
-impl<R: Record> Tets<R> {
+impl<R: TetRecord> Tets<R> {
     fn corners_of(&self, vertex: [u32; 3]) -> [[f32; 3]; 3] {
         vertex.map(|v| self.vertices[v as usize])
     }
@@ -94,8 +59,8 @@ impl<R: Record> Tets<R> {
         let mut entry: Option<(f32, usize)> = None;
         for (row, face) in self.hull.iter().enumerate() {
             let limit = entry.map_or(best, |e| e.0);
-            if let Some(t) = crosses(ray, self.corners_of(face.vertex), limit) {
-                entry = Some((t, row));
+            if let Some(hit) = moller_trumbore(ray, self.corners_of(face.vertex), limit) {
+                entry = Some((hit.t, row));
             }
         }
         match entry {
@@ -167,7 +132,7 @@ impl<R: Record> Tets<R> {
         End::Lost
     }
 
-    /// A constrained face was crossed: where, by its plane.
+    /// The end of a walk at a constrained face; t is that of its plane.
     #[inline(always)]
     fn at_face(&self, ray: &Ray, row: u32, best: f32) -> End {
         let [a, b, c] = self.corners_of(self.faces[row as usize].1);
@@ -176,7 +141,7 @@ impl<R: Record> Tets<R> {
         if t >= ray.tmin && t <= best { End::Face(row, t) } else { End::Left }
     }
 
-    /// The tetrahedron that holds a point, by looking at all of them: once for each camera.
+    /// The tetrahedron that holds a point, found by testing all of them.
     pub(super) fn holding(&self, point: [f32; 3]) -> Option<u32> {
         let p = point.map(f64::from);
         let volume = |a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]| {

@@ -1,8 +1,9 @@
 //! Rays aimed exactly at vertices and at middles of edges.
 
 use crate::model::Model;
-use crate::rays::{Random, RaySet};
+use crate::rays::RaySet;
 use bth::rays::Ray;
+use bth_random::Rng;
 
 /// Tries to find an edge whose middle is a point in f32: every axis succeeds about every other time.
 const TRIES: usize = 1000;

@@ -1,12 +1,12 @@
-//! What is wrong with answers, and by how much.
+//! Classifies wrong answers, and measures errors of t.
 
-use super::truth::{Exact, Geometry};
+use super::exact_answers::{Exact, Geometry};
 use bth::rays::{Hit, Ray};
 use serde::Serialize;
 
-/// What an answer is.
+/// The class of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Verdict {
+enum AnswerClass {
     Right,
     FalseMiss,
     Leak,
@@ -14,7 +14,7 @@ enum Verdict {
     WrongNeighbour,
 }
 
-/// Answers by what is wrong with them.
+/// Numbers of answers by what is wrong with them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Defects {
     /// Answers.
@@ -35,7 +35,7 @@ impl Defects {
         self.false_misses + self.leaks + self.ghosts + self.wrong_neighbours
     }
 
-    /// The same over more rays.
+    /// Adds the counts of other rays.
     pub fn add(&mut self, other: &Defects) {
         self.rays += other.rays;
         self.false_misses += other.false_misses;
@@ -44,14 +44,14 @@ impl Defects {
         self.wrong_neighbours += other.wrong_neighbours;
     }
 
-    fn count(&mut self, verdict: Verdict) {
+    fn count(&mut self, verdict: AnswerClass) {
         self.rays += 1;
         match verdict {
-            Verdict::Right => {}
-            Verdict::FalseMiss => self.false_misses += 1,
-            Verdict::Leak => self.leaks += 1,
-            Verdict::Ghost => self.ghosts += 1,
-            Verdict::WrongNeighbour => self.wrong_neighbours += 1,
+            AnswerClass::Right => {}
+            AnswerClass::FalseMiss => self.false_misses += 1,
+            AnswerClass::Leak => self.leaks += 1,
+            AnswerClass::Ghost => self.ghosts += 1,
+            AnswerClass::WrongNeighbour => self.wrong_neighbours += 1,
         }
     }
 }
@@ -77,32 +77,32 @@ pub fn defects(
 ) -> Defects {
     let mut defects = Defects::default();
     for ((ray, exact), hit) in rays.iter().zip(truth).zip(hits) {
-        defects.count(judge(geometry, neighbours, ray, exact, hit));
+        defects.count(classify(geometry, neighbours, ray, exact, hit));
     }
     defects
 }
 
-fn judge(geometry: &Geometry, neighbours: &Neighbours<'_>, ray: &Ray, exact: &Exact, hit: &Hit) -> Verdict {
+fn classify(geometry: &Geometry, neighbours: &Neighbours<'_>, ray: &Ray, exact: &Exact, hit: &Hit) -> AnswerClass {
     let (right, found) = (exact.hit.surface.triangle, hit.surface.triangle);
     match (exact.hit.is_hit(), hit.is_hit()) {
-        (false, false) => return Verdict::Right,
-        (true, false) => return Verdict::FalseMiss,
-        _ if right == found => return Verdict::Right,
+        (false, false) => return AnswerClass::Right,
+        (true, false) => return AnswerClass::FalseMiss,
+        _ if right == found => return AnswerClass::Right,
         _ => {}
     }
     match (geometry.crossing(ray, right), geometry.crossing(ray, found)) {
-        (Some(right), Some(found)) if found.t == right.t => Verdict::Right,
-        (Some(right), Some(found)) if found.t > right.t => Verdict::Leak,
-        // Before the nearest hit within the range: not within it.
-        (_, Some(_)) => Verdict::Ghost,
-        (_, None) if neighbours.touch(right, found) => Verdict::WrongNeighbour,
-        (_, None) => Verdict::Ghost,
+        (Some(right), Some(found)) if found.t == right.t => AnswerClass::Right,
+        (Some(right), Some(found)) if found.t > right.t => AnswerClass::Leak,
+        // It lies before the nearest hit within the range of the ray, so it is not within that range.
+        (_, Some(_)) => AnswerClass::Ghost,
+        (_, None) if neighbours.touch(right, found) => AnswerClass::WrongNeighbour,
+        (_, None) => AnswerClass::Ghost,
     }
 }
 
 /// Quantiles of an error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct ErrorQuantiles {
     /// Half of the errors are at most this.
     pub median: f64,
     /// 99 % are.
@@ -111,16 +111,16 @@ pub struct Spread {
     pub max: f64,
 }
 
-impl Spread {
-    /// Of these errors; zero if there are none.
-    pub fn of(mut errors: Vec<f64>) -> Spread {
+impl ErrorQuantiles {
+    /// The quantiles of these errors; zero if there are none.
+    pub fn of(mut errors: Vec<f64>) -> ErrorQuantiles {
         errors.sort_by(f64::total_cmp);
         // The least that so many of them do not exceed.
         let at = |share: f64| {
             let rank = (share * errors.len() as f64).ceil() as usize;
             errors.get(rank.max(1) - 1).copied().unwrap_or_default()
         };
-        Spread { median: at(0.5), most: at(0.99), max: at(1.0) }
+        ErrorQuantiles { median: at(0.5), most: at(0.99), max: at(1.0) }
     }
 }
 
@@ -144,29 +144,29 @@ pub fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -
 mod tests {
     use super::*;
     use crate::model::Model;
-    use crate::ours;
+    use crate::structures;
     use bth::rays::Surface;
 
     #[test]
     fn quantiles_are_values_that_occur() {
-        let spread = Spread::of((1..=200).rev().map(f64::from).collect());
-        assert_eq!(spread, Spread { median: 100.0, most: 198.0, max: 200.0 });
-        assert_eq!(Spread::of(vec![]), Spread::default());
+        let spread = ErrorQuantiles::of((1..=200).rev().map(f64::from).collect());
+        assert_eq!(spread, ErrorQuantiles { median: 100.0, most: 198.0, max: 200.0 });
+        assert_eq!(ErrorQuantiles::of(vec![]), ErrorQuantiles::default());
     }
 
     /// Every kind of defect, made on purpose.
     #[test]
     fn defects_are_told_apart() {
         let model = Model::load("torus-knot:320").unwrap();
-        let bytes = ours::compile(&model, &ours::BVH).unwrap().bytes;
+        let bytes = structures::compile(&model, &structures::BVH).unwrap().bytes;
         let geometry = Geometry::new(&bytes).unwrap();
         let neighbours = Neighbours(&model.mesh.triangles);
-        let set = crate::accuracy::aimed::set(&model, crate::accuracy::aimed::Target::Vertices, 200);
+        let set = crate::accuracy::aimed_rays::set(&model, crate::accuracy::aimed_rays::Target::Vertices, 200);
         let truth = geometry.answers(&set, 1).unwrap();
         let i = (0..200).find(|&i| truth[i].hit.is_hit() && truth[i].hit.t < 0.9).unwrap();
         let (ray, exact) = (&set.rays[i], &truth[i]);
         let name = |triangle| Hit { surface: Surface { instance: 0, triangle }, ..exact.hit };
-        let verdict = |hit: Hit| judge(&geometry, &neighbours, ray, exact, &hit);
+        let verdict = |hit: Hit| classify(&geometry, &neighbours, ray, exact, &hit);
         let all = 0..model.triangles() as u32;
         let met = |t: &u32| geometry.crossing(ray, *t).is_some();
         let right = exact.hit.surface.triangle;
@@ -176,10 +176,10 @@ mod tests {
             .find(|t| geometry.crossing(ray, *t).unwrap().t > geometry.crossing(ray, right).unwrap().t);
         let beside = all.clone().find(|t| !met(t) && neighbours.touch(*t, right)).unwrap();
         let elsewhere = all.clone().find(|t| !met(t) && !neighbours.touch(*t, right)).unwrap();
-        assert_eq!(verdict(exact.hit), Verdict::Right);
-        assert_eq!(verdict(Hit::MISS), Verdict::FalseMiss);
-        assert_eq!(verdict(name(behind.expect("the target lies behind"))), Verdict::Leak);
-        assert_eq!(verdict(name(beside)), Verdict::WrongNeighbour);
-        assert_eq!(verdict(name(elsewhere)), Verdict::Ghost);
+        assert_eq!(verdict(exact.hit), AnswerClass::Right);
+        assert_eq!(verdict(Hit::MISS), AnswerClass::FalseMiss);
+        assert_eq!(verdict(name(behind.expect("the target lies behind"))), AnswerClass::Leak);
+        assert_eq!(verdict(name(beside)), AnswerClass::WrongNeighbour);
+        assert_eq!(verdict(name(elsewhere)), AnswerClass::Ghost);
     }
 }

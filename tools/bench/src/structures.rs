@@ -1,4 +1,4 @@
-//! Our own structures, compiled through the compiler library.
+//! The structures of bth: each kind of compiled file, and the ways to trace it.
 
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
@@ -28,8 +28,8 @@ pub struct Kind {
 const LINK32: Kind =
     Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, bits: None, boxes: Boxes::F32 };
 
-/// The structures. The default file comes first, then the plain BVH, which is also what finds the hits
-/// that secondary rays start from.
+/// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays start
+/// from.
 pub const KINDS: [Kind; 7] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
@@ -62,7 +62,7 @@ impl Kind {
         self.structure == Structure::Tets
     }
 
-    /// Whether it can hold tetrahedra, so that hints can matter.
+    /// Whether it can hold tetrahedra, to which hints matter.
     fn takes_hints(&self) -> bool {
         self.structure != Structure::Bvh
     }
@@ -75,8 +75,8 @@ impl Kind {
         [Some(batch), hinted, Some(single)].into_iter().flatten()
     }
 
-    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would take the
-    /// rays without hints; all else is the default.
+    /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them where
+    /// there are no hints; all else is the default.
     fn options(&self) -> Options {
         Options {
             structure: self.structure,
@@ -123,7 +123,7 @@ pub fn compile(model: &Model, kind: &Kind) -> Result<Compiled> {
     Ok(Compiled { bytes: compiled.bytes, seconds, in_tets })
 }
 
-/// The message of an error without its path, which belongs into no record.
+/// The message of an error without its path, as records hold no paths.
 fn reason(error: &bth_compile::Error) -> String {
     match error {
         bth_compile::Error::Input { message, hint, .. } => format!("{message} (hint: {hint})"),

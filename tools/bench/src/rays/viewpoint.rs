@@ -1,35 +1,35 @@
-//! Where the camera stands: around the model, within it, or close to its surface.
+//! Chooses where the camera stands: around the model, within it, or close to its surface.
 
-use super::camera::Camera;
-use super::finder::Finder;
-use super::random::{Random, across};
-use super::ray;
+use super::camera::{Camera, ray};
+use super::directions::{cosine_weighted, on_sphere, perpendicular};
+use super::finder::{Finder, LIFT};
 use crate::model::Bounds;
 use bth::rays::{Hit, Ray};
+use bth_random::Rng;
 use glam::DVec3;
 use serde::Serialize;
 
-/// Where a model is seen from.
+/// Where the cameras of a model stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum View {
-    /// From around it.
+    /// Around the model.
     Outside,
-    /// From within, as is right for rooms and caves, which from outside show only their walls.
+    /// Within the model, as is right for rooms and caves: from outside only their walls are visible.
     Inside,
 }
 
 /// A camera, its rays and what they hit.
-pub(super) struct Shot {
+pub(super) struct CameraHits {
     pub(super) camera: Camera,
     pub(super) rays: Vec<Ray>,
     pub(super) hits: Vec<Hit>,
 }
 
-fn shoot(finder: &Finder<'_>, camera: Camera) -> Shot {
+fn trace_camera(finder: &Finder<'_>, camera: Camera) -> CameraHits {
     let rays = camera.rays();
     let hits = finder.nearest(&rays);
-    Shot { camera, rays, hits }
+    CameraHits { camera, rays, hits }
 }
 
 /// The three-quarter views from outside, in the order in which they are tried.
@@ -40,28 +40,28 @@ const SIDES: [DVec3; 4] = [
     DVec3::new(-1.0, 0.5, 0.8),
 ];
 
-/// A view of the whole model. Where a model shows flat sides that lie in its bounding box, secondary
-/// rays leave the box at once and measure nothing, so another side is looked for then.
-pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> Shot {
+/// A camera that frames the whole model. Where most of the visible surface lies in the faces of the bounding box, secondary
+/// rays leave the box at once and measure nothing; then the next side is tried.
+pub(super) fn outside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> CameraHits {
     let points: Vec<DVec3> = finder.model.mesh.positions.iter().map(|p| crate::model::position(*p)).collect();
     let (middle, diagonal) = (bounds.center(), bounds.diagonal());
-    let look = |from: DVec3| shoot(finder, Camera::framing(&points, middle, diagonal, from, size));
+    let look = |from: DVec3| trace_camera(finder, Camera::framing(&points, middle, diagonal, from, size));
     let mut first = None;
     for from in SIDES {
-        let shot = look(from);
-        let hit = shot.rays.iter().zip(&shot.hits).filter(|(_, h)| h.is_hit());
+        let seen = look(from);
+        let hit = seen.rays.iter().zip(&seen.hits).filter(|(_, h)| h.is_hit());
         let starts: Vec<bool> = hit.map(|(r, h)| bounds.holds(finder.start(r, h).0)).collect();
         if 2 * starts.iter().filter(|holds| **holds).count() > starts.len() {
-            return shot;
+            return seen;
         }
-        first.get_or_insert(shot);
+        first.get_or_insert(seen);
     }
     first.expect("there are sides")
 }
 
-/// A view from within: of 64 seeded points in the box, the one from which most directions hit something,
-/// far away on average; it looks where it is farthest.
-pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> Shot {
+/// A camera within the model. Of 64 random points in the box it takes the one from which most directions hit something, far
+/// away on average; it looks in the direction of the farthest hit.
+pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> CameraHits {
     const POINTS: usize = 64;
     const DIRECTIONS: usize = 256;
     let mut rng = Rng::new(6);
@@ -69,7 +69,7 @@ pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> 
     let mut inner = || 0.1 + 0.8 * rng.unit_f64();
     let eyes: Vec<DVec3> =
         (0..POINTS).map(|_| bounds.lower + extent * DVec3::new(inner(), inner(), inner())).collect();
-    let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| on_sphere(rng)).collect();
+    let directions: Vec<DVec3> = (0..DIRECTIONS).map(|_| on_sphere(&mut rng)).collect();
 
     let mut best = (f64::NEG_INFINITY, DVec3::ZERO, DVec3::Z);
     for eye in eyes {
@@ -79,44 +79,44 @@ pub(super) fn inside(finder: &Finder<'_>, bounds: &Bounds, size: (u32, u32)) -> 
         let hit = reaches.iter().filter(|t| **t > 0.0).count() as f64 / DIRECTIONS as f64;
         let mean = reaches.iter().sum::<f64>() / DIRECTIONS as f64;
         let farthest = (0..DIRECTIONS).max_by(|i, j| reaches[*i].total_cmp(&reaches[*j])).unwrap_or(0);
-        // The last of equal ones, which matters only where nothing is hit at all.
+        // `>=` takes the last of equal points, which matters only where nothing is hit at all.
         if hit * hit * mean >= best.0 {
             best = (hit * hit * mean, eye, directions[farthest]);
         }
     }
     let (_, eye, direction) = best;
     let camera = Camera { eye, target: eye + direction, tangent: 35f64.to_radians().tan(), size };
-    shoot(finder, camera)
+    trace_camera(finder, camera)
 }
 
 /// A camera just above the surface point that is nearest to the middle of the picture.
-pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, shot: &Shot) -> Camera {
-    let (front, ..) = shot.camera.axes();
-    let central = |i: &usize| front.dot(crate::model::position(shot.rays[*i].direction));
-    let hit = (0..shot.hits.len()).filter(|i| shot.hits[*i].is_hit());
-    let Some(middle) = hit.max_by(|i, j| central(i).total_cmp(&central(j))) else { return shot.camera };
-    let (point, normal) = finder.start(&shot.rays[middle], &shot.hits[middle]);
-    let (side, _) = across(normal);
+pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, seen: &CameraHits) -> Camera {
+    let (front, ..) = seen.camera.axes();
+    let central = |i: &usize| front.dot(crate::model::position(seen.rays[*i].direction));
+    let hit = (0..seen.hits.len()).filter(|i| seen.hits[*i].is_hit());
+    let Some(middle) = hit.max_by(|i, j| central(i).total_cmp(&central(j))) else { return seen.camera };
+    let (point, normal) = finder.start(&seen.rays[middle], &seen.hits[middle]);
+    let (side, _) = perpendicular(normal);
     Camera {
         eye: point + (normal * 0.6 + side * 0.8) * (0.04 * diagonal),
         target: point,
         tangent: 30f64.to_radians().tan(),
-        ..shot.camera
+        ..seen.camera
     }
 }
 
 /// Samples of [`automatic`].
 const SAMPLES: usize = 4096;
-/// A model is seen from inside when less than this share of the rays from its fronts leave it.
+/// The camera stands within the model when less than this share of the rays from the fronts of its triangles leave it.
 const OPEN: f64 = 0.08;
 
-/// Decides by how much of the sky the fronts of the triangles see: next to nothing in rooms and caves,
-/// most of it on objects. Triangles count equally, so that furniture outweighs the walls around it.
+/// Decides by the share of rays from the fronts of the triangles that hit nothing: next to none in rooms and caves,
+/// most on objects. Triangles count equally, so that furniture outweighs the walls around it.
 pub(super) fn automatic(finder: &Finder<'_>, diagonal: f64) -> View {
     if sky(finder, diagonal) < OPEN { View::Inside } else { View::Outside }
 }
 
-/// Share of cosine-weighted rays from the fronts of seeded triangles that hit nothing.
+/// Share of cosine-weighted rays from the fronts of random triangles that hit nothing.
 fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
     let mut rng = Rng::new(7);
     let count = finder.model.triangles();
@@ -126,8 +126,8 @@ fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
         let normal = finder.model.normal(triangle);
         if normal != DVec3::ZERO {
             let [a, b, c] = finder.model.corners(triangle);
-            let point = (a + b + c) / 3.0 + normal * (super::LIFT * diagonal);
-            rays.push(ray(point, cosine_weighted(rng, normal), f64::INFINITY));
+            let point = (a + b + c) / 3.0 + normal * (LIFT * diagonal);
+            rays.push(ray(point, cosine_weighted(&mut rng, normal), f64::INFINITY));
         }
     }
     let open = finder.nearest(&rays).iter().filter(|h| !h.is_hit()).count();

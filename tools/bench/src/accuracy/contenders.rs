@@ -1,11 +1,11 @@
 //! What is compared: every structure, record and instruction set of ours, and the rivals.
 
-use super::truth::Geometry;
+use super::exact_answers::Geometry;
 use crate::model::Model;
 use crate::names::Names;
-use crate::ours::{self, Compiled, Kind};
+use crate::structures::{self, Compiled, Kind};
 use crate::progress::Progress;
-use crate::rivals::RIVALS;
+use crate::rivals::{F32_TESTS, RIVALS, Rival};
 use crate::speed::record::LeftOut;
 use crate::tracer::Contender;
 use anyhow::Result;
@@ -13,24 +13,24 @@ use bth::Isa;
 use std::rc::Rc;
 
 /// A way to trace a model.
-pub(super) struct Subject {
+pub(super) struct MeasuredTracer {
     /// Its name in tables.
     pub(super) name: String,
-    /// Whose it is, for colours.
+    /// Its group, which has a colour in the charts.
     pub(super) group: &'static str,
     pub(super) contender: Rc<Contender>,
-    /// Vector instructions, where they are ours to choose.
+    /// The vector instructions of our structures; `None` for rivals.
     pub(super) isa: Option<Isa>,
-    /// Row of [`Subjects::geometries`]: the triangles that it has.
+    /// Row of [`MeasuredTracers::geometries`]: the triangles that it has.
     pub(super) geometry: usize,
-    /// Whether every answer has to be right.
+    /// Whether every wrong answer is a fault.
     pub(super) exact: bool,
 }
 
-/// All of them.
-pub(super) struct Subjects {
-    pub(super) subjects: Vec<Subject>,
-    /// The first is that of the source.
+/// All tracers of a model.
+pub(super) struct MeasuredTracers {
+    pub(super) tracers: Vec<MeasuredTracer>,
+    /// The triangles that tracers have: first those of the source, then those on grids.
     pub(super) geometries: Vec<Geometry>,
     pub(super) left_out: Vec<LeftOut>,
 }
@@ -44,7 +44,7 @@ fn group(name: &str) -> &'static str {
 
 /// Kinds that are measured with every instruction set, and not with the best only.
 fn on_every_isa(kind: &Kind) -> bool {
-    [ours::BVH.name, "tets link32"].contains(&kind.name)
+    [structures::BVH.name, "tets link32"].contains(&kind.name)
 }
 
 /// Instruction sets of this machine, the best first.
@@ -54,7 +54,12 @@ fn isas() -> Vec<Isa> {
 
 /// Our structures.
 fn kinds() -> impl Iterator<Item = &'static Kind> {
-    ours::KINDS.iter().chain(&ours::ON_GRID)
+    structures::KINDS.iter().chain(&structures::ON_GRID)
+}
+
+/// The rivals, and triangle tests in single precision.
+fn rivals() -> impl Iterator<Item = &'static Rival> {
+    RIVALS.iter().chain(&F32_TESTS)
 }
 
 /// Names of all, whether this machine has them or not.
@@ -63,34 +68,34 @@ pub(super) fn names() -> Vec<String> {
         let others = Isa::ALL.into_iter().filter(|_| on_every_isa(kind));
         std::iter::once(kind.name.to_owned()).chain(others.map(|isa| format!("{} {isa}", kind.name)))
     });
-    own.chain(RIVALS.iter().map(|rival| rival.name.to_owned())).collect()
+    own.chain(rivals().map(|rival| rival.name.to_owned())).collect()
 }
 
-impl Subjects {
-    /// Builds the selected ones. What cannot be built is left out and noted.
+impl MeasuredTracers {
+    /// Builds the selected tracers; lists those that cannot be built.
     pub(super) fn build(
         model: &Model,
         bvh: &Compiled,
         names: &Names,
         progress: &Progress,
-    ) -> Result<Subjects> {
-        let mut all = Subjects {
-            subjects: Vec::new(),
+    ) -> Result<MeasuredTracers> {
+        let mut all = MeasuredTracers {
+            tracers: Vec::new(),
             geometries: vec![Geometry::new(&bvh.bytes)?],
             left_out: Vec::new(),
         };
-        // A model without one tetrahedralization of the whole has it with no record.
+        // A model that cannot be tetrahedralized as a whole cannot with any record.
         let mut no_tets = None;
         for kind in kinds() {
             let uses = uses(kind, names);
             if uses.is_empty() {
                 continue;
             }
-            progress.say(format!("{}: compiling {}", model.name, kind.name));
+            progress.show(format!("{}: compiling {}", model.name, kind.name));
             let compiled = match (&no_tets, kind.is_tets()) {
                 (Some(why), true) => Err(anyhow::anyhow!("{why}")),
-                _ if kind.name == ours::BVH.name => Ok(bvh.clone()),
-                _ => ours::compile(model, kind),
+                _ if kind.name == structures::BVH.name => Ok(bvh.clone()),
+                _ => structures::compile(model, kind),
             };
             match compiled {
                 Ok(compiled) => all.add(kind, &compiled, uses)?,
@@ -103,10 +108,10 @@ impl Subjects {
                 }
             }
         }
-        for rival in RIVALS.iter().filter(|rival| names.select(rival.name)) {
-            progress.say(format!("{}: building {}", model.name, rival.name));
+        for rival in rivals().filter(|rival| names.select(rival.name)) {
+            progress.show(format!("{}: building {}", model.name, rival.name));
             match rival.build(model, 1) {
-                Ok(contender) => all.subjects.push(Subject {
+                Ok(contender) => all.tracers.push(MeasuredTracer {
                     name: rival.name.to_owned(),
                     group: group(rival.name),
                     contender: Rc::new(contender),
@@ -124,13 +129,13 @@ impl Subjects {
 
     fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
         // The first is the batch without hints.
-        let Some(contender) = ours::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
+        let Some(contender) = structures::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
         let contender = Rc::new(contender);
         if kind.is_on_grid() {
             self.geometries.push(Geometry::new(&compiled.bytes)?);
         }
         let geometry = if kind.is_on_grid() { self.geometries.len() - 1 } else { 0 };
-        self.subjects.extend(uses.into_iter().map(|(name, isa)| Subject {
+        self.tracers.extend(uses.into_iter().map(|(name, isa)| MeasuredTracer {
             name,
             group: group(kind.name),
             contender: contender.clone(),

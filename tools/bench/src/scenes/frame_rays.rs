@@ -1,21 +1,22 @@
 //! The rays of a frame: the camera's, and those of the diffuse bounces after it.
 
 use crate::model::position;
-use crate::rays::{Camera, LIFT, Random, ray};
+use crate::rays::{Camera, LIFT, cosine_weighted, ray};
 use crate::tracer::Batch;
 use anyhow::{Context, Result, ensure};
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_format::layout::NONE;
+use bth_random::Rng;
 use glam::DVec3;
 
-/// Times that light is reflected, as `bth-play --mode path` does by default.
+/// Diffuse bounces after the camera rays: the default of `bth-play --mode path`.
 pub(super) const BOUNCES: u32 = 4;
-/// Relative difference of t up to which another triangle at the same place is no other answer of a tracer that rounds.
+/// Answers of a tracer that rounds count as equal up to this relative difference of t.
 const SAME: f32 = 1e-4;
 
 /// Rays of one kind.
-pub(super) struct Set {
+pub(super) struct FrameRaySet {
     pub(super) rays: Vec<Ray>,
     from: Option<Vec<Surface>>,
     coherent: bool,
@@ -24,22 +25,22 @@ pub(super) struct Set {
 }
 
 /// The rays of a frame, by [`super::SETS`].
-pub(super) struct Shots {
-    pub(super) sets: [Set; 3],
+pub(super) struct FrameRays {
+    pub(super) sets: [FrameRaySet; 3],
 }
 
-impl Set {
-    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<Surface>>, coherent: bool) -> Set {
+impl FrameRaySet {
+    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<Surface>>, coherent: bool) -> FrameRaySet {
         let mut expected = vec![Hit::MISS; rays.len()];
         scene.nearest_batch(&rays, None, &mut expected);
-        Set { rays, from, coherent, expected }
+        FrameRaySet { rays, from, coherent, expected }
     }
 
     pub(super) fn batch(&self) -> Batch<'_> {
         Batch { rays: &self.rays, from: self.from.as_deref(), coherent: self.coherent }
     }
 
-    /// Answers that are others: in any bit for ours, in what is hit or where for others.
+    /// Number of answers that differ: for ours in any bit, for rivals in whether or where something is hit.
     pub(super) fn differences(&self, hits: &[Hit], ours: bool) -> u64 {
         let same = |a: &Hit, b: &Hit| {
             a == b || !ours && a.is_hit() && b.is_hit() && (a.t - b.t).abs() <= SAME * a.t.abs()
@@ -48,30 +49,30 @@ impl Set {
     }
 }
 
-impl Shots {
-    /// Of a scene at its time, seen by its camera.
-    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<Shots> {
+impl FrameRays {
+    /// The rays of a scene's camera at the scene's time.
+    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
         let (camera, diagonal) = camera(scene, size)?;
-        let first = Set::of(scene, camera.rays(), None, true);
+        let first = FrameRaySet::of(scene, camera.rays(), None, true);
         let mut rng = Rng::new(1);
         let lift = LIFT * diagonal;
         let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut rng);
-        let second = Set::of(scene, rays, Some(from), false);
+        let second = FrameRaySet::of(scene, rays, Some(from), false);
         let (mut later, mut from): (Vec<Ray>, Vec<Surface>) = Default::default();
         let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
         for _ in 1..BOUNCES {
             let (next, starts) = onward(scene, &rays, &hits, lift, &mut rng);
-            let set = Set::of(scene, next, None, false);
+            let set = FrameRaySet::of(scene, next, None, false);
             later.extend(&set.rays);
             from.extend(starts);
             (rays, hits) = (set.rays, set.expected);
         }
-        let third = Set::of(scene, later, Some(from), false);
-        Ok(Shots { sets: [first, second, third] })
+        let third = FrameRaySet::of(scene, later, Some(from), false);
+        Ok(FrameRays { sets: [first, second, third] })
     }
 }
 
-/// The first camera of the scene, or one that sees all of it; and the diagonal of what there is to see.
+/// The first camera of the scene, or one that frames all of it; and the diagonal of the visible instances' box.
 fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
     let view = scene.description().context("a scene")?;
     let mut corners = Vec::new();
@@ -96,7 +97,7 @@ fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
     Ok((camera, diagonal))
 }
 
-/// Cosine-weighted rays from where rays hit, and the surfaces there.
+/// Cosine-weighted rays from the hits of other rays, and the triangles that they start on.
 fn onward(
     scene: &Scene,
     rays: &[Ray],

@@ -8,12 +8,12 @@ use bth::rays::{Hit, Ray};
 use bth_oracle::Intersection;
 use rayon::prelude::*;
 
-/// Triangles as they are stored in a compiled file, and what finds the nearest.
+/// Triangles as they are stored in a compiled file, and the scene that finds the nearest one.
 pub struct Geometry {
     scene: Scene,
-    /// Those that can be hit, by ascending id.
+    /// Ids of the triangles that can be hit, ascending.
     ids: Vec<u32>,
-    /// Of these.
+    /// Corners of these triangles.
     corners: Vec<[[f32; 3]; 3]>,
 }
 
@@ -27,7 +27,7 @@ pub struct Exact {
 }
 
 impl Geometry {
-    /// Of a compiled plain BVH.
+    /// The triangles of a compiled plain BVH.
     ///
     /// # Errors
     /// If the runtime refuses the file, which would be a fault of ours.
@@ -44,8 +44,8 @@ impl Geometry {
         bth_oracle::intersection(ray, self.corners[row])
     }
 
-    /// The exact answers to a set. Our BVH finds them, as every triangle against every ray would take days; one in
-    /// `one_in` rays is compared with every triangle in exact arithmetic.
+    /// The exact answers to a set. Our BVH finds them, as testing every triangle against every ray would take days; one in
+    /// `one_in` rays is tested against every triangle in exact arithmetic.
     ///
     /// # Errors
     /// If one of those differs: our BVH would be wrong then, and this measurement worthless.
@@ -55,7 +55,7 @@ impl Geometry {
         let wrong = (0..set.rays.len()).into_par_iter().step_by(one_in.max(1)).find_any(|&i| {
             let (ray, hit) = (&set.rays[i], &hits[i]);
             let Some(truth) = bth_oracle::nearest(&self.corners, ray) else { return hit.is_hit() };
-            // Of triangles whose t rounds to the same any may come first.
+            // Of several triangles whose t rounds to the same number, any may be the answer.
             let t = truth.t_f64() as f32;
             let named = self.crossing(ray, hit.surface.triangle);
             hit.t != t || named.is_none_or(|at| bth_oracle::to_f64(&at.t) as f32 != t)
@@ -74,7 +74,7 @@ impl Geometry {
     }
 }
 
-/// As what draws the exact picture.
+/// Draws the exact picture.
 impl Tracer for Geometry {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         self.scene.nearest_batch(batch.rays, None, hits);

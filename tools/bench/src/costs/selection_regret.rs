@@ -1,9 +1,9 @@
-//! Regret: the time of the selections that the rules make, against the best found by measuring every selection.
+//! Regret: by how much the selections of the rules are slower than the best one, found by measuring every selection.
 
 use super::record::{Regret, Selection};
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::ours::{self, Use};
+use crate::structures::{self, Use};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::least;
@@ -24,7 +24,7 @@ const LEAST: u32 = 128;
 /// Pixels of the camera.
 const SIZE: (u32, u32) = (256, 144);
 
-/// Measures every selection of the topmost nodes of a small model, and those of the rules.
+/// Measures every selection of the topmost nodes of a small model, and the selections of the rules.
 ///
 /// # Errors
 /// If the model cannot be used.
@@ -53,7 +53,7 @@ pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Resu
     wanted.dedup();
     let mut meshes = BTreeMap::new();
     for node in wanted {
-        progress.say(format!("{}: tetrahedra of node {node}", model.name));
+        progress.show(format!("{}: tetrahedra of node {node}", model.name));
         let (built, _) = tets::build(&model.mesh, &tree, &[node], &options.tets, &Silent)?;
         if let [(at, _)] = built[..]
             && at == node
@@ -66,9 +66,9 @@ pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Resu
     for nodes in &selections {
         let built: Vec<(u32, tets::TetMesh)> = nodes.iter().map(|n| (*n, meshes[n].clone())).collect();
         let file = pipeline::assemble(&model.mesh, &tree, &built, &options, &Silent)?;
-        tracers.push(ours::tracer(&file.bytes, Use::Hinted)?);
+        tracers.push(structures::tracer(&file.bytes, Use::Hinted)?);
     }
-    progress.say(format!("{}: {} selections", model.name, selections.len()));
+    progress.show(format!("{}: {} selections", model.name, selections.len()));
     let times = mixed(model, &tracers, rounds)?;
     let best = times.iter().copied().fold(f64::INFINITY, f64::min);
     let selection = |name: String, row: usize| Selection {
@@ -104,7 +104,7 @@ fn all(tree: &BinaryBvh, marks: &Marks, node: u32, levels: u32) -> Vec<Vec<u32>>
 
 /// Nanoseconds of a ray through each: a quarter from the camera, the others bounces and ambient occlusion.
 fn mixed(model: &Model, tracers: &[Box<dyn Tracer>], rounds: usize) -> Result<Vec<f64>> {
-    let plain = ours::compile(model, &ours::BVH)?;
+    let plain = structures::compile(model, &structures::BVH)?;
     let scene = bth::from_bytes(&plain.bytes)?;
     let options = rays::Options { size: SIZE, most: 40_000, view: None };
     let (_, sets) = rays::sets(&Finder::new(model, &scene), &options);

@@ -1,0 +1,71 @@
+//! The command line: one file for the options of each command.
+
+mod accuracy;
+mod compare;
+mod costs;
+mod load;
+mod models;
+mod output;
+mod paper;
+mod quality;
+mod records;
+mod scenes;
+mod speed;
+mod stress;
+mod values;
+
+pub use accuracy::Accuracy;
+pub use compare::Compare;
+pub use costs::Costs;
+pub use load::{Load, LoadScenes, Probe, Start, Starts};
+pub use models::{Models, SeenFrom};
+pub use output::Output;
+pub use paper::Paper;
+pub use quality::Quality;
+pub use records::{RecordRows, Summary};
+pub use scenes::Scenes;
+pub use speed::Speed;
+pub use stress::Stress;
+
+use clap::{Parser, Subcommand};
+
+/// Measures bth beside other CPU ray tracers on identical rays.
+#[derive(Debug, Parser)]
+#[command(name = "bth-bench", version, max_term_width = 100)]
+pub struct Arguments {
+    /// What to measure.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The measurements.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Rays per second of our structures and the rivals.
+    Speed(Speed),
+    /// Whether a build of libbth is faster than another, in one interleaved run. Exit code 3 if it is slower.
+    Compare(Compare),
+    /// Measures what a definition names and appends the rows to the record of this machine.
+    Record(RecordRows),
+    /// Writes the summary of all records.
+    Summary(Summary),
+    /// Run time and bytes against every kind of error, ours and rivals'.
+    Accuracy(Accuracy),
+    /// Opening a compiled file and tracing the first rays, against building at the start.
+    Load(Load),
+    /// Opening compiled scenes against building all their objects at the start.
+    LoadScenes(LoadScenes),
+    /// Hard rays on hard surfaces, every answer checked exactly: misses, leaks, ghosts, errors of t.
+    Stress(Stress),
+    /// Predictions of the cost model against measurements.
+    Costs(Costs),
+    /// The paper's tables on our models.
+    Paper(Paper),
+    /// What each step of the BVH builder is worth.
+    Quality(Quality),
+    /// Scenes that move: ours, and Embree with the same instances.
+    Scenes(Scenes),
+    /// One start in a process of its own; `load` calls this.
+    #[command(hide = true)]
+    Probe(Probe),
+}

@@ -1,0 +1,49 @@
+//! Scenes to measure: our own animations by name, and manifests.
+
+use anyhow::{Context, Result};
+use bth_scene::Manifest;
+use std::path::PathBuf;
+
+/// A manifest, and the folder of its models.
+pub(super) struct Source {
+    /// Name without folder and extension.
+    pub(super) name: String,
+    pub(super) manifest: Manifest,
+    /// What paths of the manifest are relative to.
+    pub(super) folder: PathBuf,
+    /// Keeps the files of a generated scene until the end.
+    _models: Option<tempfile::TempDir>,
+}
+
+impl Source {
+    /// Makes a scene of `bth-scenes list`, or reads a manifest.
+    ///
+    /// # Errors
+    /// If there is no such scene or manifest, or the files of a generated one cannot be written.
+    pub(super) fn load(name: &str) -> Result<Source> {
+        if let Some(animation) = bth_scenes::animations::find(name) {
+            let scene = (animation.make)();
+            let folder = tempfile::tempdir()?;
+            for (path, model) in &scene.models {
+                let path = folder.path().join(path);
+                std::fs::create_dir_all(path.parent().context("models lie in a folder")?)?;
+                bth_scenes::write::file(model, &path)?;
+            }
+            let (name, manifest) = (name.to_owned(), scene.manifest);
+            return Ok(Source { name, manifest, folder: folder.path().into(), _models: Some(folder) });
+        }
+        let path = PathBuf::from(name);
+        let manifest = bth_scene::read(&path).with_context(|| format!("no scene or manifest `{name}`"))?;
+        let folder = path.parent().map_or_else(|| PathBuf::from("."), PathBuf::from);
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Source { name, manifest, folder, _models: None })
+    }
+
+    /// At most so many frames, evenly spread over the range of the manifest.
+    pub(super) fn frames(&self, count: usize) -> Vec<i32> {
+        let range = &self.manifest.frames;
+        let (first, last) = (i64::from(range.first), i64::from(range.last));
+        let count = (count as i64).min(last - first + 1);
+        (0..count).map(|i| (first + (last - first) * (2 * i + 1) / (2 * count)) as i32).collect()
+    }
+}

@@ -3,7 +3,7 @@
 use bth::Scene;
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;
-use bth_compile::pipeline::{Options, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_scenes::Model;
 
@@ -16,9 +16,9 @@ pub struct Traced {
     pub scene: Scene,
 }
 
-/// Options with which even small models get tet leaves wherever these are possible.
-pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> Options {
-    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
+/// CompileOptions with which even small models get tet leaves wherever these are possible.
+pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) -> CompileOptions {
+    let mut options = CompileOptions { structure, record, keep_subtrees, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = crate::worker().map(Into::into);
@@ -30,7 +30,7 @@ pub fn options(structure: Structure, record: RecordKind, keep_subtrees: bool) ->
 ///
 /// # Panics
 /// If it does not compile or open.
-pub fn compiled(model: &Model, options: &Options) -> Scene {
+pub fn compiled(model: &Model, options: &CompileOptions) -> Scene {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");

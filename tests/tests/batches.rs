@@ -3,7 +3,7 @@
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Hinted, Isa, Scene};
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
@@ -20,7 +20,7 @@ fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtre
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).expect("a model file");
-    let mut options = Options { structure, record, keep_subtrees, ..Options::default() };
+    let mut options = CompileOptions { structure, record, keep_subtrees, ..CompileOptions::default() };
     options.costs.minimum_triangles = 32;
     options.costs.c_tet = Some(1e-3);
     options.tets.worker = bth_tests::worker().map(Into::into);

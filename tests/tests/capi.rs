@@ -2,7 +2,7 @@
 
 use bth::rays::{Ray, Surface};
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, compile};
+use bth_compile::pipeline::{CompileOptions, compile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -53,12 +53,12 @@ fn a_c_program_opens_traces_and_reads_errors() {
     let Some(program) = c_program(folder.path(), "trace") else { return };
     let model = folder.path().join("knot.obj");
     bth_scenes::write::file(&bth_scenes::knot::torus_knot(2880), &model).expect("a model");
-    let options = Options {
-        tets: bth_compile::tets::Options {
+    let options = CompileOptions {
+        tets: bth_compile::tets::TetOptions {
             worker: bth_tests::worker().map(Into::into),
-            ..Options::default().tets
+            ..CompileOptions::default().tets
         },
-        ..Options::default()
+        ..CompileOptions::default()
     };
     let (compiled, _) = compile(&model, &options, &Silent).expect("the knot compiles");
     let file = folder.path().join("knot.bth");
@@ -131,7 +131,7 @@ fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
     let quad = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
     std::fs::write(folder.path().join("quad.obj"), quad).expect("a model");
     let manifest = bth_scene::parse(SCENE, Path::new("wheel.manifest")).expect("a manifest");
-    let options = Options::default();
+    let options = CompileOptions::default();
     let (compiled, _) =
         bth_compile::scene::compile(&manifest, folder.path(), Path::new("wheel"), &options, &Silent)
             .expect("the wheel compiles");

@@ -2,13 +2,13 @@
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Compiles a model; `None` where the structure needs a worker and there is none.
-fn compiled(model: &bth_scenes::Model, options: &Options) -> Option<Vec<u8>> {
+fn compiled(model: &bth_scenes::Model, options: &CompileOptions) -> Option<Vec<u8>> {
     if options.structure != Structure::Bvh && bth_tests::worker().is_none() {
         return None;
     }
@@ -21,17 +21,17 @@ fn compiled(model: &bth_scenes::Model, options: &Options) -> Option<Vec<u8>> {
     Some(compiled.bytes)
 }
 
-fn kinds() -> impl Iterator<Item = Options> {
+fn kinds() -> impl Iterator<Item = CompileOptions> {
     let structures = [Structure::Bvh, Structure::Bth, Structure::Tets];
     structures.into_iter().flat_map(|structure| {
         RecordKind::ALL.into_iter().flat_map(move |record| {
-            [false, true].map(|keep_subtrees| Options {
+            [false, true].map(|keep_subtrees| CompileOptions {
                 structure,
                 record,
                 keep_subtrees,
                 // At this cost of a step the tetrahedra of the knot are chosen.
-                costs: bth_compile::costs::Options { c_tet: Some(1e-3), ..Default::default() },
-                ..Options::default()
+                costs: bth_compile::costs::CostOptions { c_tet: Some(1e-3), ..Default::default() },
+                ..CompileOptions::default()
             })
         })
     })

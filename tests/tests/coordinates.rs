@@ -7,7 +7,7 @@ mod corpus_support;
 
 use bth::rays::{Hit, Ray, Surface};
 use bth::{Isa, Scene};
-use bth_compile::coordinates::Options;
+use bth_compile::coordinates::CoordinateOptions;
 use bth_compile::pipeline::{Structure, compile};
 use bth_compile::{Silent, pipeline};
 use bth_format::File;
@@ -19,14 +19,14 @@ use bth_tests::structures::bits;
 use std::path::Path;
 
 /// A compiled file.
-fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::Options) -> File {
-    options.coordinates = Options { bits: grid, ..Options::default() };
+fn compiled(path: &Path, grid: Option<GridBits>, mut options: pipeline::CompileOptions) -> File {
+    options.coordinates = CoordinateOptions { bits: grid, ..CoordinateOptions::default() };
     let (compiled, report) = compile(path, &options, &Silent).unwrap();
     assert_eq!(report.coordinates.map(|c| c.bits), grid.map(|b| b as u32));
     File::from_bytes(&compiled.bytes).unwrap()
 }
 
-fn plain() -> pipeline::Options {
+fn plain() -> pipeline::CompileOptions {
     bth_tests::structures::options(Structure::Bvh, RecordKind::Link32, false)
 }
 

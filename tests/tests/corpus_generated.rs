@@ -25,7 +25,7 @@ fn weld(model: &Model) -> Mesh {
 /// Whether the whole model is free of bad contacts according to the compiler.
 fn is_suitable(model: &Model) -> bool {
     let mesh = weld(model);
-    let (tree, _) = bvh::build(&mesh, &bvh::Options::default(), &Silent).unwrap();
+    let (tree, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
     let (marks, _) = marks::mark(&mesh, &tree, &Silent).unwrap();
     marks.suitable[0]
 }

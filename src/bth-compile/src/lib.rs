@@ -1,6 +1,6 @@
 //! The BTH compiler: mesh → coordinates → bvh → marks → costs → tets → write.
 //!
-//! Each stage is `fn(&Input, &Options, &dyn Monitor) -> Result<(Output, Report)>`: it depends on neither files, terminals
+//! Each stage is `fn(&Input, &CompileOptions, &dyn Monitor) -> Result<(Output, CompileReport)>`: it depends on neither files, terminals
 //! nor the cache, and its output is the same at any number of threads. From the bottom up:
 //!
 //! | modules | |

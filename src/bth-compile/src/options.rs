@@ -20,21 +20,21 @@ pub enum Structure {
 
 /// The options of all stages.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct CompileOptions {
     /// What to build.
     pub structure: Structure,
     /// Shading attributes to keep.
     pub attributes: mesh::Keep,
     /// Coordinates that triangle leaves store.
-    pub coordinates: coordinates::Options,
+    pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
-    pub bvh: bvh::Options,
+    pub bvh: bvh::BvhOptions,
     /// Collapse to the wide BVH; its field `keep_subtrees` is overridden by the one below.
     pub collapse: bvh::CollapseOptions,
     /// Selection of the nodes to tetrahedralize.
-    pub costs: costs::Options,
+    pub costs: costs::CostOptions,
     /// Tetrahedralization.
-    pub tets: tets::Options,
+    pub tets: tets::TetOptions,
     /// Record that stores a tetrahedron.
     pub record: RecordKind,
     /// Whether to keep a BVH under each tet leaf.
@@ -47,16 +47,16 @@ pub struct Options {
     pub objects_memory: u64,
 }
 
-impl Default for Options {
+impl Default for CompileOptions {
     fn default() -> Self {
         Self {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
-            coordinates: coordinates::Options::default(),
-            bvh: bvh::Options::default(),
+            coordinates: coordinates::CoordinateOptions::default(),
+            bvh: bvh::BvhOptions::default(),
             collapse: bvh::CollapseOptions::default(),
-            costs: costs::Options::default(),
-            tets: tets::Options::default(),
+            costs: costs::CostOptions::default(),
+            tets: tets::TetOptions::default(),
             record: RecordKind::Link32,
             keep_subtrees: true,
             geometry: true,
@@ -65,7 +65,7 @@ impl Default for Options {
     }
 }
 
-impl Options {
+impl CompileOptions {
     /// How tetrahedra will be stored; the size of the object without them is not set.
     pub fn storage(&self) -> costs::Storage {
         costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }

@@ -4,7 +4,7 @@
 
 use bth_cache::Store;
 use bth_compile::cached::{Cache, compile};
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -41,7 +41,7 @@ fn made(folder: &Path) -> String {
     std::fs::write(&source, model()).unwrap();
     let store = Store::open(&folder.join("cache"), 1 << 30).unwrap();
     for structure in [Structure::Bvh, Structure::Bth] {
-        let mut options = Options { structure, ..Options::default() };
+        let mut options = CompileOptions { structure, ..CompileOptions::default() };
         // No node is large enough: whether there is a worker makes no difference.
         options.costs.minimum_triangles = 1 << 20;
         let cache = Cache::new(&store, "model");
@@ -106,7 +106,7 @@ fn tetrahedralizations_that_are_other_ones_have_another_version() {
     let source = folder.path().join("model.obj");
     std::fs::write(&source, torus()).unwrap();
     let store = Store::open(&folder.path().join("cache"), 1 << 30).unwrap();
-    let mut options = Options { structure: Structure::Tets, ..Options::default() };
+    let mut options = CompileOptions { structure: Structure::Tets, ..CompileOptions::default() };
     options.tets.worker = Some(worker);
     let cache = Cache::new(&store, "model");
     compile(&source, &options, &cache, &|_| true, &bth_compile::Silent).unwrap();

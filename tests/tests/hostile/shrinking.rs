@@ -2,7 +2,7 @@
 
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_tests::structures::compiled;
 use std::fs::OpenOptions;
 use std::os::unix::process::ExitStatusExt;
@@ -16,7 +16,7 @@ const SIGBUS: i32 = 7;
 /// A compiled model of many pages in a folder of its own.
 fn model() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
-    let options = Options { structure: Structure::Bvh, ..Options::default() };
+    let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     let scene = compiled(&bth_scenes::blob::blob(3000), &options);
     let path = folder.path().join("model.bth");
     std::fs::write(&path, scene.file().bytes()).unwrap();

@@ -176,9 +176,9 @@ fn normals_stand_on_their_surfaces_in_the_world() {
 
 #[test]
 fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
-    use bth_compile::pipeline::{Options, Structure};
+    use bth_compile::pipeline::{CompileOptions, Structure};
     let folder = models();
-    let mut options = Options { structure: Structure::Tets, ..Options::default() };
+    let mut options = CompileOptions { structure: Structure::Tets, ..CompileOptions::default() };
     options.tets.worker = bth_tests::worker().map(Into::into);
     if options.tets.worker.is_none() {
         options.structure = Structure::Bvh;

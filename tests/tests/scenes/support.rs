@@ -1,15 +1,15 @@
 //! Folders, files and small scenes for the tests.
 
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::scene::{self, SceneReport};
 use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
 use bth_scene::Manifest;
 use std::path::{Path, PathBuf};
 
 /// A BVH only: tetrahedra are covered by other tests.
-pub(crate) fn options() -> Options {
-    Options { structure: Structure::Bvh, ..Options::default() }
+pub(crate) fn options() -> CompileOptions {
+    CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() }
 }
 
 /// Animated models beside the checkout, or a printed line.

@@ -2,7 +2,7 @@
 
 use bth::rays::Hit;
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure, compile};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_tests::rays::assorted;
@@ -14,7 +14,7 @@ fn check(name: &str, model: &Model) {
     let path = folder.path().join("model.ply");
     bth_scenes::write::file(model, &path).unwrap();
     let scene = |structure| {
-        let mut options = Options { structure, ..Options::default() };
+        let mut options = CompileOptions { structure, ..CompileOptions::default() };
         options.tets.worker = bth_tests::worker().map(Into::into);
         options.costs.minimum_triangles = 16;
         options.tets.minimum = 1;

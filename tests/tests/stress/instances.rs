@@ -3,7 +3,7 @@
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_oracle::World;
 use bth_random::Rng;
 use bth_scenes::blob::blob;
@@ -31,7 +31,7 @@ fn scene() -> Scene {
     let folder = tempfile::tempdir().unwrap();
     bth_scenes::write::file(&blob(300), &folder.path().join("blob.ply")).unwrap();
     let manifest = bth_scene::parse(NODES, "stress.manifest".as_ref()).unwrap();
-    let options = Options { structure: Structure::Bvh, ..Options::default() };
+    let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
     let compiled = bth_compile::scene::compile(&manifest, folder.path(), "x".as_ref(), &options, &Silent);
     bth::from_bytes(&compiled.unwrap().0.bytes).unwrap()
 }

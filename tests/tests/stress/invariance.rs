@@ -3,7 +3,7 @@
 use bth::Scene;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_random::Rng;
 use bth_scenes::Model;
 use bth_scenes::{blob::blob, soup::soup};
@@ -127,7 +127,7 @@ fn cutting_into_instances_changes_no_answer() {
                 .unwrap();
         }
         let manifest = bth_scene::parse(&text, "cut.manifest".as_ref()).unwrap();
-        let options = Options { structure: Structure::Bvh, ..Options::default() };
+        let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
         let (compiled, _) =
             bth_compile::scene::compile(&manifest, folder.path(), "cut".as_ref(), &options, &Silent).unwrap();
         let cut = bth::from_bytes(&compiled.bytes).unwrap();

@@ -170,8 +170,11 @@ mod tests {
 
     #[test]
     fn every_point_lies_in_the_plot_and_ticks_in_the_range() {
-        let cloud =
-            PointSeries { name: "a<b".into(), points: vec![(1.0, 30.0), (250.0, 3.0)], labels: vec!["c".into()] };
+        let cloud = PointSeries {
+            name: "a<b".into(),
+            points: vec![(1.0, 30.0), (250.0, 3.0)],
+            labels: vec!["c".into()],
+        };
         let plot = Scatter {
             title: "t".into(),
             x: "x".into(),

@@ -62,7 +62,13 @@ fn total(runs: &[ShapeRun]) -> Statistics {
     all
 }
 
-fn record(arguments: &Stress, runs: &[ShapeRun], all: &Statistics, seconds: u64, is_last: bool) -> Result<()> {
+fn record(
+    arguments: &Stress,
+    runs: &[ShapeRun],
+    all: &Statistics,
+    seconds: u64,
+    is_last: bool,
+) -> Result<()> {
     let mut rows: Vec<_> = runs
         .iter()
         .map(|run| row(run.shape.name, run.triangles(), run.structures.len(), &run.statistics))
@@ -74,7 +80,8 @@ fn record(arguments: &Stress, runs: &[ShapeRun], all: &Statistics, seconds: u64,
         "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed, "seconds": seconds
     });
     let head = Head::now("stress", isas.join(", in turn "), options);
-    let found: Vec<_> = runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.statistics)).collect();
+    let found: Vec<_> =
+        runs.iter().map(|run| json(&run.shape, run.structures.len(), &run.statistics)).collect();
     let json = json!({ "head": head, "shapes": found, "examples": all.examples });
     let record = Record { head: &head, title: "Stress", body: body(&rows), json, charts: Vec::new() };
     if is_last { record.write(&arguments.output) } else { record.save(&arguments.output) }

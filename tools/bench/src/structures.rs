@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use bth::Scene;
 use bth::rays::{Hit, Surface};
 use bth_compile::coordinates::{self, Boxes};
-use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_format::layout::{GridBits, RecordKind};
 use std::sync::Arc;
 use std::time::Instant;
@@ -77,13 +77,17 @@ impl Kind {
 
     /// Compiler options. Whole-model tetrahedra come without a BVH below them, which would be traced instead of them where
     /// there are no hints; all else is the default.
-    fn options(&self) -> Options {
-        Options {
+    fn options(&self) -> CompileOptions {
+        CompileOptions {
             structure: self.structure,
             record: self.record,
-            coordinates: coordinates::Options { bits: self.bits, max_error: None, boxes: self.boxes },
+            coordinates: coordinates::CoordinateOptions {
+                bits: self.bits,
+                max_error: None,
+                boxes: self.boxes,
+            },
             keep_subtrees: !self.is_tets(),
-            ..Options::default()
+            ..CompileOptions::default()
         }
     }
 }

@@ -122,7 +122,10 @@ mod tests {
             let ray = Ray { origin, tmin: 0.0, direction: sub(target, origin), tmax: f32::INFINITY };
             let exact = bth_oracle::intersection(&ray, corners).map(|at| bth_oracle::to_f64(&at.t));
             let exact = exact.filter(|t| *t >= 0.0);
-            let found = [moller_trumbore(&ray, corners, ray.tmax), Watertight::new(&ray).intersect(corners, ray.tmax)];
+            let found = [
+                moller_trumbore(&ray, corners, ray.tmax),
+                Watertight::new(&ray).intersect(corners, ray.tmax),
+            ];
             for found in found {
                 let near_edge = found.is_some_and(|h| h.u < 1e-3 || h.v < 1e-3 || h.u + h.v > 0.999);
                 if near_edge || exact.is_some() != found.is_some() && exact.is_some() {

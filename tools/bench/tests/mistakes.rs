@@ -8,7 +8,10 @@ fn mistake(arguments: &[&str]) -> (i32, String) {
     command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", "/nonexistent").env("TINYBVH_LIB", "/nonexistent");
     let output = command.args(arguments).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
-    assert!(!message.contains("stack backtrace") && !message.contains("panicked"), "{arguments:?}: {message}");
+    assert!(
+        !message.contains("stack backtrace") && !message.contains("panicked"),
+        "{arguments:?}: {message}"
+    );
     assert!(output.stdout.is_empty(), "{arguments:?} printed results");
     (output.status.code().expect("an exit code"), message)
 }
@@ -48,7 +51,8 @@ fn files_and_names_that_do_not_exist_exit_with_1_and_are_named() {
         let (code, message) = mistake(arguments);
         assert_eq!(code, 1, "{arguments:?}: {message}");
         assert!(message.starts_with("error: "), "{arguments:?}: {message}");
-        let named = arguments.iter().skip(1).any(|name| message.contains(name.trim_start_matches("objects:")));
+        let named =
+            arguments.iter().skip(1).any(|name| message.contains(name.trim_start_matches("objects:")));
         assert!(named, "{arguments:?}: {message}");
     }
 }
@@ -56,7 +60,9 @@ fn files_and_names_that_do_not_exist_exit_with_1_and_are_named() {
 #[test]
 fn files_that_are_no_models_exit_with_1_and_are_named() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, contents) in [("broken.ply", "ply\nformat none 1.0\n"), ("broken.stl", ""), ("broken.xyz", "1 2 3\n")] {
+    for (name, contents) in
+        [("broken.ply", "ply\nformat none 1.0\n"), ("broken.stl", ""), ("broken.xyz", "1 2 3\n")]
+    {
         let path = folder.path().join(name);
         std::fs::write(&path, contents).unwrap();
         let (code, message) = mistake(&["speed", path.to_str().unwrap()]);

@@ -116,7 +116,7 @@ fn misspelled_names_are_refused_before_anything_is_measured() {
 fn accuracy_compares_ours_and_the_crates_without_any_installed_rival() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let tracers = "bvh,bvh scalar,bvh 21 bits,bth,obvhs bvh2,k-d tree,embree compact";
+    let tracers = "bvh,bvh scalar,bvh 21 bits,bth,obvhs bvh2,k-d tree,f32 moller-trumbore,embree compact";
     let done = bench(&[
         "accuracy",
         "torus-knot:320",

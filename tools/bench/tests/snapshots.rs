@@ -5,7 +5,7 @@ use bth_bench::load::{self, LoadRecord, ModelStarts, Times};
 use bth_bench::machine::Machine;
 use bth_bench::output::Head;
 use bth_bench::rays::View;
-use bth_bench::speed::record::{LeftOut, TracerSpeeds, CompiledFile};
+use bth_bench::speed::record::{CompiledFile, LeftOut, TracerSpeeds};
 use bth_bench::speed::{self, ModelSpeeds, SpeedRecord};
 use serde_json::json;
 use std::collections::BTreeMap;

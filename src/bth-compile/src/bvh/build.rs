@@ -53,16 +53,16 @@ impl Quality {
     }
 }
 
-/// Options of [`build`].
+/// BvhOptions of [`build`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
+pub struct BvhOptions {
     /// How much time to spend on the tree.
     pub quality: Quality,
 }
 
-/// Report of [`build`].
+/// BvhReport of [`build`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct BvhReport {
     /// Triangles in the tree.
     pub triangles: u64,
     /// Triangles of exactly zero area, which are not in the tree.
@@ -86,7 +86,7 @@ pub struct Report {
 /// # Errors
 /// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
 /// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
-pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
+pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
     build_with(mesh, &options.quality.effort(), monitor)
 }
 
@@ -94,7 +94,7 @@ pub fn build(mesh: &Mesh, options: &Options, monitor: &dyn Monitor) -> Result<(B
 ///
 /// # Errors
 /// As [`build`].
-pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, Report)> {
+pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
     let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
         .into_par_iter()
@@ -103,10 +103,10 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
             (!is_zero_area(corners)).then(|| Reference { bounds: Bounds::of_points(&corners), id })
         })
         .collect();
-    let mut report = Report {
+    let mut report = BvhReport {
         triangles: references.len() as u64,
         dropped: (mesh.triangles.len() - references.len()) as u64,
-        ..Report::default()
+        ..BvhReport::default()
     };
     if references.is_empty() {
         return Ok((BinaryBvh::default(), report));
@@ -135,7 +135,7 @@ pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result
 pub fn reinsert(
     mut bvh: BinaryBvh,
     passes: &[f64],
-    report: &mut Report,
+    report: &mut BvhReport,
     monitor: &dyn Monitor,
 ) -> Result<BinaryBvh> {
     if passes.is_empty() || bvh.nodes.len() <= 3 {
@@ -289,7 +289,7 @@ fn split_by_id(references: &mut [Reference]) -> usize {
     middle
 }
 
-/// Nodes that a random line through the root's box meets on average; see [`Report::visits`].
+/// Nodes that a random line through the root's box meets on average; see [`BvhReport::visits`].
 pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
     bvh.nodes.iter().map(area).sum::<f64>() / area(&bvh.nodes[0])

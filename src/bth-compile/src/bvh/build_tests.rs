@@ -7,8 +7,8 @@ use proptest::prelude::*;
 
 const ALL: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Best];
 
-fn built(mesh: &Mesh, quality: Quality) -> (BinaryBvh, Report) {
-    build(mesh, &Options { quality }, &Silent).expect("builds")
+fn built(mesh: &Mesh, quality: Quality) -> (BinaryBvh, BvhReport) {
+    build(mesh, &BvhOptions { quality }, &Silent).expect("builds")
 }
 
 fn check(mesh: &Mesh) {
@@ -106,9 +106,9 @@ fn better_quality_costs_fewer_visits() {
 #[test]
 fn bad_indices_and_positions_are_reported() {
     let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]], attributes: None };
-    assert!(matches!(build(&mesh, &Options::default(), &Silent), Err(Error::Internal { .. })));
+    assert!(matches!(build(&mesh, &BvhOptions::default(), &Silent), Err(Error::Internal { .. })));
     let mesh = Mesh { positions: vec![[f32::NAN; 3]; 3], triangles: vec![[0, 1, 2]], attributes: None };
-    assert!(matches!(build(&mesh, &Options::default(), &Silent), Err(Error::Internal { .. })));
+    assert!(matches!(build(&mesh, &BvhOptions::default(), &Silent), Err(Error::Internal { .. })));
 }
 
 /// A monitor that cancels after a number of checks.
@@ -124,7 +124,7 @@ impl Monitor for Stop {
 fn a_build_can_be_cancelled_anywhere() {
     let mesh = soup(20_000, 31);
     for looks in [0, 1, 5, 20] {
-        let result = build(&mesh, &Options { quality: Quality::Best }, &Stop(looks.into()));
+        let result = build(&mesh, &BvhOptions { quality: Quality::Best }, &Stop(looks.into()));
         assert!(matches!(result, Err(Error::Cancelled)), "after {looks}");
     }
 }

@@ -10,7 +10,7 @@ use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_
 use bth_import::Mesh;
 use serde::Serialize;
 
-/// Options of [`collapse`].
+/// BvhOptions of [`collapse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CollapseOptions {
     /// Whether the BVH below each tet leaf is kept beside it.
@@ -36,7 +36,7 @@ pub struct Wide {
     pub subtrees: Vec<u32>,
 }
 
-/// Report of [`collapse`].
+/// BvhReport of [`collapse`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CollapseReport {
     /// Wide nodes.

@@ -1,6 +1,6 @@
 use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
-use super::super::{Options, Plan, Quality, build};
+use super::super::{BvhOptions, Plan, Quality, build};
 use super::*;
 use crate::monitor::Silent;
 use bth_format::layout::{IndexedLeaf, RawLeaf, WideNode};
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use zerocopy::{FromBytes, IntoBytes};
 
 fn built(mesh: &Mesh, quality: Quality) -> BinaryBvh {
-    build(mesh, &Options { quality }, &Silent).expect("builds").0
+    build(mesh, &BvhOptions { quality }, &Silent).expect("builds").0
 }
 
 fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool) -> (Wide, CollapseReport) {

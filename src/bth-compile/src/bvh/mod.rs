@@ -22,7 +22,7 @@ mod samples;
 #[cfg(test)]
 mod validate;
 
-pub use build::{Effort, MAX_LEVELS, Options, Quality, Report, build, build_with, reinsert, visits};
+pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build, build_with, reinsert, visits};
 pub use collapse::{CollapseOptions, CollapseReport, Decide, Wide, collapse, collapse_by};
 pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
 

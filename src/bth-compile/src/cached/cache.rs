@@ -43,7 +43,7 @@ impl<'a> Cache<'a> {
 
     /// The name of the tetrahedralizer in keys, determined once because starting the worker takes some milliseconds. `None`
     /// when the worker fails; results that depend on it are not kept then.
-    pub(crate) fn tetgen(&self, options: &tets::Options, monitor: &dyn Monitor) -> Result<Option<&str>> {
+    pub(crate) fn tetgen(&self, options: &tets::TetOptions, monitor: &dyn Monitor) -> Result<Option<&str>> {
         if self.tetgen.get().is_none() {
             let found = tets::version(options, monitor)?;
             let _ = self.tetgen.set(found);

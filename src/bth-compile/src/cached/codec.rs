@@ -47,7 +47,7 @@ fn shading(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
-/// Report and hashes of a mesh, without the mesh itself.
+/// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
     /// The import's report.

@@ -3,8 +3,8 @@
 use super::{Cache, CachedStages, Miss, keys};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use crate::options::{Options, Structure};
-use crate::pipeline::{Clock, FileReport, Report, compile_model, warn_over_limit};
+use crate::options::{CompileOptions, Structure};
+use crate::pipeline::{Clock, CompileReport, FileReport, compile_model, warn_over_limit};
 use crate::source::{Model, SourceDigest};
 use crate::write::Content;
 use bth_cache::{Key, Record};
@@ -56,7 +56,12 @@ impl DryRun {
 ///
 /// # Errors
 /// When the model cannot be read.
-pub fn dry_run(source: &Path, options: &Options, cache: &Cache<'_>, monitor: &dyn Monitor) -> Result<DryRun> {
+pub fn dry_run(
+    source: &Path,
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<DryRun> {
     let (_, key) = identify(source, options, cache, monitor, &mut Clock::default())?;
     Ok(DryRun::of(key.as_ref(), cache, monitor))
 }
@@ -69,11 +74,11 @@ pub fn dry_run(source: &Path, options: &Options, cache: &Cache<'_>, monitor: &dy
 /// As [`crate::pipeline::compile`]; `BTH-O002` when the model changes meanwhile.
 pub fn compile(
     source: &Path,
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     needed: &dyn Fn(&Record) -> bool,
     monitor: &dyn Monitor,
-) -> Result<CachedCompilation<Report>> {
+) -> Result<CachedCompilation<CompileReport>> {
     let mut clock = Clock::default();
     let (digest, key) = identify(source, options, cache, monitor, &mut clock)?;
     let model = Model { path: source, digest: &digest };
@@ -91,7 +96,7 @@ pub fn compile(
 /// Hashes a model. Returns its key too, if the compiled file may be kept.
 fn identify(
     source: &Path,
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
     clock: &mut Clock,
@@ -110,7 +115,7 @@ fn identify(
 
 /// The name of the tetrahedralizer in keys, empty if none is needed; `None` when nothing may be kept.
 pub(crate) fn tetgen_in_keys(
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Option<String>> {

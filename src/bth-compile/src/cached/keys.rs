@@ -6,7 +6,7 @@
 use super::codec::MeshSummary;
 use super::rows::HashedRows;
 use crate::bvh;
-use crate::options::{Options, Structure};
+use crate::options::{CompileOptions, Structure};
 use crate::source::SourceDigest;
 use crate::write::SceneParts;
 use bth_cache::Key;
@@ -44,7 +44,7 @@ pub(crate) fn extension(path: &Path) -> String {
 }
 
 /// The binary BVH of a mesh.
-pub(crate) fn bvh(geometry: &Digest, options: &bvh::Options) -> Key {
+pub(crate) fn bvh(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
     Key::new("bvh")
         .with("geometry", geometry.hex())
         .with("quality", text(&options.quality))
@@ -52,7 +52,7 @@ pub(crate) fn bvh(geometry: &Digest, options: &bvh::Options) -> Key {
 }
 
 /// The marks of its nodes.
-pub(crate) fn marks(geometry: &Digest, options: &bvh::Options) -> Key {
+pub(crate) fn marks(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
     Key::new("marks")
         .with_all(bvh(geometry, options).components().iter().cloned())
         .with("marks version", MARKS)
@@ -62,7 +62,7 @@ pub(crate) fn marks(geometry: &Digest, options: &bvh::Options) -> Key {
 pub(crate) fn tets_of_node(
     vertices: &[[f32; 3]],
     triangles: &[[u32; 3]],
-    options: &crate::tets::Options,
+    options: &crate::tets::TetOptions,
     tetgen: &str,
 ) -> Key {
     let mut hasher = HashedRows::new("node");
@@ -82,7 +82,7 @@ pub(crate) fn tets_of_node(
 pub(crate) struct ObjectKeys(Vec<(String, String)>);
 
 impl ObjectKeys {
-    pub(crate) fn new(options: &Options, tetgen: &str) -> Self {
+    pub(crate) fn new(options: &CompileOptions, tetgen: &str) -> Self {
         Self(components(options, tetgen))
     }
 
@@ -96,7 +96,7 @@ impl ObjectKeys {
 }
 
 /// A compiled file of one model.
-pub(crate) fn file(source: &SourceDigest, path: &Path, options: &Options, tetgen: &str) -> Key {
+pub(crate) fn file(source: &SourceDigest, path: &Path, options: &CompileOptions, tetgen: &str) -> Key {
     Key::new("file")
         .with("source", source.text())
         .with("format", extension(path))
@@ -106,7 +106,7 @@ pub(crate) fn file(source: &SourceDigest, path: &Path, options: &Options, tetgen
 }
 
 /// A compiled scene. `parts` numbers the objects as the manifest does, `sources` identifies the content of each used one.
-pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, tetgen: &str) -> Key {
+pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOptions, tetgen: &str) -> Key {
     let mut hasher = HashedRows::new("scene");
     hasher.add(std::slice::from_ref(&parts.scene));
     hasher.add(&parts.nodes);
@@ -128,7 +128,7 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &Options, t
 }
 
 /// The inventory of a scene file, by the name of the file's content.
-pub(crate) fn file_index(named: &Digest, options: &Options, tetgen: &str) -> Key {
+pub(crate) fn file_index(named: &Digest, options: &CompileOptions, tetgen: &str) -> Key {
     Key::new("outline")
         .with("file", named.hex())
         .with_all(components(options, tetgen))
@@ -138,7 +138,7 @@ pub(crate) fn file_index(named: &Digest, options: &Options, tetgen: &str) -> Key
 }
 
 /// All options that a compiled object depends on, in canonical form, under the names that explanations of misses show. The cost profile is among them by the hash of its content.
-fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
+fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     let mut all = vec![
         ("structure", text(&options.structure)),
         ("quality", text(&options.bvh.quality)),
@@ -172,7 +172,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
     if options.structure != Structure::Bvh {
-        // Options are components of their own, so that an explanation names the one that differs.
+        // CompileOptions are components of their own, so that an explanation names the one that differs.
         let fields = json(&options.costs);
         let fields = fields.as_object().into_iter().flatten();
         all.extend(fields.map(|(name, value)| (format!("selection {name}"), text(value))));
@@ -181,7 +181,7 @@ fn components(options: &Options, tetgen: &str) -> Vec<(String, String)> {
 }
 
 /// The options that the attempts at a node depend on: neither the path of the worker nor the number of workers.
-fn attempts(options: &crate::tets::Options) -> String {
+fn attempts(options: &crate::tets::TetOptions) -> String {
     format!(
         "free space {}, inflation {:?}, deadline {:?} + {:?}, memory {}",
         options.free_space,
@@ -201,6 +201,6 @@ fn text(value: &impl Serialize) -> String {
 }
 
 fn json(value: &impl Serialize) -> serde_json::Value {
-    // Options consist of numbers, strings and structures of these, which JSON can express.
+    // CompileOptions consist of numbers, strings and structures of these, which JSON can express.
     serde_json::to_value(value).unwrap_or_else(|e| unreachable!("an option that is no JSON: {e}"))
 }

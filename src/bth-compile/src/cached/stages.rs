@@ -65,7 +65,7 @@ impl Stages for CachedStages<'_> {
         &mut self,
         source: &Path,
         mesh: Mesh,
-        options: &coordinates::Options,
+        options: &coordinates::CoordinateOptions,
     ) -> Result<(Mesh, Option<OnGrid>)> {
         let (mesh, on_grid) = Direct.coordinates(source, mesh, options)?;
         if on_grid.is_some() {
@@ -77,9 +77,9 @@ impl Stages for CachedStages<'_> {
     fn bvh(
         &mut self,
         mesh: &Mesh,
-        options: &bvh::Options,
+        options: &bvh::BvhOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(bvh::BinaryBvh, bvh::Report)> {
+    ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
         if self.cache.store().is_none() {
             return Direct.bvh(mesh, options, monitor);
         }
@@ -97,9 +97,9 @@ impl Stages for CachedStages<'_> {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        options: &bvh::Options,
+        options: &bvh::BvhOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(marks::Marks, marks::Report)> {
+    ) -> Result<(marks::Marks, marks::MarkReport)> {
         if self.cache.store().is_none() {
             return Direct.marks(mesh, tree, options, monitor);
         }
@@ -118,9 +118,9 @@ impl Stages for CachedStages<'_> {
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
         chosen: &[u32],
-        options: &tets::Options,
+        options: &tets::TetOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
+    ) -> Result<(Vec<tets::Leaf>, tets::TetReport)> {
         let nodes = CachedNodes { cache: self.cache, monitor };
         timed(|| tets::build_through(mesh, tree, chosen, options, &nodes, monitor))
     }

@@ -67,7 +67,7 @@ impl Boxes {
 
 /// The form of coordinates in triangle leaves and nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Options {
+pub struct CoordinateOptions {
     /// Bits of a coordinate. If absent, coordinates are `f32`, or have the fewest bits that keep within `max_error` if that
     /// is given.
     #[serde(serialize_with = "number_of_bits")]
@@ -83,9 +83,9 @@ fn number_of_bits<S: Serializer>(bits: &Option<GridBits>, to: S) -> std::result:
     bits.map(|b| b as u32).serialize(to)
 }
 
-/// Report on the coordinates.
+/// CoordinateReport on the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Report {
+pub struct CoordinateReport {
     /// Bits of a coordinate.
     pub bits: u32,
     /// Greatest distance that a vertex moved, object space.
@@ -105,9 +105,9 @@ pub(crate) struct OnGrid {
 }
 
 impl OnGrid {
-    pub(crate) fn report(&self) -> Report {
+    pub(crate) fn report(&self) -> CoordinateReport {
         let Grid { bits, step, .. } = self.grid;
-        Report { bits: bits as u32, displacement: self.displacement, step }
+        CoordinateReport { bits: bits as u32, displacement: self.displacement, step }
     }
 }
 
@@ -116,7 +116,7 @@ impl OnGrid {
 /// # Errors
 /// `BTH-I070` when `bits` move a vertex farther than `max_error` allows, `BTH-I071` when the object has no grid of so many
 /// bits.
-pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &Options) -> Result<Option<OnGrid>> {
+pub(crate) fn place(source: &Path, mesh: &mut Mesh, options: &CoordinateOptions) -> Result<Option<OnGrid>> {
     let Some(bounds) = bounds(&mesh.positions) else { return Ok(None) };
     let found = |bits: GridBits| {
         let grid = grid(bits, bounds)?;
@@ -257,7 +257,7 @@ mod tests {
         #[test]
         fn no_vertex_moves_farther_than_is_said(points in prop::collection::vec(prop::array::uniform3(number()), 1..40)) {
             for bits in GridBits::ALL {
-                let options = Options { bits: Some(bits), ..Options::default() };
+                let options = CoordinateOptions { bits: Some(bits), ..CoordinateOptions::default() };
                 let mut moved = mesh(points.clone());
                 let found = place(Path::new("a"), &mut moved, &options);
                 if points.iter().flatten().any(|x| x.abs() > 2f32.powi(110)) {
@@ -300,7 +300,7 @@ mod tests {
     fn the_fewest_bits_that_honour_a_bound_are_taken() {
         let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
         let bits = |max_error| {
-            let options = Options { max_error: Some(max_error), ..Options::default() };
+            let options = CoordinateOptions { max_error: Some(max_error), ..CoordinateOptions::default() };
             place(Path::new("a"), &mut mesh(points.clone()), &options).unwrap().map(|on| on.grid.bits)
         };
         assert_eq!(bits(MaxError::OfDiagonal(1e-4)), Some(GridBits::B16));
@@ -311,10 +311,10 @@ mod tests {
     #[test]
     fn too_few_bits_are_refused_with_what_would_do() {
         let points = vec![[0.0; 3], [1.0; 3], [0.3, 0.4, 0.7]];
-        let options = Options {
+        let options = CoordinateOptions {
             bits: Some(GridBits::B16),
             max_error: Some(MaxError::Absolute(1e-6)),
-            ..Options::default()
+            ..CoordinateOptions::default()
         };
         let error = place(Path::new("a.ply"), &mut mesh(points), &options).unwrap_err().to_string();
         assert!(

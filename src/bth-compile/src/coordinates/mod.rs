@@ -6,6 +6,6 @@ mod boxes;
 mod choose;
 mod pack;
 
-pub use choose::{Boxes, MaxError, Options, Report};
+pub use choose::{Boxes, CoordinateOptions, CoordinateReport, MaxError};
 pub(crate) use choose::{OnGrid, place};
 pub use pack::pack;

@@ -3,7 +3,7 @@
 use super::bottom_up::Candidates;
 use super::gains::{Gain, Sampled, sample};
 use super::least_useful::{Weighed, least_useful};
-use super::options::{Choice, Options, Report, Select, SelectionOutcome, Verdict};
+use super::options::{Choice, CostOptions, CostReport, Select, SelectionOutcome, Verdict};
 use super::prices::Prices;
 use super::subtree_sums::subtree_sums;
 use super::{Weighting, top_down};
@@ -40,10 +40,10 @@ pub fn choose(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     marks: &Marks,
-    options: &Options,
+    options: &CostOptions,
     storage: Storage,
     monitor: &dyn Monitor,
-) -> Result<(Choice, Report)> {
+) -> Result<(Choice, CostReport)> {
     monitor.stage("costs", None);
     if marks.suitable.len() != bvh.nodes.len() {
         let message = format!("{} marks for {} nodes", marks.suitable.len(), bvh.nodes.len());
@@ -70,7 +70,7 @@ pub fn choose(
     }
     let triangles: u64 = choice.chosen.iter().map(|&i| u64::from(bvh.nodes[i as usize].count)).sum();
     let refused = |v: &&Verdict| v.decision == SelectionOutcome::RefusedCost;
-    let report = Report {
+    let report = CostReport {
         options: options.clone(),
         examined: choice.verdicts.len() as u64,
         chosen: choice.chosen.len() as u64,
@@ -94,7 +94,7 @@ struct Limits<'a> {
 }
 
 impl<'a> Limits<'a> {
-    fn new(triangles: usize, options: &Options, prices: &'a Prices<'a>, storage: Storage) -> Self {
+    fn new(triangles: usize, options: &CostOptions, prices: &'a Prices<'a>, storage: Storage) -> Self {
         let count = triangles as f64;
         let plain = storage.plain_bytes(triangles);
         // A file with any tet leaf also holds the map from triangles to faces.
@@ -147,7 +147,7 @@ fn best(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     marks: &Marks,
-    options: &Options,
+    options: &CostOptions,
     limits: &Limits<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Choice, f64, f64)> {
@@ -212,7 +212,7 @@ fn nodes_from(bvh: &BinaryBvh, triangles: u32) -> Vec<u32> {
     nodes
 }
 
-fn verdict(bvh: &BinaryBvh, marks: &Marks, options: &Options, i: u32, gain: Option<&Gain>) -> Verdict {
+fn verdict(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions, i: u32, gain: Option<&Gain>) -> Verdict {
     let count = bvh.nodes[i as usize].count;
     let suitable = marks.suitable[i as usize];
     let decision = match () {

@@ -5,7 +5,7 @@
 //! walk through the tetrahedra too. So the saving of a node is a sum over rays, and the savings of disjoint nodes add up.
 
 use super::bvh_walk::{Traced, walk};
-use super::options::Options;
+use super::options::CostOptions;
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::rays::{self, SampleRay, along};
 use super::subtree_sums::Sums;
@@ -46,7 +46,12 @@ pub(super) struct Sampled {
 
 /// Draws and traces the rays: those of the scene if there is one, else uniform lines and rays from the fronts of all
 /// triangles.
-pub(super) fn sample(mesh: &Mesh, bvh: &BinaryBvh, options: &Options, scene: Option<&Weighting>) -> Sampled {
+pub(super) fn sample(
+    mesh: &Mesh,
+    bvh: &BinaryBvh,
+    options: &CostOptions,
+    scene: Option<&Weighting>,
+) -> Sampled {
     let [camera, surface] = scene.map_or(options.optimize_for.weights(), |s| s.shares());
     let drawn;
     let (from_outside, from_surface): (&[SampleRay], &[SampleRay]) = match scene {

@@ -34,7 +34,7 @@ pub use choose::{Storage, choose};
 pub use estimate::{Estimator, Start};
 pub use least_squares::fit;
 pub use least_useful::{Weighed, least_useful};
-pub use options::{Choice, OptimizeFor, Options, Probe, Report, Select, SelectionOutcome, Verdict};
+pub use options::{Choice, CostOptions, CostReport, OptimizeFor, Probe, Select, SelectionOutcome, Verdict};
 pub use probe::{ProbeReport, ProbedLeaf, probe};
 pub use profile::{BvhCosts, Profile, TetCosts, Walk};
 pub use rays::{SampleRay, from_surface, outside};

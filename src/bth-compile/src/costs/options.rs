@@ -1,4 +1,4 @@
-//! Options of the selection, and the verdict on each node.
+//! CostOptions of the selection, and the verdict on each node.
 
 use super::{Estimator, Profile, Weighting};
 use serde::{Serialize, Serializer};
@@ -55,7 +55,7 @@ pub enum Probe {
 
 /// Costs of the structures, and limits on the nodes that are considered. Times are those of one ray on one thread.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Options {
+pub struct CostOptions {
     /// How nodes are selected.
     pub select: Select,
     /// The mixture of rays.
@@ -101,9 +101,9 @@ fn by_hash<S: Serializer>(profile: &Profile, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(&profile.hash())
 }
 
-impl Default for Options {
+impl Default for CostOptions {
     fn default() -> Self {
-        Options {
+        CostOptions {
             select: Select::default(),
             optimize_for: OptimizeFor::default(),
             estimator: Estimator::default(),
@@ -189,11 +189,11 @@ pub struct Choice {
     pub verdicts: Vec<Verdict>,
 }
 
-/// Report of the selection.
+/// CostReport of the selection.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct CostReport {
     /// The costs and limits that were used.
-    pub options: Options,
+    pub options: CostOptions,
     /// Nodes examined.
     pub examined: u64,
     /// Nodes chosen.

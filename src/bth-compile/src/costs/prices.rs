@@ -1,7 +1,7 @@
 //! Costs of a tetrahedralization by its size: time of rays, bytes, and time to make them.
 
 use super::profile::{BvhCosts, TetCosts};
-use super::{Options, Start, Walk};
+use super::{CostOptions, Start, Walk};
 use bth_format::layout::{HullFace, RecordKind, TetFace, TetLeaf, TetVertex};
 
 /// Tetrahedra and tetrahedron vertices for each triangle, with free-space points, as measured on scans.
@@ -12,7 +12,7 @@ pub(super) const LINES_THAT_HIT: f64 = 0.52;
 
 /// Prices under the options.
 pub(super) struct Prices<'a> {
-    options: &'a Options,
+    options: &'a CostOptions,
     costs: &'a TetCosts,
     record: RecordKind,
     /// Factor on the costs of tetrahedra.
@@ -22,7 +22,7 @@ pub(super) struct Prices<'a> {
 }
 
 impl<'a> Prices<'a> {
-    pub(super) fn new(options: &'a Options, record: RecordKind, keep_subtrees: bool) -> Self {
+    pub(super) fn new(options: &'a CostOptions, record: RecordKind, keep_subtrees: bool) -> Self {
         let costs = options.profile.record(record);
         let scale = options.c_tet.map_or(1.0, |c| c / costs.surface.step[0].max(f64::MIN_POSITIVE));
         Prices { options, costs, record, scale, keep_subtrees }

@@ -7,7 +7,7 @@
 use super::bvh_walk::walk;
 use super::choose::Storage;
 use super::gains::leaves;
-use super::options::{Options, Probe, Select};
+use super::options::{CostOptions, Probe, Select};
 use super::prices::Prices;
 use super::rays::{SampleRay, from_surface, outside};
 use super::tet_walk::TetWalker;
@@ -24,7 +24,7 @@ use serde::Serialize;
 const RAYS_OF_ALL_LEAVES: usize = 1 << 16;
 const RAYS_OF_LEAF: [usize; 2] = [64, 1024];
 
-/// Report of the probe.
+/// CostReport of the probe.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ProbeReport {
     /// Each tet leaf that was built.
@@ -63,7 +63,7 @@ pub fn probe(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     built: Vec<Leaf>,
-    options: &Options,
+    options: &CostOptions,
     storage: Storage,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<Leaf>, Option<ProbeReport>)> {
@@ -137,7 +137,7 @@ fn share_of(scene: &Weighting, bvh: &BinaryBvh, rows: &std::ops::Range<usize>) -
 struct Prober<'a> {
     mesh: &'a Mesh,
     bvh: &'a BinaryBvh,
-    options: &'a Options,
+    options: &'a CostOptions,
     prices: &'a Prices<'a>,
     /// Rays for each leaf.
     count: usize,

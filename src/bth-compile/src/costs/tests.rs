@@ -12,11 +12,11 @@ use bth_import::Mesh;
 const KEPT: Storage = Storage { record: RecordKind::Link32, keep_subtrees: true, plain_bytes: None };
 const PRUNED: Storage = Storage { record: RecordKind::Link32, keep_subtrees: false, plain_bytes: None };
 
-fn paper() -> Options {
-    Options { select: Select::Paper, minimum_gain: 0.0, ..Options::default() }
+fn paper() -> CostOptions {
+    CostOptions { select: Select::Paper, minimum_gain: 0.0, ..CostOptions::default() }
 }
 
-fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &Options) -> (Choice, Report) {
+fn chosen(bvh: &BinaryBvh, marks: &Marks, options: &CostOptions) -> (Choice, CostReport) {
     choose(&Mesh::default(), bvh, marks, options, PRUNED, &Silent).unwrap()
 }
 
@@ -32,7 +32,7 @@ fn cost_and_depths(bvh: &BinaryBvh, i: usize, depth: u32, visit: f64) -> (f64, u
     (visit + share(l) * a.0 + share(r) * b.0, a.1 + b.1)
 }
 
-fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &Options, chosen: &mut Vec<u32>) {
+fn by_recursion(bvh: &BinaryBvh, marks: &Marks, i: usize, options: &CostOptions, chosen: &mut Vec<u32>) {
     let node = &bvh.nodes[i];
     if node.count < options.minimum_triangles {
         return;
@@ -60,7 +60,8 @@ fn the_papers_rule_chooses_what_its_recursion_chooses() {
         let bvh = tree(seed, 50 + 3 * seed as u32);
         let marks = marks_beyond(&bvh, (seed % 40) as u32);
         for estimator in [Estimator::FaceCount, Estimator::AverageDepth] {
-            let mut options = Options { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
+            let mut options =
+                CostOptions { estimator, minimum_triangles: 8, maximum_triangles: 200, ..paper() };
             options.profile.bvh.outside = 3.4;
             let c_tet = 0.5 + (seed % 7) as f64 * 0.2;
             let costs = options.profile.tets.get_mut("link32").unwrap();
@@ -80,7 +81,7 @@ fn the_papers_rule_chooses_what_its_recursion_chooses() {
 #[test]
 fn costs_of_the_papers_rule_are_those_of_the_definition() {
     let bvh = tree(3, 300);
-    let mut options = Options { minimum_triangles: 1, c_tet: Some(1e9), ..paper() };
+    let mut options = CostOptions { minimum_triangles: 1, c_tet: Some(1e9), ..paper() };
     options.profile.bvh.outside = 2.0;
     let (choice, _) = chosen(&bvh, &marks_beyond(&bvh, 0), &options);
     assert_eq!(choice.verdicts.len(), bvh.nodes.len());
@@ -95,7 +96,7 @@ fn costs_of_the_papers_rule_are_those_of_the_definition() {
 fn nothing_is_chosen_for_a_gain_below_the_least_one() {
     let bvh = tree(5, 2000);
     let marks = marks_beyond(&bvh, 3);
-    let options = Options { minimum_triangles: 2, c_tet: Some(1e-3), minimum_gain: 1.1, ..paper() };
+    let options = CostOptions { minimum_triangles: 2, c_tet: Some(1e-3), minimum_gain: 1.1, ..paper() };
     let (choice, report) = chosen(&bvh, &marks, &options);
     assert!(choice.chosen.is_empty() && report.triangles == 0);
     assert!(choice.verdicts.iter().any(|v| v.decision == SelectionOutcome::RefusedGain));
@@ -104,7 +105,7 @@ fn nothing_is_chosen_for_a_gain_below_the_least_one() {
 
 #[test]
 fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
-    for options in [paper(), Options::default()] {
+    for options in [paper(), CostOptions::default()] {
         let (choice, _) = chosen(&BinaryBvh::default(), &Marks::default(), &options);
         assert!(choice.chosen.is_empty() && choice.verdicts.is_empty());
         let bvh = tree(1, 9);
@@ -117,7 +118,7 @@ fn an_empty_bvh_chooses_nothing_and_foreign_marks_are_an_error() {
 fn blob() -> (Mesh, BinaryBvh, Marks) {
     let model = bth_scenes::blob::blob(6000);
     let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
-    let (bvh, _) = bvh::build(&mesh, &bvh::Options::default(), &Silent).unwrap();
+    let (bvh, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
     let marks = Marks { suitable: vec![true; bvh.nodes.len()] };
     (mesh, bvh, marks)
 }
@@ -152,17 +153,17 @@ fn a_ray_meets_what_trying_all_triangles_meets_and_enters_the_nodes_above() {
 #[test]
 fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
     let (mesh, bvh, marks) = blob();
-    let choice = |c_tet: f64, options: Options, storage: Storage| {
-        let options = Options { c_tet: Some(c_tet), minimum_triangles: 64, ..options };
+    let choice = |c_tet: f64, options: CostOptions, storage: Storage| {
+        let options = CostOptions { c_tet: Some(c_tet), minimum_triangles: 64, ..options };
         choose(&mesh, &bvh, &marks, &options, storage, &Silent).unwrap()
     };
-    let (cheap, report) = choice(1e-3, Options::default(), KEPT);
+    let (cheap, report) = choice(1e-3, CostOptions::default(), KEPT);
     assert_eq!(cheap.chosen, [0]);
     assert!(report.cost_with_tets < 0.5 * report.cost_bvh, "{report:?}");
-    assert!(choice(1e3, Options::default(), KEPT).0.chosen.is_empty());
+    assert!(choice(1e3, CostOptions::default(), KEPT).0.chosen.is_empty());
 
     // With a BVH beside the tetrahedra, rays from outside use the BVH only; without one they walk through the tetrahedra.
-    let camera = Options { optimize_for: OptimizeFor::Camera, ..Options::default() };
+    let camera = CostOptions { optimize_for: OptimizeFor::Camera, ..CostOptions::default() };
     assert!(choice(1e-3, camera.clone(), KEPT).0.chosen.is_empty());
     assert_eq!(choice(1e-3, camera, PRUNED).0.chosen, [0]);
 }
@@ -170,17 +171,17 @@ fn cheap_tetrahedra_are_taken_whole_and_dear_ones_not_at_all() {
 #[test]
 fn limits_on_bytes_and_time_leave_fewer_triangles_to_tetrahedra() {
     let (mesh, bvh, marks) = blob();
-    let triangles = |options: Options| {
-        let options = Options { c_tet: Some(1e-3), minimum_triangles: 64, minimum_gain: 0.0, ..options };
+    let triangles = |options: CostOptions| {
+        let options = CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, minimum_gain: 0.0, ..options };
         choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().1.triangles
     };
-    let all = triangles(Options::default());
+    let all = triangles(CostOptions::default());
     let by_bytes = [40.0, 80.0, 1e3]
-        .map(|b| triangles(Options { max_bytes_per_triangle: Some(b), ..Options::default() }));
+        .map(|b| triangles(CostOptions { max_bytes_per_triangle: Some(b), ..CostOptions::default() }));
     assert!(by_bytes[0] < by_bytes[1] && by_bytes[1] < all && by_bytes[2] == all, "{by_bytes:?}");
     let seconds = Profile::default().tetrahedralize * 1e-6 * all as f64;
-    let by_time =
-        [0.1, 0.5, 2.0].map(|s| triangles(Options { budget: Some(s * seconds), ..Options::default() }));
+    let by_time = [0.1, 0.5, 2.0]
+        .map(|s| triangles(CostOptions { budget: Some(s * seconds), ..CostOptions::default() }));
     assert!(by_time[0] < by_time[1] && by_time[1] < all && by_time[2] == all, "{by_time:?}");
     assert!(by_time[1] as f64 <= 0.5 * all as f64);
 }
@@ -190,7 +191,8 @@ fn rays_of_a_scene_decide_which_nodes_count() {
     let (mesh, bvh, marks) = blob();
     let nodes = |scene: Weighting| {
         let scene = Some(std::sync::Arc::new(scene));
-        let options = Options { c_tet: Some(1e-3), minimum_triangles: 64, scene, ..Options::default() };
+        let options =
+            CostOptions { c_tet: Some(1e-3), minimum_triangles: 64, scene, ..CostOptions::default() };
         choose(&mesh, &bvh, &marks, &options, KEPT, &Silent).unwrap().0.chosen
     };
     assert!(nodes(Weighting::default()).is_empty());

@@ -1,7 +1,7 @@
 //! The paper's selection (§3.2, §3.3): top-down, the first suitable nodes for which tetrahedra are the cheaper
 //! structure for rays from outside.
 
-use super::options::{Choice, Options, SelectionOutcome, Verdict};
+use super::options::{Choice, CostOptions, SelectionOutcome, Verdict};
 use super::prices::{LINES_THAT_HIT, Prices};
 use super::subtree_sums::{half_area, subtree_sums};
 use super::{Estimator, Start};
@@ -27,7 +27,7 @@ pub(super) struct PaperCosts {
 pub(super) fn choose(
     bvh: &BinaryBvh,
     marks: &Marks,
-    options: &Options,
+    options: &CostOptions,
     prices: &Prices<'_>,
     fits: impl Fn(u32) -> bool,
     monitor: &dyn Monitor,

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 /// Greatest number of triangles of a subtree that one thread marks.
 const GRAIN: u32 = 4096;
 
-/// Report of the marking stage.
+/// MarkReport of the marking stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct MarkReport {
     /// Triangles in the BVH; those of zero area are not.
     pub triangles: u64,
     /// Nodes of the BVH.
@@ -49,7 +49,7 @@ pub struct Coverage {
 ///
 /// # Errors
 /// Only [`crate::Error::Cancelled`].
-pub fn mark(mesh: &Mesh, bvh: &BinaryBvh, monitor: &dyn Monitor) -> Result<(Marks, Report)> {
+pub fn mark(mesh: &Mesh, bvh: &BinaryBvh, monitor: &dyn Monitor) -> Result<(Marks, MarkReport)> {
     monitor.stage("marks", Some(bvh.order.len() as u64));
     let gathered = Gathered::new(mesh, bvh);
     let mut suitable = vec![false; bvh.nodes.len()];
@@ -163,7 +163,7 @@ fn mark_inner(
     Ok((contacts.bad == 0, contacts))
 }
 
-fn summarize(bvh: &BinaryBvh, marks: &Marks, contacts: Contacts) -> Report {
+fn summarize(bvh: &BinaryBvh, marks: &Marks, contacts: Contacts) -> MarkReport {
     let mut sizes = Vec::new();
     let mut i = 0;
     while i < bvh.nodes.len() {
@@ -181,7 +181,7 @@ fn summarize(bvh: &BinaryBvh, marks: &Marks, contacts: Contacts) -> Report {
         let covered: u64 = large.clone().map(|&s| u64::from(s)).sum();
         Coverage { at_least, nodes: large.count() as u64, share: covered as f64 / (total.max(1)) as f64 }
     });
-    Report {
+    MarkReport {
         triangles: total as u64,
         nodes: bvh.nodes.len() as u64,
         suitable: marks.suitable.iter().filter(|&&s| s).count() as u64,
@@ -256,7 +256,7 @@ mod tests {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let (marks, report) = pool.install(|| mark(&mesh, &bvh, &Silent)).unwrap();
-            (marks, Report { seconds: 0.0, ..report })
+            (marks, MarkReport { seconds: 0.0, ..report })
         };
         let one = run(1);
         assert_eq!(one, run(2));

@@ -20,7 +20,7 @@ mod oracle;
 mod testing;
 
 pub use bad_pairs::{BadPairs, bad_pairs};
-pub use mark::{Report, mark};
+pub use mark::{MarkReport, mark};
 pub use triangle_contact::{Triangle, in_bad_contact};
 
 /// Result of the marking stage.

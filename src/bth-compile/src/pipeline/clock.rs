@@ -21,25 +21,25 @@ pub(crate) trait StageReport {
     fn seconds(&mut self) -> &mut f64;
 }
 
-impl StageReport for bvh::Report {
+impl StageReport for bvh::BvhReport {
     fn seconds(&mut self) -> &mut f64 {
         &mut self.seconds
     }
 }
 
-impl StageReport for marks::Report {
+impl StageReport for marks::MarkReport {
     fn seconds(&mut self) -> &mut f64 {
         &mut self.seconds
     }
 }
 
-impl StageReport for costs::Report {
+impl StageReport for costs::CostReport {
     fn seconds(&mut self) -> &mut f64 {
         &mut self.seconds
     }
 }
 
-impl StageReport for tets::Report {
+impl StageReport for tets::TetReport {
     fn seconds(&mut self) -> &mut f64 {
         &mut self.seconds
     }

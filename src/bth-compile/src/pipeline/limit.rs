@@ -2,7 +2,7 @@
 //! selection of the tetrahedralizations to leave out when they are larger than estimated.
 
 use super::object::{TracedMesh, TracedRef, collapse};
-use super::{FileReport, Options, Structure};
+use super::{CompileOptions, FileReport, Structure};
 use crate::costs::{self, Choice, ProbeReport, Weighed, least_useful};
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -17,7 +17,7 @@ use bth_import::Mesh;
 pub fn storage(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<costs::Storage> {
     storage_of(TracedRef { mesh, on_grid: None, tree }, options, monitor)
@@ -26,7 +26,7 @@ pub fn storage(
 /// As [`storage`], for a mesh that may be on a grid.
 pub(super) fn storage_of(
     traced: TracedRef<'_>,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<costs::Storage> {
     let mut storage = options.storage();
@@ -37,7 +37,7 @@ pub(super) fn storage_of(
 }
 
 /// The limit that applies to tet leaves. The tetrahedralization of a whole model is not limited.
-pub(super) fn bytes_per_triangle(options: &Options) -> Option<f64> {
+pub(super) fn bytes_per_triangle(options: &CompileOptions) -> Option<f64> {
     options.costs.max_bytes_per_triangle.filter(|_| options.structure == Structure::Bth)
 }
 
@@ -48,7 +48,7 @@ pub(super) fn fit(
     most: f64,
     mut leaves: Vec<tets::Leaf>,
     (choice, mut probe): (&Choice, Option<&mut ProbeReport>),
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<Vec<tets::Leaf>> {
     let traced = traced.by_ref();
@@ -77,7 +77,7 @@ pub(super) fn fit(
 }
 
 /// Brings the probe's report up to date after leaves were left out, and leaves out the rest if it saves too little.
-fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::Options) {
+fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::CostOptions) {
     let is_left = |node: u32| leaves.iter().any(|(n, _)| *n == node);
     probe.leaves.iter_mut().for_each(|leaf| leaf.kept = leaf.kept && is_left(leaf.node));
     let left: f64 = probe.leaves.iter().filter(|leaf| leaf.kept).map(|leaf| leaf.gain).sum();
@@ -93,7 +93,7 @@ fn follow(probe: &mut ProbeReport, leaves: &mut Vec<tets::Leaf>, costs: &costs::
 fn bytes(
     traced: TracedRef<'_>,
     leaves: &[tets::Leaf],
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<u64> {
     let cut: Vec<u32> = leaves.iter().map(|(node, _)| *node).collect();
@@ -117,7 +117,7 @@ fn gain(tree: &bvh::BinaryBvh, choice: &Choice, probe: Option<&ProbeReport>, nod
 }
 
 /// Warns if an object is over the limit on bytes.
-pub(crate) fn warn_over_limit(file: &FileReport, options: &Options, monitor: &dyn Monitor) {
+pub(crate) fn warn_over_limit(file: &FileReport, options: &CompileOptions, monitor: &dyn Monitor) {
     let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = file.resident_bytes_per_triangle;
     if each > most {

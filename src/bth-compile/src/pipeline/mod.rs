@@ -11,7 +11,7 @@ mod report;
 mod select;
 mod stages;
 
-pub use crate::options::{Options, Structure};
+pub use crate::options::{CompileOptions, Structure};
 pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
@@ -19,7 +19,7 @@ pub(crate) use limit::warn_over_limit;
 pub use object::{Compiled, assemble};
 pub(crate) use object::{Object, TracedMesh};
 pub(crate) use report::StageReports;
-pub use report::{FileReport, Report};
+pub use report::{CompileReport, FileReport};
 pub(crate) use stages::{Direct, Stages};
 
 use crate::error::Result;
@@ -34,7 +34,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// Those of the stages: a source that cannot be used or read, a limit of the format, cancellation.
-pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Result<(Compiled, Report)> {
+pub fn compile(
+    source: &Path,
+    options: &CompileOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Compiled, CompileReport)> {
     let mut clock = Clock::default();
     let digest = clock.time("hash", || SourceDigest::of(source))?;
     let model = Model { path: source, digest: &digest };
@@ -46,30 +50,30 @@ pub fn compile(source: &Path, options: &Options, monitor: &dyn Monitor) -> Resul
 /// Compiles a model whose files have been hashed; `clock` has the time of that.
 pub(crate) fn compile_model(
     model: &Model<'_>,
-    options: &Options,
+    options: &CompileOptions,
     stages: &mut dyn Stages,
     mut clock: Clock,
     monitor: &dyn Monitor,
-) -> Result<(Compiled, Report)> {
+) -> Result<(Compiled, CompileReport)> {
     let (mesh, import) = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
     let (object, reports) = compile_mesh(model.path, mesh, options, stages, &mut clock, monitor)?;
     let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
     let provenance = provenance::of_model(&source_blake3, &import.format, tetgen, options)?;
     let (compiled, file) = clock.time("file", || object.file(provenance, options))?;
-    Ok((compiled, Report::new(source_blake3, clock, import, reports, file)))
+    Ok((compiled, CompileReport::new(source_blake3, clock, import, reports, file)))
 }
 
 /// Compiles a mesh into an object; `source` names the model in messages.
 pub(crate) fn compile_mesh(
     source: &Path,
     mesh: Mesh,
-    options: &Options,
+    options: &CompileOptions,
     stages: &mut dyn Stages,
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Object, StageReports)> {
-    let (mesh, on_grid) = match options.coordinates == coordinates::Options::default() {
+    let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
@@ -88,7 +92,7 @@ pub(crate) fn compile_mesh(
 fn tet_leaves(
     source: &Path,
     traced: &TracedMesh,
-    options: &Options,
+    options: &CompileOptions,
     stages: &mut dyn Stages,
     clock: &mut Clock,
     monitor: &dyn Monitor,

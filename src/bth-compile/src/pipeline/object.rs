@@ -1,7 +1,7 @@
 //! Assembles an object from the results of the stages, and the file with one object.
 
 use super::clock::timed;
-use super::{FileReport, Options};
+use super::{CompileOptions, FileReport};
 use crate::coordinates::{Boxes, OnGrid};
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -54,7 +54,7 @@ pub(crate) struct Object {
 pub(super) fn join(
     traced: TracedMesh,
     leaves: Vec<tets::Leaf>,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Object, bvh::CollapseReport)> {
     let (cut, meshes): (Vec<u32>, Vec<tets::TetMesh>) = leaves.into_iter().unzip();
@@ -80,7 +80,7 @@ pub(super) struct PackedWide {
 pub(super) fn collapse(
     traced: TracedRef<'_>,
     cut: &[u32],
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(PackedWide, bvh::CollapseReport)> {
     let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
@@ -101,7 +101,7 @@ pub fn assemble(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
     built: &[tets::Leaf],
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<Compiled> {
     let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
@@ -111,7 +111,11 @@ pub fn assemble(
 
 impl Object {
     /// The file with this object only, after the checks of a reader.
-    pub(super) fn file(&self, provenance: String, options: &Options) -> Result<(Compiled, FileReport)> {
+    pub(super) fn file(
+        &self,
+        provenance: String,
+        options: &CompileOptions,
+    ) -> Result<(Compiled, FileReport)> {
         let parts = self.parts(options);
         let mut builder = write::FileBuilder::new();
         write::object(&mut builder, 0, &parts)?;
@@ -131,12 +135,12 @@ impl Object {
     }
 
     /// The report on the coordinates, if vertices were moved.
-    pub(super) fn coordinates_report(&self) -> Option<coordinates::Report> {
+    pub(super) fn coordinates_report(&self) -> Option<coordinates::CoordinateReport> {
         self.traced.on_grid.as_ref().map(OnGrid::report)
     }
 
     /// The contents of the object's sections.
-    pub(crate) fn parts(&self, options: &Options) -> write::ObjectParts<'_> {
+    pub(crate) fn parts(&self, options: &CompileOptions) -> write::ObjectParts<'_> {
         let TracedMesh { mesh, on_grid, tree } = &self.traced;
         let mut parts = write::ObjectParts {
             bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
@@ -164,7 +168,7 @@ impl Object {
 }
 
 /// The geometry and the attributes of the source that the file keeps.
-fn source<'a>(mesh: &'a Mesh, on_grid: Option<&'a OnGrid>, options: &Options) -> write::Source<'a> {
+fn source<'a>(mesh: &'a Mesh, on_grid: Option<&'a OnGrid>, options: &CompileOptions) -> write::Source<'a> {
     let mut source = write::Source::default();
     if options.geometry {
         source.positions = on_grid.map_or(&mesh.positions, |on| &on.source);

@@ -1,13 +1,13 @@
 //! The provenance section: tool version, options and source content. No paths and no times, so that equal input gives
 //! equal bytes.
 
-use super::{Options, Structure};
+use super::{CompileOptions, Structure};
 use crate::error::{Error, Result};
 use crate::tets;
 use serde_json::json;
 
 /// Version of TetGen that a compilation used.
-pub(super) fn tetgen(report: Option<&tets::Report>) -> Option<&str> {
+pub(super) fn tetgen(report: Option<&tets::TetReport>) -> Option<&str> {
     match &report?.worker {
         tets::WorkerStatus::Ready { tetgen } => Some(tetgen),
         _ => None,
@@ -19,7 +19,7 @@ pub(super) fn of_model(
     source_blake3: &str,
     format: &str,
     tetgen: Option<&str>,
-    options: &Options,
+    options: &CompileOptions,
 ) -> Result<String> {
     text(json!({
         "tool": "bthc",
@@ -34,7 +34,7 @@ pub(super) fn of_model(
 pub(crate) fn of_scene(
     sources: &[(String, String)],
     tetgen: Option<&str>,
-    options: &Options,
+    options: &CompileOptions,
 ) -> Result<String> {
     let source = |(format, blake3): &(String, String)| json!({"format": format, "blake3": blake3});
     text(json!({
@@ -46,7 +46,7 @@ pub(crate) fn of_scene(
     }))
 }
 
-fn options_json(options: &Options) -> serde_json::Value {
+fn options_json(options: &CompileOptions) -> serde_json::Value {
     let mut json = json!({
         "structure": options.structure,
         "quality": options.bvh.quality,

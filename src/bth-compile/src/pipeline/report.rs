@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Reports of all stages of a model's compilation.
 #[derive(Clone, Debug, Serialize)]
-pub struct Report {
+pub struct CompileReport {
     /// BLAKE3 of the source file's bytes, hexadecimal.
     pub source_blake3: String,
     /// Wall-clock time of each stage, in order.
@@ -16,15 +16,15 @@ pub struct Report {
     pub mesh: mesh::Report,
     /// Coordinates, unless they are `f32`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub coordinates: Option<coordinates::Report>,
+    pub coordinates: Option<coordinates::CoordinateReport>,
     /// Binary BVH.
-    pub bvh: bvh::Report,
+    pub bvh: bvh::BvhReport,
     /// Marking; absent, as the next two, for structures without tetrahedra.
-    pub marks: Option<marks::Report>,
+    pub marks: Option<marks::MarkReport>,
     /// Selection.
-    pub costs: Option<costs::Report>,
+    pub costs: Option<costs::CostReport>,
     /// Tetrahedralization.
-    pub tets: Option<tets::Report>,
+    pub tets: Option<tets::TetReport>,
     /// Probe of the tetrahedralizations, if there were any.
     pub probe: Option<costs::ProbeReport>,
     /// Wide BVH.
@@ -48,13 +48,13 @@ pub struct FileReport {
     pub resident_bytes_per_triangle: f64,
 }
 
-/// Reports of the stages between the mesh and the wide BVH; see [`Report`].
+/// Reports of the stages between the mesh and the wide BVH; see [`CompileReport`].
 pub(crate) struct StageReports {
-    coordinates: Option<coordinates::Report>,
-    bvh: bvh::Report,
-    marks: Option<marks::Report>,
-    costs: Option<costs::Report>,
-    pub(crate) tets: Option<tets::Report>,
+    coordinates: Option<coordinates::CoordinateReport>,
+    bvh: bvh::BvhReport,
+    marks: Option<marks::MarkReport>,
+    costs: Option<costs::CostReport>,
+    pub(crate) tets: Option<tets::TetReport>,
     probe: Option<costs::ProbeReport>,
     collapse: bvh::CollapseReport,
 }
@@ -62,16 +62,16 @@ pub(crate) struct StageReports {
 /// Reports of the stages that lead to tet leaves.
 #[derive(Default)]
 pub(super) struct TetReports {
-    pub(super) marks: Option<marks::Report>,
-    pub(super) costs: Option<costs::Report>,
-    pub(super) tets: Option<tets::Report>,
+    pub(super) marks: Option<marks::MarkReport>,
+    pub(super) costs: Option<costs::CostReport>,
+    pub(super) tets: Option<tets::TetReport>,
     pub(super) probe: Option<costs::ProbeReport>,
 }
 
 impl StageReports {
     pub(super) fn new(
-        coordinates: Option<coordinates::Report>,
-        bvh: bvh::Report,
+        coordinates: Option<coordinates::CoordinateReport>,
+        bvh: bvh::BvhReport,
         TetReports { marks, costs, tets, probe }: TetReports,
         collapse: bvh::CollapseReport,
     ) -> Self {
@@ -79,7 +79,7 @@ impl StageReports {
     }
 }
 
-impl Report {
+impl CompileReport {
     pub(super) fn new(
         source_blake3: String,
         clock: Clock,

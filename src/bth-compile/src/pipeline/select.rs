@@ -3,7 +3,7 @@
 use super::clock::timed;
 use super::limit;
 use super::object::TracedMesh;
-use super::{Options, Structure};
+use super::{CompileOptions, Structure};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
 use crate::{bvh, costs, marks, tets};
@@ -15,9 +15,9 @@ pub(super) fn choose(
     source: &Path,
     traced: &TracedMesh,
     marks: &marks::Marks,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
-) -> Result<(costs::Choice, Option<costs::Report>)> {
+) -> Result<(costs::Choice, Option<costs::CostReport>)> {
     let TracedMesh { mesh, tree, .. } = traced;
     match (options.structure, marks.suitable.first()) {
         (Structure::Bvh, _) | (Structure::Tets, None) => Ok((costs::Choice::default(), None)),
@@ -50,7 +50,7 @@ pub(super) fn probe(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
     built: Vec<tets::Leaf>,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<tets::Leaf>, Option<costs::ProbeReport>)> {
     match options.structure {
@@ -64,7 +64,7 @@ pub(super) fn check_built(
     source: &Path,
     tree: &bvh::BinaryBvh,
     built: &[tets::Leaf],
-    options: &Options,
+    options: &CompileOptions,
 ) -> Result<()> {
     let whole = matches!(built, [(0, _)]);
     if options.structure == Structure::Tets && !tree.nodes.is_empty() && !whole {

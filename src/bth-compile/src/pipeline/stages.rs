@@ -35,7 +35,7 @@ pub(crate) trait Stages {
         &mut self,
         source: &Path,
         mut mesh: Mesh,
-        options: &coordinates::Options,
+        options: &coordinates::CoordinateOptions,
     ) -> Result<(Mesh, Option<OnGrid>)> {
         let on_grid = coordinates::place(source, &mut mesh, options)?;
         Ok((mesh, on_grid))
@@ -48,9 +48,9 @@ pub(crate) trait Stages {
     fn bvh(
         &mut self,
         mesh: &Mesh,
-        options: &bvh::Options,
+        options: &bvh::BvhOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(bvh::BinaryBvh, bvh::Report)> {
+    ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
         timed(|| bvh::build(mesh, options, monitor))
     }
 
@@ -62,9 +62,9 @@ pub(crate) trait Stages {
         &mut self,
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
-        _options: &bvh::Options,
+        _options: &bvh::BvhOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(marks::Marks, marks::Report)> {
+    ) -> Result<(marks::Marks, marks::MarkReport)> {
         timed(|| marks::mark(mesh, tree, monitor))
     }
 
@@ -77,9 +77,9 @@ pub(crate) trait Stages {
         mesh: &Mesh,
         tree: &bvh::BinaryBvh,
         chosen: &[u32],
-        options: &tets::Options,
+        options: &tets::TetOptions,
         monitor: &dyn Monitor,
-    ) -> Result<(Vec<tets::Leaf>, tets::Report)> {
+    ) -> Result<(Vec<tets::Leaf>, tets::TetReport)> {
         timed(|| tets::build(mesh, tree, chosen, options, monitor))
     }
 }

@@ -11,7 +11,7 @@ use crate::cached::{self, Cache, CachedCompilation, DryRun};
 use crate::costs;
 use crate::error::{self, Error, Result};
 use crate::monitor::Monitor;
-use crate::options::{Options, Structure};
+use crate::options::{CompileOptions, Structure};
 use crate::pipeline::{Clock, Compiled, provenance};
 use crate::tets::WorkerStatus;
 use crate::write::{self, Content, FileBuilder, SceneParts};
@@ -30,7 +30,7 @@ pub fn compile(
     manifest: &Manifest,
     folder: &Path,
     name: &Path,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, SceneReport)> {
     let cache = Cache::none();
@@ -71,7 +71,7 @@ pub struct CachePolicy<'a> {
 pub fn compile_cached(
     manifest: &Manifest,
     source: SceneSource<'_>,
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     policy: CachePolicy<'_>,
     monitor: &dyn Monitor,
@@ -94,7 +94,7 @@ pub fn compile_cached(
 }
 
 /// Warns if objects are over the limit on bytes.
-fn warn_over_limit(objects: &[ObjectReport], options: &Options, monitor: &dyn Monitor) {
+fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
     let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
     let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
@@ -117,7 +117,7 @@ fn warn_over_limit(objects: &[ObjectReport], options: &Options, monitor: &dyn Mo
 pub fn compile_objects(
     manifest: &Manifest,
     source: SceneSource<'_>,
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     shard: (u32, u32),
     monitor: &dyn Monitor,
@@ -144,7 +144,7 @@ pub fn compile_objects(
 pub fn dry_run(
     manifest: &Manifest,
     source: SceneSource<'_>,
-    options: &Options,
+    options: &CompileOptions,
     cache: &Cache<'_>,
     target: Option<&Path>,
     monitor: &dyn Monitor,
@@ -282,10 +282,15 @@ fn rays(
     context: &Context<'_>,
 ) -> Result<Vec<Arc<costs::Weighting>>> {
     let Context { cache, monitor, .. } = *context;
-    let costs = costs::Options { for_scene: false, ..context.options.costs.clone() };
+    let costs = costs::CostOptions { for_scene: false, ..context.options.costs.clone() };
     let coordinates = Default::default();
-    let options =
-        Options { structure: Structure::Bvh, geometry: true, costs, coordinates, ..context.options.clone() };
+    let options = CompileOptions {
+        structure: Structure::Bvh,
+        geometry: true,
+        costs,
+        coordinates,
+        ..context.options.clone()
+    };
     let tetgen = context.tetgen.as_ref().map(|_| String::new());
     let plain = Context::of(&options, cache, tetgen, monitor);
     let (content, ..) = build(manifest, plan, name, &plain, Clock::default())?;

@@ -5,12 +5,12 @@ use crate::cached::{self, Cache, ObjectKeys};
 use crate::costs;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::options::Options;
+use crate::options::CompileOptions;
 use std::sync::Arc;
 
 /// What all parts of a scene's compilation share.
 pub(super) struct Context<'a> {
-    pub(super) options: &'a Options,
+    pub(super) options: &'a CompileOptions,
     pub(super) cache: &'a Cache<'a>,
     /// The name of the tetrahedralizer in keys; `None` when objects may not be kept.
     pub(super) tetgen: Option<String>,
@@ -28,13 +28,17 @@ impl<'a> Context<'a> {
     ///
     /// # Errors
     /// Cancelled.
-    pub(super) fn new(options: &'a Options, cache: &'a Cache<'a>, monitor: &'a dyn Monitor) -> Result<Self> {
+    pub(super) fn new(
+        options: &'a CompileOptions,
+        cache: &'a Cache<'a>,
+        monitor: &'a dyn Monitor,
+    ) -> Result<Self> {
         Ok(Self::of(options, cache, cached::tetgen_in_keys(options, cache, monitor)?, monitor))
     }
 
     /// The context of a compilation whose tetrahedralizer is known.
     pub(super) fn of(
-        options: &'a Options,
+        options: &'a CompileOptions,
         cache: &'a Cache<'a>,
         tetgen: Option<String>,
         monitor: &'a dyn Monitor,

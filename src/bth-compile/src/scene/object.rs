@@ -7,7 +7,7 @@ use super::sources::File;
 use crate::cached::{CachedStages, ObjectKeys};
 use crate::costs;
 use crate::error::{Error, Result};
-use crate::options::Options;
+use crate::options::CompileOptions;
 use crate::pipeline::{self, Clock};
 use crate::tets;
 use crate::write::{self, FileBuilder, object};
@@ -51,8 +51,8 @@ pub(super) fn build(
         let key = context.keys.as_ref().map(|keys| keys.of(&mesh.summary));
         return build_or_fetch(file, mesh, (key, &part), context.options, context, clock);
     };
-    let costs = costs::Options { scene: Some(rays.clone()), ..context.options.costs.clone() };
-    let options = Options { costs, ..context.options.clone() };
+    let costs = costs::CostOptions { scene: Some(rays.clone()), ..context.options.costs.clone() };
+    let options = CompileOptions { costs, ..context.options.clone() };
     let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary));
     build_or_fetch(file, mesh, (key, &part), &options, context, clock)
 }
@@ -62,7 +62,7 @@ fn build_or_fetch(
     file: &File<'_>,
     mesh: &mut SourceMesh,
     (key, part): (Option<Key>, &str),
-    options: &Options,
+    options: &CompileOptions,
     context: &Context<'_>,
     clock: &mut Clock,
 ) -> Result<BuiltObject> {

@@ -4,7 +4,7 @@
 use super::file_index::{FileIndex, SectionRow};
 use crate::cached::{self, Cache};
 use crate::monitor::Monitor;
-use crate::options::Options;
+use crate::options::CompileOptions;
 use crate::write::{Bytes, HEADER, are_zeros, name};
 use bth_files::OpenFile;
 use bth_format::file::hash128;
@@ -23,7 +23,7 @@ impl Previous {
     /// The file at a path, if the cache has its index and it was made with the same options.
     pub(super) fn open(
         path: &Path,
-        options: &Options,
+        options: &CompileOptions,
         tetgen: &str,
         cache: &Cache<'_>,
         monitor: &dyn Monitor,

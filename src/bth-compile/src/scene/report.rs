@@ -4,7 +4,7 @@ use crate::pipeline::StageTime;
 use crate::tets::WorkerStatus;
 use serde::{Deserialize, Serialize};
 
-/// Report on an object of the file.
+/// CompileReport on an object of the file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectReport {
     /// Its names in the manifest; several for equal geometry.
@@ -24,7 +24,7 @@ pub struct ObjectReport {
     pub copied: bool,
 }
 
-/// Report on a scene and the stages of its compilation.
+/// CompileReport on a scene and the stages of its compilation.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneReport {
     /// Wall-clock time of each stage, summed over all objects.

@@ -10,9 +10,9 @@ use bth_import::Mesh;
 
 use super::node::{NodeJob, NodeResult, NodeRunner, TimedNodes, tetrahedralize};
 use super::pool::{WorkerSlot, find};
-use super::report::{NodeReport, Outcome, Report, WorkerStatus};
+use super::report::{NodeReport, Outcome, TetReport, WorkerStatus};
 use super::worker::Setup;
-use super::{Leaf, Options, TetMesh};
+use super::{Leaf, TetMesh, TetOptions};
 
 /// Tetrahedralizes the chosen nodes (ascending). The result holds, ascending by node, what was
 /// built: chosen nodes, or cells below them where they failed; the rest stays in the BVH. It is
@@ -27,9 +27,9 @@ pub fn build(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     chosen: &[u32],
-    options: &Options,
+    options: &TetOptions,
     monitor: &dyn Monitor,
-) -> Result<(Vec<Leaf>, Report)> {
+) -> Result<(Vec<Leaf>, TetReport)> {
     build_through(mesh, bvh, chosen, options, &TimedNodes, monitor)
 }
 
@@ -41,19 +41,19 @@ pub(crate) fn build_through(
     mesh: &Mesh,
     bvh: &BinaryBvh,
     chosen: &[u32],
-    options: &Options,
+    options: &TetOptions,
     runner: &dyn NodeRunner,
     monitor: &dyn Monitor,
-) -> Result<(Vec<Leaf>, Report)> {
+) -> Result<(Vec<Leaf>, TetReport)> {
     if !chosen.is_sorted_by(|a, b| a < b) || chosen.last().is_some_and(|&n| n as usize >= bvh.nodes.len()) {
         let message = format!("chosen nodes are not ascending below {}", bvh.nodes.len());
         return Err(Error::Internal { code: "BTH-X020", message });
     }
     let size = |node: u32| bvh.nodes[node as usize].count;
-    let mut report = Report {
+    let mut report = TetReport {
         chosen: chosen.len() as u64,
         chosen_triangles: chosen.iter().map(|&n| u64::from(size(n))).sum(),
-        ..Report::default()
+        ..TetReport::default()
     };
     if chosen.is_empty() {
         return Ok((Vec::new(), report));
@@ -112,13 +112,13 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn none_built(mut report: Report) -> Report {
+fn none_built(mut report: TetReport) -> TetReport {
     report.given_up = report.chosen;
     report.given_up_triangles = report.chosen_triangles;
     report
 }
 
-fn finish(results: Results, mut report: Report) -> Result<(Vec<Leaf>, Report)> {
+fn finish(results: Results, mut report: TetReport) -> Result<(Vec<Leaf>, TetReport)> {
     if let Some(error) = results.error {
         return Err(error);
     }
@@ -165,7 +165,7 @@ impl Results {
         &mut self,
         NodeResult { built, mut report, no_worker, .. }: NodeResult,
         bvh: &BinaryBvh,
-        options: &Options,
+        options: &TetOptions,
         monitor: &dyn Monitor,
     ) -> Vec<u32> {
         let mut cells = Vec::new();
@@ -192,7 +192,7 @@ impl Results {
 }
 
 /// The cells that replace a node, and the triangles that no cell holds.
-fn replace(bvh: &BinaryBvh, node: u32, options: &Options) -> (Vec<u32>, u32) {
+fn replace(bvh: &BinaryBvh, node: u32, options: &TetOptions) -> (Vec<u32>, u32) {
     let count = bvh.nodes[node as usize].count;
     let Some(most) = options.cells.iter().copied().filter(|&size| size < count).max() else {
         return (Vec::new(), count);
@@ -285,16 +285,16 @@ mod tests {
     #[test]
     fn a_failed_node_is_replaced_by_the_largest_cells_of_the_next_size() {
         let bvh = tree(1000);
-        let options = Options { cells: vec![300, 2000], minimum: 10, ..Options::default() };
+        let options = TetOptions { cells: vec![300, 2000], minimum: 10, ..TetOptions::default() };
         let (cells, left) = replace(&bvh, 0, &options);
         assert_eq!(left, 0);
         assert_eq!(cells.iter().map(|&c| bvh.nodes[c as usize].count).collect::<Vec<_>>(), [250; 4]);
         // Cells that are too small stay in the BVH and are counted.
-        let (cells, left) = replace(&bvh, 0, &Options { minimum: 251, ..options.clone() });
+        let (cells, left) = replace(&bvh, 0, &TetOptions { minimum: 251, ..options.clone() });
         assert_eq!((cells.len(), left), (0, 1000));
         // A node below the smallest size is given up.
         assert_eq!(
-            replace(&bvh, cells.first().copied().unwrap_or(1), &Options { cells: vec![500], ..options }).1,
+            replace(&bvh, cells.first().copied().unwrap_or(1), &TetOptions { cells: vec![500], ..options }).1,
             500
         );
     }

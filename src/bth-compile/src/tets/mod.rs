@@ -25,9 +25,9 @@ pub(crate) use build::build_through;
 pub use encode::{Encoded, encode, encoded_bytes};
 pub(crate) use gather::NodeInput;
 pub(crate) use node::{NodeJob, NodeResult, NodeRunner, TimedNodes};
-pub use options::Options;
+pub use options::TetOptions;
 pub(crate) use pool::version;
-pub use report::{NodeReport, Outcome, Report, WorkerStatus};
+pub use report::{NodeReport, Outcome, TetReport, WorkerStatus};
 
 /// A tet leaf: the node of the binary BVH, and its tetrahedralization.
 pub type Leaf = (u32, TetMesh);

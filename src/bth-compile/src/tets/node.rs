@@ -13,7 +13,7 @@ use super::failure::AttemptError;
 use super::gather::{NodeInput, SIDES, gather};
 use super::pool::WorkerSlot;
 use super::report::{NodeReport, Outcome};
-use super::{Options, TetMesh, check, free_space, order};
+use super::{TetMesh, TetOptions, check, free_space, order};
 
 /// A node that is to be tetrahedralized.
 #[derive(Clone, Copy)]
@@ -22,7 +22,7 @@ pub(crate) struct NodeJob<'a> {
     pub(crate) bvh: &'a BinaryBvh,
     /// Row of the BVH.
     pub(crate) node: u32,
-    pub(crate) options: &'a Options,
+    pub(crate) options: &'a TetOptions,
     /// Version of TetGen.
     pub(crate) tetgen: &'a str,
 }
@@ -74,13 +74,13 @@ struct Attempt {
     seed: u64,
     /// Whether TetGen is given coordinates relative to the box.
     local: bool,
-    /// As [`Options::inflation`]: TetGen takes points that nearly touch the box for coplanar with it.
+    /// As [`TetOptions::inflation`]: TetGen takes points that nearly touch the box for coplanar with it.
     inflation: f32,
 }
 
 /// Attempts in order. Near the origin TetGen is first given the coordinates as they are. A node that can be replaced by
 /// smaller cells gets two attempts, because on models on which TetGen fails cells succeed more often than further attempts.
-fn attempts(options: &Options, far: bool, triangles: u32) -> Vec<Attempt> {
+fn attempts(options: &TetOptions, far: bool, triangles: u32) -> Vec<Attempt> {
     let m = options.free_space;
     let more = if m == 0 { 64 } else { m.saturating_mul(4) };
     let wide = options.inflation.max(1.0 / 256.0);

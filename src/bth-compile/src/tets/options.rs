@@ -1,13 +1,13 @@
-//! Options of the tets stage.
+//! TetOptions of the tets stage.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use bth_tetgen_protocol::Fault;
 
-/// Options of the tetrahedralization.
+/// TetOptions of the tetrahedralization.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Options {
+pub struct TetOptions {
     /// The worker program. If absent it is searched for: `BTH_TETGEN`, then beside this program, then on the `PATH`.
     pub worker: Option<PathBuf>,
     /// Worker processes; 0 for one per thread of the pool that calls. The result is the same for any number.
@@ -34,7 +34,7 @@ pub struct Options {
     pub planted: Option<(u32, Fault)>,
 }
 
-impl Default for Options {
+impl Default for TetOptions {
     fn default() -> Self {
         Self {
             worker: None,

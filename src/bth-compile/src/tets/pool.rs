@@ -8,7 +8,7 @@ use bth_tetgen_protocol::{Request, Tetrahedra};
 use crate::error::Result;
 use crate::monitor::Monitor;
 
-use super::Options;
+use super::TetOptions;
 use super::failure::AttemptError;
 use super::worker::{Setup, Worker};
 
@@ -19,7 +19,7 @@ const PROGRAM: &str = if cfg!(windows) { "bth-tetgen.exe" } else { "bth-tetgen" 
 ///
 /// # Errors
 /// A hint for the user when there is no worker.
-pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
+pub(super) fn find(options: &TetOptions) -> std::result::Result<PathBuf, String> {
     let named = options.worker.clone().or_else(|| std::env::var_os("BTH_TETGEN").map(PathBuf::from));
     if let Some(named) = named {
         // The worker starts in another folder, so a relative path is made absolute.
@@ -47,7 +47,7 @@ pub(super) fn find(options: &Options) -> std::result::Result<PathBuf, String> {
 ///
 /// # Errors
 /// Cancelled.
-pub(crate) fn version(options: &Options, monitor: &dyn Monitor) -> Result<Option<String>> {
+pub(crate) fn version(options: &TetOptions, monitor: &dyn Monitor) -> Result<Option<String>> {
     let Ok(program) = find(options) else { return Ok(Some("none".to_owned())) };
     let setup = Setup { program, memory: options.memory };
     let version = WorkerSlot::new(&setup).tetgen(monitor)?.map(str::to_owned);

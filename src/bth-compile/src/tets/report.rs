@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Report on the chosen nodes.
+/// TetReport on the chosen nodes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Report {
+pub struct TetReport {
     /// The worker that was used, or why there was none.
     pub worker: WorkerStatus,
     /// Nodes that were to be tetrahedralized.
@@ -69,7 +69,7 @@ pub enum WorkerStatus {
     },
 }
 
-/// Report on one node.
+/// TetReport on one node.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NodeReport {
     /// Index in the binary BVH.

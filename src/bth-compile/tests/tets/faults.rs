@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-use bth_compile::tets::{Options, Report, WorkerStatus, build};
+use bth_compile::tets::{TetOptions, TetReport, WorkerStatus, build};
 use bth_compile::{Error, Monitor, Silent};
 use bth_tetgen_protocol::{Failure, Fault};
 
@@ -12,11 +12,11 @@ use crate::oracle::assert_holds;
 use crate::with_worker;
 
 /// Plants a fault at one node of several; the others must come out whole.
-fn one_node_is_lost(options: Options, fault: Fault) -> Report {
+fn one_node_is_lost(options: TetOptions, fault: Fault) -> TetReport {
     let mesh = torus(40, 20);
     let bvh = bvh(&mesh);
     let chosen = nodes_of_at_most(&bvh, 250);
-    let options = Options { planted: Some((chosen[3], fault)), workers: 2, ..options };
+    let options = TetOptions { planted: Some((chosen[3], fault)), workers: 2, ..options };
     let (built, report) = build(&mesh, &bvh, &chosen, &options, &Silent).unwrap();
     assert_eq!(built.len(), chosen.len() - 1);
     assert!(built.iter().all(|(node, _)| *node != chosen[3]));
@@ -39,7 +39,7 @@ fn a_crash_costs_one_node() {
 #[test]
 fn a_hang_costs_one_node_and_two_deadlines() {
     let Some(options) = with_worker("hang") else { return };
-    let options = Options { deadline: Duration::from_secs(2), ..options };
+    let options = TetOptions { deadline: Duration::from_secs(2), ..options };
     let report = one_node_is_lost(options, Fault::Hang);
     assert_eq!(report.failures["timed_out"], 2);
 }
@@ -47,7 +47,7 @@ fn a_hang_costs_one_node_and_two_deadlines() {
 #[test]
 fn a_memory_hog_costs_one_node() {
     let Some(options) = with_worker("hog") else { return };
-    let report = one_node_is_lost(Options { memory: 512 << 20, ..options }, Fault::Hog);
+    let report = one_node_is_lost(TetOptions { memory: 512 << 20, ..options }, Fault::Hog);
     assert_eq!(report.failures["out_of_memory"], 1);
 }
 
@@ -76,7 +76,7 @@ fn every_answer_that_is_none_costs_one_node_and_is_named() {
 
 #[test]
 fn no_worker_is_no_error_and_tells_how_to_get_one() {
-    let options = Options { worker: Some("does/not/exist".into()), ..Options::default() };
+    let options = TetOptions { worker: Some("does/not/exist".into()), ..TetOptions::default() };
     let mesh = cube();
     let (built, report) = build(&mesh, &bvh(&mesh), &[0], &options, &Silent).unwrap();
     assert!(built.is_empty());
@@ -91,7 +91,7 @@ fn a_program_that_is_no_worker_is_unusable() {
         if !std::path::Path::new(program).is_file() {
             continue;
         }
-        let options = Options { worker: Some(program.into()), ..Options::default() };
+        let options = TetOptions { worker: Some(program.into()), ..TetOptions::default() };
         let mesh = cube();
         let (built, report) = build(&mesh, &bvh(&mesh), &[0], &options, &Silent).unwrap();
         assert!(built.is_empty());
@@ -112,7 +112,7 @@ impl Monitor for Impatient {
 fn cancelling_ends_a_worker_that_hangs() {
     let Some(options) = with_worker("cancel") else { return };
     let mesh = cube();
-    let options = Options { planted: Some((0, Fault::Hang)), ..options };
+    let options = TetOptions { planted: Some((0, Fault::Hang)), ..options };
     let start = Instant::now();
     let result = build(&mesh, &bvh(&mesh), &[0], &options, &Impatient(AtomicU32::new(0)));
     assert!(matches!(result, Err(Error::Cancelled)));

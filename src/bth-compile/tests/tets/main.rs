@@ -11,10 +11,10 @@ mod shapes;
 
 use std::path::PathBuf;
 
-use bth_compile::tets::Options;
+use bth_compile::tets::TetOptions;
 
-/// Options with the worker that was built beside these tests.
-fn with_worker(test: &str) -> Option<Options> {
+/// TetOptions with the worker that was built beside these tests.
+fn with_worker(test: &str) -> Option<TetOptions> {
     let named = std::env::var_os("BTH_TETGEN").map(PathBuf::from);
     let beside = || {
         let exe = std::env::current_exe().ok()?;
@@ -24,5 +24,5 @@ fn with_worker(test: &str) -> Option<Options> {
     if worker.is_none() {
         println!("{test}: skipped, there is no bth-tetgen (cargo build -p bth-tetgen)");
     }
-    worker.map(|worker| Options { worker: Some(worker), ..Options::default() })
+    worker.map(|worker| TetOptions { worker: Some(worker), ..TetOptions::default() })
 }

@@ -1,14 +1,14 @@
 //! Made-up shapes through the whole stage.
 
 use bth_compile::Silent;
-use bth_compile::tets::{Options, Outcome, TetMesh, WorkerStatus, build};
+use bth_compile::tets::{Outcome, TetMesh, TetOptions, WorkerStatus, build};
 use bth_import::Mesh;
 
 use crate::meshes::{bumps, bvh, cube, grid, nodes_of_at_most, torus, weld};
 use crate::oracle::{assert_covers_once, assert_holds};
 use crate::with_worker;
 
-fn build_whole(mesh: &Mesh, options: &Options) -> TetMesh {
+fn build_whole(mesh: &Mesh, options: &TetOptions) -> TetMesh {
     let bvh = bvh(mesh);
     let (built, report) = build(mesh, &bvh, &[0], options, &Silent).unwrap();
     assert_eq!(report.built, 1, "{report:?}");
@@ -23,8 +23,8 @@ fn a_cube_a_torus_and_a_flat_sheet_hold() {
     let Some(options) = with_worker("shapes") else { return };
     for mesh in [cube(), torus(24, 12), grid(8, 8, |i, j| [i as f32, j as f32, 1.0])] {
         assert_covers_once(&build_whole(&mesh, &options), 200);
-        build_whole(&mesh, &Options { free_space: 0, ..options.clone() });
-        build_whole(&mesh, &Options { inflation: 0.0, ..options.clone() });
+        build_whole(&mesh, &TetOptions { free_space: 0, ..options.clone() });
+        build_whole(&mesh, &TetOptions { inflation: 0.0, ..options.clone() });
     }
 }
 
@@ -64,7 +64,7 @@ fn the_result_does_not_depend_on_the_number_of_workers() {
     let bvh = bvh(&mesh);
     let chosen = nodes_of_at_most(&bvh, 500);
     let run =
-        |workers| build(&mesh, &bvh, &chosen, &Options { workers, ..options.clone() }, &Silent).unwrap();
+        |workers| build(&mesh, &bvh, &chosen, &TetOptions { workers, ..options.clone() }, &Silent).unwrap();
     let (one, report) = run(1);
     let (two, _) = run(2);
     assert!(one == two && one.len() == chosen.len());
@@ -96,7 +96,7 @@ fn crossing_triangles_are_replaced_by_cells_without_them() {
     mesh.positions.extend([p(0.5, 0.5, -1.0), p(0.75, 0.5, 4.0), p(0.5, 0.75, 4.0)]);
     mesh.triangles.push([n, n + 1, n + 2]);
     let bvh = bvh(&mesh);
-    let options = Options { cells: vec![80], minimum: 20, ..options };
+    let options = TetOptions { cells: vec![80], minimum: 20, ..options };
     let (built, report) = build(&mesh, &bvh, &[0], &options, &Silent).unwrap();
     assert_eq!(report.split, 1);
     assert_eq!(report.given_up, 1, "{:?}", report.nodes);

@@ -170,8 +170,8 @@ impl Compile {
     ///
     /// # Errors
     /// If the profile cannot be used.
-    pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::Options> {
-        let mut options = bth_compile::pipeline::Options {
+    pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
+        let mut options = bth_compile::pipeline::CompileOptions {
             structure: self.structure.into(),
             attributes: self.attributes.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
@@ -194,7 +194,7 @@ impl Compile {
         Ok(options)
     }
 
-    fn coordinates(&self) -> bth_compile::coordinates::Options {
+    fn coordinates(&self) -> bth_compile::coordinates::CoordinateOptions {
         let (bits, max_error) = match self.coordinates {
             // An explicit f32 keeps all vertices in place, whatever --max-error allows.
             Some(Coordinates::F32) => (None, None),
@@ -206,7 +206,7 @@ impl Compile {
             Boxes::F32 => bth_compile::coordinates::Boxes::F32,
             Boxes::Bytes => bth_compile::coordinates::Boxes::Bytes,
         };
-        bth_compile::coordinates::Options { bits, max_error, boxes }
+        bth_compile::coordinates::CoordinateOptions { bits, max_error, boxes }
     }
 }
 
@@ -215,7 +215,10 @@ impl Selection {
     ///
     /// # Errors
     /// If the profile cannot be used.
-    pub(crate) fn apply(&self, options: &mut bth_compile::pipeline::Options) -> bth_compile::Result<()> {
+    pub(crate) fn apply(
+        &self,
+        options: &mut bth_compile::pipeline::CompileOptions,
+    ) -> bth_compile::Result<()> {
         options.bvh.quality = self.quality.into();
         let costs = &mut options.costs;
         costs.estimator = self.estimator.into();

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::measure::{QueryKind, Rays, TimedRun, nanoseconds};
 use bth::Scene;
 use bth_compile::costs::{self, SampleRay, TetWalker, Walked};
-use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::tets::WorkerStatus;
 use bth_compile::{Error, Monitor, bvh, tets};
 use bth_format::layout::RecordKind;
@@ -112,7 +112,8 @@ impl Subject {
     /// # Errors
     /// If it cannot be tetrahedralized whole, or the worker is missing.
     pub(crate) fn new(name: &str, mesh: &Mesh, monitor: &dyn Monitor) -> Result<Subject, Failure> {
-        let options = Options { structure: Structure::Tets, keep_subtrees: false, ..Options::default() };
+        let options =
+            CompileOptions { structure: Structure::Tets, keep_subtrees: false, ..CompileOptions::default() };
         let (tree, _) = bvh::build(mesh, &options.bvh, monitor)?;
         let (built, report) = tets::build(mesh, &tree, &[0], &options.tets, monitor)?;
         let [(0, tets)] = &built[..] else {
@@ -135,7 +136,7 @@ impl Subject {
             false => report.nodes.iter().map(|n| n.seconds).sum(),
         };
         let file = |built: &[(u32, tets::TetMesh)], record: RecordKind| {
-            let options = Options { record, geometry: false, ..options.clone() };
+            let options = CompileOptions { record, geometry: false, ..options.clone() };
             pipeline::assemble(mesh, &tree, built, &options, monitor).map(|compiled| compiled.bytes)
         };
         let mut files = vec![file(&[], RecordKind::Link32)?];
@@ -262,7 +263,7 @@ pub(crate) fn measure(
 fn repeated_seconds(
     mesh: &Mesh,
     tree: &bvh::BinaryBvh,
-    options: &Options,
+    options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<f64, Failure> {
     let (before, start) = (worker_seconds(), Instant::now());

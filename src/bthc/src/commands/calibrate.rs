@@ -9,7 +9,7 @@ use crate::progress::Progress;
 use crate::table::{Table, bytes};
 use bth::Scene;
 use bth_compile::costs::Profile;
-use bth_compile::pipeline::{self, Options};
+use bth_compile::pipeline::{self, CompileOptions};
 use bth_compile::{Monitor, bvh, costs, write};
 use bth_import::{self, Keep, Mesh};
 use bth_scenes::{Model, blob, gyroid};
@@ -83,8 +83,8 @@ fn leaf(progress: &Progress) -> Result<(Scene, Rays), Failure> {
         model.triangles.push([0, 1 + i, 1 + (i + 1) % 8]);
     }
     let mesh = of(model);
-    let (tree, _) = bvh::build(&mesh, &bvh::Options::default(), progress)?;
-    let file = pipeline::assemble(&mesh, &tree, &[], &Options::default(), progress)?;
+    let (tree, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), progress)?;
+    let file = pipeline::assemble(&mesh, &tree, &[], &CompileOptions::default(), progress)?;
     let scene = bth::from_bytes(&file.bytes)?;
     let root = &tree.nodes[0];
     let rays = Rays::new(&costs::outside(root.lower, root.upper, 4096, 13));

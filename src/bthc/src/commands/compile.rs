@@ -9,7 +9,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::progress::{Progress, Quiet};
 use bth_compile::Monitor;
-use bth_compile::pipeline::Options;
+use bth_compile::pipeline::CompileOptions;
 use serde_json::json;
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -28,7 +28,8 @@ pub(crate) fn run(args: &Compile) -> Result<(), Failure> {
     let mut jobs = plan(args, &models)?;
     let progress = Progress::new(args.quiet || args.json);
     let store = args.keeping.store(&|text| progress.warn(text))?;
-    let options = Options { objects_memory: jobs::memory_of_objects(args, jobs.len()), ..args.options()? };
+    let options =
+        CompileOptions { objects_memory: jobs::memory_of_objects(args, jobs.len()), ..args.options()? };
     let context = JobContext { args, options, store };
     if let Some((part, parts)) = args.jobs.shard
         && !(jobs.len() == 1 && scene::is_scene(&jobs[0].model, args))

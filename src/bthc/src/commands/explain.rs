@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use std::cmp::Reverse;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
-    let mut options = pipeline::Options { geometry: false, ..pipeline::Options::default() };
+    let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
     args.selection.apply(&mut options)?;
     let progress = Progress::new(args.json);
     let ((mesh, tree), (choice, report)) = with_threads(args.threads, || -> bth_compile::Result<_> {

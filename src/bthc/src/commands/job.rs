@@ -3,7 +3,7 @@
 use crate::args::Compile;
 use bth_cache::{Digest, Record, Store};
 use bth_compile::cached::Cache;
-use bth_compile::pipeline::Options;
+use bth_compile::pipeline::CompileOptions;
 use bth_compile::write;
 use serde_json::Value;
 use std::fs::File;
@@ -16,10 +16,10 @@ pub(super) struct Job {
     pub(super) target: Target,
 }
 
-/// Options and cache, which all jobs share.
+/// CompileOptions and cache, which all jobs share.
 pub(super) struct JobContext<'a> {
     pub(super) args: &'a Compile,
-    pub(super) options: Options,
+    pub(super) options: CompileOptions,
     pub(super) store: Option<Store>,
 }
 

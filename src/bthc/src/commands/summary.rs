@@ -1,11 +1,11 @@
 //! The report of a compiled model for people.
 
 use crate::table::{Table, bytes, count, seconds};
-use bth_compile::pipeline::Report;
+use bth_compile::pipeline::CompileReport;
 use bth_compile::tets::WorkerStatus;
 
 /// The stages with their seconds, then counts.
-pub(super) fn summary(report: &Report) -> String {
+pub(super) fn summary(report: &CompileReport) -> String {
     let mut stages = Table::default();
     for stage in &report.seconds {
         stages.row([stage.name, &seconds(stage.seconds)]);

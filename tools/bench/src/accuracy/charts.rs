@@ -1,7 +1,7 @@
 //! The charts of `accuracy`: what is paid, in time or bytes, against what is wrong.
 
-use super::record::{AccuracyRecord, TracerSummary};
 use super::contenders::GROUPS;
+use super::record::{AccuracyRecord, TracerSummary};
 use crate::output::Chart;
 use crate::scatter::{PointSeries, Scatter};
 

@@ -3,10 +3,10 @@
 use super::exact_answers::Geometry;
 use crate::model::Model;
 use crate::names::Names;
-use crate::structures::{self, Compiled, Kind};
 use crate::progress::Progress;
 use crate::rivals::{F32_TESTS, RIVALS, Rival};
 use crate::speed::record::LeftOut;
+use crate::structures::{self, Compiled, Kind};
 use crate::tracer::Contender;
 use anyhow::Result;
 use bth::Isa;
@@ -129,7 +129,9 @@ impl MeasuredTracers {
 
     fn add(&mut self, kind: &Kind, compiled: &Compiled, uses: Vec<(String, Isa)>) -> Result<()> {
         // The first is the batch without hints.
-        let Some(contender) = structures::contenders(kind, compiled)?.into_iter().next() else { return Ok(()) };
+        let Some(contender) = structures::contenders(kind, compiled)?.into_iter().next() else {
+            return Ok(());
+        };
         let contender = Rc::new(contender);
         if kind.is_on_grid() {
             self.geometries.push(Geometry::new(&compiled.bytes)?);

@@ -82,7 +82,13 @@ pub fn defects(
     defects
 }
 
-fn classify(geometry: &Geometry, neighbours: &Neighbours<'_>, ray: &Ray, exact: &Exact, hit: &Hit) -> AnswerClass {
+fn classify(
+    geometry: &Geometry,
+    neighbours: &Neighbours<'_>,
+    ray: &Ray,
+    exact: &Exact,
+    hit: &Hit,
+) -> AnswerClass {
     let (right, found) = (exact.hit.surface.triangle, hit.surface.triangle);
     match (exact.hit.is_hit(), hit.is_hit()) {
         (false, false) => return AnswerClass::Right,
@@ -161,7 +167,8 @@ mod tests {
         let bytes = structures::compile(&model, &structures::BVH).unwrap().bytes;
         let geometry = Geometry::new(&bytes).unwrap();
         let neighbours = Neighbours(&model.mesh.triangles);
-        let set = crate::accuracy::aimed_rays::set(&model, crate::accuracy::aimed_rays::Target::Vertices, 200);
+        let set =
+            crate::accuracy::aimed_rays::set(&model, crate::accuracy::aimed_rays::Target::Vertices, 200);
         let truth = geometry.answers(&set, 1).unwrap();
         let i = (0..200).find(|&i| truth[i].hit.is_hit() && truth[i].hit.t < 0.9).unwrap();
         let (ray, exact) = (&set.rays[i], &truth[i]);

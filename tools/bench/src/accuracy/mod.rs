@@ -27,13 +27,13 @@ use aimed_rays::Target;
 use anyhow::{Result, bail, ensure};
 use bth::Isa;
 use bth::rays::Hit;
-use defects::{Defects, Neighbours, ErrorQuantiles};
+use contenders::{MeasuredTracer, MeasuredTracers};
+use defects::{Defects, ErrorQuantiles, Neighbours};
+use exact_answers::Exact;
 use picture::PictureSetup;
 use record::{AIMED, AccuracyRecord, Errors, ModelErrors, ORDINARY};
 use serde_json::json;
 use std::collections::BTreeMap;
-use contenders::{MeasuredTracer, MeasuredTracers};
-use exact_answers::Exact;
 
 /// Pixels of the cameras that rays are taken from, and of the pictures; a quick run has fewer.
 const SIZE: (u32, u32) = (1024, 576);
@@ -171,7 +171,12 @@ fn time(tracers: &[MeasuredTracer], set: &RaySet, rounds: usize) -> Vec<Option<f
 }
 
 /// Everything but run time and picture.
-fn errors(model: &Model, tracer: &MeasuredTracer, all: &MeasuredTracers, answered_sets: &[AnsweredSet]) -> Result<Errors> {
+fn errors(
+    model: &Model,
+    tracer: &MeasuredTracer,
+    all: &MeasuredTracers,
+    answered_sets: &[AnsweredSet],
+) -> Result<Errors> {
     tracer.isa.map_or(Ok(()), Isa::choose)?;
     let neighbours = Neighbours(&model.mesh.triangles);
     let [mut ordinary, mut aimed] = [Defects::default(); 2];

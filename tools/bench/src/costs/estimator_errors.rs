@@ -10,7 +10,8 @@ pub fn estimator_errors(constants: &Constants, nodes: &[MeasuredNode]) -> Vec<Es
     for (start, start_name) in STARTS.into_iter().enumerate() {
         for (row, name) in ESTIMATORS.iter().copied().chain(["measured steps"]).enumerate() {
             let exact = row == ESTIMATORS.len();
-            let steps = |n: &MeasuredNode| if exact { n.steps[start] } else { constants.steps(row, start, n) };
+            let steps =
+                |n: &MeasuredNode| if exact { n.steps[start] } else { constants.steps(row, start, n) };
             let of_steps: Vec<(f64, f64)> = nodes.iter().map(|n| (steps(n), n.steps[start])).collect();
             let of_time: Vec<(f64, f64)> = nodes
                 .iter()

@@ -4,14 +4,14 @@
 use super::record::{ESTIMATORS, MeasuredNode};
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::structures::{self, Use};
 use crate::progress::Progress;
 use crate::rounds::least;
+use crate::structures::{self, Use};
 use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
 use bth::rays::{Hit, Ray, Surface};
 use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
-use bth_compile::pipeline::{self, Options, Structure};
+use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
 use bth_format::layout::RecordKind;
 use bth_import::Mesh;
@@ -51,7 +51,7 @@ pub(super) struct Candidate {
 /// If the model cannot be used.
 pub(super) fn candidates(model: &Model, which: &NodeChoice, progress: &Progress) -> Result<Vec<Candidate>> {
     progress.show(format!("{}: marks", model.name));
-    let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent)?;
+    let (tree, _) = bvh::build(&model.mesh, &bvh::BvhOptions::default(), &Silent)?;
     let (marks, _) = marks::mark(&model.mesh, &tree, &Silent)?;
     let count = |i: &u32| tree.nodes[*i as usize].count;
     let mut candidates: Vec<u32> = (0..tree.nodes.len() as u32)
@@ -87,12 +87,12 @@ fn part(mesh: &Mesh, triangles: &[u32]) -> Mesh {
 
 /// `None` if TetGen fails on it.
 fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
-    let options = Options {
+    let options = CompileOptions {
         structure: Structure::Tets,
         record: RecordKind::Link32,
         keep_subtrees: false,
         geometry: false,
-        ..Options::default()
+        ..CompileOptions::default()
     };
     let (tree, _) = bvh::build(mesh, &options.bvh, &Silent)?;
     let (built, _) = tets::build(mesh, &tree, &[0], &options.tets, &Silent)?;

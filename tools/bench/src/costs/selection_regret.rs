@@ -3,17 +3,17 @@
 use super::record::{Regret, Selection};
 use crate::clock::Clock;
 use crate::model::Model;
-use crate::structures::{self, Use};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::least;
+use crate::structures::{self, Use};
 use crate::tracer::Tracer;
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
 use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::{self, Select};
 use bth_compile::marks::Marks;
-use bth_compile::pipeline::{self, Options};
+use bth_compile::pipeline::{self, CompileOptions};
 use bth_compile::{Silent, bvh, marks, tets};
 use std::collections::BTreeMap;
 
@@ -29,14 +29,14 @@ const SIZE: (u32, u32) = (256, 144);
 /// # Errors
 /// If the model cannot be used.
 pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Result<Regret> {
-    let options = Options { geometry: false, ..Options::default() };
+    let options = CompileOptions { geometry: false, ..CompileOptions::default() };
     let (tree, _) = bvh::build(&model.mesh, &options.bvh, &Silent)?;
     let (marks, _) = marks::mark(&model.mesh, &tree, &Silent)?;
     let mut selections = all(&tree, &marks, 0, LEVELS);
     let tried = selections.len();
     let mut names: Vec<(String, Vec<u32>)> = Vec::new();
     for (name, select) in [("default", Select::Best), ("paper's rule", Select::Paper)] {
-        let costs = costs::Options { select, minimum_triangles: LEAST, ..options.costs.clone() };
+        let costs = costs::CostOptions { select, minimum_triangles: LEAST, ..options.costs.clone() };
         let (choice, _) = costs::choose(&model.mesh, &tree, &marks, &costs, options.storage(), &Silent)?;
         let (built, _) = tets::build(&model.mesh, &tree, &choice.chosen, &options.tets, &Silent)?;
         let (built, _) = costs::probe(&model.mesh, &tree, built, &costs, options.storage(), &Silent)?;
@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn all_selections_are_disjoint_and_all_there() {
         let model = Model::load("blob:2000").unwrap();
-        let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent).unwrap();
+        let (tree, _) = bvh::build(&model.mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let marks = Marks { suitable: vec![true; tree.nodes.len()] };
         let found = all(&tree, &marks, 0, 3);
         assert_eq!(found.len(), 26);

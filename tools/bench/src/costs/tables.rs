@@ -1,6 +1,8 @@
 //! The tables and plots of `costs`.
 
-use super::record::{Constants, CostsRecord, ESTIMATORS, EstimatorError, MeasuredNode, Regret, STARTS, Selection};
+use super::record::{
+    Constants, CostsRecord, ESTIMATORS, EstimatorError, MeasuredNode, Regret, STARTS, Selection,
+};
 use crate::markdown::{cells, count, table};
 use crate::output::Chart;
 use crate::scatter::{PointSeries, Scatter};
@@ -42,8 +44,15 @@ pub fn markdown(record: &CostsRecord) -> String {
 
 /// How well each estimator predicts.
 fn estimators(record: &CostsRecord) -> String {
-    let head =
-        cells(&["estimator", "rays from", "µs a node", "steps: rank", "steps: error", "ns: rank", "ns: error"]);
+    let head = cells(&[
+        "estimator",
+        "rays from",
+        "µs a node",
+        "steps: rank",
+        "steps: error",
+        "ns: rank",
+        "ns: error",
+    ]);
     let cells = |j: &EstimatorError| {
         vec![
             j.name.clone(),

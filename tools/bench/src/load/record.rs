@@ -72,7 +72,8 @@ pub struct Times {
 impl Times {
     /// The medians over at least one start.
     pub(super) fn medians(probed: &[StartTimes]) -> Times {
-        let of = |field: fn(&StartTimes) -> f64| median(probed.iter().map(field).collect()).unwrap_or(f64::NAN);
+        let of =
+            |field: fn(&StartTimes) -> f64| median(probed.iter().map(field).collect()).unwrap_or(f64::NAN);
         let storage: Option<Vec<f64>> = probed.iter().map(|p| p.storage_bytes.map(|b| b as f64)).collect();
         Times {
             ready_s: of(|p| p.ready_s),

@@ -2,9 +2,9 @@
 
 use super::record::{BASE, StartsRun, Times};
 use super::scene_record::{SceneLoadRecord, SceneStarts};
-use super::tables::{factor, on_threads, row};
+use super::tables::{factor, on_threads};
 use crate::chart::{BarChart, Scale, Series};
-use crate::markdown::{count, seconds, table};
+use crate::markdown::{cells, count, seconds, table};
 use crate::output::Chart;
 
 /// What the charts show.
@@ -53,13 +53,13 @@ fn page(scene: &SceneStarts) -> String {
         "pays after",
     ];
     for run in &scene.runs {
-        let rows: Vec<_> = run.starts.iter().map(|(name, times)| cells(scene, run, name, times)).collect();
-        text.push_str(&format!("{}:\n\n{}\n", on_threads(run.threads), table(&row(&head), &rows)));
+        let rows: Vec<_> = run.starts.iter().map(|(name, times)| row(scene, run, name, times)).collect();
+        text.push_str(&format!("{}:\n\n{}\n", on_threads(run.threads), table(&cells(&head), &rows)));
     }
     text
 }
 
-fn cells(scene: &SceneStarts, run: &StartsRun, name: &str, times: &Times) -> Vec<String> {
+fn row(scene: &SceneStarts, run: &StartsRun, name: &str, times: &Times) -> Vec<String> {
     let base = run.starts.iter().find(|(name, _)| name == BASE).map(|(_, times)| times);
     let ours = scene.compile_s.iter().find(|(kind, _)| name.starts_with(&format!("{kind} ")));
     let compared = base

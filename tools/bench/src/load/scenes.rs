@@ -16,7 +16,7 @@ use crate::rivals::embree;
 use anyhow::{Context, Result};
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::scene;
 use bth_scenes::{catalogue, write};
 use glam::DVec3;
@@ -137,7 +137,7 @@ fn compile(source: &Path, structure: Structure) -> Result<Vec<u8>> {
         }
     };
     let folder = source.parent().unwrap_or(Path::new("."));
-    let options = Options { structure, ..Options::default() };
+    let options = CompileOptions { structure, ..CompileOptions::default() };
     Ok(scene::compile(&manifest, folder, source, &options, &Silent)?.0.bytes)
 }
 

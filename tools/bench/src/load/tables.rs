@@ -16,7 +16,7 @@ fn threads(record: &LoadRecord) -> Vec<usize> {
     record.models.first().map_or(Vec::new(), |m| m.runs.iter().map(|r| r.threads).collect())
 }
 
-pub(super) /// All tables of a record.
+/// All tables of a record.
 pub fn markdown(record: &LoadRecord) -> String {
     let mut text = format!(
         "Wall-clock time from before the file is opened, or from before the build begins with the triangles in memory, \

@@ -4,9 +4,9 @@ use super::tet_records::{Tet20, Tet32, TetRecord};
 use super::tree::{self, PaperTree};
 use crate::clock::Clock;
 use crate::model::{Model, position};
-use crate::structures;
 use crate::rays::{self, Finder};
 use crate::rounds::least;
+use crate::structures;
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Result, bail};
 use bth::rays::{Hit, Ray};
@@ -48,7 +48,7 @@ struct MeasuredCosts {
 
 fn measure(model: &Model) -> Result<MeasuredCosts> {
     let (tree, _) = bvh::build(&model.mesh, &tree::bvh_options(), &Silent)?;
-    let (built, _) = tets::build(&model.mesh, &tree, &[0], &tets::Options::default(), &Silent)?;
+    let (built, _) = tets::build(&model.mesh, &tree, &[0], &tets::TetOptions::default(), &Silent)?;
     let [(0, tets)] = &built[..] else { bail!("{} could not be tetrahedralized", model.name) };
     let rays = camera(model)?;
     // Rays of few steps and of many.
@@ -68,7 +68,11 @@ fn measure(model: &Model) -> Result<MeasuredCosts> {
         let step = ((times[1] - times[0]) / (mean(&many) - mean(&few))).max(0.0);
         ((times[0] - step * mean(&few)).max(0.0), step)
     };
-    fn tracer<R: TetRecord>(model: &Model, tree: &bvh::BinaryBvh, built: &[(u32, tets::TetMesh)]) -> PaperTree<R> {
+    fn tracer<R: TetRecord>(
+        model: &Model,
+        tree: &bvh::BinaryBvh,
+        built: &[(u32, tets::TetMesh)],
+    ) -> PaperTree<R> {
         PaperTree::new(&model.mesh, tree, built)
     }
     Ok(MeasuredCosts {

@@ -14,16 +14,16 @@ mod tet_walk;
 mod tree;
 mod views;
 
-pub use record::{PaperRecord, StructureRow, PaperScene};
+pub use record::{PaperRecord, PaperScene, StructureRow};
 pub use tables::markdown;
 
 use crate::args::Paper;
 use crate::isa;
 use crate::model::Model;
-use crate::structures::{self, Use};
 use crate::output::{Head, Record as Page, note};
 use crate::progress::Progress;
 use crate::rivals;
+use crate::structures::{self, Use};
 use anyhow::Result;
 use bth_compile::costs::{self, Profile, Select};
 use bth_compile::pipeline::{self, Structure};
@@ -109,7 +109,8 @@ fn scene(
         });
     }
     let rendering = Rendering { views: &views, rounds: arguments.rounds, threads };
-    record.rows = rendering.rows(&built, |view| progress.show(format!("{}: rendering the {view} view", model.name)));
+    record.rows =
+        rendering.rows(&built, |view| progress.show(format!("{}: rendering the {view} view", model.name)));
     Ok(record)
 }
 
@@ -132,17 +133,24 @@ fn scalar<R: TetRecord + 'static>(
         let plain = PaperTree::<R>::new(mesh, &tree, &[]);
         let seconds = bvh_seconds + clock.elapsed().as_secs_f64();
         let bytes = plain.bytes() as u64;
-        built.push(BuiltStructure { name: "BVH", tracer: Box::new(plain), seconds, bytes, in_tets: 0.0, leaves: 0 });
+        built.push(BuiltStructure {
+            name: "BVH",
+            tracer: Box::new(plain),
+            seconds,
+            bytes,
+            in_tets: 0.0,
+            leaves: 0,
+        });
     }
-    let tet_options = tets::Options { workers: 1, ..tets::Options::default() };
+    let tet_options = tets::TetOptions { workers: 1, ..tets::TetOptions::default() };
     let clock = Instant::now();
     let (marks, _) = marks::mark(mesh, &tree, &Silent)?;
-    let costs = costs::Options {
+    let costs = costs::CostOptions {
         select: Select::Paper,
         profile: profile.clone(),
         minimum_triangles: LEAST,
         minimum_gain: 0.0,
-        ..costs::Options::default()
+        ..costs::CostOptions::default()
     };
     let storage = costs::Storage { record: kind, keep_subtrees: false, plain_bytes: None };
     let (choice, _) = costs::choose(mesh, &tree, &marks, &costs, storage, &Silent)?;
@@ -174,14 +182,22 @@ fn scalar<R: TetRecord + 'static>(
     let seconds = bvh_seconds + clock.elapsed().as_secs_f64();
     views.eyes().for_each(|eye| tets.look_from(eye));
     let bytes = tets.bytes() as u64;
-    built.push(BuiltStructure { name: names[1], tracer: Box::new(tets), seconds, bytes, in_tets: 1.0, leaves: 1 });
+    built.push(BuiltStructure {
+        name: names[1],
+        tracer: Box::new(tets),
+        seconds,
+        bytes,
+        in_tets: 1.0,
+        leaves: 1,
+    });
     Ok(())
 }
 
 /// Our own files, with our own traversal.
 fn own(model: &Model, built: &mut Vec<BuiltStructure>) -> Result<()> {
     for (name, structure) in [("bth (ours)", Structure::Bth), ("bvh (ours)", Structure::Bvh)] {
-        let mut options = pipeline::Options { structure, geometry: false, ..pipeline::Options::default() };
+        let mut options =
+            pipeline::CompileOptions { structure, geometry: false, ..pipeline::CompileOptions::default() };
         options.tets.workers = 1;
         let clock = Instant::now();
         let (compiled, report) = pipeline::compile(&model.path, &options, &Silent)?;

@@ -14,8 +14,8 @@ use bth_compile::tets::TetMesh;
 use bth_import::Mesh;
 
 /// How the binary BVH is built: binned and top-down, as the paper has it.
-pub(super) fn bvh_options() -> bvh::Options {
-    bvh::Options { quality: bvh::Quality::Fast }
+pub(super) fn bvh_options() -> bvh::BvhOptions {
+    bvh::BvhOptions { quality: bvh::Quality::Fast }
 }
 
 /// Most triangles of a leaf (pbrt's default).
@@ -168,8 +168,8 @@ impl<R: TetRecord> PaperTree<R> {
             End::Lost => {
                 // A walk that rounding errors led astray: all faces are tested instead.
                 let corners = |row: usize| tets.faces[row].1.map(|v| tets.vertices[v as usize]);
-                let found =
-                    (0..tets.faces.len()).filter_map(|r| Some((r as u32, moller_trumbore(ray, corners(r), best.t)?.t)));
+                let found = (0..tets.faces.len())
+                    .filter_map(|r| Some((r as u32, moller_trumbore(ray, corners(r), best.t)?.t)));
                 found.min_by(|a, b| a.1.total_cmp(&b.1))
             }
         };
@@ -242,7 +242,8 @@ mod tests {
         let mut hits = 0;
         for ray in rays {
             let all = (0..mesh.triangles.len() as u32)
-                .filter_map(|t| moller_trumbore(ray, mesh.corners(t), f32::INFINITY)).map(|hit| hit.t)
+                .filter_map(|t| moller_trumbore(ray, mesh.corners(t), f32::INFINITY))
+                .map(|hit| hit.t)
                 .fold(f32::INFINITY, f32::min);
             let found = tree.trace(ray);
             assert_eq!(found.is_hit(), all.is_finite(), "{ray:?}");
@@ -258,7 +259,7 @@ mod tests {
     fn all_structures_find_the_nearest_triangle_from_outside_and_within() {
         let model = bth_scenes::gyroid::gyroid(1500);
         let mesh = Mesh { positions: model.positions, triangles: model.triangles, ..Mesh::default() };
-        let (bvh, _) = bvh::build(&mesh, &bvh::Options::default(), &Silent).unwrap();
+        let (bvh, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let root = &bvh.nodes[0];
         let (outside, _) = rays(&costs::outside(root.lower, root.upper, 150, 1));
         let eye: [f32; 3] = std::array::from_fn(|k| 0.43 * root.lower[k] + 0.57 * root.upper[k]);
@@ -268,7 +269,7 @@ mod tests {
         let parts = [1, bvh.nodes[0].right];
         for chosen in [&[0][..], &parts[..]] {
             let (built, report) =
-                tets::build(&mesh, &bvh, chosen, &tets::Options::default(), &Silent).unwrap();
+                tets::build(&mesh, &bvh, chosen, &tets::TetOptions::default(), &Silent).unwrap();
             if let tets::WorkerStatus::Missing { .. } = report.worker {
                 crate::output::note("skipped: walks through tetrahedra need the worker bth-tetgen");
                 return;

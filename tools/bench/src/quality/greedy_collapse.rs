@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn the_greedy_tree_costs_at_least_as_much_as_the_least_one() {
         let mesh = field(40);
-        let (tree, _) = bvh::build(&mesh, &bvh::Options::default(), &Silent).unwrap();
+        let (tree, _) = bvh::build(&mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let cut = [tree.nodes[0].right];
         for (children, triangles) in [(2, 1), (4, 16), (8, 8), (16, 16)] {
             let options =

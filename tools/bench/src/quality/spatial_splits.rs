@@ -76,7 +76,9 @@ impl Builder<'_> {
             return middle;
         }
         let whole = |area, count| area * count as f64;
-        let Some(SplitPlane { axis, at, .. }) = split_plane::by_centers(references, &whole) else { return middle };
+        let Some(SplitPlane { axis, at, .. }) = split_plane::by_centers(references, &whole) else {
+            return middle;
+        };
         references.sort_by_key(|r| r.bounds.center(axis) >= at);
         references.partition_point(|r| r.bounds.center(axis) < at)
     }

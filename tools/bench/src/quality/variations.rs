@@ -55,7 +55,8 @@ pub(super) fn all() -> Vec<Variation> {
     let priced = |costs| Variation { costs, ..built(Quality::Balanced.effort()) };
     let leaves = |by| priced(Costs { indexed: costs.indexed.map(|c| by * c), ..costs });
     let ordered = |order| Variation { order, ..built(Quality::Balanced.effort()) };
-    let spatial = |exponent| Variation { tree: BinaryTree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
+    let spatial =
+        |exponent| Variation { tree: BinaryTree::Spatial(exponent), ..built(Quality::Balanced.effort()) };
     let sweep = effort.sweep_count;
     let named = |name, variation| Variation { name, ..variation };
     vec![
@@ -130,7 +131,7 @@ impl Variation {
             BinaryTree::Spatial(exponent) => {
                 let tree = spatial_splits::build(mesh, *exponent);
                 let passes = Quality::Balanced.effort().reinsertion;
-                bvh::reinsert(tree, &passes, &mut bvh::Report::default(), &Silent)?
+                bvh::reinsert(tree, &passes, &mut bvh::BvhReport::default(), &Silent)?
             }
         };
         let options = CollapseOptions { plan: self.plan, costs: self.costs, ..CollapseOptions::default() };

@@ -46,7 +46,9 @@ mod tests {
         for _ in 0..1000 {
             let normal = on_sphere(&mut rng);
             let (side, up) = perpendicular(normal);
-            for (a, b, expected) in [(normal, side, 0.0), (normal, up, 0.0), (side, up, 0.0), (side, side, 1.0), (up, up, 1.0)] {
+            for (a, b, expected) in
+                [(normal, side, 0.0), (normal, up, 0.0), (side, up, 0.0), (side, side, 1.0), (up, up, 1.0)]
+            {
                 assert!((a.dot(b) - expected).abs() < 1e-12, "{normal}");
             }
         }

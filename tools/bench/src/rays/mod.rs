@@ -15,8 +15,8 @@ mod directions;
 mod finder;
 mod viewpoint;
 
-pub(crate) use camera::ray;
 pub use camera::Camera;
+pub(crate) use camera::ray;
 pub use directions::{cosine_weighted, on_sphere, perpendicular};
 pub use finder::{Finder, LIFT};
 pub use viewpoint::View;

@@ -1,14 +1,14 @@
 //! The contenders of `scenes`: our compiled files, and Embree's instances.
 
 use super::source::Source;
-use crate::structures::BATCH;
 use crate::rivals::embree::{self, InstancePlace, Variant};
+use crate::structures::BATCH;
 use crate::tracer::{Batch, Tracer};
 use anyhow::{Context, Result, anyhow};
 use bth::Scene;
 use bth::rays::Hit;
 use bth_compile::costs::Select;
-use bth_compile::pipeline::{Options, Structure};
+use bth_compile::pipeline::{CompileOptions, Structure};
 use std::path::Path;
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ pub(super) struct ContenderKind {
 
 enum How {
     /// CompiledScene like this, traced in batches with hints.
-    Ours(fn(&mut Options)),
+    Ours(fn(&mut CompileOptions)),
     Embree(Variant),
 }
 
@@ -34,7 +34,7 @@ pub(super) const CONTENDERS: [ContenderKind; 6] = [
     ContenderKind { name: "embree hq packet16", how: How::Embree(embree::PACKETS) },
 ];
 
-fn by_the_paper(options: &mut Options) {
+fn by_the_paper(options: &mut CompileOptions) {
     options.costs.select = Select::Paper;
 }
 
@@ -85,7 +85,7 @@ pub(super) struct CompiledScene {
 /// Compiles a scene.
 pub(super) fn compile(source: &Source, kind: &ContenderKind) -> Result<CompiledScene> {
     let How::Ours(set) = kind.how else { return Err(anyhow!("not one of ours")) };
-    let mut options = Options::default();
+    let mut options = CompileOptions::default();
     set(&mut options);
     let start = Instant::now();
     let (compiled, report) = bth_compile::scene::compile(

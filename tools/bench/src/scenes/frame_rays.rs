@@ -98,13 +98,7 @@ fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
 }
 
 /// Cosine-weighted rays from the hits of other rays, and the triangles that they start on.
-fn onward(
-    scene: &Scene,
-    rays: &[Ray],
-    hits: &[Hit],
-    lift: f64,
-    rng: &mut Rng,
-) -> (Vec<Ray>, Vec<Surface>) {
+fn onward(scene: &Scene, rays: &[Ray], hits: &[Hit], lift: f64, rng: &mut Rng) -> (Vec<Ray>, Vec<Surface>) {
     let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
         let direction = position(from.direction);
         let object = scene.object(scene.object_of(hit.surface.instance));

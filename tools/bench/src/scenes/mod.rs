@@ -3,8 +3,8 @@
 //! `source` loads scenes, `frame_rays` makes the rays of a frame, and `contenders` traces them.
 
 mod contenders;
-mod record;
 mod frame_rays;
+mod record;
 mod source;
 mod tables;
 
@@ -19,9 +19,9 @@ use crate::progress::Progress;
 use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Hit;
-use contenders::{MovingContender, Frame, CONTENDERS};
-use serde_json::json;
+use contenders::{CONTENDERS, Frame, MovingContender};
 use frame_rays::FrameRays;
+use serde_json::json;
 use source::Source;
 
 /// Sets of rays of a frame.

@@ -1,6 +1,6 @@
 //! The charts of `speed`: ratios to Embree's single rays; where it did not run, rays per second.
 
-use super::record::{BASE, ThreadsRun, SpeedRecord};
+use super::record::{BASE, SpeedRecord, ThreadsRun};
 use super::tables::sets_of;
 use crate::chart::{BarChart, Scale, Series};
 use crate::output::Chart;

@@ -2,10 +2,10 @@
 
 use crate::model::Model;
 use crate::names::Names;
-use crate::structures::{self, Compiled, KINDS, Kind};
 use crate::progress::Progress;
 use crate::rivals::RIVALS;
-use crate::speed::record::{LeftOut, CompiledFile};
+use crate::speed::record::{CompiledFile, LeftOut};
+use crate::structures::{self, Compiled, KINDS, Kind};
 use crate::tracer::Contender;
 use anyhow::Result;
 
@@ -38,8 +38,9 @@ pub(super) fn build(
         match compiled {
             Ok(compiled) => {
                 notes.structures.push(CompiledFile::of(kind, &compiled));
-                built
-                    .extend(structures::contenders(kind, &compiled)?.into_iter().filter(|c| names.select(&c.name)));
+                built.extend(
+                    structures::contenders(kind, &compiled)?.into_iter().filter(|c| names.select(&c.name)),
+                );
             }
             Err(error) => {
                 let why = format!("{error:#}");

@@ -6,7 +6,7 @@ pub mod record;
 mod tables;
 
 pub use charts::draw;
-pub use record::{ModelSpeeds, ThreadsRun, SpeedRecord};
+pub use record::{ModelSpeeds, SpeedRecord, ThreadsRun};
 pub use tables::markdown;
 
 use crate::args::Speed;
@@ -127,7 +127,13 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     })
 }
 
-fn measure_set(set: &RaySet, expected: &Answers, contenders: &[Contender], rounds: usize, run: &mut ThreadsRun) {
+fn measure_set(
+    set: &RaySet,
+    expected: &Answers,
+    contenders: &[Contender],
+    rounds: usize,
+    run: &mut ThreadsRun,
+) {
     let clock = Clock::for_threads(run.threads);
     let mut hits = vec![Hit::MISS; set.rays.len()];
     let mut found = vec![false; set.rays.len()];

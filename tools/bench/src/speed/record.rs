@@ -1,10 +1,10 @@
 //! What `speed` measured, as it is written to JSON.
 
 use crate::clock::Clock;
-use crate::structures::{Compiled, Kind};
 use crate::output::Head;
 use crate::rays::View;
 use crate::rounds::geometric_mean;
+use crate::structures::{Compiled, Kind};
 use crate::tracer::Contender;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -110,7 +110,11 @@ impl ThreadsRun {
             mrays_per_s: BTreeMap::new(),
             differ: BTreeMap::new(),
         };
-        ThreadsRun { threads, clock: Clock::for_threads(threads), tracers: contenders.iter().map(row).collect() }
+        ThreadsRun {
+            threads,
+            clock: Clock::for_threads(threads),
+            tracers: contenders.iter().map(row).collect(),
+        }
     }
 
     fn rate(&self, tracer: &str, set: &str) -> Option<f64> {

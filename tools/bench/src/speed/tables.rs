@@ -1,6 +1,6 @@
 //! The tables of `speed`.
 
-use super::record::{BASE, ModelSpeeds, ThreadsRun, SpeedRecord};
+use super::record::{BASE, ModelSpeeds, SpeedRecord, ThreadsRun};
 use crate::markdown::{count, table, two_decimals};
 use crate::rays::{NAMES, View};
 

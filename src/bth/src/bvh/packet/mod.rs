@@ -1,6 +1,6 @@
 //! Traversal of the BVH by packets: up to 64 coherent rays, in four groups of sixteen lanes.
 //!
-//! [`runs`] finds coherent rays in a batch, by the measures of [`coherence`]. A packet ([`packet`]) tests boxes first against bounds of
+//! [`runs`] finds coherent rays in a batch, by the measures of [`coherence`]. A packet ([`traverse`]) tests boxes first against bounds of
 //! all its rays ([`bounds`]: a [`frustum`], or a [`segment_box`] of short rays), then against each group ([`ray_group`]), and the
 //! triangles of leaves ([`leaf`], [`leaf_mesh`], [`points`], [`projection`]) with one ray in each lane. Where few rays are left, these
 //! are tested one at a time ([`single_rays`]). Hits are computed at the end; for rays from one point the terms that do not depend on
@@ -13,7 +13,6 @@ pub(crate) mod frustum;
 pub(crate) mod hit_cache;
 pub(crate) mod leaf;
 pub(crate) mod leaf_mesh;
-pub(crate) mod packet;
 pub(crate) mod points;
 pub(crate) mod projection;
 pub(crate) mod ray_group;
@@ -22,5 +21,6 @@ pub(crate) mod segment_box;
 pub(crate) mod single_rays;
 #[cfg(test)]
 mod tests;
+pub(crate) mod traverse;
 
 pub(crate) use runs::{MINIMUM_USE, PacketScratch, trace};

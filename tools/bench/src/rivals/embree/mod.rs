@@ -3,7 +3,7 @@
 mod api;
 mod scene;
 
-pub use self::scene::{EmbreeMesh, InstancePlace, EmbreeScene, build, build_instances};
+pub use self::scene::{EmbreeMesh, EmbreeScene, InstancePlace, build, build_instances};
 
 use self::api::Api;
 use crate::model::Model;

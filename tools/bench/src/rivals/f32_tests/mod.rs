@@ -34,7 +34,7 @@ struct F32Tests {
 /// If the model cannot be built a BVH of.
 pub(super) fn contender(model: &Model, name: &str, test: TriangleTest) -> Result<Contender> {
     let start = Instant::now();
-    let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent)?;
+    let (tree, _) = bvh::build(&model.mesh, &bvh::BvhOptions::default(), &Silent)?;
     let corners: Vec<_> = tree.order.iter().map(|&triangle| model.mesh.corners(triangle)).collect();
     let build_s = start.elapsed().as_secs_f64();
     let bytes = size_of_val(&tree.nodes[..]) + size_of_val(&tree.order[..]) + size_of_val(&corners[..]);
@@ -149,17 +149,21 @@ mod tests {
     fn the_bvh_finds_what_testing_every_triangle_finds() {
         let model = Model::load("torus-knot:320").unwrap();
         let (bounds, mut rng) = (model.bounds(), Rng::new(2));
-        let (tree, _) = bvh::build(&model.mesh, &bvh::Options::default(), &Silent).unwrap();
+        let (tree, _) = bvh::build(&model.mesh, &bvh::BvhOptions::default(), &Silent).unwrap();
         let corners: Vec<_> = tree.order.iter().map(|&t| model.mesh.corners(t)).collect();
         let tracer = F32Tests { tree, corners, test: TriangleTest::MollerTrumbore };
         let mut hits = 0;
         for _ in 0..2000 {
-            let [from, to] = [(); 2].map(|()| bounds.center() + on_sphere(&mut rng) * (0.5 * bounds.diagonal()));
+            let [from, to] =
+                [(); 2].map(|()| bounds.center() + on_sphere(&mut rng) * (0.5 * bounds.diagonal()));
             let ray = crate::rays::ray(from, (to - from).normalize(), f64::INFINITY);
             let all = tracer.corners.iter().filter_map(|c| moller_trumbore(&ray, *c, ray.tmax)).map(|h| h.t);
             let expected = all.fold(f32::INFINITY, f32::min);
             let found = tracer.hit::<false>(&ray, &mut Vec::new());
-            assert_eq!((found.is_hit(), found.is_hit() && found.t != expected), (expected.is_finite(), false));
+            assert_eq!(
+                (found.is_hit(), found.is_hit() && found.t != expected),
+                (expected.is_finite(), false)
+            );
             assert_eq!(tracer.hit::<true>(&ray, &mut Vec::new()).is_hit(), expected.is_finite());
             hits += usize::from(found.is_hit());
         }

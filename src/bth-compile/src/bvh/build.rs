@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub const MAX_LEVELS: u32 = 90;
 
 /// Subtrees of more triangles are built as separate tasks, each of which first checks for cancellation.
-const TASK: usize = 1 << 12;
+const BUILD_TASK: usize = 1 << 12;
 
 /// How much time to spend on the tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
@@ -203,7 +203,7 @@ impl Builder<'_> {
         scratch: &mut sweep_split::Scratch,
     ) -> Result<()> {
         let count = references.len();
-        let task = count > TASK;
+        let task = count > BUILD_TASK;
         if task {
             self.monitor.check()?;
         }
@@ -235,7 +235,7 @@ impl Builder<'_> {
     /// As [`Self::subtree`], with buffers of its own.
     fn task(&self, references: &mut [Reference], nodes: &mut [Node], to: Destination) -> Result<()> {
         self.subtree(references, nodes, to, &mut sweep_split::Scratch::default())?;
-        if references.len() <= TASK {
+        if references.len() <= BUILD_TASK {
             self.monitor.advance(references.len() as u64);
         }
         Ok(())

@@ -170,7 +170,7 @@ pub struct Planner<'a> {
 }
 
 /// Subtrees of more triangles are planned as separate tasks.
-const TASK: u32 = 1 << 13;
+const PLAN_TASK: u32 = 1 << 13;
 
 impl<'a> Planner<'a> {
     /// Prepares the planning for a BVH of at least one node.
@@ -227,7 +227,7 @@ impl<'a> Planner<'a> {
         let (own, below) = decisions.split_at_mut(1);
         let (left_below, right_below) = below.split_at_mut((node.right - at - 1) as usize);
         let (left_cut, right_cut) = cut.split_at(cut.partition_point(|&c| c < node.right));
-        let (left, right) = if node.count > TASK {
+        let (left, right) = if node.count > PLAN_TASK {
             self.monitor.check()?;
             let (left, right) = rayon::join(
                 || self.subtree(at + 1, left_cut, left_below),

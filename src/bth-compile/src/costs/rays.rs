@@ -22,7 +22,7 @@ pub struct SampleRay {
 /// Length of rays for ambient occlusion, relative to the diagonal of the bounds.
 const SHORT: f64 = 0.05;
 /// Offset of ray origins from the surface that they start on, relative to the diagonal of the bounds.
-const LIFT: f64 = 2e-5;
+const BOUNCE_LIFT: f64 = 2e-5;
 
 /// The point at `t` on a ray.
 pub(super) fn along(ray: &SampleRay, t: f64) -> [f64; 3] {
@@ -94,7 +94,7 @@ pub fn from_surface(
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
-        let lift = LIFT * diagonal;
+        let lift = BOUNCE_LIFT * diagonal;
         let origin = a + u * (b - a) + v * (c - a) + lift * n;
         let direction = unit(n + uniform_direction(&mut random));
         let tmax = if i % 2 == 0 { f64::INFINITY } else { SHORT * diagonal };

@@ -18,7 +18,7 @@ const GRID: [u32; 2] = [96, 54];
 /// Bounces after a camera ray.
 const BOUNCES: usize = 2;
 /// Offset of ray origins from the surface that they start on, relative to the magnitude of the coordinates there.
-const LIFT: f64 = 1e-5;
+const VISIBILITY_LIFT: f64 = 1e-5;
 
 type Rows = [[f64; 4]; 3];
 
@@ -165,7 +165,7 @@ fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
     let n = if n.dot(direction) > 0.0 { -n } else { n };
     let at = origin + f64::from(hit.t) * direction;
     let size = at.to_array().iter().fold(0.0f64, |m, x| m.max(x.abs())).max(f64::from(hit.t));
-    let start = at + LIFT * size * n;
+    let start = at + VISIBILITY_LIFT * size * n;
     (n.is_finite() && start.is_finite()).then_some((start, n))
 }
 

@@ -6,7 +6,7 @@ use crate::args::{Args, Axis, View};
 use glam::{DVec2, DVec3};
 
 /// Vertical field of view, degrees: narrow enough to keep proportions natural.
-const FOV: f64 = 32.0;
+const EXTERIOR_FOV: f64 = 32.0;
 /// Degrees around the model, from its front.
 const YAW: f64 = 35.0;
 /// Degrees above the horizon.
@@ -17,7 +17,7 @@ const FILLED_SHARE: f64 = 0.86;
 /// The camera of `--camera` with eye and target, or else of `--yaw` and `--pitch` around the whole model.
 pub(super) fn exterior_camera(args: &Args, bounds: &SceneBounds) -> Camera {
     let vertical = up_vector(args.up);
-    let half_extent = half_extent(args, FOV);
+    let half_extent = half_extent(args, EXTERIOR_FOV);
     if let Some(View::Points([ex, ey, ez, tx, ty, tz])) = args.camera {
         let eye = DVec3::new(ex, ey, ez);
         return Camera::look_along(eye, DVec3::new(tx, ty, tz) - eye, vertical, half_extent / args.zoom);

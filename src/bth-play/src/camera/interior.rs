@@ -15,7 +15,7 @@ const CANDIDATES: u32 = 96;
 /// Directions in which rays leave a candidate.
 const DIRECTIONS: u32 = 1024;
 /// Vertical field of view, degrees.
-const FOV: f64 = 70.0;
+const INTERIOR_FOV: f64 = 70.0;
 
 /// The nearest hit in one direction from a candidate eye.
 struct Probe {
@@ -33,7 +33,7 @@ pub(super) fn interior_camera(scene: &Scene, bounds: &SceneBounds, args: &Args) 
     let best = (0..eyes.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b])).unwrap_or(0);
     let vertical = up_vector(args.up);
     let forward = best_direction(&probes[best], vertical, bounds.diagonal());
-    Camera::look_along(eyes[best], forward, vertical, half_extent(args, FOV) / args.zoom)
+    Camera::look_along(eyes[best], forward, vertical, half_extent(args, INTERIOR_FOV) / args.zoom)
 }
 
 /// A point in the middle eight tenths of the bounds, in height between a quarter and six tenths, as of a standing person.

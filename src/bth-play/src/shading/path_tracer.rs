@@ -11,7 +11,7 @@ use bth::rays::{Hit, Ray, Surface};
 use glam::{DVec2, DVec3, Vec3};
 
 /// Albedo of the first instance.
-const ALBEDO: Vec3 = Vec3::new(0.68, 0.66, 0.63);
+const FIRST_ALBEDO: Vec3 = Vec3::new(0.68, 0.66, 0.63);
 /// Dimension pairs of sample points for each bounce, after the one of the camera.
 const DIMENSIONS: u64 = 4;
 
@@ -113,7 +113,7 @@ fn scattered(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
 /// The albedo of a hit. Instances differ in hue, so that they can be told apart; the first is neutral.
 fn albedo(surface: Surface) -> Vec3 {
     match surface.instance {
-        0 => ALBEDO,
-        instance => ALBEDO.lerp(instance_color(instance), 0.4),
+        0 => FIRST_ALBEDO,
+        instance => FIRST_ALBEDO.lerp(instance_color(instance), 0.4),
     }
 }

@@ -14,7 +14,7 @@ const AMBIENT_RAYS: u32 = 2;
 /// Radius of the key light at distance 1, which decides how soft its shadows are.
 const KEY_RADIUS: f64 = 0.16;
 /// Albedo of the material.
-const ALBEDO: Vec3 = Vec3::new(0.57, 0.515, 0.465);
+const STUDIO_ALBEDO: Vec3 = Vec3::new(0.57, 0.515, 0.465);
 /// Irradiance of the key light, of the fill light, and of the ambient light from above and from below.
 const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
 const FILL: Vec3 = Vec3::new(0.12, 0.145, 0.19);
@@ -150,7 +150,7 @@ impl Studio {
         let gloss = 0.06 * facing(half).powi(24) * key;
         let light =
             KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient;
-        shoulder(ALBEDO * light + KEY * gloss)
+        shoulder(STUDIO_ALBEDO * light + KEY * gloss)
     }
 
     /// Where the camera ray meets the ground, and how much of the shadow there shows.

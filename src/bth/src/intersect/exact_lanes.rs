@@ -122,6 +122,7 @@ impl Intersections {
 
     /// As [`Self::compute`], for rays that all start at the origin of `terms`. `norm` holds the greatest |component| of each
     /// direction, and `hit` for each ray the index of its triangle in `terms`; with `FIRST_HALF`, all indices are below eight.
+    /// It is a kernel that is inlined into its caller, whose variables the parameters are.
     #[inline(always)]
     pub(crate) fn compute_from_point<S: Simd, const FIRST_HALF: bool>(
         &mut self,

@@ -29,6 +29,7 @@ struct AllOperations<'a> {
 
 impl Kernel for AllOperations<'_> {
     type Output = Vec<Vec<u32>>;
+    /// A table of all operations, hence its length.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
         let f = |x: S::F| {

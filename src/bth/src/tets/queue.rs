@@ -230,7 +230,7 @@ impl<S: Simd> Ready<S> {
 
     /// Prepares rays to walk from the constrained faces near which they start. Also returns the lanes for which this is right: those
     /// whose line certainly crosses the face, at a depth certainly before tmin. The walk then passes all tetrahedra of the leaf behind
-    /// the face in order, and finds every hit in the ray's range.
+    /// the face in order, and finds every hit in the ray's range. This is a kernel with a parameter for each array that it gathers from.
     #[inline(always)]
     pub(super) fn from_faces(
         s: S,

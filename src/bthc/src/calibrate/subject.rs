@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Rays of each kind to a small model: few enough that they and the model stay in the caches of the core wherever the system
 /// places their pages.
-const RAYS: usize = 4096;
+const RAYS_TO_SMALL: usize = 4096;
 /// Rays of each kind to a large model.
 const RAYS_TO_LARGE: usize = 16384;
 /// Rays whose steps are counted.
@@ -145,7 +145,7 @@ impl Subject {
         }
         let plain = bth::from_bytes(&files[0])?;
         let root = &tree.nodes[0];
-        let count = if small { RAYS } else { RAYS_TO_LARGE };
+        let count = if small { RAYS_TO_SMALL } else { RAYS_TO_LARGE };
         let lines = costs::outside(root.lower, root.upper, count, 11);
         // The opposite half of each line leads away from the model.
         let away = |ray: &SampleRay| SampleRay { direction: ray.direction.map(|x| -x), ..*ray };

@@ -6,7 +6,7 @@ use bth_compile::costs::{SampleRay, TetWalker, from_surface};
 use serde::Serialize;
 
 /// Rays that start on each node.
-const RAYS: usize = 8192;
+const RAYS_PER_NODE: usize = 8192;
 /// Rounds of which the fastest counts.
 const ROUNDS: usize = 7;
 
@@ -31,7 +31,7 @@ pub(crate) fn measure(of: &Explained<'_>, most: usize, stop: impl Fn() -> bool) 
     for (node, tets) in of.built.iter().take(most) {
         let at = &of.tree.nodes[*node as usize];
         let rows = at.first as usize..(at.first + at.count) as usize;
-        let samples = from_surface(of.mesh, of.tree, rows, RAYS, 41);
+        let samples = from_surface(of.mesh, of.tree, rows, RAYS_PER_NODE, 41);
         let (long, short): (Vec<SampleRay>, Vec<SampleRay>) =
             samples.into_iter().partition(|ray| ray.tmax.is_infinite());
         let walker = TetWalker::new(tets);

@@ -67,7 +67,8 @@ impl UncachedHits {
 }
 
 impl<Q: Query> PacketRays<'_, Q> {
-    /// Intersects the rays whose bit is set with the triangles of a leaf. Returns whether any has a nearer hit than before.
+    /// Intersects the rays whose bit is set with the triangles of a leaf. Returns whether any has a nearer hit than before. It is a
+    /// part of the kernel of packets and inlined into it: the parameters are variables of its caller.
     #[inline(always)]
     pub(crate) fn enter_leaf<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,

@@ -10,7 +10,7 @@ use zerocopy::{FromZeros, IntoBytes};
 
 /// Number of quads of the surface along x and y, and of quads of a leaf.
 const QUADS: [usize; 2] = [32, 64];
-const BLOCK: [usize; 2] = [2, 4];
+const LEAF_QUADS: [usize; 2] = [2, 4];
 
 /// A surface over a grid, in 256 leaves of 16 triangles, some of them raw, below two levels of nodes.
 pub(super) struct HeightField {
@@ -56,8 +56,8 @@ impl HeightField {
         };
         let (mut ids, mut points, mut leaves) = (vec![], vec![], vec![]);
         let mut lines = vec![CacheLine([0; 16]); NODE_LINES * (1 + WIDTH)];
-        for i in 0..QUADS[0] / BLOCK[0] * QUADS[1] / BLOCK[1] {
-            let (x0, y0) = (i % 16 * BLOCK[0], i / 16 * BLOCK[1]);
+        for i in 0..QUADS[0] / LEAF_QUADS[0] * QUADS[1] / LEAF_QUADS[1] {
+            let (x0, y0) = (i % 16 * LEAF_QUADS[0], i / 16 * LEAF_QUADS[1]);
             let first = ids.len() as u32;
             let own: Vec<[f32; 3]> = (0..15).map(|v| point(x0 + v % 3, y0 + v / 3)).collect();
             let triangles: Vec<[usize; 3]> = (0..8)

@@ -1,6 +1,6 @@
 //! What the fuzz targets share.
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
 use bth_import::{Keep, import_bytes};
@@ -33,9 +33,9 @@ pub fn open_and_trace(bytes: &[u8]) {
 /// 64 rays: one by one, as a batch, with and without hints, nearest and any hit.
 fn trace(scene: &Scene, rng: &mut Rng) {
     let rays: Vec<Ray> = (0..64).map(|_| ray(scene, rng)).collect();
-    let from: Vec<Surface> = rays
+    let from: Vec<PrimitiveRef> = rays
         .iter()
-        .map(|_| Surface { instance: rng.below(3) as u32, triangle: rng.below(40) as u32 })
+        .map(|_| PrimitiveRef { instance: rng.below(3) as u32, triangle: rng.below(40) as u32 })
         .collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut found = vec![false; rays.len()];
@@ -45,7 +45,7 @@ fn trace(scene: &Scene, rng: &mut Rng) {
     scene.any_batch(&rays, None, &mut found);
     for (ray, from) in rays.iter().zip(&from).take(8) {
         scene.nearest(ray, *from);
-        scene.any(ray, Surface::NONE);
+        scene.any(ray, PrimitiveRef::NONE);
         scene.nearest_counted(ray, *from);
     }
 }

@@ -1,6 +1,6 @@
 //! Rays for tests, including those for which ray tracers tend to miss hits.
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_random::Rng;
 
 fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
@@ -60,17 +60,17 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
 
 /// Rays that start where others hit, with the surface that they start on; and some with wild hints, wrong ones
 /// and ones out of range.
-pub fn onward(rays: &[Ray], hits: &[Hit], triangles: usize, seed: u64) -> Vec<(Ray, Surface)> {
+pub fn onward(rays: &[Ray], hits: &[Hit], triangles: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
     let mut rng = Rng::new(seed);
     let mut from = |(ray, hit): (&Ray, &Hit)| {
         if !hit.is_hit() || rng.below(8) == 0 {
             let triangle = rng.below(triangles as u64 + 3) as u32;
-            return (*ray, Surface { instance: 0, triangle });
+            return (*ray, PrimitiveRef { instance: 0, triangle });
         }
         let back = hit.t * (1.0 - 1e-4 * rng.unit_f32());
         let origin = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k] * back);
         let direction = [(); 3].map(|()| rng.unit_f32() - 0.5);
-        (Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }, hit.surface)
+        (Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }, hit.primitive)
     };
     rays.iter().zip(hits).map(&mut from).collect()
 }

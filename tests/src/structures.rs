@@ -62,5 +62,5 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
 
 /// All bits of a hit.
 pub fn bits(hit: &bth::rays::Hit) -> [u32; 5] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]
 }

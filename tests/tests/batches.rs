@@ -1,6 +1,6 @@
 //! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
@@ -30,12 +30,17 @@ fn compiled(model: &Model, structure: Structure, record: RecordKind, keep_subtre
 }
 
 fn bits(hit: &Hit) -> [u32; 5] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.instance, hit.surface.triangle]
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]
 }
 
 /// Rays as programs send them on: off the surface a little, or exactly on it, or cut right about a hit; and the rays
 /// of [`onward`], from wrong triangles too.
-fn hinted_rays(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<(Ray, Surface)> {
+fn hinted_rays(
+    plain: &Scene,
+    corners: &[[[f32; 3]; 3]],
+    count: usize,
+    seed: u64,
+) -> Vec<(Ray, PrimitiveRef)> {
     let first = assorted(corners, count, seed);
     let mut hits = vec![Hit::MISS; first.len()];
     plain.nearest_batch(&first, None, &mut hits);
@@ -72,7 +77,7 @@ fn hinted_rays(plain: &Scene, corners: &[[[f32; 3]; 3]], count: usize, seed: u64
             rays[i].0 = ray;
         }
         // Cut right about the hit.
-        let hit = plain.nearest(&ray, Surface::NONE);
+        let hit = plain.nearest(&ray, PrimitiveRef::NONE);
         if hit.is_hit() {
             let t = [hit.t, hit.t.next_up(), hit.t.next_down()][i % 3];
             let cut = if i % 2 == 0 { Ray { tmax: t, ..ray } } else { Ray { tmin: t, ..ray } };
@@ -89,9 +94,9 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     let _turn = turn();
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let plain = compiled(model, Structure::Bvh, RecordKind::Link32, false);
-    let (rays, from): (Vec<Ray>, Vec<Surface>) =
+    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) =
         hinted_rays(&plain, &corners, rays, seed).into_iter().unzip();
-    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray, Surface::NONE)).collect();
+    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray, PrimitiveRef::NONE)).collect();
     let some_hits = expected.iter().filter(|hit| hit.is_hit()).count();
     assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits} of {} hit", rays.len());
     for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {

@@ -1,6 +1,6 @@
 //! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
 
-use bth::rays::{Ray, Surface};
+use bth::rays::{PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, compile};
 use std::io::Write;
@@ -78,7 +78,7 @@ fn a_c_program_opens_traces_and_reads_errors() {
             format!("{a} {b} {c} {} {x} {y} {z} {}\n", r.tmin, r.tmax)
         })
         .collect();
-    let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r, Surface::NONE)).collect();
+    let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r, PrimitiveRef::NONE)).collect();
     assert!(hits.iter().any(|h| h.is_hit()) && hits.iter().any(|h| !h.is_hit()));
     for flags in ["read", "map"] {
         let output = run(&program, &[file.to_str().expect("UTF-8"), flags], &input);
@@ -91,9 +91,9 @@ fn a_c_program_opens_traces_and_reads_errors() {
             let field: Vec<&str> = line.split(' ').collect();
             let number = |i: usize| field[i].parse::<f32>().expect("a number").to_bits();
             assert_eq!([number(0), number(1), number(2)], [hit.t, hit.u, hit.v].map(f32::to_bits), "{ray:?}");
-            assert_eq!(field[3], hit.surface.instance.to_string());
-            assert_eq!(field[4], hit.surface.triangle.to_string());
-            assert_eq!(field[5], u8::from(scene.any(ray, hit.surface)).to_string());
+            assert_eq!(field[3], hit.primitive.instance.to_string());
+            assert_eq!(field[4], hit.primitive.triangle.to_string());
+            assert_eq!(field[5], u8::from(scene.any(ray, hit.primitive)).to_string());
             answered += 1;
         }
         assert_eq!(answered, rays.len());
@@ -176,11 +176,11 @@ fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
         for [x, z] in points {
             let ray =
                 Ray { origin: [x, 9.0, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
-            let hit = scene.nearest(&ray, Surface::NONE);
+            let hit = scene.nearest(&ray, PrimitiveRef::NONE);
             let line = lines.next().expect("a hit");
             let fields: Vec<&str> = line.split(' ').collect();
             assert_eq!(fields[1].parse::<f32>().expect("a number").to_bits(), hit.t.to_bits(), "{frame:?}");
-            let surface = [hit.surface.instance, hit.surface.triangle].map(|n| n.to_string());
+            let surface = [hit.primitive.instance, hit.primitive.triangle].map(|n| n.to_string());
             assert_eq!(fields[2..], surface, "{frame:?}");
         }
     }

@@ -5,7 +5,7 @@
 #[allow(dead_code)]
 mod corpus_support;
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Isa, Scene};
 use bth_compile::coordinates::CoordinateOptions;
 use bth_compile::pipeline::{Structure, compile};
@@ -109,10 +109,10 @@ fn same(a: &Hit, b: &Hit, ray: &Ray, triangles: &[oracle::Triangle]) -> bool {
     if a.t.to_bits().abs_diff(b.t.to_bits()) > 1 {
         return false;
     }
-    if a.surface == b.surface {
+    if a.primitive == b.primitive {
         return near(a.u, b.u) && near(a.v, b.v);
     }
-    let named = triangles.iter().find(|t| t.id == a.surface.triangle);
+    let named = triangles.iter().find(|t| t.id == a.primitive.triangle);
     named
         .and_then(|t| oracle::intersection(ray, t.corners))
         .is_some_and(|at| oracle::to_f64(&at.t) as f32 == b.t)
@@ -140,7 +140,7 @@ fn check_answers(scene: &Scene) {
         for (i, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
             assert!(same(&hits[i], expected, ray, &triangles), "{isa}: {ray:?} {:?} {expected:?}", hits[i]);
             assert_eq!(found[i], expected.is_hit(), "{isa}: {ray:?}");
-            assert_eq!(bits(&scene.nearest(ray, Surface::NONE)), bits(&hits[i]), "{isa}: {ray:?}");
+            assert_eq!(bits(&scene.nearest(ray, PrimitiveRef::NONE)), bits(&hits[i]), "{isa}: {ray:?}");
         }
     }
     Isa::best().choose().unwrap();

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa};
 use bth_random::Rng;
 use zerocopy::IntoBytes;
@@ -113,7 +113,7 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
             direction: [0, 1, 2].map(|k| target[k] - origin[k]),
             tmax: f32::INFINITY,
         };
-        let (a, b) = (tets.nearest(&ray, Surface::NONE), bvh.nearest(&ray, Surface::NONE));
+        let (a, b) = (tets.nearest(&ray, PrimitiveRef::NONE), bvh.nearest(&ray, PrimitiveRef::NONE));
         assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
         // Where triangles meet, either may be reported; only the distance must agree.
         hits += usize::from(a.t.is_finite());
@@ -122,7 +122,7 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
 }
 
 /// A pinhole camera's rays from one side, in tiles, and random rays from the surfaces they hit.
-fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<Surface>) {
+fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<PrimitiveRef>) {
     const SIDE: u16 = 64;
     let object = *bvh.object(0).header;
     let (lower, upper) = (object.lower, object.upper);
@@ -139,18 +139,18 @@ fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<Surface>) {
         let target = [middle[0] + x, middle[1] + y, middle[2] - x];
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
         rays.push(Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY });
-        from.push(Surface::NONE);
+        from.push(PrimitiveRef::NONE);
     }
     let mut rng = Rng::new(5);
     for i in 0..rays.len() {
-        let hit = bvh.nearest(&rays[i], Surface::NONE);
+        let hit = bvh.nearest(&rays[i], PrimitiveRef::NONE);
         if hit.is_hit() {
             let (o, d) = (rays[i].origin, rays[i].direction);
             let origin = [0, 1, 2].map(|k| o[k] + hit.t * d[k]);
             let direction = [(); 3].map(|()| (rng.unit_f32() - 0.5) * size);
             let tmax = if i % 3 == 0 { 0.1 } else { f32::INFINITY };
             rays.push(Ray { origin, tmin: 1e-4, direction, tmax });
-            from.push(hit.surface);
+            from.push(hit.primitive);
         }
     }
     (rays, from)
@@ -159,7 +159,7 @@ fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<Surface>) {
 /// Batches of both structures, with hints and without, give on every instruction set the bits of single rays.
 fn agree_in_batches(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) {
     let (rays, from) = coherent_and_bounced(bvh);
-    let single = |(ray, from): (&Ray, &Surface)| bvh.nearest(ray, *from);
+    let single = |(ray, from): (&Ray, &PrimitiveRef)| bvh.nearest(ray, *from);
     let expected: Vec<Hit> = rays.iter().zip(&from).map(single).collect();
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("an instruction set that is available");

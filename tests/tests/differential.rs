@@ -1,7 +1,7 @@
 //! Every structure and record agrees with the exact oracle, and with each other bit for bit.
 
 use bth::Steps;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_scenes::{Model, blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot, soup::soup};
 use bth_tests::oracle;
 use bth_tests::rays::{assorted, onward};
@@ -19,7 +19,7 @@ fn check_against_oracle(corners: &Corners, ray: &Ray, hit: &Hit) {
     assert!(hit.is_hit(), "miss: {}", context());
     let t = truth.t_f64() as f32;
     assert!(hit.t.to_bits().abs_diff(t.to_bits()) <= 1 || hit.t == t, "t: {}", context());
-    let id = hit.surface.triangle;
+    let id = hit.primitive.triangle;
     if !truth.triangles.contains(&id) {
         // Another triangle at the same t but for less than the rounding of f64.
         let other = oracle::intersection(ray, corners[id as usize]).map(|at| oracle::to_f64(&at.t));
@@ -54,10 +54,14 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
                 expected[i]
             );
             assert_eq!(any[i], expected[i].is_hit(), "{name}: any hit of {ray:?}");
-            assert_eq!(bits(&scene.nearest(ray, Surface::NONE)), bits(&hits[i]), "{name}: one ray at a time");
+            assert_eq!(
+                bits(&scene.nearest(ray, PrimitiveRef::NONE)),
+                bits(&hits[i]),
+                "{name}: one ray at a time"
+            );
         }
         for (ray, from) in &onward {
-            let (without, with) = (scene.nearest(ray, Surface::NONE), scene.nearest(ray, *from));
+            let (without, with) = (scene.nearest(ray, PrimitiveRef::NONE), scene.nearest(ray, *from));
             assert_eq!(
                 bits(&without),
                 bits(&with),
@@ -65,7 +69,7 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
             );
             assert_eq!(scene.any(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
             assert_eq!(
-                bits(&plain.nearest(ray, Surface::NONE)),
+                bits(&plain.nearest(ray, PrimitiveRef::NONE)),
                 bits(&with),
                 "{name}: {ray:?} differs from the BVH"
             );
@@ -156,8 +160,8 @@ fn rays_without_a_line_hit_nothing() {
     ];
     for Traced { name, scene } in &every_structure(&torus_knot(400), true) {
         for ray in &bad {
-            assert_eq!(scene.nearest(ray, Surface::NONE), Hit::MISS, "{name}: {ray:?}");
-            assert!(!scene.any(ray, Surface { instance: 0, triangle: 0 }), "{name}: {ray:?}");
+            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), Hit::MISS, "{name}: {ray:?}");
+            assert!(!scene.any(ray, PrimitiveRef { instance: 0, triangle: 0 }), "{name}: {ray:?}");
         }
     }
 }
@@ -176,7 +180,7 @@ fn tets_are_really_walked_and_hints_save_steps() {
     tets.nearest_batch(&first, None, &mut hits);
     let (mut plain, mut hinted, mut rays) = (Steps::default(), Steps::default(), 0);
     for (ray, from) in onward(&first, &hits, corners.len(), 10) {
-        plain += tets.nearest_counted(&ray, Surface::NONE).1;
+        plain += tets.nearest_counted(&ray, PrimitiveRef::NONE).1;
         hinted += tets.nearest_counted(&ray, from).1;
         rays += 1;
     }

@@ -3,7 +3,7 @@
 
 pub mod motion;
 
-use runtime::rays::{Hit, Ray, Surface};
+use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
@@ -99,7 +99,7 @@ pub extern "C" fn bth_last_error() -> *const c_char {
 }
 
 /// The arguments of a query: the scene, the rays, and for each ray the triangle on which it starts, if given.
-type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [Surface]>);
+type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [PrimitiveRef]>);
 
 /// The arguments of a query as slices; `None` if there are no rays, or `scene` or `rays` is null.
 ///
@@ -109,14 +109,14 @@ type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [Surface]>);
 unsafe fn batch<'a>(
     scene: *const Scene,
     rays: *const Ray,
-    from: *const Surface,
+    from: *const PrimitiveRef,
     count: usize,
 ) -> Option<Batch<'a>> {
     if scene.is_null() || rays.is_null() || count == 0 {
         return None;
     }
     // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` and `from` point to `count`
-    // elements. `Ray` and `Surface` have the layout of the C structs, and all bit patterns are valid for them.
+    // elements. `Ray` and `PrimitiveRef` have the layout of the C structs, and all bit patterns are valid for them.
     unsafe {
         let from = (!from.is_null()).then(|| std::slice::from_raw_parts(from, count));
         Some((&*scene, std::slice::from_raw_parts(rays, count), from))
@@ -132,7 +132,7 @@ unsafe fn batch<'a>(
 pub unsafe extern "C" fn bth_nearest(
     scene: *const Scene,
     rays: *const Ray,
-    from: *const Surface,
+    from: *const PrimitiveRef,
     hits: *mut Hit,
     count: usize,
 ) {
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn bth_nearest(
 pub unsafe extern "C" fn bth_any(
     scene: *const Scene,
     rays: *const Ray,
-    from: *const Surface,
+    from: *const PrimitiveRef,
     hit: *mut u8,
     count: usize,
 ) {
@@ -186,7 +186,7 @@ const CHUNK: usize = 1024;
 
 /// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
 #[inline(never)]
-fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[Surface]>, hit: &mut [u8]) {
+fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) {
     let mut buffer = [false; CHUNK];
     for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
         let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);

@@ -6,7 +6,7 @@ use crate::intersection::{
 };
 use crate::nearest::{ExactHit, nearest_of};
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use num_bigint::BigInt;
 
 /// The units of f64, 2^-1074, and of f32, 2^-149.
@@ -62,7 +62,7 @@ impl World {
     }
 
     /// The nearest exact hit.
-    pub fn nearest(&self, ray: &Ray) -> Option<ExactHit<Surface>> {
+    pub fn nearest(&self, ray: &Ray) -> Option<ExactHit<PrimitiveRef>> {
         nearest_of(ray, self.intersections(ray))
     }
 
@@ -74,7 +74,7 @@ impl World {
             t: rounded(&truth.at.t),
             u: rounded(&truth.at.u),
             v: rounded(&truth.at.v),
-            surface: truth.triangles[0],
+            primitive: truth.triangles[0],
         })
     }
 
@@ -83,15 +83,15 @@ impl World {
         self.intersections(ray).any(|found| nearest_of(ray, std::iter::once(found)).is_some())
     }
 
-    fn intersections<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (Surface, Intersection)> + 'a {
+    fn intersections<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = (PrimitiveRef, Intersection)> + 'a {
         self.instances.iter().filter(|_| has_line(ray)).flat_map(move |instance| {
             instance.triangles.iter().filter_map(move |triangle| {
-                let surface = Surface { instance: instance.number, triangle: triangle.id };
+                let primitive = PrimitiveRef { instance: instance.number, triangle: triangle.id };
                 let at = match &instance.to_world {
                     None => intersection(ray, triangle.corners)?,
                     Some(rows) => intersection_in_world(ray, rows, triangle.corners)?,
                 };
-                Some((surface, at))
+                Some((primitive, at))
             })
         })
     }

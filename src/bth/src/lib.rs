@@ -1,13 +1,13 @@
 //! Runtime of BTH files: opens compiled files and traces rays through them, without copying or converting their sections.
 //!
 //! ```no_run
-//! use bth::rays::{Ray, Surface};
+//! use bth::rays::{PrimitiveRef, Ray};
 //!
 //! let scene = bth::open("bunny.bth")?;
 //! let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
-//! let hit = scene.nearest(&ray, Surface::NONE);
+//! let hit = scene.nearest(&ray, PrimitiveRef::NONE);
 //! if hit.is_hit() {
-//!     println!("triangle {} at t = {}", hit.surface.triangle, hit.t);
+//!     println!("triangle {} at t = {}", hit.primitive.triangle, hit.t);
 //! }
 //! # Ok::<(), bth::Error>(())
 //! ```

@@ -29,16 +29,16 @@ impl Ray {
 /// A triangle of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
-pub struct Surface {
+pub struct PrimitiveRef {
     /// Index of the instance in the scene. In a file without scene sections it is the index of the object.
     pub instance: u32,
     /// Index of the triangle among those of the source file, after fan triangulation of its faces.
     pub triangle: u32,
 }
 
-impl Surface {
+impl PrimitiveRef {
     /// No triangle: the surface of a miss, and of a ray of which it is not known where it starts.
-    pub const NONE: Surface = Surface { instance: NONE, triangle: NONE };
+    pub const NONE: PrimitiveRef = PrimitiveRef { instance: NONE, triangle: NONE };
 }
 
 /// Nearest hit of a ray, or a miss.
@@ -51,13 +51,13 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric weight of the triangle's third vertex, from 0 to 1.
     pub v: f32,
-    /// The triangle, or [`Surface::NONE`] for a miss.
-    pub surface: Surface,
+    /// The triangle, or [`PrimitiveRef::NONE`] for a miss.
+    pub primitive: PrimitiveRef,
 }
 
 impl Hit {
     /// The result for a ray that hits nothing.
-    pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, surface: Surface::NONE };
+    pub const MISS: Hit = Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE };
 
     /// Whether the ray hits a triangle.
     pub fn is_hit(&self) -> bool {
@@ -65,4 +65,4 @@ impl Hit {
     }
 }
 
-const _: () = assert!(size_of::<Ray>() == 32 && size_of::<Surface>() == 8 && size_of::<Hit>() == 20);
+const _: () = assert!(size_of::<Ray>() == 32 && size_of::<PrimitiveRef>() == 8 && size_of::<Hit>() == 20);

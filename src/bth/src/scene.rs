@@ -3,7 +3,7 @@
 use crate::instances::World;
 use crate::object;
 use crate::query::Steps;
-use crate::rays::{Hit, Ray, Surface};
+use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::error::Error;
 use bth_format::file::File;
 use bth_format::layout::NONE;
@@ -140,15 +140,15 @@ impl Scene {
     }
 
     /// Nearest hit of a ray in world space, or [`Hit::MISS`]. `from` is the triangle on which the ray starts, or
-    /// [`Surface::NONE`]. It is a hint where a traversal of tetrahedra may begin, and never changes the result.
-    pub fn nearest(&self, ray: &Ray, from: Surface) -> Hit {
+    /// [`PrimitiveRef::NONE`]. It is a hint where a traversal of tetrahedra may begin, and never changes the result.
+    pub fn nearest(&self, ray: &Ray, from: PrimitiveRef) -> Hit {
         let mut hit = Hit::MISS;
         self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));
         hit
     }
 
     /// As [`Self::nearest`], with statistics of the traversal.
-    pub fn nearest_counted(&self, ray: &Ray, from: Surface) -> (Hit, Steps) {
+    pub fn nearest_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
         }
@@ -168,7 +168,7 @@ impl Scene {
     }
 
     /// Whether a ray in world space hits anything. `from` is a hint as for [`Self::nearest`].
-    pub fn any(&self, ray: &Ray, from: Surface) -> bool {
+    pub fn any(&self, ray: &Ray, from: PrimitiveRef) -> bool {
         let mut found = false;
         self.any_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut found));
         found
@@ -181,11 +181,11 @@ impl Scene {
     /// # Panics
     /// If the slices differ in length.
     #[inline]
-    pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
+    pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         check_lengths(rays, from, hits.len());
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
-                object::nearest_to(object, ray, hint(start_surface(from, 0), instance), instance, hit);
+                object::nearest_to(object, ray, hint(start_primitive(from, 0), instance), instance, hit);
             }
             (sole, ..) => self.nearest_general(sole, rays, from, hits),
         }
@@ -197,14 +197,14 @@ impl Scene {
         &self,
         sole: Option<(&ObjectView<'_>, u32)>,
         rays: &[Ray],
-        from: Option<&[Surface]>,
+        from: Option<&[PrimitiveRef]>,
         hits: &mut [Hit],
     ) {
         object::fill_misses(hits);
         if let Some((object, instance)) = sole {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = object::nearest(object, ray, hint(start_surface(from, i), instance), instance);
+                    *hit = object::nearest(object, ray, hint(start_primitive(from, i), instance), instance);
                 }
                 return;
             }
@@ -222,7 +222,7 @@ impl Scene {
                 // Not `f32::min`, which would replace a `tmax` of NaN by a number.
                 let tmax = if best.t < ray.tmax { best.t } else { ray.tmax };
                 let ray = Ray { tmax, ..*ray };
-                let hit = object::nearest(object, &ray, hint(start_surface(from, i), instance), instance);
+                let hit = object::nearest(object, &ray, hint(start_primitive(from, i), instance), instance);
                 if hit.t < best.t {
                     *best = hit;
                 }
@@ -235,11 +235,11 @@ impl Scene {
     /// # Panics
     /// If the slices differ in length.
     #[inline]
-    pub fn any_batch(&self, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
+    pub fn any_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         check_lengths(rays, from, found.len());
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
-                *found = object::any(object, ray, hint(start_surface(from, 0), instance));
+                *found = object::any(object, ray, hint(start_primitive(from, 0), instance));
             }
             (sole, ..) => self.any_general(sole, rays, from, found),
         }
@@ -251,14 +251,14 @@ impl Scene {
         &self,
         sole: Option<(&ObjectView<'_>, u32)>,
         rays: &[Ray],
-        from: Option<&[Surface]>,
+        from: Option<&[PrimitiveRef]>,
         found: &mut [bool],
     ) {
         found.fill(false);
         if let Some((object, instance)) = sole {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
-                    *found = object::any(object, ray, hint(start_surface(from, i), instance));
+                    *found = object::any(object, ray, hint(start_primitive(from, i), instance));
                 }
                 return;
             }
@@ -273,30 +273,30 @@ impl Scene {
         for instance in 0..self.object_count() {
             let object = self.view(instance);
             for (i, (ray, found)) in rays.iter().zip(found.iter_mut()).enumerate() {
-                *found = *found || object::any(object, ray, hint(start_surface(from, i), instance));
+                *found = *found || object::any(object, ray, hint(start_primitive(from, i), instance));
             }
         }
     }
 }
 
-fn check_lengths(rays: &[Ray], from: Option<&[Surface]>, results: usize) {
+fn check_lengths(rays: &[Ray], from: Option<&[PrimitiveRef]>, results: usize) {
     assert_eq!(rays.len(), results, "as many results as rays");
     assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
 }
 
-/// The triangle on which a ray of a batch starts, or [`Surface::NONE`].
-fn start_surface(from: Option<&[Surface]>, ray: usize) -> Surface {
-    from.map_or(Surface::NONE, |f| f[ray])
+/// The triangle on which a ray of a batch starts, or [`PrimitiveRef::NONE`].
+fn start_primitive(from: Option<&[PrimitiveRef]>, ray: usize) -> PrimitiveRef {
+    from.map_or(PrimitiveRef::NONE, |f| f[ray])
 }
 
 /// For each ray the triangle of an instance's object on which it starts, or `NONE`. `None` if there are no hints, or if the
 /// object has no tetrahedra, because only their traversal uses hints.
-fn hints(object: &ObjectView<'_>, from: Option<&[Surface]>, instance: u32) -> Option<Vec<u32>> {
+fn hints(object: &ObjectView<'_>, from: Option<&[PrimitiveRef]>, instance: u32) -> Option<Vec<u32>> {
     let from = from.filter(|_| !object.tet_leaves.is_empty())?;
     Some(from.iter().map(|&from| hint(from, instance)).collect())
 }
 
 /// The triangle of an instance's object on which a ray starts, or `NONE`.
-fn hint(from: Surface, instance: u32) -> u32 {
+fn hint(from: PrimitiveRef, instance: u32) -> u32 {
     if from.instance == instance { from.triangle } else { NONE }
 }

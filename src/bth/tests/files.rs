@@ -1,7 +1,7 @@
 //! The conformance files, embedded: opened, checked, damaged and traced without a file system, as it runs under Miri
 //! (`tools/check/miri`), in WebAssembly and on 32-bit machines (`tools/check/targets`).
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 
 macro_rules! files {
     ($($name:literal),* $(,)?) => {
@@ -62,8 +62,8 @@ fn rays(scene: &bth::Scene) -> Vec<Ray> {
 
 fn trace(scene: &bth::Scene) -> usize {
     let rays = rays(scene);
-    let from: Vec<Surface> =
-        (0..rays.len() as u32).map(|i| Surface { instance: i % 2, triangle: i % 5 }).collect();
+    let from: Vec<PrimitiveRef> =
+        (0..rays.len() as u32).map(|i| PrimitiveRef { instance: i % 2, triangle: i % 5 }).collect();
     let (mut hits, mut with_hints) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
     scene.nearest_batch(&rays, None, &mut hits);
     scene.nearest_batch(&rays, Some(&from), &mut with_hints);
@@ -72,7 +72,7 @@ fn trace(scene: &bth::Scene) -> usize {
     scene.any_batch(&rays, Some(&from), &mut found);
     for ((ray, hit), found) in rays.iter().zip(&hits).zip(found) {
         assert_eq!(hit.is_hit(), found);
-        assert_eq!(scene.nearest(ray, Surface::NONE), *hit);
+        assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), *hit);
     }
     hits.iter().filter(|hit| hit.is_hit()).count()
 }

@@ -1,7 +1,7 @@
 //! Measures the time of rays through compiled objects, on one thread.
 
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::costs::SampleRay;
 
 /// Rays in one call of a batch.
@@ -12,7 +12,7 @@ const BATCH: usize = 1024;
 pub(crate) struct Rays {
     rays: Vec<Ray>,
     /// The primitive on which each ray starts.
-    from: Vec<Surface>,
+    from: Vec<PrimitiveRef>,
 }
 
 impl Rays {
@@ -24,8 +24,8 @@ impl Rays {
             tmax: s.tmax as f32,
         };
         let from = |s: &SampleRay| match s.from {
-            Some(triangle) => Surface { instance: 0, triangle },
-            None => Surface::NONE,
+            Some(triangle) => PrimitiveRef { instance: 0, triangle },
+            None => PrimitiveRef::NONE,
         };
         Rays { rays: samples.iter().map(ray).collect(), from: samples.iter().map(from).collect() }
     }

@@ -2,7 +2,7 @@
 //! elements. Little-endian.
 
 use crate::failure::Failure;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub(crate) fn read_rays(path: &Path) -> Result<Vec<Ray>, Failure> {
 }
 
 /// Reads a `.from` file: for each ray the u32 id of the triangle on which it starts, or 2^32 - 1 for none.
-pub(crate) fn read_from(path: &Path, rays: usize) -> Result<Vec<Surface>, Failure> {
+pub(crate) fn read_from(path: &Path, rays: usize) -> Result<Vec<PrimitiveRef>, Failure> {
     let data = read(path, b"FROM", 4)?;
     let (ids, _) = data[HEADER..].as_chunks::<4>();
     if ids.len() != rays {
@@ -34,8 +34,8 @@ pub(crate) fn read_from(path: &Path, rays: usize) -> Result<Vec<Surface>, Failur
     Ok(ids
         .iter()
         .map(|id| match u32::from_le_bytes(*id) {
-            NONE => Surface::NONE,
-            triangle => Surface { instance: 0, triangle },
+            NONE => PrimitiveRef::NONE,
+            triangle => PrimitiveRef { instance: 0, triangle },
         })
         .collect())
 }
@@ -47,14 +47,14 @@ pub(crate) fn hits(hits: &[Hit]) -> Vec<u8> {
         for value in [hit.t, hit.u, hit.v] {
             bytes.extend_from_slice(&value.to_le_bytes());
         }
-        bytes.extend_from_slice(&hit.surface.triangle.to_le_bytes());
+        bytes.extend_from_slice(&hit.primitive.triangle.to_le_bytes());
     }
     bytes
 }
 
 /// The answer of an any-hit query as a hit: triangle 0 or none.
 pub(crate) fn answer(any: bool) -> Hit {
-    let hit = Hit { t: 0.0, u: 0.0, v: 0.0, surface: Surface { instance: 0, triangle: 0 } };
+    let hit = Hit { t: 0.0, u: 0.0, v: 0.0, primitive: PrimitiveRef { instance: 0, triangle: 0 } };
     if any { hit } else { Hit::MISS }
 }
 

@@ -15,7 +15,7 @@ pub use statistics::Statistics;
 
 use crate::structures::{Traced, bits};
 use bth::Isa;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 
 /// Rays that are traced together.
 const BATCH: usize = 1024;
@@ -67,13 +67,13 @@ pub fn run(
 
 /// Rays with hints, right and wrong ones, and one by one: the same bits.
 fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
-    let from: Vec<Surface> = expected.iter().map(|hit| hit.surface).collect();
+    let from: Vec<PrimitiveRef> = expected.iter().map(|hit| hit.primitive).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     traced.scene.nearest_batch(rays, Some(&from), &mut hits);
     statistics.different += differing(expected, &hits);
     statistics.traced += rays.len() as u64;
     for (ray, hit) in rays.iter().zip(expected).step_by(16) {
-        let one = traced.scene.nearest(ray, Surface::NONE);
+        let one = traced.scene.nearest(ray, PrimitiveRef::NONE);
         statistics.different += u64::from(bits(&one) != bits(hit));
         statistics.traced += 1;
     }

@@ -101,7 +101,7 @@ impl Statistics {
         let ray = &aimed.ray;
         if hit.is_hit() {
             self.hits += 1;
-            let exact = shape.grid.intersection(ray, hit.surface.triangle);
+            let exact = shape.grid.intersection(ray, hit.primitive.triangle);
             if exact.is_none() || !within(ray.range, hit.t) {
                 self.ghosts += 1;
                 self.example("ghost", shape, aimed, hit);
@@ -139,7 +139,7 @@ impl Statistics {
         }
         let right = match hit.is_hit() {
             // t is rounded to half an ulp, so among triangles at the same rounded t any may be the nearest.
-            true => hit.t <= nearest && (hit.surface.triangle == least || hit.t == nearest),
+            true => hit.t <= nearest && (hit.primitive.triangle == least || hit.t == nearest),
             false => nearest == f32::INFINITY,
         };
         if !right {

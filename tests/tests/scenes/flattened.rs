@@ -1,7 +1,7 @@
 //! Hits of a scene are those of its geometry in world space, compiled as one object.
 
 use crate::support::{animated, compiled, imported, models, options, varied};
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::compile;
 use bth_random::Rng;
@@ -70,10 +70,13 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
                 a.is_hit() == b.is_hit() && (!a.is_hit() || (a.t - b.t).abs() * length <= most)
             };
             if near(a, b, 4.0) {
-                let at = first.partition_point(|(t, _)| *t <= b.surface.triangle).saturating_sub(1);
+                let at = first.partition_point(|(t, _)| *t <= b.primitive.triangle).saturating_sub(1);
                 let same = !b.is_hit()
-                    || a.surface
-                        == Surface { instance: first[at].1, triangle: b.surface.triangle - first[at].0 };
+                    || a.primitive
+                        == PrimitiveRef {
+                            instance: first[at].1,
+                            triangle: b.primitive.triangle - first[at].0,
+                        };
                 // Where surfaces of two instances coincide, either may be reported.
                 other_name += usize::from(!same);
                 continue;
@@ -82,8 +85,9 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
             // rays shifted by that much give this answer too, or at grazing angles nearer and farther ones.
             graze += 1;
             let others: Vec<Hit> = shifted(&flat, ray).collect();
-            let instance = |c: &Hit| first[first.partition_point(|(t, _)| *t <= c.surface.triangle) - 1].1;
-            let same = others.iter().filter(|c| c.is_hit() && instance(c) == a.surface.instance).map(|c| c.t);
+            let instance = |c: &Hit| first[first.partition_point(|(t, _)| *t <= c.primitive.triangle) - 1].1;
+            let same =
+                others.iter().filter(|c| c.is_hit() && instance(c) == a.primitive.instance).map(|c| c.t);
             let (least, most) = same.fold((f32::INFINITY, 0.0f32), |(l, m), t| (l.min(t), m.max(t)));
             assert!(
                 others.iter().any(|c| near(a, c, 32.0)) || least <= a.t && a.t <= most,
@@ -117,7 +121,7 @@ fn shifted<'a>(flat: &'a bth::Scene, ray: &'a Ray) -> impl Iterator<Item = Hit> 
         let target = near([0, 1, 2].map(|k| ray.origin[k] + ray.direction[k]));
         let origin = near(ray.origin);
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
-        flat.nearest(&Ray { origin, direction, ..*ray }, Surface::NONE)
+        flat.nearest(&Ray { origin, direction, ..*ray }, PrimitiveRef::NONE)
     })
 }
 

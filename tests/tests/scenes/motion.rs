@@ -1,7 +1,7 @@
 //! Animation: motion, visibility, and transforms that cannot be used.
 
 use crate::support::{compiled, manifest, models, varied};
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_random::Rng;
 
 fn rays(count: usize) -> Vec<Ray> {
@@ -105,10 +105,10 @@ fn hidden_instances_are_hit_by_no_ray_and_others_are() {
         ]"#;
     let (mut scene, _) = compiled(&manifest(text), folder.path());
     let ray = Ray { origin: [0.1, 5.0, 0.3], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
-    let from = Surface { instance: 0, triangle: 0 };
+    let from = PrimitiveRef { instance: 0, triangle: 0 };
     for (frame, seen) in [(0, true), (1, false), (2, false), (3, false), (0, true)] {
         scene.set_frame(frame).unwrap();
-        assert_eq!(scene.nearest(&ray, Surface::NONE).is_hit(), seen, "frame {frame}");
+        assert_eq!(scene.nearest(&ray, PrimitiveRef::NONE).is_hit(), seen, "frame {frame}");
         assert_eq!(scene.any(&ray, from), seen, "frame {frame}");
         assert_eq!(scene.instance(0).visible, seen, "frame {frame}");
     }
@@ -194,7 +194,7 @@ fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
         let starts = hits(&scene, &first);
         let triangles = scene.object(0).triangles.len();
         let onward = bth_tests::rays::onward(&first, &starts, triangles, 5);
-        let (rays, from): (Vec<Ray>, Vec<Surface>) = onward.into_iter().unzip();
+        let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = onward.into_iter().unzip();
         let plain = hits(&scene, &rays);
         let mut found = vec![Hit::MISS; rays.len()];
         scene.nearest_batch(&rays, Some(&from), &mut found);

@@ -1,7 +1,7 @@
 //! Instances under transforms: closed surfaces stay closed, and hits stay within a documented distance of the exact ones.
 
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_oracle::World;
@@ -108,10 +108,10 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
         let mut worst: f64 = 0.0;
         for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
             assert!(hit.is_hit() && found[i], "leak: {ray:?} within instance {instance}");
-            assert_eq!(scene.nearest(ray, Surface::NONE), *hit);
-            let of = scene.instance(hit.surface.instance);
-            assert_eq!(hit.surface.instance, instance, "instances stand apart: {ray:?}");
-            let corners = object.triangles[hit.surface.triangle as usize]
+            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), *hit);
+            let of = scene.instance(hit.primitive.instance);
+            assert_eq!(hit.primitive.instance, instance, "instances stand apart: {ray:?}");
+            let corners = object.triangles[hit.primitive.triangle as usize]
                 .map(|v| apply(&of.to_world, object.positions[v as usize].map(f64::from)));
             let [a, b, c] = corners;
             let normal = cross([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
@@ -125,8 +125,8 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
             // Of a sample, the exact truth for the instance as it stands: hit as well, and at about the same t.
             if i % 10 == 0 {
                 let exact = world.hit(ray);
-                assert_eq!((exact.is_hit(), exact.surface.instance), (true, instance), "{ray:?}");
-                if exact.surface == hit.surface {
+                assert_eq!((exact.is_hit(), exact.primitive.instance), (true, instance), "{ray:?}");
+                if exact.primitive == hit.primitive {
                     let speed = dot(normal, ray.direction.map(f64::from)).abs() / dot(normal, normal).sqrt();
                     assert!(f64::from((exact.t - hit.t).abs()) * speed <= bound, "{exact:?} {hit:?}");
                 }

@@ -1,7 +1,7 @@
 //! Changes of a model that change no answer: another order, exact motions, and cuts into instances.
 
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_random::Rng;
@@ -43,7 +43,7 @@ fn compare(a: &[Hit], b: &[Hit], name: impl Fn(u32) -> u32, ordered: bool) {
     let mut same = 0;
     for (a, b) in a.iter().zip(b) {
         assert_eq!((a.is_hit(), a.t.to_bits()), (b.is_hit(), b.t.to_bits()), "{a:?} {b:?}");
-        if a.is_hit() && name(a.surface.triangle) == b.surface.triangle {
+        if a.is_hit() && name(a.primitive.triangle) == b.primitive.triangle {
             assert_eq!((a.u.to_bits(), a.v.to_bits()), (b.u.to_bits(), b.v.to_bits()), "{a:?} {b:?}");
             same += 1;
         } else {
@@ -95,7 +95,7 @@ fn moved(point: impl Fn([f32; 3]) -> [f32; 3]) {
             .collect();
         for (a, b) in every_structure(&model, false).iter().zip(&every_structure(&other, false)) {
             for (a, b) in hits(&a.scene, &rays).iter().zip(&hits(&b.scene, &moved)) {
-                assert_eq!((a.t.to_bits(), a.surface), (b.t.to_bits(), b.surface), "{a:?} {b:?}");
+                assert_eq!((a.t.to_bits(), a.primitive), (b.t.to_bits(), b.primitive), "{a:?} {b:?}");
             }
         }
     }
@@ -135,8 +135,8 @@ fn cutting_into_instances_changes_no_answer() {
         let rays = rays(&model);
         let mut ours = hits(&cut, &rays);
         for hit in ours.iter_mut().filter(|hit| hit.is_hit()) {
-            let triangle = hit.surface.instance * size as u32 + hit.surface.triangle;
-            hit.surface = Surface { instance: 0, triangle };
+            let triangle = hit.primitive.instance * size as u32 + hit.primitive.triangle;
+            hit.primitive = PrimitiveRef { instance: 0, triangle };
         }
         // Of hits at the same t, rounded, that of the least instance is reported; within an object the nearest is.
         compare(&hits(&every_structure(&model, false)[0].scene, &rays), &ours, |id| id, false);

@@ -1,6 +1,6 @@
 //! Random meshes, with and without defects, in every structure against the exact oracle.
 
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use bth_scenes::Model;
 use bth_tests::oracle;
 use bth_tests::rays::assorted;
@@ -71,7 +71,7 @@ fn check(model: &Model, seed: u64) -> Result<(), TestCaseError> {
         for ((ray, hit), first) in rays.iter().zip(&hits).zip(&expected) {
             prop_assert_eq!(bits(hit), bits(first), "{}: {:?}", &traced.name, ray);
             prop_assert_eq!(
-                traced.scene.any(ray, Surface::NONE),
+                traced.scene.any(ray, PrimitiveRef::NONE),
                 hit.is_hit(),
                 "{}: {:?}",
                 &traced.name,
@@ -91,8 +91,8 @@ fn check(model: &Model, seed: u64) -> Result<(), TestCaseError> {
             hit.t == t || hit.t.to_bits().abs_diff(t.to_bits()) <= 1,
             "t: {hit:?}, exactly {truth:?}"
         );
-        if !truth.triangles.contains(&hit.surface.triangle) {
-            let at = oracle::intersection(ray, corners[hit.surface.triangle as usize]);
+        if !truth.triangles.contains(&hit.primitive.triangle) {
+            let at = oracle::intersection(ray, corners[hit.primitive.triangle as usize]);
             let gap = at.map(|at| (oracle::to_f64(&at.t) - truth.t_f64()).abs());
             prop_assert!(
                 gap.is_some_and(|gap| gap <= truth.t_f64().abs() * 1e-12),

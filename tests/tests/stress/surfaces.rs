@@ -1,6 +1,6 @@
 //! Hard rays on hard surfaces, checked exactly; `bth-bench stress` traces many more of them.
 
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
 use bth_tests::stress::{Kind, Statistics, rays, run, shapes};
@@ -43,8 +43,8 @@ fn a_missed_and_a_made_up_hit_are_counted() {
         assert_eq!(tally.leaks, u64::from(aimed.kind == Kind::Inside), "{aimed:?}");
         let missed = (0..shape.grid.triangles.len() as u32)
             .find(|row| shape.grid.intersection(&aimed.ray, *row).is_none());
-        let surface = Surface { instance: 0, triangle: missed.expect("no ray meets all") };
-        tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, surface });
+        let primitive = PrimitiveRef { instance: 0, triangle: missed.expect("no ray meets all") };
+        tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, primitive: primitive });
         assert_eq!(tally.ghosts, 1, "{aimed:?}");
         all.add(&tally);
     }

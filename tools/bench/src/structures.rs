@@ -4,7 +4,7 @@ use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Context, Result};
 use bth::Scene;
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use bth_compile::coordinates::{self, Boxes};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_format::layout::{GridBits, RecordKind};
@@ -170,7 +170,7 @@ impl Tracer for Ours {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         if self.usage == Use::Single {
             for (ray, hit) in batch.rays.iter().zip(hits) {
-                *hit = self.scene.nearest(ray, Surface::NONE);
+                *hit = self.scene.nearest(ray, PrimitiveRef::NONE);
             }
             return;
         }
@@ -182,7 +182,7 @@ impl Tracer for Ours {
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
         if self.usage == Use::Single {
             for (ray, found) in batch.rays.iter().zip(found) {
-                *found = self.scene.any(ray, Surface::NONE);
+                *found = self.scene.any(ray, PrimitiveRef::NONE);
             }
             return;
         }
@@ -197,7 +197,7 @@ impl Tracer for Ours {
 }
 
 impl Ours {
-    fn hints<'a>(&self, batch: &Batch<'a>) -> Option<&'a [Surface]> {
+    fn hints<'a>(&self, batch: &Batch<'a>) -> Option<&'a [PrimitiveRef]> {
         if self.usage == Use::Hinted { batch.from } else { None }
     }
 }

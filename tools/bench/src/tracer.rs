@@ -1,6 +1,6 @@
 //! The interface of all tracers, ours and rivals: batches of rays.
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use std::sync::Mutex;
 
 /// Rays to trace, and hints that a tracer may use.
@@ -9,7 +9,7 @@ pub struct Batch<'a> {
     /// The rays, model space.
     pub rays: &'a [Ray],
     /// The triangle that each ray starts on, in sets that start on triangles.
-    pub from: Option<&'a [Surface]>,
+    pub from: Option<&'a [PrimitiveRef]>,
     /// Whether neighbouring rays have similar origins and directions; Embree takes this as a flag.
     pub coherent: bool,
 }

@@ -1,6 +1,6 @@
 //! The rays are the same for every tracer and run, and rivals answer them as we do, up to their own errors.
 
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_bench::model::Model;
 use bth_bench::rays::{Finder, Options, RaySet, View, sets};
 use bth_bench::rivals::RIVALS;
@@ -142,7 +142,7 @@ fn rivals_agree_with_the_exact_answers_up_to_their_errors() {
             assert!(wrong <= most, "{}, {}: {wrong} of {}", rival.name, set.name, set.rays.len());
             assert!(wrong_found <= most, "{}, {}: any: {wrong_found}", rival.name, set.name);
             assert!(error < 1e-3, "{}, {}: t is off by {error}", rival.name, set.name);
-            let beyond = |h: &Hit| h.is_hit() && h.surface.triangle as usize >= model.triangles();
+            let beyond = |h: &Hit| h.is_hit() && h.primitive.triangle as usize >= model.triangles();
             assert!(!hits.iter().any(beyond), "{}, {}: no such triangle", rival.name, set.name);
         }
     }
@@ -153,7 +153,8 @@ fn rivals_agree_with_the_exact_answers_up_to_their_errors() {
 fn threads_share_all_rays_out_once() {
     let ray = |i: usize| Ray { origin: [i as f32; 3], tmin: 0.0, direction: [1.0, 0.0, 0.0], tmax: 1.0 };
     let rays: Vec<Ray> = (0..3 * BLOCK + 17).map(ray).collect();
-    let from: Vec<Surface> = (0..rays.len()).map(|i| Surface { instance: 0, triangle: i as u32 }).collect();
+    let from: Vec<PrimitiveRef> =
+        (0..rays.len()).map(|i| PrimitiveRef { instance: 0, triangle: i as u32 }).collect();
     let mut seen = vec![0; rays.len()];
     let batch = Batch { rays: &rays, from: Some(&from), coherent: false };
     spread(batch, &mut seen, 3, BLOCK, |batch, seen| {

@@ -5,7 +5,7 @@ use crate::costs::{SampleRay, Weighting};
 use crate::error::{Error, Place, Result};
 use crate::vectors::{double_area, uniform_direction, unit};
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::{Camera, Light};
 use bth_random::Rng;
 use glam::DVec3;
@@ -121,7 +121,8 @@ fn follow(
     random: &mut Rng,
     weights: &mut [Weighting],
 ) {
-    let mut rays: Vec<(Ray, Surface)> = camera_rays.into_iter().map(|ray| (ray, Surface::NONE)).collect();
+    let mut rays: Vec<(Ray, PrimitiveRef)> =
+        camera_rays.into_iter().map(|ray| (ray, PrimitiveRef::NONE)).collect();
     for bounce in 0..=BOUNCES {
         let only: Vec<Ray> = rays.iter().map(|r| r.0).collect();
         let mut hits = vec![Hit::MISS; only.len()];
@@ -139,12 +140,12 @@ fn follow(
                 let far = if light.kind == 0 { f64::INFINITY } else { towards.length() };
                 if shines && towards.dot(normal) > 0.0 {
                     let shadow = self::ray(start, towards, far);
-                    shadow.iter().for_each(|ray| record(scene, ray, hit.surface, &Hit::MISS, weights));
+                    shadow.iter().for_each(|ray| record(scene, ray, hit.primitive, &Hit::MISS, weights));
                 }
             }
             if bounce < BOUNCES {
                 let bounced = self::ray(start, normal + uniform_direction(random), f64::INFINITY);
-                next.extend(bounced.map(|ray| (ray, hit.surface)));
+                next.extend(bounced.map(|ray| (ray, hit.primitive)));
             }
         }
         rays = next;
@@ -156,7 +157,7 @@ fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
     if !hit.is_hit() {
         return None;
     }
-    let Surface { instance, triangle } = hit.surface;
+    let PrimitiveRef { instance, triangle } = hit.primitive;
     let object = scene.object(scene.object_of(instance));
     let corners =
         object.triangles.get(triangle as usize)?.map(|v| object.positions[v as usize].map(f64::from));
@@ -170,18 +171,18 @@ fn start(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<(DVec3, DVec3)> {
 }
 
 /// Records a ray at the object that it starts on and at the one that it hits.
-fn record(scene: &Scene, ray: &Ray, from: Surface, hit: &Hit, weights: &mut [Weighting]) {
-    if from != Surface::NONE
+fn record(scene: &Scene, ray: &Ray, from: PrimitiveRef, hit: &Hit, weights: &mut [Weighting]) {
+    if from != PrimitiveRef::NONE
         && let Some(sample) = local(scene, ray, from.instance, Some(from.triangle))
     {
         weights[scene.object_of(from.instance) as usize].surface.push(sample);
     }
     // A ray from elsewhere is recorded only at the object that it hits, not at objects that it misses.
     if hit.is_hit()
-        && hit.surface.instance != from.instance
-        && let Some(sample) = local(scene, ray, hit.surface.instance, None)
+        && hit.primitive.instance != from.instance
+        && let Some(sample) = local(scene, ray, hit.primitive.instance, None)
     {
-        weights[scene.object_of(hit.surface.instance) as usize].outside.push(sample);
+        weights[scene.object_of(hit.primitive.instance) as usize].outside.push(sample);
     }
 }
 

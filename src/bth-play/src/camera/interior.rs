@@ -59,7 +59,7 @@ fn probe(scene: &Scene, eye: DVec3) -> Vec<Probe> {
     let result = |(direction, hit): (DVec3, &Hit)| Probe {
         direction,
         distance: f64::from(hit.t),
-        triangle: hit.surface.triangle,
+        triangle: hit.primitive.triangle,
     };
     directions.into_iter().zip(&hits).map(result).collect()
 }

@@ -21,7 +21,7 @@ pub(super) fn shade(
     let mut rays = OcclusionRays::default();
     for (sample, hit) in samples.iter().zip(hits).filter(|(_, hit)| hit.is_hit()) {
         let (point, normal) = frame.point_and_normal(sample, hit);
-        let origin = Origin::above(point, normal, hit.surface, frame.bounds.diagonal());
+        let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
         for ray in 0..RAYS {
             let at = sample.sampler.point(1, sample.index * RAYS + ray);
             rays.push(origin, cosine_hemisphere(normal, at), frame.occlusion_distance);

@@ -91,7 +91,7 @@ impl<'a> FrameContext<'a> {
     /// The point of a camera ray's hit and the geometric normal there, on the side of the camera.
     pub(crate) fn point_and_normal(&self, sample: &Sample, hit: &Hit) -> (DVec3, DVec3) {
         let point = sample.ray.origin + sample.ray.direction * f64::from(hit.t);
-        (point, self.geometry.geometric_normal(hit.surface, -sample.ray.direction))
+        (point, self.geometry.geometric_normal(hit.primitive, -sample.ray.direction))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use bth::Scene;
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use bth_format::object::ObjectView;
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -41,39 +41,39 @@ impl<'a> ShadingGeometry<'a> {
         })
     }
 
-    fn object(&self, surface: Surface) -> &ObjectView<'a> {
-        &self.objects[self.object_of[surface.instance as usize] as usize]
+    fn object(&self, primitive: PrimitiveRef) -> &ObjectView<'a> {
+        &self.objects[self.object_of[primitive.instance as usize] as usize]
     }
 
-    fn to_world(&self, surface: Surface, normal: DVec3) -> Option<DVec3> {
-        let normal = DVec3::from_array(self.scene.normal_to_world(surface.instance, normal.to_array()));
+    fn to_world(&self, primitive: PrimitiveRef, normal: DVec3) -> Option<DVec3> {
+        let normal = DVec3::from_array(self.scene.normal_to_world(primitive.instance, normal.to_array()));
         // Scaled first, since the square of a tiny length underflows.
         (normal / normal.abs().max_element()).try_normalize()
     }
 
     /// The geometric normal of a hit triangle in the world: unit, on the side that `towards` points to.
-    pub(crate) fn geometric_normal(&self, surface: Surface, towards: DVec3) -> DVec3 {
-        let object = self.object(surface);
+    pub(crate) fn geometric_normal(&self, primitive: PrimitiveRef, towards: DVec3) -> DVec3 {
+        let object = self.object(primitive);
         let [a, b, c] =
-            object.triangles[surface.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
+            object.triangles[primitive.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
         let (e, f) = (b - a, c - a);
         // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
         let scale = e.abs().max_element().max(f.abs().max_element());
-        let normal = self.to_world(surface, (e / scale).cross(f / scale)).unwrap_or(towards);
+        let normal = self.to_world(primitive, (e / scale).cross(f / scale)).unwrap_or(towards);
         if normal.dot(towards) < 0.0 { -normal } else { normal }
     }
 
     /// The interpolated normal of the source on the side of the geometric one, or the geometric
     /// one when the source has none.
     pub(crate) fn shading_normal(&self, hit: &Hit, geometric: DVec3) -> DVec3 {
-        let object = self.object(hit.surface);
-        let Some(corners) = object.corners.get(hit.surface.triangle as usize) else { return geometric };
+        let object = self.object(hit.primitive);
+        let Some(corners) = object.corners.get(hit.primitive.triangle as usize) else { return geometric };
         if object.normals.is_empty() {
             return geometric;
         }
         let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        match self.to_world(hit.surface, a * (1.0 - u - v) + b * u + c * v) {
+        match self.to_world(hit.primitive, a * (1.0 - u - v) + b * u + c * v) {
             Some(normal) if normal.dot(geometric) < 0.0 => -normal,
             Some(normal) => normal,
             None => geometric,

@@ -2,7 +2,7 @@
 //! it starts.
 
 use bth::Scene;
-use bth::rays::{Ray, Surface};
+use bth::rays::{PrimitiveRef, Ray};
 use glam::DVec3;
 
 /// Distance from the primitive at which secondary rays start, relative to the diagonal of the scene: well above the
@@ -15,15 +15,15 @@ pub(crate) struct Origin {
     /// World space, already moved off the primitive.
     pub(crate) point: DVec3,
     /// The primitive that it lies on, or none.
-    pub(crate) surface: Surface,
+    pub(crate) primitive: PrimitiveRef,
 }
 
 impl Origin {
     /// Just above a primitive, on the side of the normal.
-    pub(crate) fn above(point: DVec3, normal: DVec3, surface: Surface, diagonal: f64) -> Self {
+    pub(crate) fn above(point: DVec3, normal: DVec3, primitive: PrimitiveRef, diagonal: f64) -> Self {
         // Far from the origin of the world the spacing of f32 numbers exceeds the relative offset.
         let offset = (OFFSET * diagonal).max(point.abs().max_element() * f64::from(f32::EPSILON) * 4.0);
-        Self { point: point + normal * offset, surface }
+        Self { point: point + normal * offset, primitive }
     }
 }
 
@@ -31,7 +31,7 @@ impl Origin {
 #[derive(Debug, Default)]
 pub(crate) struct OcclusionRays {
     rays: Vec<Ray>,
-    from: Vec<Surface>,
+    from: Vec<PrimitiveRef>,
 }
 
 impl OcclusionRays {
@@ -40,7 +40,7 @@ impl OcclusionRays {
         let direction = direction.as_vec3().to_array();
         let point = origin.point.as_vec3().to_array();
         self.rays.push(Ray { origin: point, tmin: 0.0, direction, tmax: length as f32 });
-        self.from.push(origin.surface);
+        self.from.push(origin.primitive);
     }
 
     /// Number of rays.

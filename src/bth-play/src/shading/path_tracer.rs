@@ -7,7 +7,7 @@ use super::occlusion_rays::{OcclusionRays, Origin};
 use super::surface_colors::instance_color;
 use crate::output::reinhard;
 use crate::sampling::cosine_hemisphere;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use glam::{DVec2, DVec3, Vec3};
 
 /// Albedo of the first instance.
@@ -24,7 +24,7 @@ struct PathState {
     origin: DVec3,
     direction: DVec3,
     /// The primitive on which the next ray starts.
-    from: Surface,
+    from: PrimitiveRef,
 }
 
 /// The colours (linear) of a batch of samples.
@@ -41,7 +41,7 @@ pub(super) fn shade(
         throughput: Vec3::ONE,
         origin: s.ray.origin,
         direction: s.ray.direction,
-        from: Surface::NONE,
+        from: PrimitiveRef::NONE,
     };
     let mut paths: Vec<PathState> = samples.iter().enumerate().map(start).collect();
     let mut hits = hits.to_vec();
@@ -58,10 +58,10 @@ pub(super) fn shade(
             let sample =
                 |dimension: u64| sampler.point(DIMENSIONS * u64::from(bounce) + 1 + dimension, index);
             let point = path.origin + path.direction * f64::from(hit.t);
-            let normal = frame.geometry.geometric_normal(hit.surface, -path.direction);
+            let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
             let shading = frame.geometry.shading_normal(hit, normal);
-            let throughput = path.throughput * albedo(hit.surface);
-            let origin = Origin::above(point, normal, hit.surface, frame.bounds.diagonal());
+            let throughput = path.throughput * albedo(hit.primitive);
+            let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
             for light in lights.samples(origin.point, sample(0), sample(1)) {
                 // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
                 let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
@@ -77,7 +77,7 @@ pub(super) fn shade(
                     throughput,
                     origin: origin.point,
                     direction,
-                    from: hit.surface,
+                    from: hit.primitive,
                 });
             }
         }
@@ -92,7 +92,7 @@ pub(super) fn shade(
             tmax: f32::INFINITY,
         };
         let rays: Vec<Ray> = next.iter().map(ray).collect();
-        let from: Vec<Surface> = next.iter().map(|path| path.from).collect();
+        let from: Vec<PrimitiveRef> = next.iter().map(|path| path.from).collect();
         hits.clear();
         hits.resize(rays.len(), Hit::MISS);
         frame.scene.nearest_batch(&rays, Some(&from), &mut hits);
@@ -111,8 +111,8 @@ fn scattered(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
 }
 
 /// The albedo of a hit. Instances differ in hue, so that they can be told apart; the first is neutral.
-fn albedo(surface: Surface) -> Vec3 {
-    match surface.instance {
+fn albedo(primitive: PrimitiveRef) -> Vec3 {
+    match primitive.instance {
         0 => FIRST_ALBEDO,
         instance => FIRST_ALBEDO.lerp(instance_color(instance), 0.4),
     }

@@ -6,7 +6,7 @@ use super::occlusion_rays::{OcclusionRays, Origin};
 use super::room_lamp::room_lamp;
 use crate::output::shoulder;
 use crate::sampling::{cosine_hemisphere, uniform_disc};
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use glam::{DVec3, Vec3};
 
 /// Ambient-occlusion rays per sample.
@@ -83,12 +83,12 @@ impl Studio {
         for (index, (sample, hit)) in samples.iter().zip(hits).enumerate() {
             if hit.is_hit() {
                 let (point, geometric) = frame.point_and_normal(sample, hit);
-                let origin = Origin::above(point, geometric, hit.surface, self.diagonal);
+                let origin = Origin::above(point, geometric, hit.primitive, self.diagonal);
                 let to_key = self.push(&mut rays, origin, geometric, sample, frame.occlusion_distance);
                 let normal = frame.geometry.shading_normal(hit, geometric);
                 points.push(ShadingPoint { sample: index, normal, to_key, ground: None });
             } else if let Some((point, share)) = self.on_ground(frame, sample) {
-                let origin = Origin::above(point, self.vertical, Surface::NONE, self.diagonal);
+                let origin = Origin::above(point, self.vertical, PrimitiveRef::NONE, self.diagonal);
                 let distance = frame.occlusion_distance;
                 let to_key = self.push(&mut rays, origin, self.vertical, sample, distance);
                 points.push(ShadingPoint {

@@ -24,7 +24,7 @@ pub(super) fn instances(frame: &FrameContext<'_>, samples: &[Sample], hits: &[Hi
         }
         let (_, normal) = frame.point_and_normal(sample, hit);
         let facing = normal.dot(-sample.ray.direction) as f32;
-        instance_color(hit.surface.instance) * (0.25 + 0.75 * facing)
+        instance_color(hit.primitive.instance) * (0.25 + 0.75 * facing)
     };
     samples.iter().zip(hits).map(color).collect()
 }

@@ -11,7 +11,7 @@ use super::visit_queue::VisitQueue;
 use crate::object::{self, Scratch};
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{self, Steps, better};
-use crate::rays::{Hit, Ray, Surface};
+use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::file::File;
 use bth_format::object::ObjectView;
@@ -118,7 +118,7 @@ impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
 
 impl World {
     /// Computes the nearest hits; among hits of equal t that in the instance of least index.
-    pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, hits: &mut [Hit]) {
+    pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         hits.fill(Hit::MISS);
         object::with_scratch(|scratch| {
             let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
@@ -127,7 +127,7 @@ impl World {
     }
 
     /// Computes whether rays hit anything.
-    pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, found: &mut [bool]) {
+    pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         found.fill(false);
         object::with_scratch(|scratch| {
             let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
@@ -136,13 +136,13 @@ impl World {
     }
 
     /// As [`Self::nearest`] for one ray, with the statistics of the traversal of objects.
-    pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: Surface) -> (Hit, Steps) {
+    pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
         self.run(file, std::slice::from_ref(ray), Some(&[from]), &mut query);
         (query.best, query.steps)
     }
 
-    fn run(&self, file: &File, rays: &[Ray], from: Option<&[Surface]>, query: &mut impl SceneQuery) {
+    fn run(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, query: &mut impl SceneQuery) {
         let batch = SceneBatch { world: self, file, rays, from };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
         let mut active_rays = ACTIVE_RAYS.take();
@@ -161,7 +161,7 @@ impl World {
     }
 
     /// The instance on which a ray starts, if it is given and visible.
-    fn start_instance(&self, from: Option<&[Surface]>, ray: usize) -> Option<u32> {
+    fn start_instance(&self, from: Option<&[PrimitiveRef]>, ray: usize) -> Option<u32> {
         let instance = from?[ray].instance;
         self.placements.get(instance as usize)?.is_some().then_some(instance)
     }

@@ -99,9 +99,12 @@ fn top_level_and_hints_do_not_change_results() {
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = rays(&mut rng, &transforms, 40);
-        let from: Vec<Surface> = rays
+        let from: Vec<PrimitiveRef> = rays
             .iter()
-            .map(|_| Surface { instance: rng.below(count as u64 + 2) as u32, triangle: rng.below(3) as u32 })
+            .map(|_| PrimitiveRef {
+                instance: rng.below(count as u64 + 2) as u32,
+                triangle: rng.below(3) as u32,
+            })
             .collect();
         for from in [None, Some(from.as_slice())] {
             let mut hits = vec![Hit::MISS; rays.len()];
@@ -113,7 +116,7 @@ fn top_level_and_hints_do_not_change_results() {
                 assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
                 assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
                 if i % 8 == 0 {
-                    assert_eq!(world.nearest_counted(&file, ray, Surface::NONE).0, expected);
+                    assert_eq!(world.nearest_counted(&file, ray, PrimitiveRef::NONE).0, expected);
                 }
                 let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
                 far_hits += u32::from(expected.is_hit() && start > world.top.reach);
@@ -223,9 +226,9 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
         assert_eq!(World::with_placements(placements, file.object_count()).sole(), None);
 
         let rays = rays(&mut rng, &[identity], count);
-        let from: Vec<Surface> = rays
+        let from: Vec<PrimitiveRef> = rays
             .iter()
-            .map(|_| Surface { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
+            .map(|_| PrimitiveRef { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
             .collect();
         let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
         world.nearest(&file, &rays, Some(&from), &mut hits);

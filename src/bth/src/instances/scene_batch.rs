@@ -3,7 +3,7 @@
 use super::World;
 use super::affine::ObjectRay;
 use crate::query::sink::Visit;
-use crate::rays::{Ray, Surface};
+use crate::rays::{PrimitiveRef, Ray};
 use bth_format::File;
 use bth_format::layout::NONE;
 
@@ -13,7 +13,7 @@ pub(super) struct SceneBatch<'a> {
     pub(super) file: &'a File,
     pub(super) rays: &'a [Ray],
     /// For each ray the triangle on which it starts; see [`Scene::nearest_batch`](crate::Scene::nearest_batch).
-    pub(super) from: Option<&'a [Surface]>,
+    pub(super) from: Option<&'a [PrimitiveRef]>,
 }
 
 impl SceneBatch<'_> {
@@ -24,7 +24,7 @@ impl SceneBatch<'_> {
 
     /// The triangle of an instance's object on which a ray starts, or `NONE`.
     pub(super) fn hint(&self, ray: usize, instance: u32) -> u32 {
-        let from = self.from.map_or(Surface::NONE, |f| f[ray]);
+        let from = self.from.map_or(PrimitiveRef::NONE, |f| f[ray]);
         if from.instance == instance { from.triangle } else { NONE }
     }
 }

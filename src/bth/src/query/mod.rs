@@ -4,7 +4,7 @@ pub(crate) mod sink;
 
 use crate::intersect::exact::{Intersection, reported};
 use crate::intersect::exact_lanes::Intersections;
-use crate::rays::{Hit, Ray, Surface};
+use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 use bth_format::layout::NONE;
 
@@ -55,7 +55,7 @@ pub(crate) trait Query: Copy {
     /// reported with a hit.
     fn answer(&self, ids: &[u32], instance: u32) -> Self::Answer;
     /// The result for a hit in the ray's range whose t, u and v are already rounded.
-    fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Self::Answer;
+    fn answer_of(primitive: PrimitiveRef, t: f32, u: f32, v: f32) -> Self::Answer;
     /// Writes the results of sixteen rays; rays whose bit is not set in `hits.lanes` are misses.
     fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, answers: &mut [Self::Answer; LANES]);
     /// Merges the answer of a ray in an object into the answer of its ray in the scene. `t_scale` is the factor from t in
@@ -125,24 +125,24 @@ impl Query for Nearest {
         if self.triangle == NONE {
             return Hit::MISS;
         }
-        let surface = Surface { instance, triangle: self.best_triangle(ids).read() };
+        let primitive = PrimitiveRef { instance, triangle: self.best_triangle(ids).read() };
         let [u, v] = self.best.uv();
-        Self::answer_of(surface, reported(self.best.t), u, v)
+        Self::answer_of(primitive, reported(self.best.t), u, v)
     }
     #[inline(always)]
-    fn answer_of(surface: Surface, t: f32, u: f32, v: f32) -> Hit {
-        Hit { t, u, v, surface }
+    fn answer_of(primitive: PrimitiveRef, t: f32, u: f32, v: f32) -> Hit {
+        Hit { t, u, v, primitive }
     }
     #[inline(always)]
     fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, answers: &mut [Hit; LANES]) {
         let &AnswerLanes { lanes, intersections, instance } = hits;
         let m = s.mask(lanes);
-        let Hit { t, u, v, surface } = Hit::MISS;
+        let Hit { t, u, v, primitive } = Hit::MISS;
         let t = s.select(m, s.load(&intersections.t), s.splat(t));
         let u = s.select(m, s.load(&intersections.u), s.splat(u));
         let v = s.select(m, s.load(&intersections.v), s.splat(v));
-        let instance = s.select_u(m, s.splat_u(instance), s.splat_u(surface.instance));
-        let triangle = s.select_u(m, s.load_u(&intersections.triangle), s.splat_u(surface.triangle));
+        let instance = s.select_u(m, s.splat_u(instance), s.splat_u(primitive.instance));
+        let triangle = s.select_u(m, s.load_u(&intersections.triangle), s.splat_u(primitive.triangle));
         s.store_rows5(
             [s.bits(t), s.bits(u), s.bits(v), instance, triangle],
             zerocopy::transmute_mut!(answers),
@@ -190,7 +190,7 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
     let t = if t_scale == 1.0 { hit.t } else { hit.t * t_scale };
     let hit = Hit { t, ..*hit };
     let in_range = ray.tmin <= hit.t && hit.t <= ray.tmax && hit.is_hit();
-    let nearer = hit.t < best.t || hit.t == best.t && hit.surface.instance < best.surface.instance;
+    let nearer = hit.t < best.t || hit.t == best.t && hit.primitive.instance < best.primitive.instance;
     (in_range && nearer).then_some(hit)
 }
 
@@ -219,7 +219,7 @@ impl Query for Any {
     fn answer(&self, _ids: &[u32], _instance: u32) -> bool {
         self.found
     }
-    fn answer_of(_surface: Surface, _t: f32, _u: f32, _v: f32) -> bool {
+    fn answer_of(_surface: PrimitiveRef, _t: f32, _u: f32, _v: f32) -> bool {
         true
     }
     fn answers_of<S: Simd>(_s: S, hits: &AnswerLanes<'_>, answers: &mut [bool; LANES]) {

@@ -2,7 +2,7 @@
 
 use super::{AnswerLanes, Query};
 use crate::intersect::exact_lanes::Intersections;
-use crate::rays::{Ray, Surface};
+use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
 
 /// The traversal of one instance by one ray of a scene.
@@ -75,11 +75,12 @@ impl<'a, Q: Query> Sink<'a, Q> {
         let index = self.first + ray;
         match &self.scene {
             None => {
-                self.answers[index] = Q::answer_of(Surface { instance: self.instance, triangle }, t, u, v);
+                self.answers[index] =
+                    Q::answer_of(PrimitiveRef { instance: self.instance, triangle }, t, u, v);
             }
             Some(scene) => {
                 let instance = scene.visits[index].instance;
-                self.merge(index, Q::answer_of(Surface { instance, triangle }, t, u, v));
+                self.merge(index, Q::answer_of(PrimitiveRef { instance, triangle }, t, u, v));
             }
         }
     }

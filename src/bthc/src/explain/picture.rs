@@ -1,7 +1,7 @@
 //! A picture with the model twice: coloured by the structure that holds each triangle, and by the cost of a bounced ray.
 
 use super::Explained;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Result;
 use bth_compile::costs::SelectionOutcome;
 use glam::Vec3;
@@ -39,10 +39,10 @@ pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
     let mut pixels = vec![255u8; (2 * SIZE * SIZE * 3) as usize];
     for (i, ((ray, hit), cost)) in rays.iter().zip(&hits).zip(&costs).enumerate() {
         let Some(cost) = cost else { continue };
-        let normal = normal(of, hit.surface.triangle);
+        let normal = normal(of, hit.primitive.triangle);
         let light = 0.35 + 0.65 * normal.dot(Vec3::from_array(ray.direction)).abs();
         let (x, y) = (i as u32 % SIZE, i as u32 / SIZE);
-        let left = kind[hit.surface.triangle as usize] * light;
+        let left = kind[hit.primitive.triangle as usize] * light;
         for (colour, x) in [(left, x), (heat((cost / most) as f32), x + SIZE)] {
             let at = ((y * 2 * SIZE + x) * 3) as usize;
             for k in 0..3 {
@@ -127,7 +127,7 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
         return None;
     }
     let (start, incoming) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
-    let n = normal(of, hit.surface.triangle);
+    let n = normal(of, hit.primitive.triangle);
     let cosine = n.dot(incoming);
     let direction = unit(incoming - 2.0 * cosine * n).to_array();
     let root = &of.tree.nodes[0];
@@ -136,7 +136,7 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     let lift = -2e-5 * diagonal * cosine.signum();
     let origin = (start + hit.t * incoming + lift * n).to_array();
     let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
-    let from = Surface { instance: 0, triangle: hit.surface.triangle };
+    let from = PrimitiveRef { instance: 0, triangle: hit.primitive.triangle };
     let (_, steps) = of.compiled.nearest_counted(&ray, from);
     let costs = &of.costs.profile;
     let walk = costs.record(bth_format::layout::RecordKind::Link32).surface;

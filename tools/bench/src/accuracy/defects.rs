@@ -89,7 +89,7 @@ fn classify(
     exact: &Exact,
     hit: &Hit,
 ) -> AnswerClass {
-    let (right, found) = (exact.hit.surface.triangle, hit.surface.triangle);
+    let (right, found) = (exact.hit.primitive.triangle, hit.primitive.triangle);
     match (exact.hit.is_hit(), hit.is_hit()) {
         (false, false) => return AnswerClass::Right,
         (true, false) => return AnswerClass::FalseMiss,
@@ -135,7 +135,7 @@ impl ErrorQuantiles {
 pub fn errors_of_t(neighbours: &Neighbours<'_>, truth: &[Exact], hits: &[Hit]) -> [Vec<f64>; 2] {
     let (mut relative, mut ulp) = (Vec::new(), Vec::new());
     for (exact, hit) in truth.iter().zip(hits).filter(|(e, h)| e.hit.is_hit() && h.is_hit()) {
-        let (right, found) = (exact.hit.surface.triangle, hit.surface.triangle);
+        let (right, found) = (exact.hit.primitive.triangle, hit.primitive.triangle);
         if (right == found || neighbours.touch(right, found)) && exact.t > 0.0 {
             let error = (f64::from(hit.t) - exact.t).abs();
             let nearest = exact.t as f32;
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::model::Model;
     use crate::structures;
-    use bth::rays::Surface;
+    use bth::rays::PrimitiveRef;
 
     #[test]
     fn quantiles_are_values_that_occur() {
@@ -172,11 +172,11 @@ mod tests {
         let truth = geometry.answers(&set, 1).unwrap();
         let i = (0..200).find(|&i| truth[i].hit.is_hit() && truth[i].hit.t < 0.9).unwrap();
         let (ray, exact) = (&set.rays[i], &truth[i]);
-        let name = |triangle| Hit { surface: Surface { instance: 0, triangle }, ..exact.hit };
+        let name = |triangle| Hit { primitive: PrimitiveRef { instance: 0, triangle }, ..exact.hit };
         let verdict = |hit: Hit| classify(&geometry, &neighbours, ray, exact, &hit);
         let all = 0..model.triangles() as u32;
         let met = |t: &u32| geometry.crossing(ray, *t).is_some();
-        let right = exact.hit.surface.triangle;
+        let right = exact.hit.primitive.triangle;
         let behind = all
             .clone()
             .filter(met)

@@ -57,7 +57,7 @@ impl Geometry {
             let Some(truth) = bth_oracle::nearest(&self.corners, ray) else { return hit.is_hit() };
             // Of several triangles whose t rounds to the same number, any may be the answer.
             let t = truth.t_f64() as f32;
-            let named = self.crossing(ray, hit.surface.triangle);
+            let named = self.crossing(ray, hit.primitive.triangle);
             hit.t != t || named.is_none_or(|at| bth_oracle::to_f64(&at.t) as f32 != t)
         });
         ensure!(
@@ -67,7 +67,7 @@ impl Geometry {
             wrong.unwrap_or_default()
         );
         let exact = |(ray, hit): (&Ray, &Hit)| {
-            let at = self.crossing(ray, hit.surface.triangle);
+            let at = self.crossing(ray, hit.primitive.triangle);
             Exact { hit: *hit, t: at.map_or(f64::INFINITY, |at| bth_oracle::to_f64(&at.t)) }
         };
         Ok(set.rays.par_iter().zip(&hits).map(exact).collect())

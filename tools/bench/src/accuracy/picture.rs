@@ -66,7 +66,7 @@ impl PictureSetup {
         }
         let direction = position(ray.direction);
         let point = position(ray.origin) + direction * f64::from(hit.t);
-        let normal = model.normal(hit.surface.triangle);
+        let normal = model.normal(hit.primitive.triangle);
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let start = point + normal * (LIFT * self.diagonal);
         let to_light = self.light - start;

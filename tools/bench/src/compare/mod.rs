@@ -116,7 +116,7 @@ fn compare(set: &RaySet, builds: &[OpenedByBuild<'_>; 2], arguments: &Compare) -
     let ratios: Vec<f64> = seconds[1].iter().zip(&seconds[0]).map(|(new, old)| new / old).collect();
     let ns = |seconds: &[f64]| quartiles(seconds.to_vec())[1] * 1e9 / rays.len() as f64;
     let bits =
-        |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.surface.instance, h.surface.triangle];
+        |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.primitive.instance, h.primitive.triangle];
     let [low, ratio, high] = quartiles(ratios.clone());
     SetComparison {
         name: set.name.to_owned(),

@@ -9,7 +9,7 @@ use crate::rounds::least;
 use crate::structures::{self, Use};
 use crate::tracer::{Batch, Tracer};
 use anyhow::Result;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::costs::{self, Estimator, SampleRay, Start, TetWalker};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_compile::{Silent, bvh, marks, tets};
@@ -42,7 +42,7 @@ pub(super) struct Candidate {
     node: MeasuredNode,
     tracer: Box<dyn Tracer>,
     /// Rays from outside and from surfaces.
-    sets: [(Vec<Ray>, Vec<Surface>); 2],
+    sets: [(Vec<Ray>, Vec<PrimitiveRef>); 2],
 }
 
 /// The candidate nodes of a model: suitable ones, evenly spread over their sizes.
@@ -201,13 +201,14 @@ pub(super) fn time(candidates: Vec<Candidate>, rounds: usize, progress: &Progres
 }
 
 /// Sampled rays and the triangles that they start on, as the runtime library takes them.
-pub(crate) fn rays(samples: &[SampleRay]) -> (Vec<Ray>, Vec<Surface>) {
+pub(crate) fn rays(samples: &[SampleRay]) -> (Vec<Ray>, Vec<PrimitiveRef>) {
     let ray = |s: &SampleRay| Ray {
         origin: s.origin.map(|x| x as f32),
         tmin: 0.0,
         direction: s.direction.map(|x| x as f32),
         tmax: s.tmax as f32,
     };
-    let from = |s: &SampleRay| s.from.map_or(Surface::NONE, |triangle| Surface { instance: 0, triangle });
+    let from =
+        |s: &SampleRay| s.from.map_or(PrimitiveRef::NONE, |triangle| PrimitiveRef { instance: 0, triangle });
     (samples.iter().map(ray).collect(), samples.iter().map(from).collect())
 }

@@ -8,7 +8,7 @@ use super::tet_records::{TetRecord, Tets};
 use super::tet_walk::{End, Plane};
 use crate::tracer::{Batch, Tracer};
 use crate::triangle_tests::moller_trumbore;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::bvh::{self, BinaryBvh};
 use bth_compile::tets::TetMesh;
 use bth_import::Mesh;
@@ -140,7 +140,11 @@ impl<R: TetRecord> PaperTree<R> {
                     let first = node.offset as usize;
                     for (corners, id) in &self.triangles[first..first + usize::from(node.count)] {
                         if let Some(hit) = moller_trumbore(ray, *corners, best.t) {
-                            best = Hit { t: hit.t, surface: Surface { instance: 0, triangle: *id }, ..best };
+                            best = Hit {
+                                t: hit.t,
+                                primitive: PrimitiveRef { instance: 0, triangle: *id },
+                                ..best
+                            };
                         }
                     }
                 }
@@ -151,7 +155,7 @@ impl<R: TetRecord> PaperTree<R> {
             top -= 1;
             at = stack[top] as usize;
         }
-        if best.surface == Surface::NONE { Hit::MISS } else { best }
+        if best.primitive == PrimitiveRef::NONE { Hit::MISS } else { best }
     }
 
     #[inline(always)]
@@ -175,7 +179,7 @@ impl<R: TetRecord> PaperTree<R> {
         };
         if let Some((row, t)) = hit {
             let triangle = tets.faces[row as usize].0;
-            *best = Hit { t, surface: Surface { instance: 0, triangle }, ..*best };
+            *best = Hit { t, primitive: PrimitiveRef { instance: 0, triangle }, ..*best };
         }
     }
 }

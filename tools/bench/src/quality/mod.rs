@@ -24,7 +24,7 @@ use crate::speed::Answers;
 use crate::{isa, structures};
 use anyhow::{Result, bail, ensure};
 use bth::Scene;
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use serde_json::json;
 use std::collections::BTreeMap;
 use variations::BuiltVariation;
@@ -157,7 +157,7 @@ fn steps(scene: &Scene, rays: &[bth::rays::Ray]) -> [f64; 2] {
     let mut sum = bth::Steps::default();
     let mut count = 0;
     for ray in rays.iter().step_by(step) {
-        sum += scene.nearest_counted(ray, Surface::NONE).1;
+        sum += scene.nearest_counted(ray, PrimitiveRef::NONE).1;
         count += 1;
     }
     [sum.nodes, sum.leaves].map(|n| f64::from(n) / f64::from(count.max(1)))

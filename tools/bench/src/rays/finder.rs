@@ -37,7 +37,7 @@ impl<'a> Finder<'a> {
     /// Where a ray goes on from a hit: the point, lifted off the surface to the ray's side, and the unit
     /// normal to that side.
     pub(super) fn start(&self, ray: &Ray, hit: &Hit) -> (DVec3, DVec3) {
-        let normal = self.model.normal(hit.surface.triangle);
+        let normal = self.model.normal(hit.primitive.triangle);
         let direction = position(ray.direction);
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         (position(ray.origin) + direction * f64::from(hit.t) + normal * self.lift, normal)

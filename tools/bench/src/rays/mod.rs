@@ -23,7 +23,7 @@ pub use viewpoint::View;
 
 use crate::model::Bounds;
 use crate::tracer::Batch;
-use bth::rays::{Ray, Surface};
+use bth::rays::{PrimitiveRef, Ray};
 use bth_random::Rng;
 use glam::DVec3;
 use viewpoint::CameraHits;
@@ -48,7 +48,7 @@ pub struct RaySet {
     /// The rays, model space.
     pub rays: Vec<Ray>,
     /// For each ray the triangle that it starts on, if the rays start on triangles.
-    pub from: Option<Vec<Surface>>,
+    pub from: Option<Vec<PrimitiveRef>>,
 }
 
 impl RaySet {
@@ -134,26 +134,26 @@ fn trace_camera(finder: &Finder<'_>, options: &Options) -> (View, CameraHits) {
     (view, seen)
 }
 
-type Started = (Vec<Ray>, Vec<Surface>);
+type Started = (Vec<Ray>, Vec<PrimitiveRef>);
 
 /// Bounces, ambient occlusion and shadow rays from what the camera sees.
 fn secondary(finder: &Finder<'_>, seen: &CameraHits, diagonal: f64, light: DVec3) -> [Started; 3] {
     let (mut bounces, mut occlusion) = (Rng::new(1), Rng::new(2));
     let mut sets = [const { (Vec::new(), Vec::new()) }; 3];
-    let mut push = |set: usize, surface: Surface, ray: Ray| {
+    let mut push = |set: usize, primitive: PrimitiveRef, ray: Ray| {
         sets[set].0.push(ray);
-        sets[set].1.push(surface);
+        sets[set].1.push(primitive);
     };
     for (ray_in, hit) in seen.rays.iter().zip(&seen.hits).filter(|(_, h)| h.is_hit()) {
         let (point, normal) = finder.start(ray_in, hit);
-        push(0, hit.surface, ray(point, cosine_weighted(&mut bounces, normal), f64::INFINITY));
+        push(0, hit.primitive, ray(point, cosine_weighted(&mut bounces, normal), f64::INFINITY));
         for _ in 0..AO_RAYS {
-            push(1, hit.surface, ray(point, cosine_weighted(&mut occlusion, normal), AO_REACH * diagonal));
+            push(1, hit.primitive, ray(point, cosine_weighted(&mut occlusion, normal), AO_REACH * diagonal));
         }
         let to_light = light - point;
         if to_light.dot(normal) > 0.0 {
             // The ray ends just before the light.
-            push(2, hit.surface, ray(point, to_light.normalize(), to_light.length() * (1.0 - 1e-4)));
+            push(2, hit.primitive, ray(point, to_light.normalize(), to_light.length() * (1.0 - 1e-4)));
         }
     }
     sets

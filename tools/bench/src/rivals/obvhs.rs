@@ -4,7 +4,7 @@
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::Result;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2_from_tris};
@@ -93,8 +93,8 @@ impl<B: Bvh> Tracer for Obvhs<B> {
                 Some(triangle) => {
                     let weights = triangle.compute_barycentric(&ray);
                     let triangle = self.bvh.triangles()[found.primitive_id as usize];
-                    let surface = Surface { instance: 0, triangle };
-                    Hit { t: found.t, u: weights.x, v: weights.y, surface }
+                    let primitive = PrimitiveRef { instance: 0, triangle };
+                    Hit { t: found.t, u: weights.x, v: weights.y, primitive: primitive }
                 }
             };
         }

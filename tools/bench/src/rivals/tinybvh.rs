@@ -5,7 +5,7 @@ use super::library;
 use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use anyhow::{Result, anyhow, ensure};
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use std::ffi::c_void;
 use std::sync::OnceLock;
@@ -119,7 +119,7 @@ impl Tracer for TinyBvh {
                         t: answer.t,
                         u: answer.u,
                         v: answer.v,
-                        surface: Surface { instance: 0, triangle },
+                        primitive: PrimitiveRef { instance: 0, triangle },
                     },
                 };
             }

@@ -5,7 +5,7 @@ use crate::rays::{Camera, LIFT, cosine_weighted, ray};
 use crate::tracer::Batch;
 use anyhow::{Context, Result, ensure};
 use bth::Scene;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use bth_random::Rng;
 use glam::DVec3;
@@ -18,7 +18,7 @@ const SAME: f32 = 1e-4;
 /// Rays of one kind.
 pub(super) struct FrameRaySet {
     pub(super) rays: Vec<Ray>,
-    from: Option<Vec<Surface>>,
+    from: Option<Vec<PrimitiveRef>>,
     coherent: bool,
     /// The answers of our plain BVH.
     expected: Vec<Hit>,
@@ -30,7 +30,7 @@ pub(super) struct FrameRays {
 }
 
 impl FrameRaySet {
-    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<Surface>>, coherent: bool) -> FrameRaySet {
+    fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<PrimitiveRef>>, coherent: bool) -> FrameRaySet {
         let mut expected = vec![Hit::MISS; rays.len()];
         scene.nearest_batch(&rays, None, &mut expected);
         FrameRaySet { rays, from, coherent, expected }
@@ -58,7 +58,7 @@ impl FrameRays {
         let lift = LIFT * diagonal;
         let (rays, from) = onward(scene, &first.rays, &first.expected, lift, &mut rng);
         let second = FrameRaySet::of(scene, rays, Some(from), false);
-        let (mut later, mut from): (Vec<Ray>, Vec<Surface>) = Default::default();
+        let (mut later, mut from): (Vec<Ray>, Vec<PrimitiveRef>) = Default::default();
         let (mut rays, mut hits) = (second.rays.clone(), second.expected.clone());
         for _ in 1..BOUNCES {
             let (next, starts) = onward(scene, &rays, &hits, lift, &mut rng);
@@ -98,17 +98,23 @@ fn camera(scene: &Scene, size: (u32, u32)) -> Result<(Camera, f64)> {
 }
 
 /// Cosine-weighted rays from the hits of other rays, and the triangles that they start on.
-fn onward(scene: &Scene, rays: &[Ray], hits: &[Hit], lift: f64, rng: &mut Rng) -> (Vec<Ray>, Vec<Surface>) {
+fn onward(
+    scene: &Scene,
+    rays: &[Ray],
+    hits: &[Hit],
+    lift: f64,
+    rng: &mut Rng,
+) -> (Vec<Ray>, Vec<PrimitiveRef>) {
     let onward = rays.iter().zip(hits).filter(|(_, hit)| hit.is_hit()).map(|(from, hit)| {
         let direction = position(from.direction);
-        let object = scene.object(scene.object_of(hit.surface.instance));
+        let object = scene.object(scene.object_of(hit.primitive.instance));
         let [a, b, c] =
-            object.triangles[hit.surface.triangle as usize].map(|v| position(object.positions[v as usize]));
-        let normal = scene.normal_to_world(hit.surface.instance, (b - a).cross(c - a).to_array());
+            object.triangles[hit.primitive.triangle as usize].map(|v| position(object.positions[v as usize]));
+        let normal = scene.normal_to_world(hit.primitive.instance, (b - a).cross(c - a).to_array());
         let normal = DVec3::from_array(normal).normalize();
         let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };
         let point = position(from.origin) + direction * f64::from(hit.t) + normal * lift;
-        (ray(point, cosine_weighted(rng, normal), f64::INFINITY), hit.surface)
+        (ray(point, cosine_weighted(rng, normal), f64::INFINITY), hit.primitive)
     });
     onward.unzip()
 }

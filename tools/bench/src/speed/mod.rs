@@ -19,7 +19,7 @@ use crate::rounds::medians;
 use crate::tracer::Contender;
 use crate::{isa, rivals, structures};
 use anyhow::{Result, bail, ensure};
-use bth::rays::{Hit, Surface};
+use bth::rays::{Hit, PrimitiveRef};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -185,7 +185,7 @@ impl Answers {
 
     /// How many answers differ: of ours in any bit, of rivals in whether something is hit.
     pub(crate) fn differ(&self, ours: bool, hits: &[Hit], found: &[bool]) -> usize {
-        let bits = |h: &Hit| -> ([u32; 3], Surface) { ([h.t, h.u, h.v].map(f32::to_bits), h.surface) };
+        let bits = |h: &Hit| -> ([u32; 3], PrimitiveRef) { ([h.t, h.u, h.v].map(f32::to_bits), h.primitive) };
         match self {
             Answers::Any(expected) => expected.iter().zip(found).filter(|(a, b)| a != b).count(),
             Answers::Nearest(expected) => {
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn wrong_answers_are_counted_to_the_last_bit_for_ours() {
-        let hit = Hit { t: 1.0, u: 0.25, v: 0.5, surface: Surface { instance: 0, triangle: 7 } };
+        let hit = Hit { t: 1.0, u: 0.25, v: 0.5, primitive: PrimitiveRef { instance: 0, triangle: 7 } };
         let nudged = Hit { u: 0.25f32.next_up(), ..hit };
         let expected = Answers::Nearest(vec![hit, hit, Hit::MISS, Hit::MISS]);
         let hits = [hit, nudged, Hit::MISS, hit];

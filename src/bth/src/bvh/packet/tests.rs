@@ -61,7 +61,7 @@ fn packed_in<Q: Query>(
 }
 
 fn bits(hit: &Hit) -> [u32; 4] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.surface.triangle]
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.triangle]
 }
 
 /// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
@@ -181,7 +181,7 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
     let mut runs = [0; 3];
     for run in all.chunks(64) {
         let different: std::collections::BTreeSet<u32> =
-            run.iter().filter(|h| h.is_hit()).map(|h| h.surface.triangle).collect();
+            run.iter().filter(|h| h.is_hit()).map(|h| h.primitive.triangle).collect();
         runs[(different.len().max(1) - 1) / 8 % 3] += usize::from(different.len() <= 24);
     }
     assert!(runs.iter().all(|&runs| runs > 5), "{runs:?}");

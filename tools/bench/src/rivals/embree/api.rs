@@ -4,7 +4,7 @@
 use crate::rivals::library;
 use crate::tracer::Batch;
 use anyhow::Result;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::OnceLock;
@@ -76,8 +76,8 @@ impl<const N: usize> RayHit<N> {
             return Hit::MISS;
         }
         let instance = if instances { self.instance[0][lane] } else { 0 };
-        let surface = Surface { instance, triangle: self.primitive[lane] };
-        Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], surface }
+        let primitive = PrimitiveRef { instance, triangle: self.primitive[lane] };
+        Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], primitive: primitive }
     }
 
     /// The library marks an occluded ray so.

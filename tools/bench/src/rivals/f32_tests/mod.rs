@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::tracer::{Batch, Contender, Tracer};
 use crate::triangle_tests::{Intersection, Watertight, moller_trumbore};
 use anyhow::Result;
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Silent;
 use bth_compile::bvh::{self, BinaryBvh, Node};
 use std::time::Instant;
@@ -93,7 +93,7 @@ impl F32Tests {
             if node.is_leaf() {
                 if let Some(Intersection { t, u, v }) = test(self.corners[node.first as usize], best.t) {
                     let triangle = self.tree.order[node.first as usize];
-                    best = Hit { t, u, v, surface: Surface { instance: 0, triangle } };
+                    best = Hit { t, u, v, primitive: PrimitiveRef { instance: 0, triangle } };
                     if ANY {
                         break;
                     }
@@ -107,7 +107,7 @@ impl F32Tests {
             let order = if nearer_is_second { [0, 1] } else { [1, 0] };
             stack.extend(order.into_iter().filter(|i| entries[*i].is_some()).map(|i| children[i]));
         }
-        if best.surface == Surface::NONE { Hit::MISS } else { best }
+        if best.primitive == PrimitiveRef::NONE { Hit::MISS } else { best }
     }
 
     fn hit<const ANY: bool>(&self, ray: &Ray, stack: &mut Vec<u32>) -> Hit {

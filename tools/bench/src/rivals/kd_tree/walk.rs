@@ -2,7 +2,7 @@
 
 use super::{KdTree, Node};
 use crate::triangle_tests::{Intersection, moller_trumbore};
-use bth::rays::{Hit, Ray, Surface};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 
 /// A child that is visited later, and the interval of the ray in it.
 pub(super) type Postponed = (u32, f32, f32);
@@ -51,7 +51,7 @@ impl KdTree {
                 _ => break,
             }
         }
-        if best.surface == Surface::NONE { Hit::MISS } else { best }
+        if best.primitive == PrimitiveRef::NONE { Hit::MISS } else { best }
     }
 
     /// The part of the ray in the bounds, a little widened (as pbrt does).
@@ -76,7 +76,7 @@ impl KdTree {
     fn test(&self, ray: &Ray, triangle: u32, best: &mut Hit) -> bool {
         let hit = moller_trumbore(ray, self.corners[triangle as usize], best.t);
         if let Some(Intersection { t, u, v }) = hit {
-            *best = Hit { t, u, v, surface: Surface { instance: 0, triangle } };
+            *best = Hit { t, u, v, primitive: PrimitiveRef { instance: 0, triangle } };
         }
         hit.is_some()
     }
@@ -88,6 +88,6 @@ impl KdTree {
         for &triangle in triangles {
             self.test(ray, triangle, &mut best);
         }
-        if best.surface == Surface::NONE { Hit::MISS } else { best }
+        if best.primitive == PrimitiveRef::NONE { Hit::MISS } else { best }
     }
 }

@@ -44,7 +44,7 @@ fn a_missed_and_a_made_up_hit_are_counted() {
         let missed = (0..shape.grid.triangles.len() as u32)
             .find(|row| shape.grid.intersection(&aimed.ray, *row).is_none());
         let primitive = PrimitiveRef { instance: 0, triangle: missed.expect("no ray meets all") };
-        tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, primitive: primitive });
+        tally.check(shape, &aimed, &Hit { t: 0.5, u: 0.0, v: 0.0, primitive });
         assert_eq!(tally.ghosts, 1, "{aimed:?}");
         all.add(&tally);
     }

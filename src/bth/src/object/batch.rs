@@ -1,5 +1,5 @@
-//! Batches of rays through one object. Rays that start on a known triangle may walk through its tetrahedra first; coherent rays are
-//! traced in packets, and the others interleaved through the BVH.
+//! Tracing of one object by batches of rays. Coherent rays are traced in packets. Of the others, those that start on a known
+//! triangle may first walk through the tetrahedra at that triangle, and those that remain are traced interleaved through the BVH.
 
 use super::hints::Hinted;
 use super::scratch::Scratch;
@@ -20,9 +20,9 @@ use crate::tets::{enter_tets, leaf_of_face};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
-/// Batches of fewer rays are traced one ray after the other.
+/// Least number of rays of a batch; fewer rays are traced one after the other.
 pub(crate) const MIN_BATCH: usize = 4;
-/// Number of rays that walk through tetrahedra together. It is large, because towards the end of each part lanes are idle.
+/// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
 const RAYS_PER_PART: usize = 2048;
 
 /// Computes the nearest hits of rays in object space. `from` holds for each ray the triangle on which it starts, or `NONE`; it
@@ -54,7 +54,7 @@ pub(crate) fn any_batch(
 /// Fills `hits` with [`Hit::MISS`].
 #[inline]
 pub(crate) fn fill_misses(hits: &mut [Hit]) {
-    // For few hits the call of a kernel would take longer.
+    // For a few hits the call of a kernel takes longer than a loop.
     if hits.len() < MIN_BATCH {
         hits.fill(Hit::MISS);
     } else {
@@ -94,7 +94,7 @@ pub(crate) fn trace_batch<Q: Query>(
         !object.tet_leaves.is_empty()
             && starts.any(|(ray, &triangle)| triangle != NONE && may_gain_by_walk::<Q>(object, ray))
     });
-    // Without a BVH over the triangles of tet leaves there is no choice of strategy.
+    // There is a choice of strategy only if the triangles of tet leaves are also in a BVH.
     if from.is_none() || !has_subtrees(object) {
         return trace_with(object, rays, from, scratch, sink);
     }
@@ -116,7 +116,7 @@ pub(crate) fn trace_batch<Q: Query>(
     }
 }
 
-/// Traces rays with the hints `from` if they are given, else through packets and the BVH.
+/// Traces rays with the hints `from` if they are given or the object is a single tet leaf, else in packets and through the BVH.
 fn trace_with<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -132,22 +132,22 @@ fn trace_with<Q: Query>(
         }
         return;
     }
-    let packed = in_packets(object, rays, scratch, sink);
-    if packed < rays.len() {
+    let packet_rays = in_packets(object, rays, scratch, sink);
+    if packet_rays < rays.len() {
         let rest = std::mem::take(&mut scratch.packets.rest);
-        let order = (packed > 0).then_some(&rest[..]);
+        let order = (packet_rays > 0).then_some(&rest[..]);
         let remaining = RemainingRays { order, queries: None, walked: None };
         through_bvh(object, rays, remaining, scratch, sink);
         scratch.packets.rest = rest;
     }
 }
 
-/// Whether the triangles of tet leaves are in a BVH, too.
+/// Whether the triangles of tet leaves are also in a BVH.
 fn has_subtrees(object: &ObjectView<'_>) -> bool {
     object.tet_leaves.first().is_some_and(|leaf| leaf.subtree != NONE)
 }
 
-/// The tet leaf that is the whole object, if rays from outside have no BVH to go through; else `NONE`.
+/// Index of the tet leaf that is the whole object, if its triangles are not also in a BVH; else `NONE`.
 fn sole_tet_leaf(object: &ObjectView<'_>) -> u32 {
     match Child::from_code(object.header.root) {
         Some(Child::Tets(leaf)) if object.tet_leaves[leaf as usize].subtree == NONE => leaf,
@@ -163,14 +163,14 @@ fn trace_hinted<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
-    // Packets are the fastest for coherent rays, whether these have hints or not.
-    let packed = in_packets(object, rays, scratch, sink);
+    // For coherent rays packets are the fastest, with hints or without.
+    let packet_rays = in_packets(object, rays, scratch, sink);
     let mut faces = vec![NONE; rays.len()];
     let face_of = |ray: usize| {
         let triangle = from.map_or(NONE, |from| from[ray]);
         object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE)
     };
-    let mut order: Vec<u32> = match packed {
+    let mut order: Vec<u32> = match packet_rays {
         0 => (0..rays.len() as u32).collect(),
         _ => scratch.packets.rest.clone(),
     };
@@ -182,11 +182,11 @@ fn trace_hinted<Q: Query>(
     let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
     let mut walks = vec![WalkState::NotWalked; rays.len()];
     walk_tets(object, rays, &faces, &mut queries, &mut walks);
-    let is_all = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
+    let is_whole_object = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
     let mut walked = vec![NONE; rays.len()];
     order.retain(|&ray| {
         let ray = ray as usize;
-        let done = walks[ray] == WalkState::Done || walks[ray] == WalkState::Left && is_all;
+        let done = walks[ray] == WalkState::Done || walks[ray] == WalkState::Left && is_whole_object;
         if done {
             sink.query(ray, &queries[ray]);
         } else if walks[ray] == WalkState::Left {
@@ -201,9 +201,11 @@ fn trace_hinted<Q: Query>(
 }
 
 /// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
-/// Measurements (docs/notes/tets.md) exclude long any-hit rays and all rays in scalar code; for the others
-/// [`strategy`] chooses by time. No answer depends on this.
+///
+/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not; for other rays [`strategy`]
+/// chooses by measured time. No answer depends on this.
 fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
+    /// Greatest length of an any-hit ray that may gain, relative to the longest side of the object's box.
     const SHORT: f32 = 0.3;
     if !has_subtrees(object) {
         return true;
@@ -219,8 +221,8 @@ fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     d[0].abs().max(d[1].abs()).max(d[2].abs()) * ray.tmax <= SHORT * size
 }
 
-/// Walks through tetrahedra with the rays that start on a face in `faces`, or with all rays if a tet leaf is the whole object. `walks`
-/// receives what became of each ray; all slices have one element per ray.
+/// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `walks`
+/// receives the state of each ray's walk. All slices have one element per ray.
 fn walk_tets<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -229,19 +231,19 @@ fn walk_tets<Q: Query>(
     walks: &mut [WalkState],
 ) {
     let sole_leaf = sole_tet_leaf(object);
-    let any = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
-    let records = LaneRecords::new(object.records).filter(|_| any && WalkBatch::<Q>::fits(object));
+    let has_walks = sole_leaf != NONE || faces.iter().any(|&face| face != NONE);
+    let records = LaneRecords::new(object.records).filter(|_| has_walks && WalkBatch::<Q>::fits(object));
     if let Some(records) = records {
         let leaves = vec![sole_leaf; rays.len()];
         let mut batch =
             WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
-        // In scalar code nothing is walked here: rays through a BVH are faster, and the BVH does not use hints.
+        // In scalar code no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
         let _ = Isa::chosen().run_wide(&mut batch);
     }
 }
 
-/// Traces coherent rays in packets, and returns their number. If it is not 0, the indices of the other rays are left in
-/// `scratch.packets.rest`. Scalar code has no packets.
+/// Traces coherent rays in packets and returns their number. If it is not 0, the indices of the other rays are stored in
+/// `scratch.packets.rest`. In scalar code there are no packets, and the number is 0.
 fn in_packets<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
@@ -295,8 +297,8 @@ fn through_bvh<Q: Query>(
     }
 }
 
-/// As [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar code, where
-/// they would be the largest part of the library.
+/// Implements [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar
+/// code, where they would be the largest part of the library.
 fn one_by_one<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],

@@ -1,4 +1,4 @@
-//! How rays that start on known triangles are traced: as set by the caller or the environment, or by measurement.
+//! Setting of how rays that start on known triangles are traced, by the caller or the environment.
 
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -6,20 +6,20 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// Environment variable with the default: `measured`, `bvh` or `tets`.
 const HINTS_VARIABLE: &str = "BTH_HINTS";
 
-/// How batches use hints where a file has tetrahedra and a BVH over the same triangles. Answers have the same bits in all cases; this
-/// is for measurements and tests.
+/// How batches use hints where a file has tetrahedra and a BVH over the same triangles. Answers have the same bits in all cases;
+/// the setting serves measurements and tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Hinted {
-    /// The strategy that has proved faster for such rays through the object on this thread.
+    /// Rays take the strategy that was measured to be faster for such rays through the object on this thread.
     #[default]
     Measured,
     /// Hints are not used: all rays go through the BVH.
     Bvh,
-    /// Rays that may gain by it walk through tetrahedra first.
+    /// Rays that may be faster through tetrahedra walk through them first.
     Tets,
 }
 
-/// 0 if nothing is chosen yet, else the index in `ALL` plus one.
+/// 0 if no value is chosen yet, else the index of the value in `ALL` plus one.
 static CHOSEN_HINTS: AtomicU8 = AtomicU8::new(0);
 
 impl Hinted {
@@ -38,7 +38,7 @@ impl Hinted {
             0 => {
                 let named = std::env::var(HINTS_VARIABLE).ok().and_then(|name| name.parse().ok());
                 let hinted: Hinted = named.unwrap_or_default();
-                // Two threads that arrive here at once store the same value.
+                // Two threads that are here at the same time store the same value.
                 hinted.choose();
                 hinted
             }

@@ -1,4 +1,4 @@
-//! Tracing of one object by rays in its space, through its BVH and its tetrahedra: one ray or a batch.
+//! Tracing of one object by rays in object space, through its BVH and its tetrahedra: by one ray or by a batch.
 
 mod batch;
 pub(crate) mod hints;
@@ -15,7 +15,8 @@ use crate::query::{Any, Nearest, Steps};
 use crate::rays::{Hit, Ray};
 use bth_format::object::ObjectView;
 
-/// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a hit.
+/// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a
+/// hit.
 #[inline(never)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
@@ -23,7 +24,7 @@ pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u
     hit
 }
 
-/// As [`nearest`], stored in `hit`, which avoids a copy.
+/// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
 #[inline(always)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
     trace::<Nearest, ()>(object, ray, from, instance, &mut (), hit);

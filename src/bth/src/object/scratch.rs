@@ -1,11 +1,11 @@
-//! Scratch memory of a thread, which is kept from one batch to the next.
+//! Scratch memory of a thread, which is reused from one batch to the next.
 
 use super::strategy::StrategyTable;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
 use std::cell::Cell;
 
-/// Memory that the traversals of batches need.
+/// Memory that the traversals of batches use, and the measured costs of strategies.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
@@ -19,11 +19,11 @@ pub(crate) fn with_scratch<R>(work: impl FnOnce(&mut Scratch) -> R) -> R {
     thread_local! {
         static SCRATCH: Cell<Option<Box<Scratch>>> = const { Cell::new(None) };
     }
-    // It is taken out while it is in use, so that after a panic the next batch begins with new memory.
-    SCRATCH.with(|lent| {
-        let mut scratch = lent.take().unwrap_or_default();
+    // The memory is taken out of the cell while it is in use, so that after a panic the next batch begins with new memory.
+    SCRATCH.with(|cell| {
+        let mut scratch = cell.take().unwrap_or_default();
         let result = work(&mut scratch);
-        lent.set(Some(scratch));
+        cell.set(Some(scratch));
         result
     })
 }

@@ -76,7 +76,7 @@ struct SingleKernel<'a, Q: Query, C> {
     stack: &'a mut SingleStack,
 }
 
-// The kernel is passed by reference: copies of fields that were just written stall.
+// The kernel is passed by reference, because a copy of fields that were just written would stall.
 impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     type Output = ();
     #[inline(always)]
@@ -88,7 +88,7 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     }
 }
 
-/// A separate kernel for the less common node format, so that the other stays short.
+/// Runs a separate kernel for the less common node format, so that the kernel for the other stays short.
 #[cold]
 #[inline(never)]
 fn through_packed_nodes<Q: Query, C: Count>(single: &mut SingleKernel<'_, Q, C>) {
@@ -107,6 +107,7 @@ impl<Q: Query, C: Count> Kernel for SinglePackedKernel<'_, SingleKernel<'_, Q, C
 }
 
 impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
+    /// Prepares the ray and traverses the BVH with nodes in the format `N`.
     #[inline(always)]
     fn traverse<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
         let SingleKernel { object, ray, query, walked, count, stack } = self;

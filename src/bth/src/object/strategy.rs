@@ -1,39 +1,43 @@
-//! Choice between two strategies of tracing, by measuring both on the caller's own batches.
+//! Choice between two strategies of tracing, by measuring both on the caller's batches.
 //!
-//! Whether rays that start on a known triangle are faster through tetrahedra or through the BVH depends on the model, the rays, the
-//! caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers have
-//! the same bits either strategy, so the choice can depend on time. The slower strategy is measured again at intervals that grow
-//! while the order stays the same; in the long run it gets one batch in 256.
+//! Whether rays that start on a known triangle are faster through tetrahedra or through the BVH depends on the model, the rays,
+//! the caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers
+//! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
+//! that grow while it remains the slower one; in the long run it gets one batch in 256.
 
 use std::time::Instant;
 
 /// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Strategy {
+    /// Through the BVH, without hints.
     Bvh,
+    /// Through tetrahedra first, from the triangle on which the ray starts.
     Tets,
 }
 
-/// Smaller batches are neither measured nor used to measure: they take the strategy that is faster as far as is known.
+/// Least number of rays of a batch that is measured. Smaller batches take the strategy that is faster by the measurements so far.
 pub(crate) const MIN_MEASURED_RAYS: usize = 256;
-/// Number of batches in which both strategies are measured in turn before the first choice.
+/// Number of batches before the first choice, in which the two strategies alternate.
 const TRIALS: u32 = 8;
-/// The first of those, which warm the caches and are not counted.
+/// Number of these batches, from the first on, that warm the caches and whose times are ignored.
 const WARM_UP: u32 = 2;
-/// Batches until the slower strategy is measured again, after the first choice or a change of order.
+/// Number of batches until the slower strategy is measured again, after the first choice or after the other strategy became the
+/// faster.
 const FIRST_INTERVAL: u32 = 32;
-/// The greatest number of such batches.
+/// Greatest number of batches until the slower strategy is measured again.
 const LAST_INTERVAL: u32 = 256;
 
 /// The measurements for one kind of rays through one object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyChoice {
-    /// Seconds per ray of each strategy, once measured.
+    /// Seconds per ray of each strategy, in the order of [`Strategy`]; `None` before the first measurement.
     cost: [Option<f64>; 2],
+    /// Number of batches that were recorded.
     batches: u32,
-    /// Batches until the slower strategy is measured again.
+    /// Number of batches until the slower strategy is measured again.
     remaining: u32,
-    /// Batches from then until the next time.
+    /// Number of batches between that measurement and the following one.
     interval: u32,
 }
 
@@ -42,7 +46,7 @@ impl StrategyChoice {
         StrategyChoice { cost: [None; 2], batches: 0, remaining: FIRST_INTERVAL, interval: FIRST_INTERVAL }
     }
 
-    /// The faster strategy as far as is known.
+    /// The strategy that is faster by the measurements so far; [`Strategy::Bvh`] without measurements of both.
     pub(crate) fn best(&self) -> Strategy {
         match self.cost {
             [Some(bvh), Some(tets)] if tets < bvh => Strategy::Tets,
@@ -72,8 +76,8 @@ impl StrategyChoice {
         }
         let before = self.best();
         let cost = &mut self.cost[strategy as usize];
-        // The thread may have been interrupted. Therefore the least of the first measurements counts; later ones count as at most
-        // twice the expected time, and change it less when they are greater than when they are smaller.
+        // The thread may have been interrupted. Therefore the least of the first measurements counts. A later measurement counts
+        // as at most twice the expected time, and changes that less if it is greater than if it is smaller.
         *cost = Some(match *cost {
             None => seconds_per_ray,
             Some(cost) if self.batches <= TRIALS => cost.min(seconds_per_ray),
@@ -88,21 +92,21 @@ impl StrategyChoice {
     }
 }
 
-/// The choices of one thread, by object and kind of rays.
+/// The choices of one thread, as a hash table by object and kind of rays. A new key replaces the key that has the same row.
 #[derive(Debug)]
 pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 
 impl StrategyTable {
     const ROWS: usize = 32;
 
-    /// The choice for a kind of rays through an object, which is identified by its address. If the address belonged to another object
+    /// The choice for a kind of rays, 0 or 1, through the object with the address `object`. If another object had this address
     /// before, a few batches may take the slower strategy.
     pub(crate) fn of(&mut self, object: usize, kind: usize) -> &mut StrategyChoice {
-        let name = (object / 8).wrapping_mul(2).wrapping_add(kind);
-        let row = (name.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
-        let (key, choice) = &mut self.0[row];
-        if *key != name {
-            (*key, *choice) = (name, StrategyChoice::new());
+        let key = (object / 8).wrapping_mul(2).wrapping_add(kind);
+        let row = (key.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
+        let (stored_key, choice) = &mut self.0[row];
+        if *stored_key != key {
+            (*stored_key, *choice) = (key, StrategyChoice::new());
         }
         choice
     }
@@ -114,9 +118,8 @@ impl Default for StrategyTable {
     }
 }
 
-/// The current time; None on targets without a clock.
+/// The current time; `None` on targets without a clock, where [`Instant::now`] panics.
 pub(crate) fn now() -> Option<Instant> {
-    // `Instant::now` panics there.
     if cfg!(all(target_family = "wasm", target_os = "unknown")) { None } else { Some(Instant::now()) }
 }
 
@@ -125,7 +128,8 @@ mod tests {
     use super::*;
     use bth_random::Rng;
 
-    /// Number of batches that are traced by tets, of `batches` with the given seconds per ray; one in twenty is interrupted.
+    /// Number of batches that take [`Strategy::Tets`], of `batches` with the given seconds per ray, one in twenty of which is
+    /// interrupted.
     fn tets_taken(choice: &mut StrategyChoice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
         let mut taken = 0;
         for _ in 0..batches {
@@ -152,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_noticed() {
+    fn the_choice_follows_a_change_of_costs() {
         let mut rng = Rng::new(7);
         let mut choice = StrategyChoice::new();
         tets_taken(&mut choice, &mut rng, 2000, [100e-9, 150e-9]);

@@ -1,5 +1,7 @@
-//! Walks through the tetrahedra of tet leaves, in any of the four record formats: one ray at a time ([`walk`], [`flood`], [`locate`])
-//! or a batch in lanes ([`batch`], [`queue`], [`lanes`], [`rounds`], [`decide`]).
+//! Walks of rays through the tetrahedra of tet leaves, in any of the four record formats ([`records`]).
+//!
+//! A single ray is walked in f64 ([`walk`], [`flood`], [`locate`]). The rays of a batch are walked in f32, sixteen to a vector
+//! ([`batch`], [`queue`], [`lanes`], [`rounds`]), and in f64 where f32 does not decide ([`decide`]).
 
 pub(crate) mod batch;
 pub(crate) mod decide;
@@ -11,7 +13,7 @@ pub(crate) mod records;
 pub(crate) mod rounds;
 pub(crate) mod walk;
 
-use self::walk::{TetSpace, WalkOutcome};
+use self::walk::{TetWalker, WalkOutcome};
 use crate::bvh::single::TetOutcome;
 use crate::intersect::line::Line;
 use crate::query::{Count, Query};
@@ -23,31 +25,32 @@ use bth_format::object::ObjectView;
 pub(crate) enum TetStart {
     /// The query is complete.
     Done,
-    /// The query holds the hits in this tet leaf, or the value is `NONE` and nothing was walked. The ray continues through the BVH.
+    /// The ray continues through the BVH. The value is the index of the tet leaf whose hits the query already holds, or `NONE` if
+    /// the ray was not walked.
     Walked(u32),
 }
 
-/// Walks through the tet leaf of the face on which a ray starts, from that face. The BVH then skips the leaf, so the hint affects
-/// where the search begins, never the result.
+/// Walks through the tet leaf of the triangle on which a ray starts, from the constrained face of that triangle. The traversal of
+/// the BVH then skips the leaf, so the hint affects where the search begins, never the result.
 pub(crate) fn start_in_tets<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     ray: &Ray,
-    from: u32,
+    triangle: u32,
     query: &mut Q,
     count: &mut C,
 ) -> TetStart {
-    let row = object.triangle_faces.get(from as usize).copied().unwrap_or(NONE);
-    // The walk finds hits with t >= 0 only.
-    if row == NONE || ray.tmin < 0.0 {
+    let face = object.triangle_faces.get(triangle as usize).copied().unwrap_or(NONE);
+    // The walk starts at the origin, so it would miss hits with t < 0.
+    if face == NONE || ray.tmin < 0.0 {
         return TetStart::Walked(NONE);
     }
-    let leaf = leaf_of_face(object, row);
-    // A single ray is faster through the BVH over the leaf's triangles, if there is one.
+    let leaf = leaf_of_face(object, face);
+    // For a single ray the BVH over the leaf's triangles is faster, if there is one.
     if object.tet_leaves[leaf as usize].subtree != NONE {
         return TetStart::Walked(NONE);
     }
     let Some(line) = Line::new(ray) else { return TetStart::Done };
-    let outcome = start(object, leaf, row, &line, query, count);
+    let outcome = walk_from_face(object, leaf, face, &line, query, count);
     match outcome {
         Some(WalkOutcome::Done) => TetStart::Done,
         Some(_) => TetStart::Walked(leaf),
@@ -55,20 +58,20 @@ pub(crate) fn start_in_tets<Q: Query, C: Count>(
     }
 }
 
-/// Walks from a constrained face; None if the tetrahedron that holds the origin was not found.
-fn start<Q: Query, C: Count>(
+/// Walks from the constrained face with index `face`. `None` if the tetrahedron that holds the origin was not found.
+fn walk_from_face<Q: Query, C: Count>(
     object: &ObjectView<'_>,
     leaf: u32,
-    row: u32,
+    face: u32,
     line: &Line,
     query: &mut Q,
     count: &mut C,
 ) -> Option<WalkOutcome> {
-    let space = space(object, leaf, line);
-    let position = space.locate(row)?;
+    let walker = TetWalker::new(object, leaf, line);
+    let position = walker.locate(face)?;
     count.leaf();
-    Some(match space.walk(position, query, count) {
-        WalkOutcome::Uncertain => space.flood(query, count),
+    Some(match walker.walk(position, query, count) {
+        WalkOutcome::Uncertain => walker.flood(query, count),
         outcome => outcome,
     })
 }
@@ -83,24 +86,19 @@ pub(crate) fn enter_tets<Q: Query, C: Count>(
     count: &mut C,
 ) -> TetOutcome {
     let Some(line) = Line::new(ray) else { return TetOutcome::Done };
-    let space = space(object, leaf, &line);
-    let outcome = match space.enter_hull() {
-        Ok(position) => space.walk(position, query, count),
+    let walker = TetWalker::new(object, leaf, &line);
+    let outcome = match walker.enter_hull() {
+        Ok(position) => walker.walk(position, query, count),
         Err(outcome) => outcome,
     };
     let outcome = match outcome {
-        WalkOutcome::Uncertain => space.flood(query, count),
+        WalkOutcome::Uncertain => walker.flood(query, count),
         outcome => outcome,
     };
     if outcome == WalkOutcome::Done { TetOutcome::Done } else { TetOutcome::Continue }
 }
 
-/// The tet leaf that a constrained face belongs to.
-pub(crate) fn leaf_of_face(object: &ObjectView<'_>, row: u32) -> u32 {
-    object.tet_leaves.partition_point(|leaf| leaf.first_face <= row) as u32 - 1
-}
-
-/// The parts of a tet leaf, prepared for a line.
-pub(crate) fn space<'a>(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> TetSpace<'a> {
-    TetSpace::new(object, leaf, line)
+/// Index of the tet leaf to which the constrained face with index `face` belongs.
+pub(crate) fn leaf_of_face(object: &ObjectView<'_>, face: u32) -> u32 {
+    object.tet_leaves.partition_point(|leaf| leaf.first_face <= face) as u32 - 1
 }

@@ -1,4 +1,4 @@
-//! Rays that are prepared for tet walks, and the queue from which lanes are filled.
+//! Preparation of rays for tet walks in lanes, and the queue of prepared rays from which lanes are filled.
 
 use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::intersect::prepare;
@@ -7,18 +7,18 @@ use crate::simd::{LANES, Simd};
 use bth_format::layout::{HullFace, NONE, TetFace};
 use zerocopy::{FromBytes, IntoBytes};
 
-/// Greatest |coordinate| of an origin, 2^59. Rays beyond these limits are walked in f64, because products could overflow or underflow
-/// in f32.
+/// Greatest |coordinate| of an origin, 2^59. Rays beyond this limit or those below are walked in f64, because products could
+/// overflow or underflow in f32.
 const GREATEST_ORIGIN: f32 = (1u64 << 59) as f32;
-/// Greatest |component| of a direction. A depth is t times a factor between 2^-40 and 2^40.
+/// Greatest |component| of a direction, 2^40. A depth is t times a factor between 2^-40 and 2^40.
 const GREATEST_DIRECTION: f32 = (1u64 << 40) as f32;
-/// Least value of a direction's greatest |component|.
+/// Least value of a direction's greatest |component|, 2^-40.
 const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
-/// Slack of comparisons of depths with bounds of t, relative to the depth: more than all roundings together.
+/// Slack of comparisons of depths with bounds of t, relative to the depth. It exceeds the sum of all rounding errors.
 const LANE_DEPTH_SLACK: f32 = 1.0 / (1 << 20) as f32;
-/// The slack of depths near 0: more than the least positive f32 times the greatest direction.
+/// Absolute part of the slack, for depths near 0. It exceeds the least positive f32 times the greatest direction.
 const LEAST_DEPTH_SLACK: f32 = 1.0 / (1u128 << 100) as f32;
-/// Products of three lengths up to this value, 2^40, do not overflow.
+/// Bound of lengths, 2^40, up to which products of three lengths do not overflow.
 const GREATEST_REACH: f32 = GREATEST_DIRECTION;
 /// Bound of the amount that underflow removes from such products, 2^-120.
 const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
@@ -26,29 +26,31 @@ const LEAST_VOLUME: f32 = 1.0 / (1u128 << 120) as f32;
 /// Greatest number of queued rays.
 const QUEUE_CAPACITY: usize = 4 * LANES;
 
-/// Queue of prepared rays: a row for each field of [`Lanes`], read at `first` and written at `end`.
-pub(super) struct ReadyQueue {
+/// Queue of prepared rays, which holds a row for each element of [`Lanes`].
+pub(super) struct PreparedQueue {
     words: [[u32; QUEUE_CAPACITY + LANES]; word::COUNT],
     floats: [[f32; QUEUE_CAPACITY + LANES]; float::COUNT],
+    /// Index of the next ray to pop.
     first: usize,
+    /// Index at which the next ray is pushed.
     end: usize,
 }
 
-/// The sixteen elements of a row from `at` on.
+/// The sixteen elements of a row from index `start` on.
 #[inline(always)]
-fn sixteen<T>(row: &[T; QUEUE_CAPACITY + LANES], at: usize) -> &[T; LANES] {
-    row[at..].first_chunk().expect("rows have sixteen elements to spare")
+fn sixteen<T>(row: &[T; QUEUE_CAPACITY + LANES], start: usize) -> &[T; LANES] {
+    row[start..].first_chunk().expect("rows have sixteen elements to spare")
 }
 
-/// The sixteen elements of a row from `at` on.
+/// The sixteen elements of a row from index `start` on.
 #[inline(always)]
-fn sixteen_mut<T>(row: &mut [T; QUEUE_CAPACITY + LANES], at: usize) -> &mut [T; LANES] {
-    row[at..].first_chunk_mut().expect("rows have sixteen elements to spare")
+fn sixteen_mut<T>(row: &mut [T; QUEUE_CAPACITY + LANES], start: usize) -> &mut [T; LANES] {
+    row[start..].first_chunk_mut().expect("rows have sixteen elements to spare")
 }
 
-impl ReadyQueue {
+impl PreparedQueue {
     pub(super) fn new() -> Self {
-        ReadyQueue {
+        PreparedQueue {
             words: [[0; QUEUE_CAPACITY + LANES]; word::COUNT],
             floats: [[0.0; QUEUE_CAPACITY + LANES]; float::COUNT],
             first: 0,
@@ -60,7 +62,7 @@ impl ReadyQueue {
         self.end - self.first
     }
 
-    /// Makes the whole capacity available; the queue must be empty.
+    /// Makes the whole capacity available again; the queue must be empty.
     pub(super) fn rewind(&mut self) {
         debug_assert_eq!(self.len(), 0);
         (self.first, self.end) = (0, 0);
@@ -71,7 +73,7 @@ impl ReadyQueue {
         self.end + LANES <= QUEUE_CAPACITY
     }
 
-    /// Appends the lanes whose bit is set.
+    /// Appends the rays of the lanes whose bit is set.
     #[inline(always)]
     pub(super) fn push<S: Simd>(&mut self, s: S, bits: u32, lanes: &Lanes<S>) {
         macro_rules! push {
@@ -84,7 +86,8 @@ impl ReadyQueue {
         self.end += bits.count_ones() as usize;
     }
 
-    /// Fills lanes whose bit is set in `idle`, as many as there are rays; returns the bits of the filled lanes.
+    /// Moves rays from the queue to lanes whose bit is set in `idle`, until no such lane or no ray is left. Returns the bits of
+    /// the lanes that were filled.
     #[inline(always)]
     pub(super) fn pop<S: Simd>(&mut self, s: S, idle: u32, lanes: &mut Lanes<S>) -> u32 {
         let mut taken = idle;
@@ -105,63 +108,63 @@ impl ReadyQueue {
     }
 }
 
-/// The slack of a depth.
+/// Slack of comparisons of `depth` with bounds of t.
 #[inline(always)]
 fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
     s.fma(s.abs(depth), s.splat(LANE_DEPTH_SLACK), s.splat(LEAST_DEPTH_SLACK))
 }
 
-/// Sixteen rays, prepared for projection, and the projections of the faces that they enter through.
-pub(super) struct Ready<S: Simd> {
+/// Sixteen rays with the constants of their projections, and the projected faces through which their walks begin.
+pub(super) struct PreparedWalks<S: Simd> {
     pub(super) lanes: Lanes<S>,
-    /// Lower bound of the depth of tmin.
+    /// Lower bound of the depth at tmin.
     tmin_low: S::F,
-    /// The lanes whose rays f32 can represent.
-    pub(super) able: S::M,
+    /// The lanes whose rays are within the limits of f32 and have tmin <= tmax.
+    pub(super) representable: S::M,
 }
 
-impl<S: Simd> Ready<S> {
-    /// Prepares the rays with indices `slot`, without a face.
+impl<S: Simd> PreparedWalks<S> {
+    /// Computes the constants of projection of the rays with indices `ray` in `rays`.
     #[inline(always)]
-    fn of_rays(s: S, m: S::M, rays: &[Ray], slot: S::U) -> Self {
-        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::gather_rays(s, m, rays, slot);
+    fn of_rays(s: S, m: S::M, rays: &[Ray], ray: S::U) -> Self {
+        let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::gather_rays(s, m, rays, ray);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let size = three!(|k| s.abs(d[k]));
         let greatest = s.max(size[0], s.max(size[1], size[2]));
-        // Comparisons with NaN are false.
-        let mut able = s.and(m, s.le(tmin, tmax));
-        able = s.and(able, s.le(s.splat(LEAST_DIRECTION), greatest));
+        // Comparisons with NaN are false, so rays with NaN are excluded.
+        let mut representable = s.and(m, s.le(tmin, tmax));
+        representable = s.and(representable, s.le(s.splat(LEAST_DIRECTION), greatest));
         for k in 0..3 {
-            able = s.and(able, s.le(s.abs(o[k]), s.splat(GREATEST_ORIGIN)));
-            able = s.and(able, s.le(size[k], s.splat(GREATEST_DIRECTION)));
+            representable = s.and(representable, s.le(s.abs(o[k]), s.splat(GREATEST_ORIGIN)));
+            representable = s.and(representable, s.le(size[k], s.splat(GREATEST_DIRECTION)));
         }
         // The axis of the depth is that of the direction's greatest |component|.
-        let along0 = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
-        let along1 = s.and_not(s.lt(size[2], size[1]), along0);
-        let axis = s.select_u(along0, s.splat_u(0), s.select_u(along1, s.splat_u(1), s.splat_u(2)));
+        let is_x = s.and(s.lt(size[1], size[0]), s.lt(size[2], size[0]));
+        let is_y = s.and_not(s.lt(size[2], size[1]), is_x);
+        let axis = s.select_u(is_x, s.splat_u(0), s.select_u(is_y, s.splat_u(1), s.splat_u(2)));
         let mut lanes = Lanes::idle(s);
         lanes.words[word::AXIS] = axis;
         let depth = lanes.permute(s, d)[2];
-        let down = s.lt(depth, s.splat(0.0));
+        let negative = s.lt(depth, s.splat(0.0));
         let per_t = s.abs(depth);
-        lanes.words[word::SIGN] = s.select_u(down, s.splat_u(1 << 31), s.splat_u(0));
+        lanes.words[word::SIGN] = s.select_u(negative, s.splat_u(1 << 31), s.splat_u(0));
         let (origin, direction) = (lanes.permute(s, o), lanes.permute(s, d));
         lanes.floats[float::ORIGIN..float::ORIGIN + 3].copy_from_slice(&origin);
         lanes.floats[float::SHEAR] = s.div(direction[0], per_t);
         lanes.floats[float::SHEAR + 1] = s.div(direction[1], per_t);
-        lanes.words[word::SLOT] = slot;
+        lanes.words[word::RAY] = ray;
         let (low, high) = (s.mul(tmin, per_t), s.mul(tmax, per_t));
         lanes.floats[float::LIMIT] = s.add(high, slack(s, high));
-        Ready { lanes, tmin_low: s.sub(low, slack(s, low)), able }
+        PreparedWalks { lanes, tmin_low: s.sub(low, slack(s, low)), representable }
     }
 
-    /// Sets and projects the faces.
+    /// Projects faces with these vertices and sets them as the entered faces.
     #[inline(always)]
     fn set_face(&mut self, s: S, m: S::M, vertices: &[[f32; 4]], face: [S::U; 3]) {
         let lanes = &mut self.lanes;
         let mut extent = Extent::least(s);
         for (i, vertex) in face.into_iter().enumerate() {
-            let corner = lanes.project(s, lanes.gather(s, m, vertices, vertex));
+            let corner = lanes.project(s, lanes.gather_positions(s, m, vertices, vertex));
             extent = extent.with(s, &corner).0;
             lanes.words[word::FACE + i] = vertex;
             lanes.floats[float::X + i] = corner.x;
@@ -172,23 +175,23 @@ impl<S: Simd> Ready<S> {
         lanes.floats[float::SIZE] = extent.size;
     }
 
-    /// Prepares the rays with indices `slot`, which enter through the faces with these vertices.
+    /// Prepares the rays with indices `ray` in `rays`, whose walks begin at the faces with the vertices `face`.
     #[inline(always)]
     pub(super) fn new(
         s: S,
         m: S::M,
         rays: &[Ray],
         vertices: &[[f32; 4]],
-        slot: S::U,
+        ray: S::U,
         face: [S::U; 3],
     ) -> Self {
-        let mut ready = Self::of_rays(s, m, rays, slot);
-        ready.set_face(s, m, vertices, face);
-        ready
+        let mut prepared = Self::of_rays(s, m, rays, ray);
+        prepared.set_face(s, m, vertices, face);
+        prepared
     }
 
-    /// Prepares rays at the hull faces through which their lines enter a leaf. Also returns the lanes whose line certainly enters, and
-    /// those whose line certainly misses the hull.
+    /// Prepares the rays with indices `ray` at the faces of `hull` through which their lines enter a leaf. Also returns the lanes
+    /// whose line certainly enters, and those whose line certainly misses the hull.
     #[inline(always)]
     pub(super) fn from_hull(
         s: S,
@@ -196,41 +199,42 @@ impl<S: Simd> Ready<S> {
         rays: &[Ray],
         vertices: &[[f32; 4]],
         hull: &[HullFace],
-        slot: S::U,
+        ray: S::U,
     ) -> (Self, S::M, S::M) {
-        let mut ready = Self::of_rays(s, m, rays, slot);
-        let (mut entered, mut in_doubt) = (s.mask(0), s.mask(0));
+        let mut prepared = Self::of_rays(s, m, rays, ray);
+        let (mut entered, mut uncertain) = (s.mask(0), s.mask(0));
         let [mut tet, mut apex] = [s.splat_u(0); 2];
         let mut entry = [s.splat_u(0); 3];
         for face in hull {
             let vertex = three!(|i| s.splat_u(face.vertex[i]));
-            ready.set_face(s, m, vertices, vertex);
-            let lanes = &ready.lanes;
+            prepared.set_face(s, m, vertices, vertex);
+            let lanes = &prepared.lanes;
             let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
             let bound = extent.bound(s, extent.size);
             let mut inwards = m;
             for i in 0..3 {
                 let value = cross(s, &lanes.corner(i), &lanes.corner((i + 1) % 3));
                 inwards = s.and(inwards, s.lt(bound, value));
-                in_doubt = s.or(in_doubt, s.and_not(m, s.lt(bound, s.abs(value))));
+                uncertain = s.or(uncertain, s.and_not(m, s.lt(bound, s.abs(value))));
             }
             entered = s.or(entered, inwards);
             tet = s.select_u(inwards, s.splat_u(face.tet), tet);
             apex = s.select_u(inwards, s.splat_u(face.opposite), apex);
             entry = three!(|i| s.select_u(inwards, vertex[i], entry[i]));
         }
-        let certain = s.and_not(ready.able, in_doubt);
+        let certain = s.and_not(prepared.representable, uncertain);
         let entered = s.and(certain, entered);
-        ready.set_face(s, entered, vertices, entry);
-        ready.lanes.words[word::TET] = tet;
-        ready.lanes.words[word::APEX] = apex;
-        ready.lanes.words[word::BEHIND] = s.splat_u(NONE);
-        (ready, entered, s.and_not(certain, entered))
+        prepared.set_face(s, entered, vertices, entry);
+        prepared.lanes.words[word::TET] = tet;
+        prepared.lanes.words[word::APEX] = apex;
+        prepared.lanes.words[word::BEHIND] = s.splat_u(NONE);
+        (prepared, entered, s.and_not(certain, entered))
     }
 
-    /// Prepares rays to walk from the constrained faces near which they start. Also returns the lanes for which this is right: those
-    /// whose line certainly crosses the face, at a depth certainly before tmin. The walk then passes all tetrahedra of the leaf behind
-    /// the face in order, and finds every hit in the ray's range. This is a kernel with a parameter for each array that it gathers from.
+    /// Prepares the rays with indices `ray` to walk from the constrained faces with indices `face`, near which they start. Also
+    /// returns the lanes in which the walk from the face is valid: those whose line certainly crosses the face, at a depth that
+    /// is certainly less than that of tmin. Such a walk passes all tetrahedra of the leaf behind the face in order, and finds
+    /// every hit in the ray's range. This is a kernel with a parameter for each array that it gathers from.
     #[inline(always)]
     pub(super) fn from_faces(
         s: S,
@@ -238,49 +242,53 @@ impl<S: Simd> Ready<S> {
         rays: &[Ray],
         vertices: &[[f32; 4]],
         faces: &[TetFace],
-        slot: S::U,
+        ray: S::U,
         face: S::U,
     ) -> (Self, S::M) {
         let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).expect("a face is eight words");
         // The fields of a `TetFace`, in their order.
         let [v0, v1, v2, _, above, below, apex_above, apex_below] = s.rows8(m, faces, face);
         let vertex = [v0, v1, v2];
-        let mut ready = Ready::new(s, m, rays, vertices, slot, vertex);
-        let lanes = &mut ready.lanes;
+        let mut prepared = PreparedWalks::new(s, m, rays, vertices, ray, vertex);
+        let lanes = &mut prepared.lanes;
         let corner = three!(|i| lanes.corner(i));
         let extent = Extent { reach: lanes.floats[float::REACH], size: lanes.floats[float::SIZE] };
         let bound = extent.bound(s, extent.size);
-        let minus = s.sub(s.splat(0.0), bound);
-        let (mut up, mut down) = (ready.able, ready.able);
+        let minus_bound = s.sub(s.splat(0.0), bound);
+        let (mut along_normal, mut against_normal) = (prepared.representable, prepared.representable);
         let (mut area, mut volume) = (s.splat(0.0), s.splat(0.0));
         for i in 0..3 {
             let value = cross(s, &corner[i], &corner[(i + 1) % 3]);
-            (up, down) = (s.and(up, s.lt(bound, value)), s.and(down, s.lt(value, minus)));
+            (along_normal, against_normal) =
+                (s.and(along_normal, s.lt(bound, value)), s.and(against_normal, s.lt(value, minus_bound)));
             let weight = s.abs(value);
             area = s.add(area, weight);
             volume = s.fma(weight, corner[(i + 2) % 3].depth, volume);
         }
-        // volume / area is the depth of the intersection; `doubt` times a depth bounds the errors of both.
-        let low = ready.tmin_low;
-        let mut farthest = s.abs(low);
+        // volume / area is the depth of the intersection; `error_factor` times the greatest |depth| bounds the errors of both.
+        let tmin_low = prepared.tmin_low;
+        let mut greatest_depth = s.abs(tmin_low);
         for p in &corner {
-            farthest = s.max(s.abs(p.depth), farthest);
+            greatest_depth = s.max(s.abs(p.depth), greatest_depth);
         }
-        let doubt = s.fma(area, s.splat(LANE_DEPTH_SLACK), s.mul(bound, s.splat(6.0)));
-        let behind = s.lt(s.fma(doubt, farthest, s.add(volume, s.splat(LEAST_VOLUME))), s.mul(low, area));
-        let near = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
-        let able = s.and(s.or(up, down), s.and(behind, near));
-        // For rays against the normal the orientation of the face is reversed.
-        lanes.words[word::TET] = s.select_u(up, above, below);
-        lanes.words[word::APEX] = s.select_u(up, apex_above, apex_below);
+        let error_factor = s.fma(area, s.splat(LANE_DEPTH_SLACK), s.mul(bound, s.splat(6.0)));
+        let before_tmin = s.lt(
+            s.fma(error_factor, greatest_depth, s.add(volume, s.splat(LEAST_VOLUME))),
+            s.mul(tmin_low, area),
+        );
+        let in_reach = s.le(lanes.floats[float::REACH], s.splat(GREATEST_REACH));
+        let representable = s.and(s.or(along_normal, against_normal), s.and(before_tmin, in_reach));
+        // For rays against the face's normal, the orientation of the face is reversed.
+        lanes.words[word::TET] = s.select_u(along_normal, above, below);
+        lanes.words[word::APEX] = s.select_u(along_normal, apex_above, apex_below);
         lanes.words[word::BEHIND] = s.or_u(face, s.splat_u(bth_format::layout::FACE_BIT));
-        lanes.words[word::FACE + 1] = s.select_u(up, v1, v2);
-        lanes.words[word::FACE + 2] = s.select_u(up, v2, v1);
+        lanes.words[word::FACE + 1] = s.select_u(along_normal, v1, v2);
+        lanes.words[word::FACE + 2] = s.select_u(along_normal, v2, v1);
         for k in [float::X, float::Y, float::DEPTH] {
             let (p1, p2) = (lanes.floats[k + 1], lanes.floats[k + 2]);
-            lanes.floats[k + 1] = s.select(up, p1, p2);
-            lanes.floats[k + 2] = s.select(up, p2, p1);
+            lanes.floats[k + 1] = s.select(along_normal, p1, p2);
+            lanes.floats[k + 2] = s.select(along_normal, p2, p1);
         }
-        (ready, able)
+        (prepared, representable)
     }
 }

@@ -1,28 +1,31 @@
-//! The four record formats of tetrahedra behind one interface, for one tetrahedron and for sixteen.
+//! One interface to the four record formats of tetrahedra, for one tetrahedron and for sixteen.
 //!
-//! A record is always read after the walk has entered through a face, so the face's three vertices and the link behind it are known.
-//! The record yields the fourth vertex and the links behind the other faces. `Tet32`, `Tet20` and `Tet16` are the formats of Aman,
-//! Demirci and Güdükbay ("Compact tetrahedralization-based acceleration structures for ray tracing", 2021), named by their bytes;
-//! `Link32` stores for each face a link and the vertex beyond.
+//! A record is read only after a walk has entered its tetrahedron through a face, so the three vertices of the face and the link
+//! behind it are known. The record yields the fourth vertex and the links behind the other faces.
+//!
+//! `Tet32`, `Tet20` and `Tet16` have 32, 20 and 16 bytes. They are the formats of A. Aman, S. Demirci and U. Güdükbay, "Compact
+//! tetrahedralization-based acceleration structures for ray tracing", 2021 (arXiv 2103.02309). `Link32`, of 32 bytes, is not from
+//! that paper.
 
 use crate::simd::Simd;
 use bth_format::layout::{Link, Link32, NONE, Tet16, Tet20, Tet32};
 use bth_format::object::Records;
 use zerocopy::{FromBytes, IntoBytes};
 
-/// How a walk entered a tetrahedron.
+/// The face through which a walk entered a tetrahedron, and the fourth vertex of the tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entered {
     /// Vertices of the entered face.
     pub(crate) face: [u32; 3],
     /// The fourth vertex.
     pub(crate) apex: u32,
-    /// The link behind the entered face, as the record stores it: the tetrahedron or face from which the walk came.
+    /// The link behind the entered face, as the record of the tetrahedron stores it: it leads to the previous tetrahedron, or to
+    /// the constrained face between the two.
     pub(crate) behind: u32,
 }
 
 impl Entered {
-    /// Rank of a vertex among the four in ascending order.
+    /// Number of the tetrahedron's vertices with an index below `vertex`: 0 to 3 for its own vertices.
     #[inline(always)]
     fn rank(&self, vertex: u32) -> usize {
         let below = |v: u32| (v < vertex) as usize;
@@ -30,112 +33,119 @@ impl Entered {
     }
 }
 
-/// A record format.
+/// A record of one tetrahedron. Links are stored in ascending order of the opposite vertex.
 pub(crate) trait Record: Copy {
-    /// The vertex that is not on `face`. `carried` is the `opposite` of the link that was followed.
-    fn apex(&self, face: [u32; 3], carried: u32) -> u32;
+    /// The vertex that is not on `face`. `opposite` is that of the link that was followed to this tetrahedron.
+    fn apex(&self, face: [u32; 3], opposite: u32) -> u32;
     /// The link behind the face opposite to `vertex`. Its `opposite` is `NONE` in formats whose [`Self::apex`] does not need it.
-    fn link(&self, at: &Entered, vertex: u32) -> Link;
+    fn link(&self, entered: &Entered, vertex: u32) -> Link;
 }
 
+/// Each link stores the fourth vertex of the tetrahedron that it leads to.
 impl Record for Link32 {
     #[inline(always)]
-    fn apex(&self, _face: [u32; 3], carried: u32) -> u32 {
-        carried
+    fn apex(&self, _face: [u32; 3], opposite: u32) -> u32 {
+        opposite
     }
     #[inline(always)]
-    fn link(&self, at: &Entered, vertex: u32) -> Link {
-        self.link[at.rank(vertex) & 3]
+    fn link(&self, entered: &Entered, vertex: u32) -> Link {
+        self.link[entered.rank(vertex) & 3]
     }
 }
 
-/// The fourth vertex from the exclusive or of all four.
+/// The fourth vertex of a tetrahedron, from the exclusive or of all four vertices and the vertices of a face.
 #[inline(always)]
-fn fourth(xor: u32, face: [u32; 3]) -> u32 {
+fn fourth_vertex(xor: u32, face: [u32; 3]) -> u32 {
     xor ^ face[0] ^ face[1] ^ face[2]
 }
 
+/// Tet32 of Aman et al. (2021): three of the vertices, the exclusive or of all four, and four links.
 impl Record for Tet32 {
     #[inline(always)]
-    fn apex(&self, face: [u32; 3], _carried: u32) -> u32 {
-        fourth(self.xor, face)
+    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
+        fourth_vertex(self.xor, face)
     }
     #[inline(always)]
-    fn link(&self, at: &Entered, vertex: u32) -> Link {
-        Link { next: self.next[at.rank(vertex) & 3], opposite: NONE }
+    fn link(&self, entered: &Entered, vertex: u32) -> Link {
+        Link { next: self.next[entered.rank(vertex) & 3], opposite: NONE }
     }
 }
 
+/// Tet20 of Aman et al. (2021): the exclusive or of the four vertices, and four links.
 impl Record for Tet20 {
     #[inline(always)]
-    fn apex(&self, face: [u32; 3], _carried: u32) -> u32 {
-        fourth(self.xor, face)
+    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
+        fourth_vertex(self.xor, face)
     }
     #[inline(always)]
-    fn link(&self, at: &Entered, vertex: u32) -> Link {
-        Link { next: self.next[at.rank(vertex) & 3], opposite: NONE }
+    fn link(&self, entered: &Entered, vertex: u32) -> Link {
+        Link { next: self.next[entered.rank(vertex) & 3], opposite: NONE }
     }
 }
 
+/// Tet16 of Aman et al. (2021): the exclusive or of the four vertices, and three words that combine the four links.
 impl Record for Tet16 {
     #[inline(always)]
-    fn apex(&self, face: [u32; 3], _carried: u32) -> u32 {
-        fourth(self.xor, face)
+    fn apex(&self, face: [u32; 3], _opposite: u32) -> u32 {
+        fourth_vertex(self.xor, face)
     }
-    /// Each of the three stored words is the exclusive or of a link and the fourth link, so one known link yields the others.
+    /// Each of the three words is the exclusive or of a link and the fourth link, so `entered.behind` yields the fourth link, and
+    /// that yields any other.
     #[inline(always)]
-    fn link(&self, at: &Entered, vertex: u32) -> Link {
-        let combined = |rank: usize| self.next.get(rank).copied().unwrap_or(0);
-        let last = at.behind ^ combined(at.rank(at.apex));
-        Link { next: last ^ combined(at.rank(vertex)), opposite: NONE }
+    fn link(&self, entered: &Entered, vertex: u32) -> Link {
+        let stored = |rank: usize| self.next.get(rank).copied().unwrap_or(0);
+        let fourth_link = entered.behind ^ stored(entered.rank(entered.apex));
+        Link { next: fourth_link ^ stored(entered.rank(vertex)), opposite: NONE }
     }
 }
 
-/// Reads tetrahedra of an object in its record format.
+/// Reads records of an object's tetrahedra in the format of the object.
 pub(crate) trait ReadRecords {
     /// [`Record::apex`] of a tetrahedron.
-    fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32;
+    fn apex(&self, tet: u32, face: [u32; 3], opposite: u32) -> u32;
     /// [`Record::link`] of a tetrahedron.
-    fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link;
+    fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link;
 }
 
 impl ReadRecords for Records<'_> {
     #[inline(always)]
-    fn apex(&self, tet: u32, face: [u32; 3], carried: u32) -> u32 {
+    fn apex(&self, tet: u32, face: [u32; 3], opposite: u32) -> u32 {
         match self {
-            Records::Link32(_) => carried,
-            Records::Tet32(records) => records[tet as usize].apex(face, carried),
-            Records::Tet20(records) => records[tet as usize].apex(face, carried),
-            Records::Tet16(records) => records[tet as usize].apex(face, carried),
+            Records::Link32(_) => opposite,
+            Records::Tet32(records) => records[tet as usize].apex(face, opposite),
+            Records::Tet20(records) => records[tet as usize].apex(face, opposite),
+            Records::Tet16(records) => records[tet as usize].apex(face, opposite),
             Records::None => NONE,
         }
     }
 
     #[inline(always)]
-    fn link(&self, tet: u32, at: &Entered, vertex: u32) -> Link {
+    fn link(&self, tet: u32, entered: &Entered, vertex: u32) -> Link {
         match self {
-            Records::Link32(records) => records[tet as usize].link(at, vertex),
-            Records::Tet32(records) => records[tet as usize].link(at, vertex),
-            Records::Tet20(records) => records[tet as usize].link(at, vertex),
-            Records::Tet16(records) => records[tet as usize].link(at, vertex),
+            Records::Link32(records) => records[tet as usize].link(entered, vertex),
+            Records::Tet32(records) => records[tet as usize].link(entered, vertex),
+            Records::Tet20(records) => records[tet as usize].link(entered, vertex),
+            Records::Tet16(records) => records[tet as usize].link(entered, vertex),
             Records::None => Link { next: NONE, opposite: NONE },
         }
     }
 }
 
-/// How sixteen walks entered their tetrahedra, one in each lane; see [`Entered`].
+/// The tetrahedra of sixteen walks, one in each lane, and the faces through which they were entered. The fields are those of
+/// [`Entered`].
 #[derive(Clone, Copy)]
 pub(crate) struct EnteredLanes<S: Simd> {
     pub(crate) tet: S::U,
     pub(crate) face: [S::U; 3],
+    /// The `opposite` of the link that was followed, where the fourth vertex is not yet known.
     pub(crate) apex: S::U,
     pub(crate) behind: S::U,
-    /// 1 in every lane. It is a variable, because for a constant the compiler replaces the masked addition by slower code.
+    /// 1 in every lane. It is a variable, because the compiler replaces the masked addition of a constant by slower code.
     pub(crate) one: S::U,
 }
 
 impl<S: Simd> EnteredLanes<S> {
-    /// Rank of a vertex among the four in ascending order.
+    /// As [`Entered::rank`], for a vertex in each lane.
     #[inline(always)]
     fn rank(&self, s: S, vertex: S::U) -> S::U {
         let mut rank = s.splat_u(0);
@@ -146,15 +156,15 @@ impl<S: Simd> EnteredLanes<S> {
     }
 }
 
-/// The fourth vertices. `xor` holds the indices of the words that store the exclusive or of all four.
+/// The fourth vertex in each lane. `xor` holds the index of the word that stores the exclusive or of all four vertices.
 #[inline(always)]
-fn fourth_lanes<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, xor: S::U) -> S::U {
-    let [a, b, c] = at.face;
+fn fourth_vertices<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, xor: S::U) -> S::U {
+    let [a, b, c] = entered.face;
     s.xor_u(s.xor_u(s.gather_u(m, words, xor), a), s.xor_u(b, c))
 }
 
-/// [`Records`] as words, for gathers of sixteen lanes. The format is tested at every step: the branch is well predicted, and one
-/// kernel serves all formats.
+/// The words of [`Records`], for gathers in sixteen lanes. The format is tested at every step, so that one kernel serves all
+/// formats; the branch is well predicted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LaneRecords<'a> {
     Link32(&'a [[u32; 2]]),
@@ -163,7 +173,7 @@ pub(crate) enum LaneRecords<'a> {
     Tet16(&'a [u32]),
 }
 
-/// Records as a slice of words.
+/// Records as a slice of words, or of pairs of words.
 fn words<T: FromBytes + zerocopy::Immutable>(
     records: &(impl IntoBytes + zerocopy::Immutable + ?Sized),
 ) -> &[T] {
@@ -188,44 +198,55 @@ impl<'a> LaneRecords<'a> {
         matches!(self, LaneRecords::Tet16(_))
     }
 
-    /// See [`Record::apex`].
+    /// As [`Record::apex`], in the lanes of the mask; those of other lanes are undefined.
     #[inline(always)]
-    pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, at: &EnteredLanes<S>) -> S::U {
+    pub(crate) fn apex<S: Simd>(&self, s: S, m: S::M, entered: &EnteredLanes<S>) -> S::U {
         match self {
-            LaneRecords::Link32(_) => at.apex,
+            LaneRecords::Link32(_) => entered.apex,
             LaneRecords::Tet32(words) => {
-                fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(3)))
+                fourth_vertices(s, words, m, entered, s.add_u(s.shl_u::<3>(entered.tet), s.splat_u(3)))
             }
-            LaneRecords::Tet20(words) => fourth_lanes(s, words, m, at, s.add_u(s.shl_u::<2>(at.tet), at.tet)),
-            LaneRecords::Tet16(words) => fourth_lanes(s, words, m, at, s.shl_u::<2>(at.tet)),
+            LaneRecords::Tet20(words) => {
+                fourth_vertices(s, words, m, entered, s.add_u(s.shl_u::<2>(entered.tet), entered.tet))
+            }
+            LaneRecords::Tet16(words) => fourth_vertices(s, words, m, entered, s.shl_u::<2>(entered.tet)),
         }
     }
 
-    /// `next` and `opposite` of [`Record::link`]; those of lanes that are not in the mask are undefined.
+    /// `next` and `opposite` of [`Record::link`], in the lanes of the mask; those of other lanes are undefined.
     #[inline(always)]
-    pub(crate) fn link<S: Simd>(&self, s: S, m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> (S::U, S::U) {
+    pub(crate) fn link<S: Simd>(
+        &self,
+        s: S,
+        m: S::M,
+        entered: &EnteredLanes<S>,
+        vertex: S::U,
+    ) -> (S::U, S::U) {
         let (words, first) = match self {
             LaneRecords::Link32(pairs) => {
-                return s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(at.tet), at.rank(s, vertex)));
+                return s.gather_pair(m, pairs, s.add_u(s.shl_u::<2>(entered.tet), entered.rank(s, vertex)));
             }
-            LaneRecords::Tet16(words) => return (link_of_tet16(s, words, m, at, vertex), s.splat_u(NONE)),
-            LaneRecords::Tet32(words) => (words, s.add_u(s.shl_u::<3>(at.tet), s.splat_u(4))),
+            LaneRecords::Tet16(words) => {
+                return (link_of_tet16(s, words, m, entered, vertex), s.splat_u(NONE));
+            }
+            LaneRecords::Tet32(words) => (words, s.add_u(s.shl_u::<3>(entered.tet), s.splat_u(4))),
             LaneRecords::Tet20(words) => {
-                (words, s.add_u(s.add_u(s.shl_u::<2>(at.tet), at.tet), s.splat_u(1)))
+                (words, s.add_u(s.add_u(s.shl_u::<2>(entered.tet), entered.tet), s.splat_u(1)))
             }
         };
-        (s.gather_u(m, words, s.add_u(first, at.rank(s, vertex))), s.splat_u(NONE))
+        (s.gather_u(m, words, s.add_u(first, entered.rank(s, vertex))), s.splat_u(NONE))
     }
 }
 
-/// [`Record::link`] of [`Tet16`].
+/// `next` of [`Record::link`] of [`Tet16`] in each lane.
 #[inline(always)]
-fn link_of_tet16<S: Simd>(s: S, words: &[u32], m: S::M, at: &EnteredLanes<S>, vertex: S::U) -> S::U {
-    let first = s.add_u(s.shl_u::<2>(at.tet), s.splat_u(1));
-    // The link behind the entered face yields the fourth link, and that the requested one.
-    let mut link = at.behind;
-    for v in [at.apex, vertex] {
-        let rank = at.rank(s, v);
+fn link_of_tet16<S: Simd>(s: S, words: &[u32], m: S::M, entered: &EnteredLanes<S>, vertex: S::U) -> S::U {
+    let first = s.add_u(s.shl_u::<2>(entered.tet), s.splat_u(1));
+    // The first round turns the link behind the entered face into the fourth link, the second round the fourth into the requested
+    // one.
+    let mut link = entered.behind;
+    for v in [entered.apex, vertex] {
+        let rank = entered.rank(s, v);
         let stored = s.and(m, s.lt_u(rank, s.splat_u(3)));
         link = s.xor_u(link, s.gather_u(stored, words, s.add_u(first, rank)));
     }

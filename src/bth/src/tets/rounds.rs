@@ -1,10 +1,10 @@
-//! The kernel of a batch of tet walks: three groups of sixteen lanes that make one step each in turn.
+//! The kernel of a batch of tet walks: three groups of sixteen lanes, whose steps are interleaved so that their gathers overlap.
 //!
-//! When several lanes of a group have stopped, their results are taken and the lanes are refilled from the queue.
+//! When several lanes of a group have stopped, their results are evaluated and the lanes are refilled from the queue.
 
 use super::batch::{WalkBatch, WalkStart, vertices};
 use super::lanes::{Lanes, Step, float, word};
-use super::queue::ReadyQueue;
+use super::queue::PreparedQueue;
 use super::records::Entered;
 use crate::query::Query;
 use crate::simd::{Kernel, LANES, Simd};
@@ -18,32 +18,38 @@ const MIN_IDLE_LANES: u32 = 6;
 struct LaneGroup<S: Simd> {
     lanes: Lanes<S>,
     step: Step<S>,
-    /// Bits of the lanes that hold a ray, which may have stopped.
+    /// Bits of the lanes that hold a ray, including those that have stopped and are not yet evaluated.
     held: u32,
     /// For each lane the round in which it received its ray.
-    since: S::U,
+    start_round: S::U,
 }
 
-/// State that the groups share.
-struct Clock {
-    /// Number of rounds; in a round each lane makes as many steps as the object has tetrahedra.
+/// State of the kernel that the groups share.
+struct RefillState {
+    /// Number of completed rounds. In a round each lane makes as many steps as the object has tetrahedra.
     round: u32,
-    /// Whether the queue may yield more rays.
-    more: bool,
+    /// Whether the batch may have rays that no lane holds yet.
+    rays_left: bool,
 }
 
 impl<Q: Query + Copy> WalkBatch<'_, Q> {
-    /// Takes the results of stopped lanes and fills idle lanes from the queue.
+    /// Evaluates stopped lanes and fills idle lanes from the queue, if enough lanes are idle.
     #[inline(always)]
-    fn refill<S: Simd>(&mut self, s: S, queue: &mut ReadyQueue, group: &mut LaneGroup<S>, clock: &mut Clock) {
+    fn refill<S: Simd>(
+        &mut self,
+        s: S,
+        queue: &mut PreparedQueue,
+        group: &mut LaneGroup<S>,
+        state: &mut RefillState,
+    ) {
         let active = s.mask_bits(group.lanes.active(s));
         let idle = LANES as u32 - active.count_ones();
-        if idle < MIN_IDLE_LANES || !(clock.more || (active == 0 && group.held != 0)) {
+        if idle < MIN_IDLE_LANES || !(state.rays_left || (active == 0 && group.held != 0)) {
             return;
         }
         let stopped = group.held & !active;
         if stopped != 0 {
-            self.take_stopped(s, &group.lanes, stopped);
+            self.evaluate_stopped(s, &group.lanes, stopped);
         }
         group.held = active;
         let mut idle = !active & 0xffff;
@@ -54,40 +60,41 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
             let taken = queue.pop(s, idle, &mut group.lanes);
             idle &= !taken;
             group.held |= taken;
-            group.since = s.select_u(s.mask(taken), s.splat_u(clock.round), group.since);
-            clock.more = taken != 0;
-            if !clock.more {
+            group.start_round = s.select_u(s.mask(taken), s.splat_u(state.round), group.start_round);
+            state.rays_left = taken != 0;
+            if !state.rays_left {
                 break;
             }
         }
     }
 
-    /// Stops walks that began two rounds ago, and repeats them by a flood. A line passes each tetrahedron at most once, so such a walk
-    /// has made more steps than it can need, which happens only with inconsistent data.
+    /// Stops walks that began two rounds ago, and repeats them by a flood. A line passes each tetrahedron at most once, so such a
+    /// walk has made more steps than any line needs, which happens only if the data are inconsistent.
     #[inline(always)]
-    fn stop_endless<S: Simd>(&mut self, s: S, group: &mut LaneGroup<S>, round: u32) {
-        let old = s.and(group.lanes.active(s), s.lt_u(group.since, s.splat_u(round.saturating_sub(1))));
-        let mut bits = s.mask_bits(old);
-        let mut slot = [0; LANES];
-        s.store_u(group.lanes.words[word::SLOT], &mut slot);
+    fn stop_overlong<S: Simd>(&mut self, s: S, group: &mut LaneGroup<S>, round: u32) {
+        let overlong =
+            s.and(group.lanes.active(s), s.lt_u(group.start_round, s.splat_u(round.saturating_sub(1))));
+        let mut bits = s.mask_bits(overlong);
+        let mut rays = [0; LANES];
+        s.store_u(group.lanes.words[word::RAY], &mut rays);
         let tet = &mut group.lanes.words[word::TET];
-        *tet = s.select_u(old, s.splat_u(NONE), *tet);
+        *tet = s.select_u(overlong, s.splat_u(NONE), *tet);
         group.held &= !bits;
         while bits != 0 {
-            self.flood(slot[bits.trailing_zeros() as usize % LANES]);
+            self.flood(rays[bits.trailing_zeros() as usize % LANES]);
             bits &= bits - 1;
         }
     }
 
     /// Evaluates the lanes whose bit is set in `stopped`.
     #[inline(always)]
-    fn take_stopped<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, mut stopped: u32) {
-        let (mut words, mut slot, mut depth) = ([[0; LANES]; word::AXIS], [0; LANES], [[0.0; LANES]; 3]);
+    fn evaluate_stopped<S: Simd>(&mut self, s: S, lanes: &Lanes<S>, mut stopped: u32) {
+        let (mut words, mut rays, mut depth) = ([[0; LANES]; word::AXIS], [0; LANES], [[0.0; LANES]; 3]);
         macro_rules! store {
             ($($i:literal)*) => { $(s.store_u(lanes.words[$i], &mut words[$i]);)* };
         }
         store!(0 1 2 3 4 5);
-        s.store_u(lanes.words[word::SLOT], &mut slot);
+        s.store_u(lanes.words[word::RAY], &mut rays);
         if Q::KEEPS_DEPTHS {
             s.store(lanes.floats[float::DEPTH], &mut depth[0]);
             s.store(lanes.floats[float::DEPTH + 1], &mut depth[1]);
@@ -96,13 +103,13 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         while stopped != 0 {
             let lane = stopped.trailing_zeros() as usize % LANES;
             stopped &= stopped - 1;
-            let word = |name: usize| words[name][lane];
+            let word = |index: usize| words[index][lane];
             let entered = Entered {
                 face: [word(word::FACE), word(word::FACE + 1), word(word::FACE + 2)],
                 apex: word(word::APEX),
                 behind: word(word::BEHIND),
             };
-            let start = WalkStart { slot: slot[lane], tet: word(word::TET), entered };
+            let start = WalkStart { ray: rays[lane], tet: word(word::TET), entered };
             self.evaluate(start, depth.map(|row| row[lane]));
         }
     }
@@ -111,49 +118,50 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
 impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
     type Output = ();
 
-    /// Walks all rays.
+    /// Walks all rays of the batch.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let records = self.records;
         let vertices = vertices(self.object);
-        let mut queue = ReadyQueue::new();
-        let idle = LaneGroup { lanes: Lanes::idle(s), step: Step::none(s), held: 0, since: s.splat_u(0) };
+        let mut queue = PreparedQueue::new();
+        let idle =
+            LaneGroup { lanes: Lanes::idle(s), step: Step::empty(s), held: 0, start_round: s.splat_u(0) };
         let mut groups = [idle; 3];
-        // A line passes each tetrahedron at most once.
-        let most = self.object.records.len();
-        let mut clock = Clock { round: 0, more: true };
+        // A line passes each tetrahedron at most once, so a valid walk ends within this number of steps.
+        let steps_per_round = self.object.records.len();
+        let mut state = RefillState { round: 0, rays_left: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));
         loop {
-            // This is a loop, so that `refill` is compiled once; the lanes are in memory at this point in any case.
+            // `refill` is called in a loop, so that it is compiled once. The lanes are in memory at this point in any case.
             let mut held = 0;
             for group in &mut groups {
-                self.refill(s, &mut queue, group, &mut clock);
+                self.refill(s, &mut queue, group, &mut state);
                 held |= group.held;
             }
             if held == 0 {
                 return;
             }
             let [a, b, c] = &mut groups;
-            a.lanes.fetch(s, one, &mut a.step, &records, vertices);
-            b.lanes.fetch(s, one, &mut b.step, &records, vertices);
-            c.lanes.fetch(s, one, &mut c.step, &records, vertices);
-            macro_rules! onward {
+            a.lanes.fetch_apex(s, one, &mut a.step, &records, vertices);
+            b.lanes.fetch_apex(s, one, &mut b.step, &records, vertices);
+            c.lanes.fetch_apex(s, one, &mut c.step, &records, vertices);
+            macro_rules! advance {
                 ($depths:literal $($group:ident)*) => {
-                    $($group.lanes.choose::<$depths>(s, &mut $group.step);)*
-                    $($group.lanes.follow::<$depths>(s, one, &$group.step, &records);)*
+                    $($group.lanes.choose_exit::<$depths>(s, &mut $group.step);)*
+                    $($group.lanes.follow_link::<$depths>(s, one, &$group.step, &records);)*
                 };
             }
             if Q::KEEPS_DEPTHS {
-                onward!(true a b c);
+                advance!(true a b c);
             } else {
-                onward!(false a b c);
+                advance!(false a b c);
             }
             steps += 1;
-            if steps == most {
-                (clock.round, steps) = (clock.round + 1, 0);
+            if steps == steps_per_round {
+                (state.round, steps) = (state.round + 1, 0);
                 for group in &mut groups {
-                    self.stop_endless(s, group, clock.round);
+                    self.stop_overlong(s, group, state.round);
                 }
             }
         }

@@ -1,9 +1,10 @@
 //! The walk of one ray from tetrahedron to tetrahedron along its line, in f64.
 //!
-//! As in the traversal of Aman et al. (2021), the projections of the entered face's three vertices are kept, the fourth vertex is
-//! projected, and the signs of three cross products select the face of exit. While all signs are certain, the walk follows the
-//! real line through the interiors of faces. Where a sign is uncertain, because the line passes within rounding of an edge or a
-//! vertex, the walk ends, and [`TetSpace::flood`] visits every tetrahedron that the line may touch.
+//! As in the traversal of Aman et al. (arXiv 2103.02309, 2021), the projections of the entered face's three vertices are kept,
+//! the fourth vertex is projected, and the signs of three cross products select the face of exit. While all signs are certain,
+//! the walk follows the exact line through the interiors of faces. A sign is uncertain if the line passes an edge or a vertex
+//! within the bound of the rounding errors. The walk then ends, and [`TetWalker::flood`] visits every tetrahedron that the line
+//! may touch.
 
 use super::records::{Entered, ReadRecords};
 use crate::intersect::line::{Line, Projected, Sign};
@@ -11,16 +12,19 @@ use crate::query::{Count, Query, TriangleRef};
 use bth_format::layout::{FACE_BIT, HullFace, Link, NONE, TetFace, TetLeaf, TetVertex};
 use bth_format::object::{ObjectView, Records};
 
-/// The parts of a tet leaf that a walk reads, and the line of the ray.
-pub(crate) struct TetSpace<'a> {
+/// The data of a tet leaf that a walk reads, and the line of the ray, in object space.
+pub(crate) struct TetWalker<'a> {
     pub(crate) leaf: &'a TetLeaf,
-    /// Records, vertices and faces are those of the whole object, and indices refer to them.
+    /// Records of all tetrahedra of the object.
     pub(crate) records: Records<'a>,
+    /// Vertices of all tetrahedra of the object.
     pub(crate) vertices: &'a [TetVertex],
+    /// Constrained faces of all tet leaves of the object.
     pub(crate) faces: &'a [TetFace],
+    /// Hull faces of this leaf.
     pub(crate) hull: &'a [HullFace],
     pub(crate) line: &'a Line,
-    /// Bound on the error of projected coordinates within the leaf's box.
+    /// Bound of the error of projected coordinates of points within the leaf's box.
     pub(crate) error: f64,
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
@@ -31,27 +35,27 @@ pub(crate) struct TetSpace<'a> {
 pub(crate) enum WalkOutcome {
     /// The query is complete.
     Done,
-    /// The line has left the leaf, or no later face can change the result.
+    /// The line has left the leaf, or no face further along it can change the result.
     Left,
-    /// A sign was uncertain. The hits offered before are right, but others may be missing.
+    /// A sign was uncertain, or the data are inconsistent. The hits that were offered are correct, but others may be missing.
     Uncertain,
 }
 
-/// Position of a walk: the tetrahedron `tet`, entered through a face that the line crosses with certain signs and whose corners are
-/// counterclockwise as seen along the ray.
+/// Position of a walk: the tetrahedron `tet`, and the face through which the line enters it. The line crosses that face with
+/// certain signs, and the corners of the face are counterclockwise as seen along the ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TetPosition {
     pub(crate) tet: u32,
     pub(crate) entered: Entered,
-    /// The corners of that face, projected.
+    /// Projected corners of the entered face.
     pub(crate) corner: [Projected; 3],
 }
 
-impl<'a> TetSpace<'a> {
-    /// A tet leaf of an object.
+impl<'a> TetWalker<'a> {
+    /// The walker for the tet leaf with index `leaf`.
     pub(crate) fn new(object: &ObjectView<'a>, leaf: u32, line: &'a Line) -> Self {
         let leaf = &object.tet_leaves[leaf as usize];
-        TetSpace {
+        TetWalker {
             leaf,
             records: object.records,
             vertices: object.tet_vertices,
@@ -63,6 +67,7 @@ impl<'a> TetSpace<'a> {
         }
     }
 
+    /// Position of a vertex in object space.
     #[inline(always)]
     pub(crate) fn position(&self, vertex: u32) -> [f32; 3] {
         self.vertices[vertex as usize].position
@@ -73,12 +78,13 @@ impl<'a> TetSpace<'a> {
         self.line.project(self.position(vertex))
     }
 
-    /// Signs of the sides on which the line passes the three edges of a face.
-    pub(crate) fn sides(&self, p: &[Projected; 3]) -> [Sign; 3] {
-        [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Line::side(&p[i], &p[j], self.error))
+    /// The sides on which the line passes the three edges of a face with these corners.
+    pub(crate) fn sides(&self, corner: &[Projected; 3]) -> [Sign; 3] {
+        [(0, 1), (1, 2), (2, 0)].map(|(i, j)| Line::side(&corner[i], &corner[j], self.error))
     }
 
-    /// Offers a constrained face to the query, by the exact test that all structures share; returns whether the query is complete.
+    /// Tests a constrained face exactly, as the triangles of BVH leaves are, and offers a hit to the query. Returns whether the
+    /// query is complete.
     pub(crate) fn offer<Q: Query>(&self, face: &TetFace, query: &mut Q) -> bool {
         let corners = face.vertex.map(|v| self.position(v));
         match self.line.intersection(corners) {
@@ -87,74 +93,78 @@ impl<'a> TetSpace<'a> {
         }
     }
 
-    /// The tetrahedron behind a link from tetrahedron `from` through `face`, its fourth vertex, and the link with which its record
-    /// refers back; `None` outside of the hull.
+    /// Follows a link from the tetrahedron `from` through `face`. Returns the tetrahedron behind the face, its fourth vertex, and
+    /// the link in its record that leads back through the face; `None` if the face belongs to the hull.
     #[inline(always)]
     pub(crate) fn beyond(&self, from: u32, link: Link, face: [u32; 3]) -> Option<(u32, u32, u32)> {
         if link.next == NONE {
             return None;
         }
         if link.next & FACE_BIT != 0 {
-            let row = &self.faces[(link.next & !FACE_BIT) as usize];
-            let side = (row.tet[0] == from) as usize;
-            return Some((row.tet[side], row.opposite[side], link.next));
+            let constrained = &self.faces[(link.next & !FACE_BIT) as usize];
+            let side = (constrained.tet[0] == from) as usize;
+            return Some((constrained.tet[side], constrained.opposite[side], link.next));
         }
         let apex = self.records.apex(link.next, face, link.opposite);
         Some((link.next, apex, from))
     }
 
-    /// Replaces the position's face by the one through which the line leaves the tetrahedron, and returns the link behind it. `None`
-    /// if a sign is uncertain; the position is then unchanged.
+    /// Replaces the position's face by the one through which the line leaves the tetrahedron, and returns the link behind it.
+    /// `None` if a sign is uncertain; the position is then unchanged.
     #[inline(always)]
-    pub(crate) fn exit(&self, at: &mut TetPosition) -> Option<Link> {
+    pub(crate) fn exit(&self, position: &mut TetPosition) -> Option<Link> {
         use Sign::{Negative, Positive};
-        let apex = self.project(at.entered.apex);
-        let [s0, s1, s2] = at.corner.each_ref().map(|p| Line::side(&apex, p, self.error));
-        let out = match (s0, s1, s2) {
+        let apex = self.project(position.entered.apex);
+        let [s0, s1, s2] = position.corner.each_ref().map(|p| Line::side(&apex, p, self.error));
+        let replaced = match (s0, s1, s2) {
             (Positive, Negative, _) => 2,
             (Negative, _, Positive) => 1,
             (_, Positive, Negative) => 0,
             _ => return None,
         };
-        let link = self.records.link(at.tet, &at.entered, at.entered.face[out]);
-        at.entered.face[out] = at.entered.apex;
-        at.corner[out] = apex;
+        let link = self.records.link(position.tet, &position.entered, position.entered.face[replaced]);
+        position.entered.face[replaced] = position.entered.apex;
+        position.corner[replaced] = apex;
         Some(link)
     }
 
-    /// Walks from a position until the query is complete, the line leaves the hull or passes the query's limit, or a sign is uncertain.
+    /// Walks from a position until the query is complete, the line leaves the hull or passes the query's limit, or a sign is
+    /// uncertain.
     pub(crate) fn walk<Q: Query, C: Count>(
         &self,
-        mut at: TetPosition,
+        mut position: TetPosition,
         query: &mut Q,
         count: &mut C,
     ) -> WalkOutcome {
-        // A line passes each tetrahedron at most once, so more steps occur only with inconsistent data.
+        // A line passes each tetrahedron at most once, so a walk has more steps only if the data are inconsistent.
         for _ in 0..self.leaf.tets {
             count.tet();
-            let Some(link) = self.exit(&mut at) else { return WalkOutcome::Uncertain };
+            let Some(link) = self.exit(&mut position) else { return WalkOutcome::Uncertain };
             if link.next & FACE_BIT != 0
                 && link.next != NONE
                 && self.offer(&self.faces[(link.next & !FACE_BIT) as usize], query)
             {
                 return WalkOutcome::Done;
             }
-            let (nearest, _) = self.line.t_range(at.corner.each_ref());
+            let (nearest, _) = self.line.t_range(position.corner.each_ref());
             if nearest > query.limit() {
                 return WalkOutcome::Left;
             }
-            let Some((tet, apex, behind)) = self.beyond(at.tet, link, at.entered.face) else {
+            let Some((tet, apex, behind)) = self.beyond(position.tet, link, position.entered.face) else {
                 return WalkOutcome::Left;
             };
-            at.tet = tet;
-            at.entered.apex = apex;
-            at.entered.behind = behind;
+            position.tet = tet;
+            position.entered.apex = apex;
+            position.entered.behind = behind;
         }
         WalkOutcome::Uncertain
     }
 
-    /// The position at which the line enters the hull. `Err` is `Left` if the line misses the hull, and `Uncertain` if it passes too
-    /// close to an edge of it.
+    /// The position at which the line enters the hull.
+    ///
+    /// # Errors
+    /// [`WalkOutcome::Left`] if the line misses the hull, [`WalkOutcome::Uncertain`] if it passes an edge of the hull within the
+    /// bound of the rounding errors.
     pub(crate) fn enter_hull(&self) -> Result<TetPosition, WalkOutcome> {
         let mut position = Err(WalkOutcome::Left);
         for face in self.hull {
@@ -162,7 +172,7 @@ impl<'a> TetSpace<'a> {
             let sides = self.sides(&corner);
             if sides.contains(&Sign::Negative) {
                 if !sides.contains(&Sign::Positive) && sides.contains(&Sign::Uncertain) {
-                    // The line leaves the hull here or passes its silhouette; it may enter close to the same edge.
+                    // The line leaves the hull here or passes its silhouette, and it may also enter close to the same edge.
                     return Err(WalkOutcome::Uncertain);
                 }
                 continue;

@@ -43,7 +43,7 @@ pub(crate) const COLOURS: [&str; 9] =
 
 const BAR: f64 = 22.0;
 const GAP: f64 = 26.0;
-const LEFT: f64 = 60.0;
+const PLOT_LEFT: f64 = 60.0;
 const PLOT_TOP: f64 = 54.0;
 const PLOT_HEIGHT: f64 = 280.0;
 /// Width of a letter, about.
@@ -119,7 +119,7 @@ impl BarChart {
         let axis = Axis::of(self);
         let longest = self.groups.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let group = (self.series.len() as f64 * BAR).max(longest as f64 * LETTER);
-        let width = (LEFT + self.groups.len() as f64 * (group + GAP) + GAP).max(420.0);
+        let width = (PLOT_LEFT + self.groups.len() as f64 * (group + GAP) + GAP).max(420.0);
         let legend = self.legend(width);
         let bottom = PLOT_TOP + PLOT_HEIGHT;
         let height = bottom + 34.0 + 20.0 * legend.len() as f64 + 12.0;
@@ -133,11 +133,11 @@ impl BarChart {
         text(&mut svg, 14.0, 40.0, "fill=\"#555\"", &self.unit);
         for tick in &axis.ticks {
             let y = axis.y(*tick);
-            line(&mut svg, (LEFT, width - GAP), y, "stroke=\"#ddd\"");
-            text(&mut svg, LEFT - 8.0, y + 4.0, "text-anchor=\"end\" fill=\"#555\"", &tick.to_string());
+            line(&mut svg, (PLOT_LEFT, width - GAP), y, "stroke=\"#ddd\"");
+            text(&mut svg, PLOT_LEFT - 8.0, y + 4.0, "text-anchor=\"end\" fill=\"#555\"", &tick.to_string());
         }
         for (g, name) in self.groups.iter().enumerate() {
-            let middle = LEFT + GAP + g as f64 * (group + GAP) + group / 2.0;
+            let middle = PLOT_LEFT + GAP + g as f64 * (group + GAP) + group / 2.0;
             // Bars without a value leave no gap.
             let value = |s: &Series| s.values.get(g).copied().flatten();
             let bars: Vec<(usize, f64)> =
@@ -149,9 +149,14 @@ impl BarChart {
             }
             text(&mut svg, middle, bottom + 18.0, "text-anchor=\"middle\"", name);
         }
-        line(&mut svg, (LEFT, width - GAP), bottom, "stroke=\"#333\"");
+        line(&mut svg, (PLOT_LEFT, width - GAP), bottom, "stroke=\"#333\"");
         if let Some(value) = self.line {
-            line(&mut svg, (LEFT, width - GAP), axis.y(value), "stroke=\"#333\" stroke-dasharray=\"5 4\"");
+            line(
+                &mut svg,
+                (PLOT_LEFT, width - GAP),
+                axis.y(value),
+                "stroke=\"#333\" stroke-dasharray=\"5 4\"",
+            );
         }
         for (row, entries) in legend.iter().enumerate() {
             let y = bottom + 42.0 + 20.0 * row as f64;
@@ -171,12 +176,12 @@ impl BarChart {
 
     /// Rows of the legend: each entry's series and left edge.
     fn legend(&self, width: f64) -> Vec<Vec<(usize, f64)>> {
-        let (mut rows, mut x) = (vec![Vec::new()], LEFT);
+        let (mut rows, mut x) = (vec![Vec::new()], PLOT_LEFT);
         for (i, series) in self.series.iter().enumerate() {
             let entry = 36.0 + LETTER * series.name.chars().count() as f64;
-            if x + entry > width && x > LEFT {
+            if x + entry > width && x > PLOT_LEFT {
                 rows.push(Vec::new());
-                x = LEFT;
+                x = PLOT_LEFT;
             }
             rows.last_mut().expect("starts with a row").push((i, x));
             x += entry;

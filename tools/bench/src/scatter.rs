@@ -33,9 +33,9 @@ pub struct Scatter {
     pub radius: f64,
 }
 
-const LEFT: f64 = 70.0;
-const TOP: f64 = 40.0;
-const SIZE: f64 = 400.0;
+const PLOT_LEFT: f64 = 70.0;
+const PLOT_TOP: f64 = 40.0;
+const PLOT_SIZE: f64 = 400.0;
 
 /// Least and greatest value of an axis, a little widened; 1 to 10 without values.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
@@ -90,8 +90,10 @@ impl Scatter {
             ys = xs;
         }
         let place = |value: f64, (low, high): (f64, f64)| (value / low).ln() / (high / low).ln();
-        let at = |(x, y): (f64, f64)| (LEFT + SIZE * place(x, xs), TOP + SIZE * (1.0 - place(y, ys)));
-        let (width, height) = (LEFT + SIZE + 190.0, TOP + SIZE + 60.0);
+        let at = |(x, y): (f64, f64)| {
+            (PLOT_LEFT + PLOT_SIZE * place(x, xs), PLOT_TOP + PLOT_SIZE * (1.0 - place(y, ys)))
+        };
+        let (width, height) = (PLOT_LEFT + PLOT_SIZE + 190.0, PLOT_TOP + PLOT_SIZE + 60.0);
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
              viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"sans-serif\" font-size=\"12\">\n\
@@ -124,7 +126,7 @@ impl Scatter {
             text(
                 &mut svg,
                 at((tick, ys.0)).0,
-                TOP + SIZE + 16.0,
+                PLOT_TOP + PLOT_SIZE + 16.0,
                 "text-anchor=\"middle\" fill=\"#555\"",
                 &written(tick),
             );
@@ -132,15 +134,22 @@ impl Scatter {
         for tick in ticks(ys) {
             text(
                 &mut svg,
-                LEFT - 6.0,
+                PLOT_LEFT - 6.0,
                 at((xs.0, tick)).1 + 4.0,
                 "text-anchor=\"end\" fill=\"#555\"",
                 &written(tick),
             );
         }
-        text(&mut svg, LEFT + SIZE / 2.0, TOP + SIZE + 40.0, "text-anchor=\"middle\"", &self.x);
-        let turned = format!("text-anchor=\"middle\" transform=\"rotate(-90 16 {0:.0})\"", TOP + SIZE / 2.0);
-        text(&mut svg, 16.0, TOP + SIZE / 2.0, &turned, &self.y);
+        text(
+            &mut svg,
+            PLOT_LEFT + PLOT_SIZE / 2.0,
+            PLOT_TOP + PLOT_SIZE + 40.0,
+            "text-anchor=\"middle\"",
+            &self.x,
+        );
+        let turned =
+            format!("text-anchor=\"middle\" transform=\"rotate(-90 16 {0:.0})\"", PLOT_TOP + PLOT_SIZE / 2.0);
+        text(&mut svg, 16.0, PLOT_TOP + PLOT_SIZE / 2.0, &turned, &self.y);
         for (row, cloud) in self.series.iter().enumerate() {
             let colour = COLOURS[row % COLOURS.len()];
             let mut dot = |(x, y): (f64, f64), radius: f64| {
@@ -152,9 +161,9 @@ impl Scatter {
             cloud.points.iter().for_each(|p| dot(at(*p), self.radius));
             let places = cloud.points.iter().map(|p| at(*p));
             let named: Vec<_> = places.zip(&cloud.labels).collect();
-            let y = TOP + 14.0 + 20.0 * row as f64;
-            dot((LEFT + SIZE + 20.0, y - 4.0), 5.0);
-            text(&mut svg, LEFT + SIZE + 32.0, y, "", &cloud.name);
+            let y = PLOT_TOP + 14.0 + 20.0 * row as f64;
+            dot((PLOT_LEFT + PLOT_SIZE + 20.0, y - 4.0), 5.0);
+            text(&mut svg, PLOT_LEFT + PLOT_SIZE + 32.0, y, "", &cloud.name);
             for ((x, y), label) in named {
                 text(&mut svg, x + self.radius + 2.0, y - 3.0, "font-size=\"9\" fill=\"#333\"", label);
             }

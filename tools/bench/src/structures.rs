@@ -146,7 +146,7 @@ pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
         ours: true,
         build_s: compiled.seconds,
         bytes: Some(scene.resident_bytes()),
-        tracer: Box::new(Ours { scene: scene.clone(), usage }),
+        tracer: Box::new(OurTracer { scene: scene.clone(), usage }),
     };
     Ok(kind.uses().map(contender).collect())
 }
@@ -157,16 +157,16 @@ pub fn contenders(kind: &Kind, compiled: &Compiled) -> Result<Vec<Contender>> {
 /// If the runtime refuses the file, which would be a fault of ours.
 pub fn tracer(bytes: &[u8], usage: Use) -> Result<Box<dyn Tracer>> {
     let scene = Arc::new(bth::from_bytes(bytes).context("a file that was just compiled")?);
-    Ok(Box::new(Ours { scene, usage }))
+    Ok(Box::new(OurTracer { scene, usage }))
 }
 
 /// A scene and how it is traced.
-struct Ours {
+struct OurTracer {
     scene: Arc<Scene>,
     usage: Use,
 }
 
-impl Tracer for Ours {
+impl Tracer for OurTracer {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         if self.usage == Use::Single {
             for (ray, hit) in batch.rays.iter().zip(hits) {
@@ -196,7 +196,7 @@ impl Tracer for Ours {
     }
 }
 
-impl Ours {
+impl OurTracer {
     fn hints<'a>(&self, batch: &Batch<'a>) -> Option<&'a [PrimitiveRef]> {
         if self.usage == Use::Hinted { batch.from } else { None }
     }

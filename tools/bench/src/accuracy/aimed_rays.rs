@@ -6,7 +6,7 @@ use bth::rays::Ray;
 use bth_random::Rng;
 
 /// Tries to find an edge whose middle is a point in f32: every axis succeeds about every other time.
-const TRIES: usize = 1000;
+const EDGE_TRIES: usize = 1000;
 
 /// What is aimed at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub fn set(model: &Model, target: Target, count: usize) -> RaySet {
     let mut rays = Vec::with_capacity(count);
     while rays.len() < count {
         // A model without a single usable edge has a shorter set.
-        let Some(point) = (0..TRIES).find_map(|_| point(model, target, &mut rng)) else { break };
+        let Some(point) = (0..EDGE_TRIES).find_map(|_| point(model, target, &mut rng)) else { break };
         rays.extend(through(point, diagonal, &mut rng));
     }
     RaySet { name: target.name(), any: false, coherent: false, rays, from: None }

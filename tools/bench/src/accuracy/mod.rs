@@ -35,10 +35,8 @@ use record::{AIMED, AccuracyRecord, Errors, ModelErrors, ORDINARY};
 use serde_json::json;
 use std::collections::BTreeMap;
 
-/// Pixels of the cameras that rays are taken from, and of the pictures; a quick run has fewer.
-const SIZE: (u32, u32) = (1024, 576);
+/// Pixels of the pictures that are compared; a quick run has fewer.
 const PICTURE: (u32, u32) = (512, 288);
-const QUICK_SIZE: (u32, u32) = (128, 72);
 /// Rays of a set in a quick run.
 const QUICK_RAYS: usize = 2000;
 
@@ -113,7 +111,7 @@ fn measure(
     let all = MeasuredTracers::build(model, &bvh, &arguments.tracers, progress)?;
 
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let (_, mut sets) =
         rays::sets(&finder, &rays::Options { size, most: rays, view: arguments.models.seen_from.view() });
     sets.retain(|set| ORDINARY.contains(&set.name));
@@ -134,7 +132,8 @@ fn measure(
             times.extend(seconds.map(|s| (answered_set.set.name, s * 1e9 / count)));
         }
     }
-    let picture_setup = PictureSetup::new(&finder, model, if arguments.quick { QUICK_SIZE } else { PICTURE });
+    let picture_setup =
+        PictureSetup::new(&finder, model, if arguments.quick { rays::QUICK_PICTURE_SIZE } else { PICTURE });
     let expected = picture_setup.draw(model, &all.geometries[0]);
     let mut rows = Vec::new();
     for (tracer, nanoseconds) in all.tracers.iter().zip(times) {

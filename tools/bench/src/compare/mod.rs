@@ -23,14 +23,9 @@ use anyhow::{Context, Result, bail, ensure};
 use bth::rays::Hit;
 use std::io::Write;
 
-/// Smaller sets are not timed, as the clock is too coarse for them.
-const FEWEST: usize = 1024;
 /// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
 /// shorter ones.
 const TURN_SECONDS: f64 = 0.02;
-/// Pixels of the cameras; a quick run has fewer.
-const SIZE: (u32, u32) = (1024, 576);
-const QUICK_SIZE: (u32, u32) = (128, 72);
 
 /// Measures, prints and writes the comparison; returns whether a set is slower than `--worse` allows.
 ///
@@ -68,10 +63,12 @@ fn model(
     let compiled = CompiledModel::load(which)?;
     let model = &compiled.model;
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.seen_from.view() };
     let (_, mut sets) = rays::sets(&Finder::new(model, &compiled.scene), &options);
-    sets.retain(|set| set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= FEWEST);
+    sets.retain(|set| {
+        set.name != "miss" && arguments.sets.select(set.name) && set.rays.len() >= rays::FEWEST_TIMED
+    });
 
     let opened = [builds[0].open(&compiled.file)?, builds[1].open(&compiled.file)?];
     let mut out = ModelComparison { name: model.name.clone(), sets: Vec::new() };

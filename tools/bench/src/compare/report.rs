@@ -98,11 +98,14 @@ pub struct Mean {
 }
 
 /// The interval in which the geometric mean of the medians lies with 95 % confidence, by resampling each model's rounds
-/// (percentile bootstrap, Efron 1979).
+/// (percentile bootstrap, Efron 1979). A single round allows any value.
 fn interval(models: &[&[f64]]) -> [f64; 2] {
-    const SAMPLES: usize = 1000;
+    const RESAMPLES: usize = 1000;
+    if models.iter().any(|rounds| rounds.len() < 2) {
+        return [0.0, f64::INFINITY];
+    }
     let mut rng = Rng::new(1);
-    let mut means: Vec<f64> = (0..SAMPLES)
+    let mut means: Vec<f64> = (0..RESAMPLES)
         .filter_map(|_| {
             let medians = models.iter().filter_map(|rounds| {
                 let draw = |_| rounds[rng.below(rounds.len().max(1) as u64) as usize];
@@ -217,6 +220,13 @@ mod tests {
         // The mean alone would be slower; so noisy rounds do not show it.
         assert_eq!(comparison(1.015, 0.2).verdict(), Verdict::Undecided);
         assert!(comparison(0.9, 0.001).markdown().contains("| primary | 0.900 |"));
+    }
+
+    #[test]
+    fn a_single_round_decides_nothing() {
+        let mut quick = comparison(1.05, 0.0);
+        quick.models.iter_mut().flat_map(|m| &mut m.sets).for_each(|set| set.ratios.truncate(1));
+        assert_eq!(quick.verdict(), Verdict::Undecided);
     }
 
     #[test]

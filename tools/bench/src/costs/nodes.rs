@@ -19,7 +19,7 @@ use std::collections::HashMap;
 use std::time::Instant;
 
 /// Rays whose steps the sampling estimator counts.
-const SAMPLES: usize = 1024;
+const SAMPLED_RAYS: usize = 1024;
 /// Rays that are measured.
 const RAYS: usize = 8192;
 
@@ -121,8 +121,8 @@ fn candidate(model: &str, node: u32, mesh: &Mesh) -> Result<Option<Candidate>> {
             }
             _ => {
                 // Rays of other seeds than those that are measured.
-                let outside = costs::outside(root.lower, root.upper, SAMPLES, 23);
-                let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLES, 24);
+                let outside = costs::outside(root.lower, root.upper, SAMPLED_RAYS, 23);
+                let surface = costs::from_surface(mesh, &tree, 0..tree.order.len(), 2 * SAMPLED_RAYS, 24);
                 let surface: Vec<SampleRay> = surface.into_iter().filter(|r| r.tmax.is_infinite()).collect();
                 // Making the walker belongs to the time of sampling.
                 let walker = TetWalker::new(tets);

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 /// Levels of the binary BVH whose nodes are tried: 26 selections.
 const LEVELS: u32 = 3;
 /// Nodes of fewer triangles are not tried, nor offered to the rules.
-const LEAST: u32 = 128;
+const LEAST_TRIANGLES: u32 = 128;
 /// Pixels of the camera.
 const SIZE: (u32, u32) = (256, 144);
 
@@ -36,7 +36,8 @@ pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Resu
     let tried = selections.len();
     let mut names: Vec<(String, Vec<u32>)> = Vec::new();
     for (name, select) in [("default", Select::Best), ("paper's rule", Select::Paper)] {
-        let costs = costs::CostOptions { select, minimum_triangles: LEAST, ..options.costs.clone() };
+        let costs =
+            costs::CostOptions { select, minimum_triangles: LEAST_TRIANGLES, ..options.costs.clone() };
         let (choice, _) = costs::choose(&model.mesh, &tree, &marks, &costs, options.storage(), &Silent)?;
         let (built, _) = tets::build(&model.mesh, &tree, &choice.chosen, &options.tets, &Silent)?;
         let (built, _) = costs::probe(&model.mesh, &tree, built, &costs, options.storage(), &Silent)?;
@@ -88,7 +89,7 @@ pub(super) fn measure(model: &Model, rounds: usize, progress: &Progress) -> Resu
 /// All selections of suitable nodes in so many levels from a node down, none below another.
 fn all(tree: &BinaryBvh, marks: &Marks, node: u32, levels: u32) -> Vec<Vec<u32>> {
     let at = &tree.nodes[node as usize];
-    if levels == 0 || at.count < LEAST {
+    if levels == 0 || at.count < LEAST_TRIANGLES {
         return vec![Vec::new()];
     }
     let mut found = Vec::new();

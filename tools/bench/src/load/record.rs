@@ -5,13 +5,11 @@ use super::probe::StartTimes;
 use crate::args::Start;
 use crate::output::Head;
 use crate::rays::View;
+use crate::rivals::embree;
 use crate::rounds::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-
-/// Name of the start that others are compared with.
-pub(super) const BASE: &str = "embree";
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,7 +88,7 @@ impl StartsRun {
     /// The time of Embree's build over that of a start; both include the first rays.
     pub(super) fn faster(&self, name: &str) -> Option<f64> {
         let total = |name: &str| self.starts.iter().find(|(n, _)| n == name).map(|(_, t)| t.total_s);
-        Some(total(BASE)? / total(name)?)
+        Some(total(embree::NAME)? / total(name)?)
     }
 }
 

@@ -1,11 +1,12 @@
 //! Tables and chart of `load-scenes`.
 
-use super::record::{BASE, StartsRun, Times};
+use super::record::{StartsRun, Times};
 use super::scene_record::{SceneLoadRecord, SceneStarts};
 use super::tables::{factor, on_threads};
 use crate::chart::{BarChart, Scale, Series};
 use crate::markdown::{cells, count, seconds, table};
 use crate::output::Chart;
+use crate::rivals::embree;
 
 /// What the charts show.
 const SHOWN: [&str; 4] = ["bth map warm", "bth map cold", "bth read warm", "bth read cold"];
@@ -60,7 +61,7 @@ fn page(scene: &SceneStarts) -> String {
 }
 
 fn row(scene: &SceneStarts, run: &StartsRun, name: &str, times: &Times) -> Vec<String> {
-    let base = run.starts.iter().find(|(name, _)| name == BASE).map(|(_, times)| times);
+    let base = run.starts.iter().find(|(name, _)| name == embree::NAME).map(|(_, times)| times);
     let ours = scene.compile_s.iter().find(|(kind, _)| name.starts_with(&format!("{kind} ")));
     let compared = base
         .zip(ours)
@@ -104,7 +105,7 @@ pub(super) fn draw(record: &SceneLoadRecord) -> Vec<Chart> {
         let run = |scene: &'_ SceneStarts| scene.runs.iter().find(|r| r.threads == threads).cloned();
         let runs: Vec<(String, StartsRun)> =
             record.scenes.iter().filter_map(|s| Some((s.name.clone(), run(s)?))).collect();
-        if runs.iter().any(|(_, run)| run.faster(BASE).is_none()) {
+        if runs.iter().any(|(_, run)| run.faster(embree::NAME).is_none()) {
             continue;
         }
         let series = |name: &&str| Series {

@@ -1,9 +1,10 @@
 //! Tables and charts of `load`.
 
-use super::record::{BASE, LoadRecord, ModelStarts};
+use super::record::{LoadRecord, ModelStarts};
 use crate::chart::{BarChart, Scale, Series};
 use crate::markdown::{cells, count, seconds, table};
 use crate::output::Chart;
+use crate::rivals::embree;
 
 /// What the summary and the charts show.
 const SHOWN: [&str; 5] = ["bth map warm", "bth map cold", "bth read warm", "bth read cold", "bvh map warm"];
@@ -47,7 +48,7 @@ fn summary(record: &LoadRecord, threads: usize) -> String {
     let mut rows = Vec::new();
     for model in &record.models {
         let Some(run) = model.runs.iter().find(|r| r.threads == threads) else { continue };
-        let base = run.starts.iter().find(|(name, _)| name == BASE).map(|(_, t)| t.total_s);
+        let base = run.starts.iter().find(|(name, _)| name == embree::NAME).map(|(_, t)| t.total_s);
         let mut cells = vec![model.name.clone(), count(model.triangles as u64), seconds(base)];
         cells.extend(SHOWN.iter().map(|name| factor(run.faster(name))));
         rows.push(cells);
@@ -101,7 +102,7 @@ pub fn draw(record: &LoadRecord) -> Vec<Chart> {
             .models
             .iter()
             .filter_map(|m| Some((&m.name, m.runs.iter().find(|r| r.threads == threads)?)))
-            .filter(|(_, run)| run.faster(BASE).is_some())
+            .filter(|(_, run)| run.faster(embree::NAME).is_some())
             .collect();
         if runs.is_empty() {
             continue;

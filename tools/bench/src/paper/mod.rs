@@ -40,7 +40,7 @@ use views::Views;
 const SIZE: (u32, u32) = (1920, 1080);
 const QUICK_SIZE: (u32, u32) = (192, 108);
 /// Nodes of fewer triangles are not tetrahedralized: their tetrahedra would have more hull faces than triangles.
-const LEAST: u32 = 64;
+const LEAST_TRIANGLES: u32 = 64;
 
 /// Measures, prints and writes the record.
 ///
@@ -148,7 +148,7 @@ fn scalar<R: TetRecord + 'static>(
     let costs = costs::CostOptions {
         select: Select::Paper,
         profile: profile.clone(),
-        minimum_triangles: LEAST,
+        minimum_triangles: LEAST_TRIANGLES,
         minimum_gain: 0.0,
         ..costs::CostOptions::default()
     };

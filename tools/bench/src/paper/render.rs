@@ -1,7 +1,7 @@
 //! Renders the views of a model with all structures in turn, on all threads.
 
 use super::record::StructureRow;
-use super::views::{TILE, Views};
+use super::views::{THREAD_TILE, Views};
 use crate::clock::process_cpu;
 use crate::rounds::least;
 use crate::tracer::{Batch, Tracer, spread};
@@ -67,7 +67,7 @@ impl Rendering<'_> {
             let trace = |b: Batch<'_>, h: &mut [Hit]| built[structure].tracer.nearest(b, h);
             // CPU time, as other jobs may take turns on the same cores.
             let before = process_cpu();
-            spread(batch, &mut hits, self.threads, (TILE * TILE) as usize, trace);
+            spread(batch, &mut hits, self.threads, (THREAD_TILE * THREAD_TILE) as usize, trace);
             let seconds = (process_cpu() - before) / self.threads as f64;
             if round == 0 {
                 let expected = hits.iter().zip(&self.views.expected[view]);

@@ -21,13 +21,13 @@ pub(super) fn bvh_options() -> bvh::BvhOptions {
 /// Most triangles of a leaf (pbrt's default).
 const LEAF: u32 = 4;
 /// Cost of a step down in units of that of a triangle (pbrt, §4.3.2).
-const STEP: f64 = 0.125;
+const STEP_COST: f64 = 0.125;
 /// Set in `count` where a leaf is a tetrahedralization.
 const TETS: u16 = u16::MAX;
 
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-struct Node {
+struct PbrtNode {
     lower: [f32; 3],
     upper: [f32; 3],
     /// First triangle or row of the tetrahedralization; of an inner node its second child.
@@ -38,11 +38,11 @@ struct Node {
     unused: u8,
 }
 
-const _: () = assert!(size_of::<Node>() == 32);
+const _: () = assert!(size_of::<PbrtNode>() == 32);
 
 /// The structure.
 pub(super) struct PaperTree<R> {
-    nodes: Vec<Node>,
+    nodes: Vec<PbrtNode>,
     /// Corners in the order of the leaves, as pbrt's leaves hold them, with the triangle's id.
     triangles: Vec<([[f32; 3]; 3], u32)>,
     leaves: Vec<Tets<R>>,
@@ -68,7 +68,8 @@ impl<R: TetRecord> PaperTree<R> {
 
     fn flatten(&mut self, mesh: &Mesh, bvh: &BinaryBvh, built: &[(u32, TetMesh)], cost: &[f64], at: u32) {
         let node = &bvh.nodes[at as usize];
-        let mut flat = Node { lower: node.lower, upper: node.upper, offset: 0, count: 0, axis: 0, unused: 0 };
+        let mut flat =
+            PbrtNode { lower: node.lower, upper: node.upper, offset: 0, count: 0, axis: 0, unused: 0 };
         if let Ok(row) = built.binary_search_by_key(&at, |b| b.0) {
             (flat.offset, flat.count) = (row as u32, TETS);
             self.nodes.push(flat);
@@ -186,14 +187,14 @@ impl<R: TetRecord> PaperTree<R> {
 
 /// pbrt's test of a box, with its factor against rounding.
 #[inline(always)]
-fn meets(node: &Node, ray: &Ray, inverse: &[f32; 3], negative: &[bool; 3], best: f32) -> bool {
-    const WIDER: f32 = 1.0 + 2.0 * (3.0 * f32::EPSILON / 2.0);
+fn meets(node: &PbrtNode, ray: &Ray, inverse: &[f32; 3], negative: &[bool; 3], best: f32) -> bool {
+    const ROUNDING: f32 = 1.0 + 2.0 * (3.0 * f32::EPSILON / 2.0);
     let (mut near, mut far) = (ray.tmin, best);
     for k in 0..3 {
         let (a, b) =
             if negative[k] { (node.upper[k], node.lower[k]) } else { (node.lower[k], node.upper[k]) };
         near = near.max((a - ray.origin[k]) * inverse[k]);
-        far = far.min((b - ray.origin[k]) * inverse[k] * WIDER);
+        far = far.min((b - ray.origin[k]) * inverse[k] * ROUNDING);
     }
     near <= far
 }
@@ -213,7 +214,7 @@ fn costs(bvh: &BinaryBvh, built: &[(u32, TetMesh)]) -> Vec<f64> {
             cost[i] = 0.0;
         } else if !node.is_leaf() {
             let (l, r) = (i + 1, node.right as usize);
-            let split = STEP + (area(l) * cost[l] + area(r) * cost[r]) / area(i);
+            let split = STEP_COST + (area(l) * cost[l] + area(r) * cost[r]) / area(i);
             cost[i] = if node.count <= LEAF { split.min(f64::from(node.count)) } else { split };
         }
     }

@@ -7,7 +7,7 @@ use anyhow::Result;
 use bth::rays::{Hit, Ray};
 
 /// Pixels of the side of a tile, which a thread renders at a time.
-pub(super) const TILE: u32 = 16;
+pub(super) const THREAD_TILE: u32 = 16;
 
 /// The rays of both cameras, and what they hit.
 pub(super) struct Views {
@@ -44,13 +44,13 @@ impl Views {
     }
 }
 
-/// Rays in tiles of 4×4 pixels into tiles of [`TILE`].
+/// Rays in tiles of 4×4 pixels into tiles of [`THREAD_TILE`].
 fn tiled(rays: &[Ray], (width, height): (u32, u32)) -> Vec<Ray> {
     let mut ordered = Vec::with_capacity(rays.len());
-    for tile_y in (0..height).step_by(TILE as usize) {
-        for tile_x in (0..width).step_by(TILE as usize) {
-            for y in tile_y..height.min(tile_y + TILE) {
-                for x in tile_x..width.min(tile_x + TILE) {
+    for tile_y in (0..height).step_by(THREAD_TILE as usize) {
+        for tile_x in (0..width).step_by(THREAD_TILE as usize) {
+            for y in tile_y..height.min(tile_y + THREAD_TILE) {
+                for x in tile_x..width.min(tile_x + THREAD_TILE) {
                     let at = (y / 4 * (width / 4) + x / 4) * 16 + y % 4 * 4 + x % 4;
                     ordered.push(rays[at as usize]);
                 }

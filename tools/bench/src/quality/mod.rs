@@ -29,11 +29,6 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use variations::BuiltVariation;
 
-/// Smaller sets are not timed, as the clock is too coarse for them.
-const FEWEST: usize = 1024;
-/// Pixels of the cameras; a quick run has fewer.
-const SIZE: (u32, u32) = (1024, 576);
-const QUICK_SIZE: (u32, u32) = (128, 72);
 /// Rays of a set whose steps are counted, at most.
 const COUNTED: usize = 10_000;
 
@@ -97,11 +92,11 @@ fn measure_model(
     }
     progress.show(format!("{}: making rays", model.name));
     let plain = bth::from_bytes(&built[0].1.bytes)?;
-    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &plain), &options);
     let counted: Vec<RaySet> = sets.iter().filter(|s| STEPS_OF.contains(&s.name)).cloned().collect();
-    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
+    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
 
     let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&plain, s)).collect();
     let mut rows = Vec::new();

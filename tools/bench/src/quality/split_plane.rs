@@ -30,7 +30,7 @@ struct Bin {
     end: usize,
 }
 
-const EMPTY: [Bin; BINS] = [Bin { bounds: Box3::EMPTY, begin: 0, end: 0 }; BINS];
+const EMPTY_BINS: [Bin; BINS] = [Bin { bounds: Box3::EMPTY, begin: 0, end: 0 }; BINS];
 
 /// Lower ends of the bins between two coordinates; `None` if these are too close for as many different numbers.
 fn ends(lower: f32, upper: f32) -> Option<[f32; BINS]> {
@@ -51,7 +51,7 @@ pub(super) fn by_centers(references: &[Reference], cost: Cost<'_>) -> Option<Spl
         let (lower, upper) =
             centers().fold((f32::INFINITY, f32::NEG_INFINITY), |(l, u), c| (l.min(c), u.max(c)));
         let Some(ends) = ends(lower, upper) else { continue };
-        let mut bins = EMPTY;
+        let mut bins = EMPTY_BINS;
         for reference in references {
             let bin = &mut bins[bin_of(&ends, reference.bounds.center(axis))];
             bin.bounds.grow(&reference.bounds);
@@ -70,7 +70,7 @@ pub(super) fn by_space(mesh: &Mesh, references: &[Reference], cost: Cost<'_>) ->
         let lower = references.iter().map(|r| r.bounds.lower[axis]).fold(f32::INFINITY, f32::min);
         let upper = references.iter().map(|r| r.bounds.upper[axis]).fold(f32::NEG_INFINITY, f32::max);
         let Some(ends) = ends(lower, upper) else { continue };
-        let mut bins = EMPTY;
+        let mut bins = EMPTY_BINS;
         for reference in references {
             let first = bin_of(&ends, reference.bounds.lower[axis]);
             // A reference that ends on a plane has no part beyond it.

@@ -31,6 +31,13 @@ use viewpoint::CameraHits;
 /// Names of the sets, in order.
 pub const NAMES: [&str; 7] = ["primary", "closeup", "diffuse", "ao", "shadow", "random", "miss"];
 
+/// Pixels of the cameras that rays are taken from.
+pub const PICTURE_SIZE: (u32, u32) = (1024, 576);
+/// The same in a quick run.
+pub const QUICK_PICTURE_SIZE: (u32, u32) = (128, 72);
+/// Smaller sets are not timed, as the clock is too coarse for them.
+pub const FEWEST_TIMED: usize = 1024;
+
 /// Length of the ambient occlusion rays, relative to the diagonal.
 const AO_REACH: f64 = 0.05;
 /// Ambient occlusion rays from each point.
@@ -171,9 +178,9 @@ fn chords(bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
 
 /// Chords that cross the bounding box and hit nothing. In a closed room there are hardly any, so the set is small there.
 fn misses(finder: &Finder<'_>, bounds: &Bounds, count: usize, rng: &mut Rng) -> Vec<Ray> {
-    const TRIES: usize = 64;
+    const ROUNDS: usize = 64;
     let mut found = Vec::new();
-    for _ in 0..TRIES {
+    for _ in 0..ROUNDS {
         let rays = chords(bounds, count, rng);
         let hits = finder.nearest(&rays);
         let crosses =

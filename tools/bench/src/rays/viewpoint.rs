@@ -106,7 +106,7 @@ pub(super) fn close_up(finder: &Finder<'_>, diagonal: f64, seen: &CameraHits) ->
 }
 
 /// Samples of [`automatic`].
-const SAMPLES: usize = 4096;
+const SKY_SAMPLES: usize = 4096;
 /// The camera stands within the model when less than this share of the rays from the fronts of its triangles leave it.
 const OPEN: f64 = 0.08;
 
@@ -120,8 +120,8 @@ pub(super) fn automatic(finder: &Finder<'_>, diagonal: f64) -> View {
 fn sky(finder: &Finder<'_>, diagonal: f64) -> f64 {
     let mut rng = Rng::new(7);
     let count = finder.model.triangles();
-    let mut rays = Vec::with_capacity(SAMPLES);
-    for _ in 0..SAMPLES {
+    let mut rays = Vec::with_capacity(SKY_SAMPLES);
+    for _ in 0..SKY_SAMPLES {
         let triangle = ((rng.unit_f64() * count as f64) as usize).min(count - 1) as u32;
         let normal = finder.model.normal(triangle);
         if normal != DVec3::ZERO {

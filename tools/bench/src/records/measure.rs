@@ -5,13 +5,11 @@ use super::row::Row;
 use crate::args::{Models, Output, SeenFrom, Speed};
 use crate::machine;
 use crate::names::Names;
+use crate::rivals::embree;
 use crate::rounds::geometric_mean;
 use crate::speed::{self, SpeedRecord};
 use anyhow::{Result, bail};
 use std::path::Path;
-
-/// The tracer that others are compared with.
-const BASE: &str = "embree";
 
 /// The rows of a definition, measured now.
 ///
@@ -69,7 +67,7 @@ fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedRecord) -> Vec<Ro
     let mut ratios: Vec<(String, bool, String, usize, Vec<f64>)> = Vec::new();
     for model in &record.models {
         for run in &model.runs {
-            let base = run.tracers.iter().find(|t| t.name == BASE);
+            let base = run.tracers.iter().find(|t| t.name == embree::NAME);
             for tracer in &run.tracers {
                 let (name, ours) = (tracer.name.as_str(), tracer.ours);
                 if let Some(bytes) = tracer.bytes {

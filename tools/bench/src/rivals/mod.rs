@@ -21,7 +21,7 @@ pub struct Rival {
 
 /// All rivals, in the order of the tables.
 pub const RIVALS: [Rival; 9] = [
-    Rival { name: "embree", build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
+    Rival { name: embree::NAME, build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
     Rival { name: "embree robust", build: |m, n, t| embree::contender(m, n, &embree::ROBUST, t) },
     Rival { name: "embree compact", build: |m, n, t| embree::contender(m, n, &embree::COMPACT, t) },
     Rival { name: "embree hq packet16", build: |m, n, t| embree::contender(m, n, &embree::PACKETS, t) },

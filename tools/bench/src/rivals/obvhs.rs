@@ -94,7 +94,7 @@ impl<B: Bvh> Tracer for Obvhs<B> {
                     let weights = triangle.compute_barycentric(&ray);
                     let triangle = self.bvh.triangles()[found.primitive_id as usize];
                     let primitive = PrimitiveRef { instance: 0, triangle };
-                    Hit { t: found.t, u: weights.x, v: weights.y, primitive: primitive }
+                    Hit { t: found.t, u: weights.x, v: weights.y, primitive }
                 }
             };
         }

@@ -102,12 +102,12 @@ pub(super) fn contender(model: &Model, name: &str, width: Width) -> Result<Conte
 }
 
 /// Answers that are kept before they are turned into hits.
-const BATCH: usize = 1024;
+const MOST_ANSWERS: usize = 1024;
 
 impl Tracer for TinyBvh {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        let mut answers = [Answer { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: NONE }; BATCH];
-        for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        let mut answers = [Answer { t: f32::INFINITY, u: 0.0, v: 0.0, triangle: NONE }; MOST_ANSWERS];
+        for (batch, hits) in batch.chunks(MOST_ANSWERS).zip(hits.chunks_mut(MOST_ANSWERS)) {
             // SAFETY: at most as many rays as there is room for answers; `Ray` is what the shim expects.
             unsafe {
                 (self.api.nearest)(self.bvh, batch.rays.as_ptr(), batch.rays.len(), answers.as_mut_ptr())

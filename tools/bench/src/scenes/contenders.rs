@@ -117,12 +117,12 @@ pub(super) fn build(source: &Source, kind: &ContenderKind, shown: &Scene) -> Res
     let compiled = compile(source, kind)?;
     let scene = bth::from_bytes(&compiled.bytes).context("a file that was just compiled")?;
     let (build_s, in_tets) = (compiled.seconds, compiled.in_tets);
-    Ok(MovingContender { name: kind.name, ours: true, moving: Box::new(Ours(scene)), build_s, in_tets })
+    Ok(MovingContender { name: kind.name, ours: true, moving: Box::new(OurScene(scene)), build_s, in_tets })
 }
 
-struct Ours(Scene);
+struct OurScene(Scene);
 
-impl Moving for Ours {
+impl Moving for OurScene {
     fn hide(&mut self) -> Result<()> {
         // A time before the first frame.
         self.0.set_seconds(-1e3)?;

@@ -1,9 +1,10 @@
 //! The charts of `speed`: ratios to Embree's single rays; where it did not run, rays per second.
 
-use super::record::{BASE, SpeedRecord, ThreadsRun};
+use super::record::{SpeedRecord, ThreadsRun};
 use super::tables::sets_of;
 use crate::chart::{BarChart, Scale, Series};
 use crate::output::Chart;
+use crate::rivals::embree;
 
 /// The tracers that a chart has, if they were measured; the table has all. Embree's single rays are the line at 1.
 const SHOWN: [&str; 8] = [
@@ -24,7 +25,7 @@ pub fn draw(record: &SpeedRecord) -> Vec<Chart> {
         let plural = if threads == 1 { "" } else { "s" };
         let on = format!("{threads} thread{plural}");
         let tracers = record.tracers(threads);
-        let ratios = tracers.contains(&BASE);
+        let ratios = tracers.contains(&embree::NAME);
         let mut shown: Vec<&str> = tracers.iter().copied().filter(|t| SHOWN.contains(t)).collect();
         if shown.is_empty() {
             // None of these was selected: the first few tracers are shown instead.

@@ -23,12 +23,6 @@ use bth::rays::{Hit, PrimitiveRef};
 use serde_json::json;
 use std::collections::BTreeMap;
 
-/// Smaller sets are not timed, as the clock is too coarse for them.
-const FEWEST: usize = 1024;
-/// Pixels of the cameras; a quick run has fewer.
-const SIZE: (u32, u32) = (1024, 576);
-const QUICK_SIZE: (u32, u32) = (128, 72);
-
 /// Measures, prints and writes the record.
 ///
 /// # Errors
@@ -99,10 +93,10 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     let scene = bth::from_bytes(&bvh.bytes)?;
 
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
-    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= FEWEST);
+    sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
     let expected: Vec<Answers> = sets.iter().map(|s| Answers::of_scene(&scene, s)).collect();
 
     let most_threads = arguments.threads.iter().copied().max().unwrap_or(1);

@@ -3,14 +3,12 @@
 use crate::clock::Clock;
 use crate::output::Head;
 use crate::rays::View;
+use crate::rivals::embree;
 use crate::rounds::geometric_mean;
 use crate::structures::{Compiled, Kind};
 use crate::tracer::Contender;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// The tracer that others are compared with.
-pub(super) const BASE: &str = "embree";
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -123,7 +121,7 @@ impl ThreadsRun {
 
     /// A tracer's speed over that of Embree's single rays, if both ran.
     pub(super) fn ratio(&self, tracer: &str, set: &str) -> Option<f64> {
-        Some(self.rate(tracer, set)? / self.rate(BASE, set)?)
+        Some(self.rate(tracer, set)? / self.rate(embree::NAME, set)?)
     }
 
     /// Names of our tracers with wrong answers.

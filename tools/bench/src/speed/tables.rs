@@ -1,8 +1,9 @@
 //! The tables of `speed`.
 
-use super::record::{BASE, ModelSpeeds, SpeedRecord, ThreadsRun};
+use super::record::{ModelSpeeds, SpeedRecord, ThreadsRun};
 use crate::markdown::{count, table, two_decimals};
 use crate::rays::{NAMES, View};
+use crate::rivals::embree;
 
 /// All tables of a record.
 pub fn markdown(record: &SpeedRecord) -> String {
@@ -34,7 +35,7 @@ fn on_threads(threads: usize) -> String {
 fn means(record: &SpeedRecord, threads: usize) -> String {
     let sets = sets_of(record.models.iter());
     let tracers = record.tracers(threads);
-    if !tracers.contains(&BASE) {
+    if !tracers.contains(&embree::NAME) {
         return String::new();
     }
     let row = |tracer: &&str| {
@@ -43,7 +44,7 @@ fn means(record: &SpeedRecord, threads: usize) -> String {
                 return "-".to_owned();
             };
             // Of fewer models than the others: not comparable with them.
-            let all = record.runs(threads).filter(|r| r.ratio(BASE, set).is_some()).count();
+            let all = record.runs(threads).filter(|r| r.ratio(embree::NAME, set).is_some()).count();
             if models < all { format!("{ratio:.2} ({models})") } else { format!("{ratio:.2}") }
         };
         [(*tracer).to_owned()].into_iter().chain(sets.iter().map(mean)).collect()

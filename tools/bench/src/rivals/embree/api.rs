@@ -77,7 +77,7 @@ impl<const N: usize> RayHit<N> {
         }
         let instance = if instances { self.instance[0][lane] } else { 0 };
         let primitive = PrimitiveRef { instance, triangle: self.primitive[lane] };
-        Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], primitive: primitive }
+        Hit { t: self.far[lane], u: self.u[lane], v: self.v[lane], primitive }
     }
 
     /// The library marks an occluded ray so.
@@ -89,7 +89,7 @@ impl<const N: usize> RayHit<N> {
 
 /// `RTCIntersectArguments`, and `RTCOccludedArguments`, which is the same.
 #[repr(C)]
-pub(super) struct Arguments {
+pub(super) struct QueryArguments {
     flags: c_int,
     features: u32,
     context: Handle,
@@ -99,9 +99,9 @@ pub(super) struct Arguments {
     min_width: f32,
 }
 
-impl Arguments {
+impl QueryArguments {
     fn new(coherent: bool) -> Self {
-        Arguments {
+        QueryArguments {
             flags: if coherent { QUERY_COHERENT } else { 0 },
             features: u32::MAX,
             context: std::ptr::null_mut(),
@@ -116,8 +116,8 @@ impl Arguments {
 #[repr(C, align(64))]
 pub(super) struct Lanes([c_int; 16]);
 
-pub(super) type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut Arguments);
-pub(super) type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut Arguments);
+pub(super) type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut QueryArguments);
+pub(super) type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut QueryArguments);
 
 pub(super) struct Api {
     pub(super) new_device: unsafe extern "C" fn(*const c_char) -> Handle,
@@ -197,7 +197,7 @@ pub(super) fn singly(
     trace: Trace1,
     mut done: impl FnMut(usize, &RayHit<1>),
 ) {
-    let mut arguments = Arguments::new(batch.coherent);
+    let mut arguments = QueryArguments::new(batch.coherent);
     let mut lane = RayHit::<1>::EMPTY;
     for (i, ray) in batch.rays.iter().enumerate() {
         lane.set(0, ray);
@@ -214,7 +214,7 @@ pub(super) fn packets(
     trace: Trace16,
     mut done: impl FnMut(usize, &RayHit<16>, usize),
 ) {
-    let mut arguments = Arguments::new(batch.coherent);
+    let mut arguments = QueryArguments::new(batch.coherent);
     let mut lanes = RayHit::<16>::EMPTY;
     for (packet, rays) in batch.rays.chunks(16).enumerate() {
         let mut used = Lanes([0; 16]);

@@ -12,6 +12,9 @@ use anyhow::Result;
 use std::ffi::c_int;
 use std::time::Instant;
 
+/// Name of Embree's single rays in tables: ratios are relative to these.
+pub const NAME: &str = "embree";
+
 /// How a scene is built and traced.
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {

@@ -1,13 +1,13 @@
 //! Builds the tree: at each node the plane of least expected cost, by a sweep over the sorted bounds.
 
-use super::{KdTree, Node};
+use super::{KdNode, KdTree};
 
 /// Cost of a triangle test in units of that of a step (pbrt, 4th edition, §7.3 of the 3rd edition's text).
-const TEST: f32 = 5.0;
+const TEST_COST: f32 = 5.0;
 /// Cost of a step.
-const STEP: f32 = 1.0;
+const STEP_COST: f32 = 1.0;
 /// By how much a plane is favoured that cuts off empty space (Wald and Havran 2006, equation 8).
-const EMPTY: f32 = 0.5;
+const EMPTY_BONUS: f32 = 0.5;
 /// How often a node on a path may be split although that costs more than a leaf.
 const BAD_SPLITS: u32 = 3;
 
@@ -60,7 +60,7 @@ struct KdPlane {
 
 struct KdBuilder {
     bounds: Vec<Cell>,
-    nodes: Vec<Node>,
+    nodes: Vec<KdNode>,
     lists: Vec<u32>,
 }
 
@@ -79,7 +79,7 @@ impl KdTree {
 
 impl KdBuilder {
     fn node(&mut self, triangles: Vec<u32>, bounds: Cell, depth: u32, bad: u32) {
-        let leaf_cost = TEST * triangles.len() as f32;
+        let leaf_cost = TEST_COST * triangles.len() as f32;
         let events = [0, 1, 2].map(|axis| self.events(&triangles, axis));
         let best = if triangles.len() <= 1 || depth == 0 { None } else { best_plane(&events, &bounds) };
         let Some(plane) = best else { return self.leaf(&triangles) };
@@ -96,17 +96,17 @@ impl KdBuilder {
         let above = events[plane.event + 1..].iter().filter(|e| e.ends).map(|e| e.triangle).collect();
         drop(triangles);
         let at = self.nodes.len();
-        self.nodes.push(Node::Inner { axis: axis as u8, split, upper: 0 });
+        self.nodes.push(KdNode::Inner { axis: axis as u8, split, upper: 0 });
         self.node(below, bounds.below(axis, split), depth - 1, bad);
         let next = self.nodes.len() as u32;
-        if let Node::Inner { upper, .. } = &mut self.nodes[at] {
+        if let KdNode::Inner { upper, .. } = &mut self.nodes[at] {
             *upper = next;
         }
         self.node(above, bounds.above(axis, split), depth - 1, bad);
     }
 
     fn leaf(&mut self, triangles: &[u32]) {
-        self.nodes.push(Node::Leaf { first: self.lists.len() as u32, count: triangles.len() as u32 });
+        self.nodes.push(KdNode::Leaf { first: self.lists.len() as u32, count: triangles.len() as u32 });
         self.lists.extend_from_slice(triangles);
     }
 
@@ -137,10 +137,10 @@ fn best_plane(events: &[Vec<Event>; 3], bounds: &Cell) -> Option<KdPlane> {
             above -= usize::from(event.ends);
             if event.at > bounds.lower[axis] && event.at < bounds.upper[axis] {
                 let share = |b: Cell| b.area() / whole;
-                let empty = if below == 0 || above == 0 { EMPTY } else { 0.0 };
+                let empty = if below == 0 || above == 0 { EMPTY_BONUS } else { 0.0 };
                 let tests = share(bounds.below(axis, event.at)) * below as f32
                     + share(bounds.above(axis, event.at)) * above as f32;
-                let cost = STEP + TEST * (1.0 - empty) * tests;
+                let cost = STEP_COST + TEST_COST * (1.0 - empty) * tests;
                 if best.as_ref().is_none_or(|b| cost < b.cost) {
                     best = Some(KdPlane { cost, axis, event: i });
                 }

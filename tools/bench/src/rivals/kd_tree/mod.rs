@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// An inner node or a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Node {
+enum KdNode {
     /// Its lower child follows it.
     Inner { axis: u8, split: f32, upper: u32 },
     /// A range of `KdTree::lists`.
@@ -23,7 +23,7 @@ enum Node {
 /// A built tree.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    nodes: Vec<Node>,
+    nodes: Vec<KdNode>,
     /// Rows of `corners`, leaf by leaf.
     lists: Vec<u32>,
     corners: Vec<[[f32; 3]; 3]>,
@@ -63,7 +63,7 @@ impl Tracer for KdTree {
     }
 }
 
-const _: () = assert!(size_of::<Node>() == 12);
+const _: () = assert!(size_of::<KdNode>() == 12);
 
 #[cfg(test)]
 mod tests {
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn splits_follow_the_surface_area() {
         let tree = KdTree::build(soup(2000, &mut Rng::new(5)));
-        let inner = tree.nodes.iter().filter(|n| matches!(n, Node::Inner { .. })).count();
+        let inner = tree.nodes.iter().filter(|n| matches!(n, KdNode::Inner { .. })).count();
         assert!(inner > 500, "{inner} inner nodes");
         assert!(tree.lists.len() < 20 * tree.corners.len(), "{} references", tree.lists.len());
     }

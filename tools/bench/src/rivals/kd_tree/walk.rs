@@ -1,6 +1,6 @@
 //! Walks the tree: front to back, far children on a stack, done at a hit within the current cell.
 
-use super::{KdTree, Node};
+use super::{KdNode, KdTree};
 use crate::triangle_tests::{Intersection, moller_trumbore};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 
@@ -17,7 +17,7 @@ impl KdTree {
         let mut at = 0u32;
         loop {
             match self.nodes[at as usize] {
-                Node::Inner { axis, split, upper } => {
+                KdNode::Inner { axis, split, upper } => {
                     let axis = axis as usize;
                     let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
                     let t = (split - origin) * reciprocal[axis];
@@ -37,7 +37,7 @@ impl KdTree {
                     }
                     continue;
                 }
-                Node::Leaf { first, count } => {
+                KdNode::Leaf { first, count } => {
                     for &triangle in &self.lists[first as usize..(first + count) as usize] {
                         if self.test(ray, triangle, &mut best) && ANY {
                             return best;

@@ -81,7 +81,7 @@ fn stairs(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
 }
 
 impl Scatter {
-    /// The picture.
+    /// The picture, as SVG.
     pub fn svg(&self) -> String {
         let all = || self.series.iter().flat_map(|c| &c.points);
         let (mut xs, mut ys) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
@@ -150,6 +150,13 @@ impl Scatter {
         let turned =
             format!("text-anchor=\"middle\" transform=\"rotate(-90 16 {0:.0})\"", PLOT_TOP + PLOT_SIZE / 2.0);
         text(&mut svg, 16.0, PLOT_TOP + PLOT_SIZE / 2.0, &turned, &self.y);
+        self.draw_series(&mut svg, at);
+        svg.push_str("</svg>\n");
+        svg
+    }
+
+    /// Draws the points with their labels, and the legend. `at` maps a point to its place in the picture.
+    fn draw_series(&self, svg: &mut String, at: impl Fn((f64, f64)) -> (f64, f64)) {
         for (row, cloud) in self.series.iter().enumerate() {
             let colour = COLOURS[row % COLOURS.len()];
             let mut dot = |(x, y): (f64, f64), radius: f64| {
@@ -163,13 +170,11 @@ impl Scatter {
             let named: Vec<_> = places.zip(&cloud.labels).collect();
             let y = PLOT_TOP + 14.0 + 20.0 * row as f64;
             dot((PLOT_LEFT + PLOT_SIZE + 20.0, y - 4.0), 5.0);
-            text(&mut svg, PLOT_LEFT + PLOT_SIZE + 32.0, y, "", &cloud.name);
+            text(svg, PLOT_LEFT + PLOT_SIZE + 32.0, y, "", &cloud.name);
             for ((x, y), label) in named {
-                text(&mut svg, x + self.radius + 2.0, y - 3.0, "font-size=\"9\" fill=\"#333\"", label);
+                text(svg, x + self.radius + 2.0, y - 3.0, "font-size=\"9\" fill=\"#333\"", label);
             }
         }
-        svg.push_str("</svg>\n");
-        svg
     }
 }
 

@@ -30,7 +30,7 @@ struct Answer {
     triangle: u32,
 }
 
-struct Api {
+struct TinybvhApi {
     build: unsafe extern "C" fn(*const [f32; 4], u32, u32, u32) -> *mut c_void,
     free: unsafe extern "C" fn(*mut c_void),
     bytes: unsafe extern "C" fn(*const c_void) -> usize,
@@ -38,18 +38,21 @@ struct Api {
     occluded: unsafe extern "C" fn(*const c_void, *const Ray, usize, *mut bool),
 }
 
-impl Api {
-    fn get() -> Result<&'static Api> {
-        static API: OnceLock<std::result::Result<Api, String>> = OnceLock::new();
-        API.get_or_init(|| Api::load().map_err(|e| format!("{e:#}"))).as_ref().map_err(|e| anyhow!("{e}"))
+impl TinybvhApi {
+    fn get() -> Result<&'static TinybvhApi> {
+        static TINYBVH_API: OnceLock<std::result::Result<TinybvhApi, String>> = OnceLock::new();
+        TINYBVH_API
+            .get_or_init(|| TinybvhApi::load().map_err(|e| format!("{e:#}")))
+            .as_ref()
+            .map_err(|e| anyhow!("{e}"))
     }
 
-    fn load() -> Result<Api> {
+    fn load() -> Result<TinybvhApi> {
         // SAFETY: TINYBVH_LIB names the shim, which has no initializers but those of C++, and whose
         // functions have the types above.
         unsafe {
             let library = library::load("TINYBVH_LIB", "libtinybvh_shim.so")?;
-            Ok(Api {
+            Ok(TinybvhApi {
                 build: *library.get(b"tb_build\0")?,
                 free: *library.get(b"tb_free\0")?,
                 bytes: *library.get(b"tb_bytes\0")?,
@@ -61,7 +64,7 @@ impl Api {
 }
 
 struct TinyBvh {
-    api: &'static Api,
+    api: &'static TinybvhApi,
     bvh: *mut c_void,
     /// The structure keeps pointers into these.
     _corners: Vec<[f32; 4]>,
@@ -80,7 +83,7 @@ impl Drop for TinyBvh {
 }
 
 pub(super) fn contender(model: &Model, name: &str, width: Width) -> Result<Contender> {
-    let api = Api::get()?;
+    let api = TinybvhApi::get()?;
     let triangles = u32::try_from(model.triangles())?;
     let corners: Vec<[f32; 4]> =
         (0..triangles).flat_map(|t| model.mesh.corners(t)).map(|[x, y, z]| [x, y, z, 0.0]).collect();

@@ -119,7 +119,7 @@ pub(super) struct Lanes([c_int; 16]);
 pub(super) type Trace1 = unsafe extern "C" fn(Handle, *mut RayHit<1>, *mut QueryArguments);
 pub(super) type Trace16 = unsafe extern "C" fn(*const Lanes, Handle, *mut RayHit<16>, *mut QueryArguments);
 
-pub(super) struct Api {
+pub(super) struct EmbreeApi {
     pub(super) new_device: unsafe extern "C" fn(*const c_char) -> Handle,
     pub(super) release_device: unsafe extern "C" fn(Handle),
     pub(super) device_error: unsafe extern "C" fn(Handle) -> c_int,
@@ -147,21 +147,22 @@ pub(super) struct Api {
     pub(super) disable_geometry: unsafe extern "C" fn(Handle),
 }
 
-impl Api {
-    pub(super) fn get() -> Result<&'static Api> {
-        static API: OnceLock<std::result::Result<Api, String>> = OnceLock::new();
-        API.get_or_init(|| Api::load().map_err(|e| format!("{e:#}")))
+impl EmbreeApi {
+    pub(super) fn get() -> Result<&'static EmbreeApi> {
+        static EMBREE_API: OnceLock<std::result::Result<EmbreeApi, String>> = OnceLock::new();
+        EMBREE_API
+            .get_or_init(|| EmbreeApi::load().map_err(|e| format!("{e:#}")))
             .as_ref()
             .map_err(|e| anyhow::anyhow!("{e}"))
     }
 
-    fn load() -> Result<Api> {
+    fn load() -> Result<EmbreeApi> {
         // SAFETY: EMBREE_LIB names Embree 4, whose initializers may run at any time, and whose
         // functions have the types above (rtcore_device.h, rtcore_scene.h, rtcore_geometry.h).
         // Occluded rays are passed as the `RTCRay` that a `RTCRayHit` begins with.
         unsafe {
             let library = library::load("EMBREE_LIB", "libembree4.so")?;
-            Ok(Api {
+            Ok(EmbreeApi {
                 new_device: *library.get(b"rtcNewDevice\0")?,
                 release_device: *library.get(b"rtcReleaseDevice\0")?,
                 device_error: *library.get(b"rtcGetDeviceError\0")?,

@@ -5,7 +5,7 @@ mod scene;
 
 pub use self::scene::{EmbreeMesh, EmbreeScene, InstancePlace, build, build_instances};
 
-use self::api::Api;
+use self::api::EmbreeApi;
 use crate::model::Model;
 use crate::tracer::Contender;
 use anyhow::Result;
@@ -42,7 +42,7 @@ pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets:
 /// # Errors
 /// If it is missing.
 pub fn available() -> Result<()> {
-    Api::get().map(|_| ())
+    EmbreeApi::get().map(|_| ())
 }
 
 /// Builds a scene of a model.

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicI64, AtomicPtr, AtomicUsize, Ordering};
 
 /// A built scene.
 pub struct EmbreeScene {
-    api: &'static Api,
+    api: &'static EmbreeApi,
     device: Handle,
     scene: Handle,
     packets: bool,
@@ -110,7 +110,7 @@ pub fn build_instances(
 impl EmbreeScene {
     /// A device for these meshes, without scenes yet.
     fn new(meshes: Vec<EmbreeMesh>, variant: &Variant, threads: usize) -> Result<EmbreeScene> {
-        let api = Api::get()?;
+        let api = EmbreeApi::get()?;
         let fits = |(positions, triangles): &EmbreeMesh| {
             let count = positions.len().saturating_sub(1);
             triangles.iter().flatten().all(|v| (*v as usize) < count)

@@ -5,6 +5,8 @@ mod corpus_support;
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use corpus_support::{data_and_compiler, listed_triangles, models, run};
@@ -28,11 +30,24 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
     let Some((data, bthc)) = data_and_compiler() else { return };
     let folder = data.join("messy");
     let out = tempfile::tempdir().unwrap();
-    let (mut compiled, mut refused, mut slowest, mut wrong) = (0, 0, 0.0f64, Vec::new());
     let models = models(&folder);
-    for (number, model) in models.iter().enumerate() {
-        let file = out.path().join(format!("{number}.bth"));
-        match check(&bthc, &data, model, &file) {
+    // As many models at once as there are processors.
+    let (next, results) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let number = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(model) = models.get(number) else { break };
+                    let result = check(&bthc, &data, model, &out.path().join(format!("{number}.bth")));
+                    results.lock().unwrap().push((model, result));
+                }
+            });
+        }
+    });
+    let (mut compiled, mut refused, mut slowest, mut wrong) = (0, 0, 0.0f64, Vec::new());
+    for (model, result) in results.into_inner().unwrap() {
+        match result {
             Ok((done, seconds)) => {
                 compiled += usize::from(done);
                 refused += usize::from(!done);

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-/// The exit code and standard error of the program, run where the user asked Rust for backtraces.
+/// The exit code and standard error of the program, run with backtraces enabled.
 fn mistake(arguments: &[&str]) -> (i32, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bth-bench"));
     command.env("RUST_BACKTRACE", "1").env("EMBREE_LIB", "/nonexistent").env("TINYBVH_LIB", "/nonexistent");
@@ -36,6 +36,7 @@ fn misused_command_lines_exit_with_2_and_name_the_word() {
 fn files_and_names_that_do_not_exist_exit_with_1_and_are_named() {
     for arguments in [
         &["speed", "missing.ply"][..],
+        &["speed", "no-such-model"],
         &["speed", "torus-knot:0"],
         &["speed", "torus-knot", "--set", "missing"],
         &["accuracy", "torus-knot", "--tracer", "missing"],

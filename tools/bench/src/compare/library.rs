@@ -80,7 +80,7 @@ impl OpenedByBuild<'_> {
     /// Nearest hits, in calls of `batch` rays, without hints.
     pub(super) fn nearest(&self, rays: &[Ray], hits: &mut [Hit], batch: usize) {
         for (rays, hits) in rays.chunks(batch).zip(hits.chunks_mut(batch)) {
-            // SAFETY: as many rays and places for hits as the count says; no hints; the scene is open.
+            // SAFETY: rays and hits are slices of the length that is passed; the hints are null, which is allowed; the scene is open.
             unsafe {
                 (self.build.nearest)(
                     self.scene,

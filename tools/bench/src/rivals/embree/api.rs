@@ -223,7 +223,7 @@ pub(super) fn packets(
             lanes.set(lane, ray);
             used.0[lane] = -1;
         }
-        // SAFETY: as above; the mask and the packet have the alignment that the library asks for.
+        // SAFETY: as above; the mask and the packet have the alignment that the library requires.
         unsafe { trace(&used, scene, &mut lanes, &mut arguments) };
         for lane in 0..rays.len() {
             done(packet * 16 + lane, &lanes, lane);

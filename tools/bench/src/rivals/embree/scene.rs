@@ -149,9 +149,9 @@ impl EmbreeScene {
     /// A committed scene of a mesh of this one.
     fn object(&self, (positions, triangles): &EmbreeMesh, variant: &Variant) -> Handle {
         let (api, count_of_positions) = (self.api, positions.len().saturating_sub(1));
-        // SAFETY: the calls are in the order and with the constants that the library's documentation asks for, which allows
-        // them from several threads for different scenes. The buffers hold as many items as is said, plus the padding
-        // that it asks for, every index is below the number of positions (checked by `new`), and all of it lives in the `EmbreeScene`
+        // SAFETY: the calls are in the order and with the constants that the library's documentation requires, which allows
+        // them from several threads for different scenes. The buffers hold as many items as the calls pass, plus the padding
+        // that it requires, every index is below the number of positions (checked by `new`), and all of it lives in the `EmbreeScene`
         // until after the device is released: moving a `Vec` does not move what it points to.
         unsafe {
             let scene = self.empty(variant);

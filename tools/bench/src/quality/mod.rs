@@ -176,9 +176,9 @@ fn trace(scene: &Scene, set: &RaySet, hits: &mut [Hit], found: &mut [bool]) {
     for first in (0..set.rays.len()).step_by(structures::BATCH) {
         let part = first..set.rays.len().min(first + structures::BATCH);
         if set.any {
-            scene.any_batch(&set.rays[part.clone()], None, &mut found[part]);
+            scene.batch(&set.rays[part.clone()]).any(&mut found[part]);
         } else {
-            scene.nearest_batch(&set.rays[part.clone()], None, &mut hits[part]);
+            scene.batch(&set.rays[part.clone()]).nearest(&mut hits[part]);
         }
     }
 }

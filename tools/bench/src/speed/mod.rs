@@ -168,11 +168,11 @@ impl Answers {
     pub(crate) fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
         if set.any {
             let mut found = vec![false; set.rays.len()];
-            scene.any_batch(&set.rays, None, &mut found);
+            scene.batch(&set.rays).any(&mut found);
             Answers::Any(found)
         } else {
             let mut hits = vec![Hit::MISS; set.rays.len()];
-            scene.nearest_batch(&set.rays, None, &mut hits);
+            scene.batch(&set.rays).nearest(&mut hits);
             Answers::Nearest(hits)
         }
     }

@@ -262,6 +262,9 @@ fn opacity() -> Vec<Case> {
     let micro = |name, word: usize, value| field(name, base, kind::OPACITY_MICRO, 4 * word, value);
     let rows = |name: &str, kind: u32, count: u64| {
         broken(name, base, Seal::Sections, |e| {
+            // What is no longer in the section is a gap, which is zero.
+            let rows = e.section_at(kind) + 4 * count as usize;
+            e.put(rows, &vec![0; 24 - 4 * count as usize]);
             let at = e.entry_at(0, kind);
             e.put(at + offset_of!(SectionEntry, length), &(4 * count).to_le_bytes());
             e.put(at + offset_of!(SectionEntry, count), &count.to_le_bytes());

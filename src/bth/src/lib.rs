@@ -16,8 +16,11 @@
 #![allow(clippy::needless_range_loop)]
 
 mod bvh;
+mod enumerate;
+mod hits;
 mod instances;
 mod intersect;
+mod masks;
 mod motion;
 mod object;
 mod query;
@@ -27,6 +30,7 @@ mod simd;
 mod tets;
 
 pub use bth_format::{Code, Error};
+pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;

@@ -12,7 +12,6 @@ use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabLanes;
-use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Nearest, TriangleRef};
 use crate::rays::Ray;

@@ -18,6 +18,6 @@ mod nearest;
 mod world;
 
 pub use geometry::{Triangle, triangles};
-pub use intersection::{Intersection, intersection, to_f64};
+pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};
 pub use world::World;

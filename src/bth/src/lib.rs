@@ -16,8 +16,11 @@
 
 mod batch;
 mod bvh;
+mod enumerate;
+mod hits;
 mod instances;
 mod intersect;
+mod masks;
 mod motion;
 mod object;
 mod query;
@@ -28,6 +31,7 @@ mod tets;
 
 pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;

@@ -1,6 +1,6 @@
 //! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
 
-use bth::rays::{PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, compile};
 use std::io::Write;
@@ -78,7 +78,7 @@ fn a_c_program_opens_traces_and_reads_errors() {
             format!("{a} {b} {c} {} {x} {y} {z} {}\n", r.tmin, r.tmax)
         })
         .collect();
-    let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r, PrimitiveRef::NONE)).collect();
+    let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r).unwrap_or(Hit::MISS)).collect();
     assert!(hits.iter().any(|h| h.is_hit()) && hits.iter().any(|h| !h.is_hit()));
     for flags in ["read", "map"] {
         let output = run(&program, &[file.to_str().expect("UTF-8"), flags], &input);
@@ -93,7 +93,7 @@ fn a_c_program_opens_traces_and_reads_errors() {
             assert_eq!([number(0), number(1), number(2)], [hit.t, hit.u, hit.v].map(f32::to_bits), "{ray:?}");
             assert_eq!(field[3], hit.primitive.instance.to_string());
             assert_eq!(field[4], hit.primitive.triangle.to_string());
-            assert_eq!(field[5], u8::from(scene.any(ray, hit.primitive)).to_string());
+            assert_eq!(field[5], u8::from(scene.any_from(ray, hit.primitive)).to_string());
             answered += 1;
         }
         assert_eq!(answered, rays.len());
@@ -174,9 +174,8 @@ fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
             seen[1] += usize::from(!view.visible);
         }
         for [x, z] in points {
-            let ray =
-                Ray { origin: [x, 9.0, z], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
-            let hit = scene.nearest(&ray, PrimitiveRef::NONE);
+            let ray = Ray::new([x, 9.0, z], [0.0, -1.0, 0.0]);
+            let hit = scene.nearest(&ray).unwrap_or(Hit::MISS);
             let line = lines.next().expect("a hit");
             let fields: Vec<&str> = line.split(' ').collect();
             assert_eq!(fields[1].parse::<f32>().expect("a number").to_bits(), hit.t.to_bits(), "{frame:?}");

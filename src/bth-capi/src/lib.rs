@@ -145,7 +145,7 @@ pub unsafe extern "C" fn bth_nearest(
     // slices above. All bit patterns are valid for `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
     // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
-    if catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits))).is_err() {
+    if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).nearest(hits))).is_err() {
         hits.fill(Hit::MISS);
     }
 }
@@ -174,7 +174,7 @@ pub unsafe extern "C" fn bth_any(
     // the buffer of [`any_in_chunks`].
     if let [hit] = hit {
         let mut found = [false];
-        let traced = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut found)));
+        let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(&mut found)));
         *hit = (traced.is_ok() && found[0]).into();
     } else {
         any_in_chunks(scene, rays, from, hit);
@@ -191,7 +191,7 @@ fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit
     for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
         let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);
         let found = &mut buffer[..rays.len()];
-        if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, found))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(found))).is_err() {
             found.fill(false);
         }
         for (out, found) in hit.iter_mut().zip(found) {

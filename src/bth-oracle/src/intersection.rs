@@ -174,7 +174,7 @@ mod tests {
             let target = [0, 1, 2].map(|k| (a * corners[0][k] + b * corners[1][k] + c * corners[2][k]) as f32);
             let (origin, scaled) = (f(origin), corners.map(f));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) / 4.0);
-            let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+            let ray = Ray::new(origin, direction);
             if let Some(found) = intersection(&ray, scaled) {
                 let eighth = |n: i32| BigRational::new(n.into(), 8.into());
                 prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });

@@ -1,13 +1,12 @@
 //! Runtime of BTH files: opens compiled files and traces rays through them, without copying or converting their sections.
 //!
 //! ```no_run
-//! use bth::rays::{PrimitiveRef, Ray};
+//! use bth::rays::Ray;
 //!
 //! let scene = bth::open("bunny.bth")?;
-//! let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
-//! let hit = scene.nearest(&ray, PrimitiveRef::NONE);
-//! if hit.is_hit() {
-//!     println!("triangle {} at t = {}", hit.primitive.triangle, hit.t);
+//! let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
+//! if let Some(hit) = scene.nearest(&ray) {
+//!     println!("triangle {} at {:?}", hit.primitive.triangle, ray.at(hit.t));
 //! }
 //! # Ok::<(), bth::Error>(())
 //! ```
@@ -15,6 +14,7 @@
 // Kernels loop over lanes by index: iterators and closures could be compiled as functions without the kernel's instruction set.
 #![allow(clippy::needless_range_loop)]
 
+mod batch;
 mod bvh;
 mod enumerate;
 mod hits;
@@ -29,6 +29,7 @@ mod scene;
 mod simd;
 mod tets;
 
+pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;

@@ -153,15 +153,32 @@ impl Scene {
         self.file.resident_bytes()
     }
 
-    /// Nearest hit of a ray in world space, or [`Hit::MISS`]. `from` is the triangle on which the ray starts, or
-    /// [`PrimitiveRef::NONE`]. It is a hint where a traversal of tetrahedra may begin, and never changes the result.
-    pub fn nearest(&self, ray: &Ray, from: PrimitiveRef) -> Hit {
-        let mut hit = Hit::MISS;
-        self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));
-        hit
+    /// Nearest hit of a ray in world space.
+    pub fn nearest(&self, ray: &Ray) -> Option<Hit> {
+        self.nearest_from(ray, PrimitiveRef::NONE)
     }
 
-    /// As [`Self::nearest`], with statistics of the traversal.
+    /// As [`Self::nearest`], for a ray that starts on a triangle, or [`PrimitiveRef::NONE`]. The triangle is a hint where a
+    /// traversal of tetrahedra may begin, and never changes the result.
+    pub fn nearest_from(&self, ray: &Ray, triangle: PrimitiveRef) -> Option<Hit> {
+        let mut hit = Hit::MISS;
+        self.nearest_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut hit));
+        hit.is_hit().then_some(hit)
+    }
+
+    /// Whether a ray in world space hits anything.
+    pub fn any(&self, ray: &Ray) -> bool {
+        self.any_from(ray, PrimitiveRef::NONE)
+    }
+
+    /// As [`Self::any`], with a hint as for [`Self::nearest_from`].
+    pub fn any_from(&self, ray: &Ray, triangle: PrimitiveRef) -> bool {
+        let mut found = false;
+        self.any_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut found));
+        found
+    }
+
+    /// As [`Self::nearest_from`], with statistics of the traversal. A miss is [`Hit::MISS`].
     pub fn nearest_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
@@ -181,22 +198,9 @@ impl Scene {
         (best, steps)
     }
 
-    /// Whether a ray in world space hits anything. `from` is a hint as for [`Self::nearest`].
-    pub fn any(&self, ray: &Ray, from: PrimitiveRef) -> bool {
-        let mut found = false;
-        self.any_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut found));
-        found
-    }
-
-    /// Stores the nearest hit of each ray, or [`Hit::MISS`], in `hits`. Rays are in world space. `from` holds for each ray the
-    /// triangle on which it starts, a hint as for [`Self::nearest`]; without hints it is `None`. Coherent rays that are adjacent
-    /// in the slice are traced fastest.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
+    /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
     #[inline]
-    pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
-        check_lengths(rays, from, hits.len());
+    pub(crate) fn nearest_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
                 object::nearest_to(object, ray, hint(start_primitive(from, 0), instance), instance, hit);
@@ -205,7 +209,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::nearest_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
+    /// As [`Self::nearest_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
     fn nearest_general(
         &self,
@@ -244,13 +248,9 @@ impl Scene {
         }
     }
 
-    /// Stores in `found` for each ray in world space whether it hits anything. `from` is as for [`Self::nearest_batch`].
-    ///
-    /// # Panics
-    /// If the slices differ in length.
+    /// Stores for each ray whether it hits anything. `found`, and `from` if it is given, are as long as `rays`.
     #[inline]
-    pub fn any_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
-        check_lengths(rays, from, found.len());
+    pub(crate) fn any_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
                 *found = object::any(object, ray, hint(start_primitive(from, 0), instance));
@@ -259,7 +259,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::any_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
+    /// As [`Self::any_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
     fn any_general(
         &self,
@@ -291,11 +291,6 @@ impl Scene {
             }
         }
     }
-}
-
-fn check_lengths(rays: &[Ray], from: Option<&[PrimitiveRef]>, results: usize) {
-    assert_eq!(rays.len(), results, "as many results as rays");
-    assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
 }
 
 /// The triangle on which a ray of a batch starts, or [`PrimitiveRef::NONE`].

@@ -1,7 +1,7 @@
 //! Instances under transforms: closed surfaces stay closed, and hits stay within a documented distance of the exact ones.
 
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_oracle::World;
@@ -81,7 +81,7 @@ fn rays_from_inside(scene: &Scene, instance: u32, rng: &mut Rng) -> Vec<Ray> {
         let target = apply(&view.to_world, at);
         let direction = [0, 1, 2].map(|k| (target[k] - f64::from(origin[k])) as f32);
         if direction != [0.0; 3] {
-            return Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+            return Ray::new(origin, direction);
         }
     };
     (0..600).map(ray).collect()
@@ -103,12 +103,12 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
         let size = greatest(object.header.lower.into_iter().chain(object.header.upper).map(f64::from));
         let rays = rays_from_inside(&scene, instance, &mut rng);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        scene.nearest_batch(&rays, None, &mut hits);
-        scene.any_batch(&rays, None, &mut found);
+        scene.batch(&rays).nearest(&mut hits);
+        scene.batch(&rays).any(&mut found);
         let mut worst: f64 = 0.0;
         for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
             assert!(hit.is_hit() && found[i], "leak: {ray:?} within instance {instance}");
-            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), *hit);
+            assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *hit);
             let of = scene.instance(hit.primitive.instance);
             assert_eq!(hit.primitive.instance, instance, "instances stand apart: {ray:?}");
             let corners = object.triangles[hit.primitive.triangle as usize]

@@ -12,7 +12,7 @@ impl Scene {
     /// If the slices differ in length.
     pub fn nearest_accepted_batch(&self, rays: &[Ray], accept: &Accept<'_>, hits: &mut [Hit]) {
         if self.accepts_everything(accept) {
-            return self.nearest_batch(rays, None, hits);
+            return self.batch(rays).nearest(hits);
         }
         store_each(rays, hits, |ray| self.search_nearest(ray, accept).unwrap_or(Hit::MISS));
     }
@@ -23,7 +23,7 @@ impl Scene {
     /// If the slices differ in length.
     pub fn any_accepted_batch(&self, rays: &[Ray], accept: &Accept<'_>, found: &mut [bool]) {
         if self.accepts_everything(accept) {
-            return self.any_batch(rays, None, found);
+            return self.batch(rays).any(found);
         }
         store_each(rays, found, |ray| self.search_any(ray, accept));
     }

@@ -19,7 +19,7 @@ pub use accept::{Accept, Cull, Filter};
 
 use self::collect::{Any, Count, First, FirstOf, Found};
 use self::search::search;
-use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
 use std::collections::BinaryHeap;
 
@@ -32,7 +32,7 @@ impl Scene {
     /// the bit if everything is accepted.
     pub fn nearest_accepted(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
         if self.accepts_everything(accept) {
-            return Some(self.nearest(ray, PrimitiveRef::NONE)).filter(Hit::is_hit);
+            return self.nearest(ray);
         }
         self.search_nearest(ray, accept)
     }
@@ -40,7 +40,7 @@ impl Scene {
     /// Whether a ray in world space has a hit that is accepted.
     pub fn any_accepted(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
         if self.accepts_everything(accept) {
-            return self.any(ray, PrimitiveRef::NONE);
+            return self.any(ray);
         }
         self.search_any(ray, accept)
     }
@@ -53,7 +53,7 @@ impl Scene {
     /// use bth::rays::Ray;
     ///
     /// let scene = bth::open("bunny.bth")?;
-    /// let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+    /// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
     /// let mut hits = Vec::new();
     /// scene.all_hits(&ray, &Accept::default(), &mut hits);
     /// for hit in &hits {

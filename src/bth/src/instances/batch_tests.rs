@@ -235,8 +235,8 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
         world.any(&file, &rays, Some(&from), &mut found);
         let scene = Scene::with_instances(file, world);
         let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
-        scene.nearest_batch(&rays, Some(&from), &mut sole_hits);
-        scene.any_batch(&rays, Some(&from), &mut sole_found);
+        scene.batch(&rays).from(&from[..]).nearest(&mut sole_hits);
+        scene.batch(&rays).from(&from[..]).any(&mut sole_found);
         assert_eq!((&sole_hits, &sole_found), (&hits, &found), "case {case}: {rays:?}");
         assert_eq!(scene.nearest_counted(&rays[0], from[0]).0, hits[0]);
         assert_eq!(scene.touched_objects(), 1);

@@ -148,3 +148,142 @@ fn first_sign(value: f64, gradient: [impl Fn() -> f64; 3]) -> i32 {
     let signs = std::iter::once(sign(value)).chain(gradient.iter().map(|slope| sign(slope())));
     signs.into_iter().find(|sign| *sign != 0).unwrap_or(0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bth_random::Rng;
+
+    /// Fewer rounds under Miri, which takes a thousand times as long.
+    const ROUNDS: usize = if cfg!(miri) { 100 } else { 20_000 };
+
+    type Point = [i64; 3];
+
+    /// A number with its coefficients of ε, ε² and ε³.
+    type Series = [i128; 4];
+
+    fn lexicographic(series: Series) -> i32 {
+        series.into_iter().map(|x| x.signum() as i32).find(|sign| *sign != 0).unwrap_or(0)
+    }
+
+    fn minus(p: Point, q: Point) -> Point {
+        [0, 1, 2].map(|k| p[k] - q[k])
+    }
+
+    fn determinant([a, b, c]: [Point; 3]) -> i128 {
+        let [a, b, c] = [a, b, c].map(|p| p.map(i128::from));
+        NEXT.into_iter().enumerate().map(|(k, [i, j])| a[k] * (b[i] * c[j] - b[j] * c[i])).sum()
+    }
+
+    /// The value of a function that is linear in a point, at `point`, and its changes along the axes.
+    fn series(point: Point, value: impl Fn(Point) -> i128) -> Series {
+        let at = value(point);
+        let slope = |k: usize| {
+            let mut moved = point;
+            moved[k] += 1;
+            value(moved) - at
+        };
+        [at, slope(0), slope(1), slope(2)]
+    }
+
+    /// The rule in integers, by differences of values in place of the formulas of gradients. The range is in units of 1/4.
+    fn expected(o: Point, d: Point, [a, b, c]: [Point; 3], range: [i64; 2]) -> i32 {
+        let side = |p, q| lexicographic(series(o, |o| determinant([d, minus(p, o), minus(q, o)])));
+        let sides = [side(b, c), side(c, a), side(a, b)];
+        if sides[0] == 0 || sides != [sides[0]; 3] {
+            return 0;
+        }
+        let whole = determinant([d, minus(b, a), minus(c, a)]);
+        assert_eq!(whole.signum() as i32, sides[0]);
+        let after = |quarters: i64| {
+            let value =
+                |o| 4 * determinant([minus(a, o), minus(b, o), minus(c, o)]) - i128::from(quarters) * whole;
+            lexicographic(series(o, value)) * sides[0]
+        };
+        if after(range[0]) > 0 && after(range[1]) < 0 { sides[0] } else { 0 }
+    }
+
+    #[test]
+    fn small_integers_agree_with_the_rule_in_integers() {
+        let mut rng = Rng::new(23);
+        let (mut crossed, mut degenerate) = (0, 0);
+        for round in 0..ROUNDS {
+            let range = [2, 4, 40, 1 << 20][round % 4];
+            let mut draw = || [(); 3].map(|()| rng.below(2 * range + 1) as i64 - range as i64);
+            let (o, corners) = (draw(), [draw(), draw(), draw()]);
+            let target = draw();
+            let d = if round % 8 < 4 { target } else { minus(corners[round % 3], o) };
+            if d == [0; 3] {
+                continue;
+            }
+            let ends = if round % 3 == 0 { [0, 8] } else { [-(round as i64 % 9), round as i64 % 7] };
+            // A power of two, which changes no sign.
+            let scale = [0, -100, 90, -149][round / 4 % 4];
+            let scaled = |p: Point| p.map(|x| (x as f64 * 2f64.powi(scale)) as f32);
+            let ray = Ray::new(scaled(o), scaled(d)).with_range(ends[0] as f32 / 4.0, ends[1] as f32 / 4.0);
+            let found = crossing(&ray, corners.map(scaled));
+            assert_eq!(found, expected(o, d, corners, ends), "round {round}: {ray:?}, {corners:?}");
+            let [a, b, c] = corners;
+            assert_eq!(found, crossing(&ray, [b, c, a].map(scaled)));
+            assert_eq!(found, -crossing(&ray, [b, a, c].map(scaled)));
+            crossed += usize::from(found != 0);
+            let [a, b, c] = [a, b, c].map(|p| minus(p, o));
+            degenerate += usize::from(
+                [[d, a, b], [d, b, c], [d, c, a], [a, b, c]].into_iter().any(|m| determinant(m) == 0),
+            );
+        }
+        assert!(
+            crossed > ROUNDS / 50 && degenerate > ROUNDS / 4,
+            "{crossed} crossed, {degenerate} degenerate"
+        );
+    }
+
+    /// The faces of a tetrahedron, counterclockwise from outside if it is positive.
+    fn faces([a, b, c, d]: [[f32; 3]; 4]) -> [[[f32; 3]; 3]; 4] {
+        [[a, c, b], [a, b, d], [b, c, d], [c, a, d]]
+    }
+
+    #[test]
+    fn a_closed_surface_is_crossed_as_often_in_as_out_and_ranges_add_up() {
+        let mut rng = Rng::new(29);
+        let (mut passed, mut on) = (0, 0);
+        for round in 0..ROUNDS / 4 {
+            let range = [1, 2, 5][round % 3];
+            let scale = [1.0, 1e-40, 3e37, 1e-20][round / 3 % 4];
+            let mut draw = || [(); 3].map(|()| (rng.below(2 * range + 1) as f32 - range as f32) * scale);
+            let corners = [draw(), draw(), draw(), draw()];
+            let (origin, direction) = (draw(), draw());
+            if direction == [0.0; 3] {
+                continue;
+            }
+            let sum = |from: f32, to: f32| {
+                let ray = Ray::new(origin, direction).with_range(from, to);
+                faces(corners).map(|face| crossing(&ray, face)).iter().sum::<i32>()
+            };
+            assert_eq!(sum(f32::NEG_INFINITY, f32::INFINITY), 0, "round {round}");
+            let ahead = sum(0.0, f32::INFINITY);
+            assert_eq!(sum(0.0, 1.0) + sum(1.0, f32::INFINITY), ahead, "round {round}");
+            for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 1.0], [2.0, -1.0, 3.0]] {
+                let ray = Ray::new(origin, direction);
+                let winding: i32 = faces(corners).iter().map(|&face| crossing(&ray, face)).sum();
+                assert_eq!(winding, ahead, "round {round}: the winding number depends on the direction");
+            }
+            passed += usize::from(ahead != 0);
+            on += usize::from(corners.contains(&origin));
+        }
+        assert!(passed >= ROUNDS / 1000 && on >= ROUNDS / 100, "{passed} inside, {on} at a corner");
+    }
+
+    #[test]
+    fn ranges_of_nan_and_empty_ranges_hold_no_crossing() {
+        let triangle = [[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+        let ray = Ray::new([1.0, 1.0, -1.0], [0.0, 0.0, 1.0]);
+        assert_eq!(crossing(&ray, triangle), 1);
+        for (from, to) in
+            [(f32::NAN, 2.0), (0.0, f32::NAN), (1.0, 1.0), (2.0, 0.0), (f32::INFINITY, f32::INFINITY)]
+        {
+            assert_eq!(crossing(&ray.with_range(from, to), triangle), 0, "{from} to {to}");
+        }
+        assert_eq!(crossing(&ray.with_range(f32::NEG_INFINITY, f32::INFINITY), triangle), 1);
+    }
+}

@@ -16,6 +16,7 @@
 
 mod batch;
 mod bvh;
+mod crossing;
 mod enumerate;
 mod hits;
 mod instances;
@@ -31,6 +32,7 @@ mod tets;
 
 pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use crossing::Crossings;
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};

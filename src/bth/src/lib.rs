@@ -16,6 +16,7 @@
 
 mod batch;
 mod bvh;
+mod closest;
 mod instances;
 mod intersect;
 mod motion;
@@ -28,6 +29,7 @@ mod tets;
 
 pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use closest::{Closest, Feature};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;

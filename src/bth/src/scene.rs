@@ -111,8 +111,9 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
+    /// The sections of an object below [`Self::object_count`].
     #[inline]
-    fn view(&self, object: u32) -> &ObjectView<'_> {
+    pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
         self.file.view(object).expect("an object below object_count, checked when opened")
     }
 

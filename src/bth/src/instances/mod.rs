@@ -20,4 +20,5 @@ mod visit_queue;
 mod world;
 
 pub use world::Update;
-pub(crate) use world::World;
+pub(crate) use top_level::INSTANCE;
+pub(crate) use world::{Placed, World};

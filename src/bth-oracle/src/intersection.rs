@@ -35,7 +35,7 @@ pub(crate) fn integer(x: f32) -> BigInt {
     if x.is_sign_negative() { -magnitude } else { magnitude }
 }
 
-fn sub(a: &Point, b: &Point) -> Point {
+pub(crate) fn sub(a: &Point, b: &Point) -> Point {
     [0, 1, 2].map(|k| &a[k] - &b[k])
 }
 

@@ -79,7 +79,8 @@ fn spectral_norm(rows: &[[f64; 3]; 3]) -> f64 {
     if greatest == 0.0 {
         return 0.0;
     }
-    let row_norm = |m: &[[f64; 3]; 3]| m.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0f64, f64::max);
+    let row_norm =
+        |m: &[[f64; 3]; 3]| m.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0f64, f64::max);
     let product = |a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]| {
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j]))
     };

@@ -19,6 +19,6 @@ mod traverse;
 mod visit_queue;
 mod world;
 
-pub use world::Update;
 pub(crate) use top_level::INSTANCE;
+pub use world::Update;
 pub(crate) use world::{Placed, World};

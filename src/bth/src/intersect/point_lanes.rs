@@ -61,7 +61,11 @@ impl LanePoint {
     #[inline(always)]
     pub(crate) fn lanes<S: Simd>(&self, s: S) -> PointLanes<S> {
         let [x, y, z] = self.point;
-        PointLanes { point: [s.splat(x), s.splat(y), s.splat(z)], scale: s.splat(self.scale), origin: self.point }
+        PointLanes {
+            point: [s.splat(x), s.splat(y), s.splat(z)],
+            scale: s.splat(self.scale),
+            origin: self.point,
+        }
     }
 }
 

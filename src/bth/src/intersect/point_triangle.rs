@@ -218,7 +218,8 @@ pub(crate) fn locate(point: [f32; 3], corners: [[f32; 3]; 3], feature: Feature) 
             let i = usize::from(i);
             let j = (i + 1) % 3;
             let edge = difference(corners[j], corners[i]);
-            let (from, to) = (dot(edge, difference(point, corners[i])), dot(edge, difference(corners[j], point)));
+            let (from, to) =
+                (dot(edge, difference(point, corners[i])), dot(edge, difference(corners[j], point)));
             let t = (from / (from + to)).clamp(0.0, 1.0);
             let mut weight = [0.0; 3];
             (weight[i], weight[j]) = (1.0 - t, t);

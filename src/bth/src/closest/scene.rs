@@ -46,8 +46,9 @@ impl Scene {
                 *closest = None;
                 continue;
             };
-            // A bound from the triangle of the point before: it never changes the result.
-            if let Some(previous) = &previous {
+            // The triangle of the point before gives a bound, which never changes the result. For points farther from each other
+            // than from the surface it is of no use.
+            if let Some(previous) = previous.as_ref().filter(|previous| previous.is_near(point)) {
                 search.offer_result(previous);
             }
             searcher.search(&mut search);

@@ -55,6 +55,12 @@ impl Search {
         }
     }
 
+    /// Whether a point is nearer to the point of this search than that to the best triangle.
+    pub(super) fn is_near(&self, point: &[f32; 3]) -> bool {
+        let difference = [0, 1, 2].map(|k| f64::from(point[k]) - f64::from(self.point[k]));
+        difference.iter().map(|x| x * x).sum::<f64>() < self.squared
+    }
+
     /// Offers the result of another search.
     pub(super) fn offer_result(&mut self, other: &Search) {
         if other.primitive != PrimitiveRef::NONE {

@@ -2,7 +2,7 @@
 
 use super::placed::PlacedObject;
 use super::search::Search;
-use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf};
+use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
@@ -88,6 +88,8 @@ impl Kernel for WalkKernel<'_> {
                 let (count, nearest) = s.sort_far_to_near(bits, squared, children, free.codes, free.keys);
                 code = child[nearest % WIDTH];
                 free.push(count);
+                // The entry below the new top is most often needed next.
+                prefetch(s, Wide, node_base, stack.below());
             }
             let (mut indexed, mut raw) = (None, None);
             if let Some(leaf) = indexed_leaf(object, node_base, code, &mut indexed) {
@@ -134,6 +136,9 @@ impl ObjectWalk<'_> {
         valid: u32,
         limit: f32,
     ) -> u32 {
+        if block.is_beyond(s, point, limit) {
+            return 0;
+        }
         let bounds = TriangleLanes::new(s, &block.relative(s, point));
         // In object space, the least upper bound says nothing about which triangle is closest in world space.
         let least = if self.placed.is_none() { bounds.least_upper_bound(s, valid) } else { limit };

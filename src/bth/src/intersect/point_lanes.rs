@@ -107,6 +107,26 @@ impl<S: Simd> PointLanes<S> {
 pub(crate) trait CornerLanes {
     /// The corners relative to a point, scaled: `[corner][axis]`.
     fn relative<S: Simd>(&self, s: S, point: &PointLanes<S>) -> [[S::F; 3]; 3];
+    /// Whether all triangles certainly have a squared distance above `limit`, by the bound for one q for all of them. Most leaves
+    /// whose boxes are near enough are excluded so, in a tenth of the time that [`TriangleLanes`] takes.
+    fn is_beyond<S: Simd>(&self, s: S, point: &PointLanes<S>, limit: f32) -> bool;
+}
+
+/// The bounds for a q that leads to one of the points, given all points of a leaf.
+#[inline(always)]
+fn common_bounds<S: Simd>(s: S, points: &[[S::F; 3]]) -> TriangleLanes<S> {
+    let zero = s.splat(0.0);
+    let (mut q, mut square) = ([zero; 3], zero);
+    for k in 0..3 {
+        q[k] = s.lookup(points[0][k], s.splat_u(0));
+        square = s.fma(q[k], q[k], square);
+    }
+    let (mut support, mut reach) = (square, zero);
+    for point in points {
+        support = s.min(support, dot(s, q, *point));
+        reach = s.max(reach, s.add(s.add(s.abs(point[0]), s.abs(point[1])), s.abs(point[2])));
+    }
+    TriangleLanes { square, support, reach }
 }
 
 impl CornerLanes for IndexedLeaf {
@@ -122,6 +142,11 @@ impl CornerLanes for IndexedLeaf {
         }
         corners
     }
+    #[inline(always)]
+    fn is_beyond<S: Simd>(&self, s: S, point: &PointLanes<S>, limit: f32) -> bool {
+        let vertex = point.relative(s, &self.vertex);
+        common_bounds(s, &[vertex]).candidates(s, u32::MAX >> LANES, limit) == 0
+    }
 }
 
 impl CornerLanes for RawLeaf {
@@ -132,6 +157,10 @@ impl CornerLanes for RawLeaf {
             point.relative(s, &self.corner[1]),
             point.relative(s, &self.corner[2]),
         ]
+    }
+    #[inline(always)]
+    fn is_beyond<S: Simd>(&self, s: S, point: &PointLanes<S>, limit: f32) -> bool {
+        common_bounds(s, &self.relative(s, point)).candidates(s, u32::MAX >> LANES, limit) == 0
     }
 }
 

@@ -100,7 +100,7 @@ pub(crate) fn squared_distance(point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64,
         corner: [difference(a, point), difference(b, point), difference(c, point)],
         edge: [difference(b, a), difference(c, b), difference(a, c)],
     };
-    let normal = cross(relative.edge[0], relative.edge[2]).map(|x| -x);
+    let normal = cross(relative.edge[2], relative.edge[0]);
     let size = greatest(relative.edge[0]) * greatest(relative.edge[2]);
     let [outside, inside] = relative.sides(normal, size);
     if inside {
@@ -142,7 +142,8 @@ impl Relative {
         if greatest(normal) < CERTAIN * CROSS_ERROR * size {
             normal = ExactTriangle::new(corners).normal();
         }
-        let far = self.corner.map(greatest);
+        let [a, b, c] = self.corner;
+        let far = [greatest(a), greatest(b), greatest(c)];
         let nearest = if far[0] <= far[1] && far[0] <= far[2] {
             0
         } else if far[1] <= far[2] {
@@ -164,7 +165,8 @@ impl Relative {
     /// Squared distance of the point to the nearest of the edges, and the feature.
     #[inline(always)]
     fn boundary(&self, point: [f32; 3], corners: [[f32; 3]; 3]) -> (f64, Feature) {
-        let squared = self.corner.map(|p| dot(p, p));
+        let [a, b, c] = self.corner;
+        let squared = [dot(a, a), dot(b, b), dot(c, c)];
         let mut best = (squared[0], Feature::Vertex(0));
         for i in 1..3 {
             if squared[i] < best.0 {
@@ -193,17 +195,19 @@ impl Relative {
 /// more than [`ACCURACY`]. The same bits for both directions of the edge.
 #[inline(always)]
 fn line(p: [f64; 3], q: [f64; 3], edge: [f64; 3], nearer: Option<Ordering>) -> Option<f64> {
-    let from = |p: [f64; 3]| {
-        let area = cross(p, edge);
-        let certain = greatest(area) >= CERTAIN * CROSS_ERROR * greatest(p) * greatest(edge);
-        certain.then(|| dot(area, area))
-    };
     let area = match nearer {
-        Some(Ordering::Less) => from(p)?,
-        Some(Ordering::Greater) => from(q)?,
-        _ => from(p)?.min(from(q)?),
+        Some(Ordering::Less) => squared_area(p, edge)?,
+        Some(Ordering::Greater) => squared_area(q, edge)?,
+        _ => squared_area(p, edge)?.min(squared_area(q, edge)?),
     };
     Some(area / dot(edge, edge))
+}
+
+/// The squared length of p × edge. `None` where cancellation costs more than [`ACCURACY`].
+#[inline(always)]
+fn squared_area(p: [f64; 3], edge: [f64; 3]) -> Option<f64> {
+    let area = cross(p, edge);
+    (greatest(area) >= CERTAIN * CROSS_ERROR * greatest(p) * greatest(edge)).then_some(dot(area, area))
 }
 
 /// The closest point of a triangle, given the feature on which it lies.
@@ -238,8 +242,11 @@ pub(crate) fn locate(point: [f32; 3], corners: [[f32; 3]; 3], feature: Feature) 
 
 /// Barycentric weights of the projection of a point to the plane of a triangle, limited to the triangle.
 fn face_weights(point: [f32; 3], corners: [[f32; 3]; 3]) -> [f64; 3] {
-    let exact = ExactTriangle::new(corners);
-    let normal = exact.normal();
+    let [ab, ac] = [difference(corners[1], corners[0]), difference(corners[2], corners[0])];
+    let mut normal = cross(ab, ac);
+    if greatest(normal) < CERTAIN * CROSS_ERROR * greatest(ab) * greatest(ac) {
+        normal = ExactTriangle::new(corners).normal();
+    }
     let squared = dot(normal, normal);
     let relative = corners.map(|p| difference(p, point));
     let height = dot(normal, relative[0]) / squared;

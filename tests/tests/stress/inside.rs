@@ -168,3 +168,30 @@ fn the_ends_of_the_range_of_f32_are_exact() {
         assert_eq!(found.defects(), 0, "{unit}: {found:#?}");
     }
 }
+
+/// Closed models that lie beside the checkout, in `BTH_DATA` or `../shared/data`.
+#[test]
+#[allow(clippy::print_stdout, reason = "it prints what it skips")]
+fn winding_numbers_in_closed_scans_are_exact() {
+    let folder = std::env::var_os("BTH_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        std::path::PathBuf::from,
+    );
+    for name in ["static/fandisk.ply", "static/neptun_torus_knot.ply", "messy/thingi/112544.off"] {
+        let path = folder.join(name);
+        if !path.is_file() {
+            println!("SKIPPED: no {} (set BTH_DATA to the folder of the test models)", path.display());
+            continue;
+        }
+        let options = options(Structure::Bvh, RecordKind::Link32, false);
+        let (file, _) = bth_compile::pipeline::compile(&path, &options, &bth_compile::Silent).unwrap();
+        let scene = bth::from_bytes(&file.bytes).unwrap();
+        let corners = corners_of(&scene);
+        assert!(is_closed(&corners), "{name}");
+        assert_eq!(scene.is_closed(0), Some(true), "{name}");
+        let mut found = InsideStatistics::default();
+        run_inside(&scene, &corners, 20 * 1024, 256, 3, &mut found);
+        assert_eq!(found.defects(), 0, "{name}: {found:#?}");
+        assert!(found.inside > found.points / 50 && found.aimed > found.points / 8, "{name}: {found:?}");
+    }
+}

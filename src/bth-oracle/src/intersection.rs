@@ -107,6 +107,14 @@ pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
 }
 
+/// Whether the direction of a ray and the normal (b-a)×(c-a) of a triangle point to opposite sides, so that the ray comes from
+/// the side from which the corners appear counter-clockwise. False if they are perpendicular.
+pub fn is_front(ray: &Ray, corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(integer));
+    let whole = determinant(&ray.direction.map(integer), &sub(&b, &a), &sub(&c, &a));
+    whole.is_negative()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

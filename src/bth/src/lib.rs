@@ -16,6 +16,7 @@
 
 mod batch;
 mod bvh;
+mod closest;
 mod crossing;
 mod enumerate;
 mod hits;
@@ -32,6 +33,7 @@ mod tets;
 
 pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use closest::{Closest, Feature};
 pub use crossing::Crossings;
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;

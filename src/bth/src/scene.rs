@@ -124,7 +124,7 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
-    /// As [`Self::object`], without a copy.
+    /// The sections of an object below [`Self::object_count`].
     #[inline]
     pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
         self.file.view(object).expect("an object below object_count, checked when opened")

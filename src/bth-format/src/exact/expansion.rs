@@ -147,6 +147,18 @@ impl<const PARTS: usize> Expansion<PARTS> {
         self.add_determinant(-1.0, a, b, o);
     }
 
+    /// Adds the product of two other sums. The parts of each, multiplied with one another, must neither over- nor underflow, as
+    /// is true of sums of products of two `f32` values.
+    pub fn add_product_of<const A: usize, const B: usize>(&mut self, a: &Expansion<A>, b: &Expansion<B>) {
+        for &x in &a.part[..a.len] {
+            for &y in &b.part[..b.len] {
+                let (product, error) = two_product(x, y);
+                self.add(error);
+                self.add(product);
+            }
+        }
+    }
+
     /// The sum, rounded; its sign is exact.
     pub fn value(&self) -> f64 {
         self.part[..self.len].iter().sum()
@@ -175,6 +187,27 @@ mod tests {
             let want = a as i128 * b as i128 * c as i128;
             let got: i128 = e.part[..e.len].iter().map(|&x| x as i128).sum();
             assert_eq!(got, want);
+        }
+    }
+
+    #[test]
+    fn products_of_sums_are_exact_where_integers_can_tell() {
+        let mut rng = Rng::new(9);
+        for _ in 0..ROUNDS / 2 {
+            let mut draw = || {
+                let (mut sum, mut want) = (Expansion::<2>::new(), 0);
+                for shift in [0, 30] {
+                    let x = (rng.below(1 << 24) as i128 - (1 << 23)) << shift;
+                    want += x;
+                    sum.add(x as f64);
+                }
+                (sum, want)
+            };
+            let ((a, x), (b, y)) = (draw(), draw());
+            let mut product = Expansion::<8>::new();
+            product.add_product_of(&a, &b);
+            let got: i128 = product.part[..product.len].iter().map(|&x| x as i128).sum();
+            assert_eq!(got, x * y);
         }
     }
 

@@ -43,7 +43,7 @@ pub type Filter<'a> = dyn Fn(&Ray, &Hit) -> bool + Sync + 'a;
 ///
 /// # fn is_opaque(_: u32, _: f32, _: f32) -> bool { true }
 /// let scene = bth::open("forest.bth")?;
-/// let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+/// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
 /// let filter = |_: &Ray, hit: &Hit| is_opaque(hit.primitive.triangle, hit.u, hit.v);
 /// let accept = Accept { cull: Cull::Back, filter: Some(&filter), ..Accept::default() };
 /// if let Some(hit) = scene.nearest_accepted(&ray, &accept) {

@@ -53,7 +53,7 @@ impl Scene {
     /// use bth::rays::Ray;
     ///
     /// let scene = bth::open("bunny.bth")?;
-    /// let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
+    /// let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
     /// let mut hits = Vec::new();
     /// scene.all_hits(&ray, &Accept::default(), &mut hits);
     /// for hit in &hits {

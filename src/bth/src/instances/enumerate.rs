@@ -18,8 +18,9 @@ impl World {
     /// beyond are left out. Returns whether `visit` has ended the enumeration.
     pub(crate) fn enumerate(&self, ray: &Ray, visit: &mut dyn FnMut(u32) -> Option<f32>) -> bool {
         let top = &self.top;
-        // The comparison fails for NaN.
-        if top.is_empty() || !(ray.tmin <= ray.tmax) {
+        // False for NaN, too.
+        let has_range = ray.tmin <= ray.tmax;
+        if top.is_empty() || !has_range {
             return false;
         }
         let Some(slabs) = slabs(ray, top) else { return false };

@@ -5,6 +5,9 @@
 //! uncertain: [`exact`] computes one ray and triangle, [`exact_lanes`] sixteen pairs at a time with the same bits, and
 //! [`crossing`] decides by a rule of its own whether a ray passes through a surface. [`line`] projects points along a ray in f64,
 //! and [`prepare`] computes the per-ray constants of the box test and of the filter.
+//!
+//! The distance of a point to boxes and triangles is bounded in f32 in the same way ([`point_lanes`]) and decided in f64
+//! ([`point_triangle`]) or exactly ([`point_exact`]).
 
 pub(crate) mod boxes;
 pub(crate) mod crossing;
@@ -12,4 +15,7 @@ pub(crate) mod exact;
 pub(crate) mod exact_lanes;
 pub(crate) mod filter;
 pub(crate) mod line;
+mod point_exact;
+pub(crate) mod point_lanes;
+pub(crate) mod point_triangle;
 pub(crate) mod prepare;

@@ -16,10 +16,12 @@ mod closest;
 mod geometry;
 mod intersection;
 mod nearest;
+mod overlap;
 mod world;
 
 pub use closest::{is_root_within, squared_distance};
 pub use geometry::{Triangle, triangles};
 pub use intersection::{Intersection, intersection, to_f64};
 pub use nearest::{ExactHit, any, nearest};
+pub use overlap::overlaps_box;
 pub use world::World;

@@ -13,6 +13,7 @@
 #![warn(missing_docs)]
 
 mod closest;
+mod crossing;
 mod geometry;
 mod intersection;
 mod nearest;
@@ -20,8 +21,9 @@ mod overlap;
 mod world;
 
 pub use closest::{is_root_within, squared_distance};
+pub use crossing::{crossings, winding};
 pub use geometry::{Triangle, triangles};
-pub use intersection::{Intersection, intersection, to_f64};
+pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};
 pub use overlap::overlaps_box;
 pub use world::World;

@@ -1,6 +1,7 @@
 //! Scenes: opening of compiled files and queries by rays in world space.
 
 use crate::instances::World;
+use crate::masks::Masks;
 use crate::object;
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -28,6 +29,8 @@ pub struct Scene {
     file: File,
     /// The instances at the scene's time; `None` if the file has no scene sections.
     world: Option<World>,
+    /// The masks of instances and of groups of triangles.
+    masks: Masks,
 }
 
 /// Reads a compiled file into memory and checks every index, so that tracing is safe for any contents of the file. The time is
@@ -80,12 +83,22 @@ impl Scene {
     /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
         let world = World::new(&file)?;
-        Ok(Scene { file, world })
+        Ok(Scene { file, world, masks: Masks::default() })
     }
 
     /// The instances; `None` if the file has no scene sections.
     pub(crate) fn world(&self) -> Option<&World> {
         self.world.as_ref()
+    }
+
+    /// The masks of instances and of groups of triangles.
+    pub(crate) fn masks(&self) -> &Masks {
+        &self.masks
+    }
+
+    /// Mutable access to the masks.
+    pub(crate) fn masks_mut(&mut self) -> &mut Masks {
+        &mut self.masks
     }
 
     /// The file, and mutable access to the instances.
@@ -120,13 +133,13 @@ impl Scene {
     /// A scene with given instances.
     #[cfg(test)]
     pub(crate) fn with_instances(file: File, world: World) -> Scene {
-        Scene { file, world: Some(world) }
+        Scene { file, world: Some(world), masks: Masks::default() }
     }
 
     /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
     /// are then traced directly in the object, without the top level.
     #[inline(always)]
-    fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
+    pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
         };

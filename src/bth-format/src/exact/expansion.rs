@@ -2,7 +2,7 @@
 //!
 //! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
-//! three f32 values lie between 2^-447 and 2^384, so nothing here over- or underflows.
+//! three f32 values lie between 2^-447 and 2^384, those of four between 2^-596 and 2^512, so nothing here over- or underflows.
 
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -112,6 +112,15 @@ impl<const PARTS: usize> Expansion<PARTS> {
     /// Adds another sum.
     pub fn add_sum<const OTHER: usize>(&mut self, other: &Expansion<OTHER>) {
         other.part[..other.len].iter().for_each(|&part| self.add(part));
+    }
+
+    /// Adds another sum times a value of `f32` precision.
+    pub fn add_scaled<const OTHER: usize>(&mut self, other: &Expansion<OTHER>, factor: f64) {
+        for &part in &other.part[..other.len] {
+            let (product, error) = two_product(part, factor);
+            self.add(error);
+            self.add(product);
+        }
     }
 
     /// Adds det[d, a-o, b-o]. Where `f64` does not hold the differences, the determinant is expanded into products of three

@@ -40,5 +40,5 @@ pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;
 pub use query::Steps;
-pub use scene::{Scene, from_bytes, map, open};
+pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};

@@ -11,6 +11,7 @@ mod cutout;
 pub mod error;
 pub mod gltf;
 mod import;
+mod memory;
 mod mesh;
 pub mod monitor;
 mod number;
@@ -29,6 +30,7 @@ pub use error::{Error, Place, Result};
 pub use import::{
     import, import_bytes, import_cutouts, import_gltf_cutouts, import_gltf_meshes, source_files,
 };
+pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities};
 pub use monitor::{Monitor, Silent};
 pub use source::read_file;

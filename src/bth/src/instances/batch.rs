@@ -168,7 +168,7 @@ impl World {
 
     /// The placement of an instance that is in the top level.
     #[inline]
-    pub(super) fn placement(&self, instance: u32) -> &Placement {
+    pub(crate) fn placement(&self, instance: u32) -> &Placement {
         self.placements[instance as usize].as_ref().expect("the top level holds visible instances")
     }
 

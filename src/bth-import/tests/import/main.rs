@@ -1,6 +1,7 @@
 //! Import of models: what each format yields, what is refused and where, and the collected test models.
 
 mod compressed;
+mod cutouts;
 mod data;
 mod gltf;
 mod obj;

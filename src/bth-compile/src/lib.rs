@@ -5,7 +5,7 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
+//! | [`opacity`], [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
 //! | [`scene`] | many objects, each by the pipeline, into one file |
@@ -18,6 +18,7 @@ pub mod coordinates;
 pub mod costs;
 pub mod jobs;
 pub mod marks;
+pub mod opacity;
 mod options;
 pub mod pipeline;
 pub mod scene;

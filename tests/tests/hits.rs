@@ -97,12 +97,12 @@ fn check_queries(scene: &Scene, ray: &Ray, context: &str) {
         }
         check_filter_calls(scene, ray, &expected, filter);
     }
-    let nearest = scene.nearest(ray, PrimitiveRef::NONE);
+    let nearest = scene.nearest(ray);
     let accept = Accept { filter: Some(&everything), ..Accept::default() };
-    let accepted = scene.nearest_accepted(ray, &accept).unwrap_or(Hit::MISS);
-    assert_eq!(bits(&accepted), bits(&nearest), "{}", context());
-    assert_eq!(scene.nearest_accepted(ray, &Accept::default()), Some(nearest).filter(Hit::is_hit));
-    assert_eq!(scene.any_accepted(ray, &Accept::default()), nearest.is_hit(), "{}: {nearest:?}", context());
+    let accepted = scene.nearest_accepted(ray, &accept);
+    assert_eq!(accepted.as_ref().map(bits), nearest.as_ref().map(bits), "{}", context());
+    assert_eq!(scene.nearest_accepted(ray, &Accept::default()), nearest);
+    assert_eq!(scene.any_accepted(ray, &Accept::default()), nearest.is_some(), "{}: {nearest:?}", context());
     let by_side = |cull| all_hits(scene, ray, &Accept { cull, ..Accept::default() });
     let (front, back) = (by_side(Cull::Back), by_side(Cull::Front));
     let mut sides = all_bits(&[front.clone(), back.clone()].concat());
@@ -355,7 +355,7 @@ fn hits_in_instances_are_those_that_the_nearest_hit_finds_one_after_the_other() 
         // Directions that are scaled in an object's space round the range, too, so only others are ended at hits.
         let ordinary = i % 11 != 6 && i % 11 != 7;
         while let Some(hit) = hits.peek().copied().filter(|_| ordinary) {
-            assert_eq!(bits(&scene.nearest(&rest, PrimitiveRef::NONE)), bits(&hit), "{rest:?}");
+            assert_eq!(scene.nearest(&rest).as_ref().map(bits), Some(bits(&hit)), "{rest:?}");
             rest.tmin = hit.t.next_up();
             while hits.next_if(|next| next.t == hit.t).is_some() {
                 found += 1;
@@ -383,7 +383,7 @@ fn masks_hide_instances_from_rays_without_a_common_bit() {
                 assert_eq!(scene.count_hits(ray, &accept), expected.len());
             }
             // Queries without conditions ignore masks.
-            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), unmasked.nearest(ray, PrimitiveRef::NONE));
+            assert_eq!(scene.nearest(ray), unmasked.nearest(ray));
         }
         for instance in 0..masks.len() as u32 {
             if rng.below(2) == 0 {

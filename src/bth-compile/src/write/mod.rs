@@ -26,6 +26,7 @@ use crate::error::{Error, Result};
 pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     let file = bth_format::File::from_bytes(bytes).map_err(defect)?;
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
+    file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
     Ok(file)
 }

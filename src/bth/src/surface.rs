@@ -4,6 +4,7 @@
 //! What a file keeps is decided when it is compiled: positions of triangles by default (not with `--no-geometry`), normals and
 //! texture coordinates with `--attributes`, groups, materials and names with `--names`.
 
+use crate::intersect::point_exact::exact_normal;
 use crate::rays::{Hit, PrimitiveRef};
 use crate::scene::Scene;
 use bth_format::layout::NONE;
@@ -79,10 +80,10 @@ impl Scene {
             return None;
         }
         let view = self.object(object);
-        let corners = triangle(&view, id)?.map(|corner| corner.map(f64::from));
+        let corners = triangle(&view, id)?;
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let weights = [1.0 - u - v, u, v];
-        let object_position = weighted(weights, corners);
+        let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
         let object_geometric_normal = plane_normal(corners)?;
         let object_normal = interpolated_normal(&view, id, weights, object_geometric_normal);
         let to_world = |normal: [f64; 3]| unit(self.normal_to_world(instance, normal)).unwrap_or(normal);
@@ -182,13 +183,20 @@ fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
     Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
 }
 
+/// Normals are computed exactly if the error bound of f64 exceeds this share of their greatest component.
+const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// The normal of a triangle's plane; `None` for a triangle of zero area, which is never hit.
-fn plane_normal([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 3]> {
+fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
+    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
     let edge = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
     let (e, f) = (edge(b), edge(c));
-    // Scaled separately, since the products of components of long or short edges would overflow or underflow.
-    let (e, f) = (scaled(e)?, scaled(f)?);
-    unit([e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]])
+    let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
+    let normal = products.map(|(p, q)| p - q);
+    // The products of differences of f32 neither overflow nor underflow in f64. Each component has at most 7 roundings.
+    let error = products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
+    let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
 }
 
 /// The interpolated normal at barycentric weights, in the space of the object.
@@ -229,17 +237,14 @@ fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
 }
 
-/// A vector divided by its greatest component; `None` for zero and for what is not finite.
-fn scaled(v: [f64; 3]) -> Option<[f64; 3]> {
-    let greatest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let scaled = v.map(|x| x / greatest);
-    (greatest > 0.0 && scaled.iter().all(|x| x.is_finite())).then_some(scaled)
-}
-
-/// A vector divided by its length; `None` for zero and for what is not finite. Scaled first, since the squares of components may
-/// overflow or underflow.
+/// A vector divided by its length; `None` for zero and for what is not finite. It is divided by its greatest component first, since
+/// the squares of components may overflow or underflow.
 fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
-    let v = scaled(v)?;
+    let greatest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let v = v.map(|x| x / greatest);
+    if !(greatest > 0.0 && v.iter().all(|x| x.is_finite())) {
+        return None;
+    }
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     Some(v.map(|x| x / length))
 }

@@ -55,7 +55,7 @@ pub(crate) fn compile_model(
     mut clock: Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let (mesh, import) = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let (mesh, import) = clock.time("mesh", || stages.import(model, options.wanted(), monitor))?;
     let (object, reports) = compile_mesh(model.path, mesh, options, stages, &mut clock, monitor)?;
     let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());

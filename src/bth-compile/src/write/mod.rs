@@ -3,6 +3,7 @@
 mod atomic;
 mod builder;
 mod content;
+mod groups;
 mod object;
 mod scene;
 mod whole;
@@ -12,6 +13,7 @@ pub use builder::FileBuilder;
 pub(crate) use builder::SectionHead;
 pub(crate) use content::Bytes;
 pub use content::Content;
+pub use groups::{GroupParts, object_names};
 pub use object::{ObjectParts, Source, object};
 pub use scene::{SceneParts, scene};
 pub use whole::name_if_whole;

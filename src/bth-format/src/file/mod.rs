@@ -270,7 +270,7 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], and `BTH-F101` to `BTH-F141`.
+    /// As [`Self::object`], and `BTH-F101` to `BTH-F147`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;

@@ -30,6 +30,7 @@ mod query;
 pub mod rays;
 mod scene;
 mod simd;
+mod surface;
 mod tets;
 
 pub use batch::RayBatch;
@@ -44,3 +45,4 @@ pub use object::Hinted;
 pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
+pub use surface::{Bounds, SurfacePoint};

@@ -26,7 +26,7 @@ use texture::Pyramid;
 /// Words of the micro-triangles of a mesh, before equal patterns are merged: 256 MiB. Beyond it levels are lowered.
 const MAX_WORDS: usize = 1 << 26;
 
-/// Triangles whose patterns are made at a time; at most 64 KiB each.
+/// Triangles whose patterns are made between two looks at whether the user cancelled.
 const BATCH: usize = 512;
 
 /// Adds the opacity of its triangles to a mesh and its report.
@@ -68,31 +68,41 @@ pub fn compile(
     let surface = |material| Surface { material, pyramid: material.image.map(|row: usize| &pyramids[row]) };
     let surfaces: Vec<Surface<'_>> = cutouts.materials.iter().map(surface).collect();
     let footprint = |t: &CutoutTriangle| Footprint::new(&surfaces[t.material as usize], &t.corners);
-    let plans: Vec<Plan> =
-        cutouts.triangles.par_iter().map(|triangle| subdivide::plan(&footprint(triangle))).collect();
+    let (distinct, kinds) = distinct(&cutouts.triangles);
+    let plans: Vec<Plan> = distinct.par_iter().map(|t| subdivide::plan(&footprint(t))).collect();
     monitor.check()?;
     let most = most_levels(&plans);
-    let mut writer = OpacityWriter::new(mesh);
-    for (triangles, plans) in cutouts.triangles.chunks(BATCH).zip(plans.chunks(BATCH)) {
-        let patterns: Vec<Option<Pattern>> = triangles
-            .par_iter()
-            .zip(plans)
-            .map(|(triangle, plan)| match plan {
-                Plan::Whole(_) => None,
-                Plan::Micro(level) => Some(subdivide::pattern(&footprint(triangle), (*level).min(most))),
-            })
-            .collect();
-        for ((triangle, plan), pattern) in triangles.iter().zip(plans).zip(patterns) {
-            match (plan, pattern) {
-                (Plan::Whole(state), _) => writer.whole(triangle.triangle, *state),
-                (Plan::Micro(_), Some(pattern)) => writer.micro(triangle.triangle, pattern),
-                (Plan::Micro(_), None) => {}
-            }
-        }
-        monitor.advance(triangles.len() as u64);
+    let mut patterns = Vec::with_capacity(distinct.len());
+    for (triangles, plans) in distinct.chunks(BATCH).zip(plans.chunks(BATCH)) {
+        let pattern = |(triangle, plan): (&CutoutTriangle, &Plan)| match plan {
+            Plan::Whole(state) => Pattern::whole(*state),
+            Plan::Micro(level) => subdivide::pattern(&footprint(triangle), (*level).min(most)),
+        };
+        patterns.par_extend(triangles.par_iter().zip(plans).map(pattern));
         monitor.check()?;
     }
+    let mut writer = OpacityWriter::new(mesh);
+    let rows: Vec<TriangleOpacity> = patterns.iter().map(|pattern| writer.row(pattern)).collect();
+    for (triangle, kind) in cutouts.triangles.iter().zip(kinds) {
+        writer.add(triangle.triangle, rows[kind], &patterns[kind]);
+    }
+    monitor.advance(cutouts.triangles.len() as u64);
     Ok(writer.finish())
+}
+
+/// The triangles that differ in more than their number, and for each triangle which of them it is like.
+fn distinct(triangles: &[CutoutTriangle]) -> (Vec<CutoutTriangle>, Vec<usize>) {
+    let mut known = HashMap::new();
+    let mut distinct = Vec::new();
+    let mut like = |triangle: &CutoutTriangle| {
+        let corners = triangle.corners.map(|c| [c.uv[0], c.uv[1], c.alpha].map(f32::to_bits));
+        *known.entry((triangle.material, corners)).or_insert_with(|| {
+            distinct.push(*triangle);
+            distinct.len() - 1
+        })
+    };
+    let kinds = triangles.iter().map(&mut like).collect();
+    (distinct, kinds)
 }
 
 /// The greatest level for which all patterns have room.
@@ -130,36 +140,27 @@ impl<'a> OpacityWriter<'a> {
         }
     }
 
-    fn whole(&mut self, triangle: u32, state: Opacity) {
-        self.count(triangle, [0, 1, 2].map(|k| f64::from(u8::from(k == state as u32))));
-        self.opacities.rows[triangle as usize] = TriangleOpacity::Whole(state).code();
+    /// The row for a pattern, whose words are added unless an equal one was there before.
+    fn row(&mut self, pattern: &Pattern) -> TriangleOpacity {
+        if pattern.level == 0 {
+            return TriangleOpacity::Whole(Opacity::from_code(pattern.words[0]).unwrap_or(Opacity::Unknown));
+        }
+        let next = self.opacities.micro.len() as u32;
+        let word = *self.first.entry(pattern.clone()).or_insert(next);
+        if word == next {
+            self.opacities.micro.extend_from_slice(&pattern.words);
+        }
+        TriangleOpacity::Micro { level: pattern.level, word }
     }
 
-    fn micro(&mut self, triangle: u32, pattern: Pattern) {
-        let Pattern { level, count, .. } = pattern;
-        let micros = count.iter().sum::<u32>();
-        self.count(triangle, count.map(|k| f64::from(k) / f64::from(micros)));
-        let row = match level {
-            0 => TriangleOpacity::Whole(Opacity::from_code(pattern.words[0]).unwrap_or(Opacity::Unknown)),
-            _ => {
-                self.report.subdivided += 1;
-                let next = self.opacities.micro.len() as u32;
-                if let Some(&word) = self.first.get(&pattern) {
-                    TriangleOpacity::Micro { level, word }
-                } else {
-                    self.opacities.micro.extend_from_slice(&pattern.words);
-                    self.first.insert(pattern, next);
-                    TriangleOpacity::Micro { level, word: next }
-                }
-            }
-        };
-        self.opacities.rows[triangle as usize] = row.code();
-    }
-
-    fn count(&mut self, triangle: u32, shares: [f64; 3]) {
+    /// Stores the row of a triangle, and counts its area.
+    fn add(&mut self, triangle: u32, row: TriangleOpacity, pattern: &Pattern) {
+        let micros = f64::from(pattern.count.iter().sum::<u32>());
         let area = 0.5 * double_area(corners(self.mesh, triangle)).length();
+        (0..3).for_each(|k| self.area[k] += area * (f64::from(pattern.count[k]) / micros));
         self.report.triangles += 1;
-        (0..3).for_each(|k| self.area[k] += area * shares[k]);
+        self.report.subdivided += u64::from(pattern.level > 0);
+        self.opacities.rows[triangle as usize] = row.code();
     }
 
     fn finish(self) -> Option<(TriangleOpacities, OpacityReport)> {

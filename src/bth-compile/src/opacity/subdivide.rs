@@ -28,6 +28,13 @@ pub(super) struct Pattern {
     pub(super) count: [u32; 3],
 }
 
+impl Pattern {
+    /// One state.
+    pub(super) fn whole(state: Opacity) -> Self {
+        pack(0, &[state as u8])
+    }
+}
+
 /// A part of a subdivided triangle: the corner at (column, row) of those of its level, upright or upside down.
 #[derive(Clone, Copy)]
 struct Part {

@@ -1,5 +1,6 @@
 //! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
 
+use bth::Accept;
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, compile};
@@ -47,6 +48,15 @@ fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
     child.wait_with_output().expect("the C program ends")
 }
 
+/// Rays as the C programs read them.
+fn lines_of(rays: &[Ray]) -> String {
+    let line = |ray: &Ray| {
+        let ([a, b, c], [x, y, z]) = (ray.origin, ray.direction);
+        format!("{a} {b} {c} {} {x} {y} {z} {}\n", ray.tmin, ray.tmax)
+    };
+    rays.iter().map(line).collect()
+}
+
 #[test]
 fn a_c_program_opens_traces_and_reads_errors() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -70,14 +80,7 @@ fn a_c_program_opens_traces_and_reads_errors() {
         (0..model.triangles.len()).map(|i| model.corners(i)).collect()
     };
     let rays: Vec<Ray> = bth_tests::rays::assorted(&corners, 16, 21);
-    let input: String = rays
-        .iter()
-        .map(|r| {
-            let [a, b, c] = r.origin;
-            let [x, y, z] = r.direction;
-            format!("{a} {b} {c} {} {x} {y} {z} {}\n", r.tmin, r.tmax)
-        })
-        .collect();
+    let input = lines_of(&rays);
     let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r).unwrap_or(Hit::MISS)).collect();
     assert!(hits.iter().any(|h| h.is_hit()) && hits.iter().any(|h| !h.is_hit()));
     for flags in ["read", "map"] {
@@ -111,6 +114,59 @@ fn a_c_program_opens_traces_and_reads_errors() {
         assert_eq!(output.status.code(), Some(1));
         assert!(text.starts_with(&format!("error {code} null ")) && text.contains(says), "{text}");
     }
+}
+
+#[test]
+fn a_c_program_gets_several_hits_under_conditions() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "hits") else { return };
+    let model = bth_scenes::knot::torus_knot(720);
+    let corners: Vec<_> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let path = folder.path().join("knot.ply");
+    bth_scenes::write::file(&model, &path).expect("a model");
+    let options = bth_compile::pipeline::Structure::Bvh;
+    let options = CompileOptions { structure: options, ..CompileOptions::default() };
+    let (compiled, _) = compile(&path, &options, &Silent).expect("the knot compiles");
+    let file = folder.path().join("knot.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let scene = bth::open(&file).expect("the knot opens");
+
+    let rays: Vec<Ray> = bth_tests::rays::assorted(&corners, 16, 22);
+    let output = run(&program, &[file.to_str().expect("UTF-8")], &lines_of(&rays));
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    let mut lines = text.lines();
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let everything = Accept::default();
+    let mut counts = String::new();
+    for accept in [everything, Accept { filter: Some(&even), ..everything }] {
+        for ray in &rays {
+            let mut hits = Vec::new();
+            scene.all_hits(ray, &accept, &mut hits);
+            let first = hits.first().copied().unwrap_or(Hit::MISS);
+            let field: Vec<&str> = lines.next().expect("a line for each ray").split(' ').collect();
+            let number = |i: usize| field[i].parse::<f32>().expect("a number").to_bits();
+            assert_eq!(field[0], u8::from(!hits.is_empty()).to_string());
+            assert_eq!(field[1], hits.len().to_string());
+            assert_eq!(number(2), first.t.to_bits(), "{ray:?}");
+            assert_eq!(field[3], first.primitive.triangle.to_string(), "{ray:?}");
+            assert_eq!(field.len(), 4 + 5 * hits.len(), "{ray:?}");
+            for (i, hit) in hits.iter().enumerate() {
+                let at = 4 + 5 * i;
+                assert_eq!(
+                    [number(at), number(at + 1), number(at + 2)],
+                    [hit.t, hit.u, hit.v].map(f32::to_bits)
+                );
+                assert_eq!(field[at + 3], hit.primitive.instance.to_string());
+                assert_eq!(field[at + 4], hit.primitive.triangle.to_string());
+            }
+            if accept.filter.is_none() {
+                counts += &format!("{} ", hits.len());
+            }
+        }
+    }
+    let none = "0 ".repeat(rays.len());
+    assert_eq!(lines.collect::<Vec<_>>(), [none.as_str(), &counts, &counts]);
 }
 
 /// A wheel that turns, and stands on its edge without any depth in frame 3.

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
 pub mod hits;
+pub mod inside;
 pub mod motion;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};

@@ -35,11 +35,11 @@ pub(crate) fn integer(x: f32) -> BigInt {
     if x.is_sign_negative() { -magnitude } else { magnitude }
 }
 
-fn sub(a: &Point, b: &Point) -> Point {
+pub(crate) fn sub(a: &Point, b: &Point) -> Point {
     [0, 1, 2].map(|k| &a[k] - &b[k])
 }
 
-fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
+pub(crate) fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
     let minor = |i: usize, j: usize| &b[i] * &c[j] - &b[j] * &c[i];
     &a[0] * minor(1, 2) + &a[1] * minor(2, 0) + &a[2] * minor(0, 1)
 }

@@ -16,6 +16,8 @@
 
 mod batch;
 mod bvh;
+mod closest;
+mod crossing;
 mod enumerate;
 mod hits;
 mod instances;
@@ -31,10 +33,12 @@ mod tets;
 
 pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use closest::{Closest, Feature};
+pub use crossing::Crossings;
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;
 pub use query::Steps;
-pub use scene::{Scene, from_bytes, map, open};
+pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};

@@ -29,6 +29,7 @@ mod query;
 pub mod rays;
 mod scene;
 mod simd;
+mod streams;
 mod tets;
 
 pub use batch::RayBatch;
@@ -40,5 +41,6 @@ pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;
 pub use query::Steps;
-pub use scene::{Scene, from_bytes, map, open};
+pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
+pub use streams::{HitStreams, RayStreams};

@@ -54,6 +54,14 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
 }
 
+/// As [`open`], for an open file, which is neither copied nor read again.
+///
+/// # Errors
+/// As [`open`], except for those about reading, the header and the section table.
+pub fn from_file(file: File) -> Result<Scene, Error> {
+    Scene::checked(file)
+}
+
 /// Maps a compiled file into memory and checks only its header, section table and scene sections, so the time does not depend on
 /// the size of its objects.
 ///

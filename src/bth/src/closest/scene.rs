@@ -138,3 +138,38 @@ impl<'a> Searcher<'a> {
         search_placed(scene.view(placed.object()), placed, instance, search);
     }
 }
+
+impl Scene {
+    /// The distance of a point in world space to the closest triangle as [`Self::closest`] reports it, negative if the scene
+    /// contains the point ([`Self::contains`]). Infinite if nothing can be hit; NaN if the point is not finite. The sign is as
+    /// good as the meshes are closed.
+    pub fn signed_distance(&self, point: [f32; 3]) -> f32 {
+        let mut distance = 0.0;
+        self.signed_distance_batch(&[point], std::slice::from_mut(&mut distance));
+        distance
+    }
+
+    /// As [`Self::signed_distance`], for each of the points.
+    ///
+    /// # Panics
+    /// If there are not as many distances as points.
+    pub fn signed_distance_batch(&self, points: &[[f32; 3]], distances: &mut [f32]) {
+        assert_eq!(points.len(), distances.len(), "as many distances as points");
+        const CHUNK: usize = 1024;
+        let (mut closest, mut inside) = (vec![None; CHUNK.min(points.len())], [false; CHUNK]);
+        for (points, distances) in points.chunks(CHUNK).zip(distances.chunks_mut(CHUNK)) {
+            let (closest, inside) = (&mut closest[..points.len()], &mut inside[..points.len()]);
+            self.closest_batch(points, f32::INFINITY, closest);
+            self.contains_batch(points, inside);
+            for i in 0..points.len() {
+                let is_finite = points[i].iter().all(|x| x.is_finite());
+                let distance = closest[i].map_or(f32::INFINITY, |closest| closest.distance);
+                distances[i] = match (is_finite, inside[i] && distance > 0.0) {
+                    (false, _) => f32::NAN,
+                    (true, true) => -distance,
+                    (true, false) => distance,
+                };
+            }
+        }
+    }
+}

@@ -128,8 +128,8 @@ typedef struct {
 } bth_closest;
 
 /* Stores for each of `count` points, x, y and z in world space, the closest point of the triangles whose distance is at most
- * `radius`. There is none for a point that is not finite, or with a radius that is negative or NaN. Points that are adjacent and
- * close to each other are fastest. Returns BTH_OK, or a negative code. */
+ * `radius`. There is none for a point that is not finite, or with a radius that is negative or NaN. Many points in
+ * one call are faster. Returns BTH_OK, or a negative code. */
 int32_t bth_closest_points(const bth_scene *scene, const float *points, float radius, bth_closest *closest, size_t count);
 
 /* Stores for each of `count` points the distance to the closest triangle, negative inside of closed meshes; infinite if nothing

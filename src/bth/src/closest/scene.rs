@@ -1,6 +1,7 @@
 //! Closest points in scenes.
 
 use super::Closest;
+use super::order::along_curve;
 use super::placed::PlacedObject;
 use super::search::Search;
 use super::walk::{search_object, search_placed};
@@ -34,31 +35,33 @@ impl Scene {
         closest
     }
 
-    /// Stores for each point what [`Self::closest`] returns. Points that are adjacent in the slice and close to each other are
-    /// fastest.
+    /// Stores for each point what [`Self::closest`] returns. Many points in one call are faster: they are searched in an order in
+    /// which each is close to the one before.
     ///
     /// # Panics
     /// If the slices differ in length.
     pub fn closest_batch(&self, points: &[[f32; 3]], radius: f32, closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "as many results as points");
         let mut searcher = Searcher::new(self);
-        let mut previous: Option<Search> = None;
-        for (point, closest) in points.iter().zip(closest) {
-            let Some(mut search) = Search::new(*point, radius) else {
-                *closest = None;
+        let mut order = Vec::new();
+        for (points, closest) in points.chunks(CHUNK).zip(closest.chunks_mut(CHUNK)) {
+            if points.len() < MIN_ORDERED {
+                (0..points.len()).for_each(|i| closest[i] = searcher.closest(points[i], radius));
                 continue;
-            };
-            // The triangle of the point before gives a bound, which never changes the result. For points farther from each other
-            // than from the surface it is of no use.
-            if let Some(previous) = previous.as_ref().filter(|previous| previous.is_near(point)) {
-                search.offer_result(previous);
             }
-            searcher.search(&mut search);
-            *closest = search.answer(radius);
-            previous = Some(search);
+            along_curve(points, &mut order);
+            for entry in &order {
+                let i = *entry as u32 as usize;
+                closest[i] = searcher.closest(points[i], radius);
+            }
         }
     }
 }
+
+/// Number of points that are ordered together.
+const CHUNK: usize = 1 << 20;
+/// Fewer points are searched in the order in which they are given.
+const MIN_ORDERED: usize = 32;
 
 /// Searches of a scene.
 struct Searcher<'a> {
@@ -67,6 +70,8 @@ struct Searcher<'a> {
     sole: Option<(&'a ObjectView<'a>, u32)>,
     /// The instances that were searched before.
     placed: HashMap<u32, PlacedObject>,
+    /// The search of the point before.
+    previous: Option<Search>,
 }
 
 impl<'a> Searcher<'a> {
@@ -76,7 +81,20 @@ impl<'a> Searcher<'a> {
             Some(world) => world.sole().map(|(instance, object)| (object, instance)),
         };
         let sole = sole.map(|(object, instance)| (scene.view(object), instance));
-        Searcher { scene, sole, placed: HashMap::new() }
+        Searcher { scene, sole, placed: HashMap::new(), previous: None }
+    }
+
+    /// As [`Scene::closest`].
+    fn closest(&mut self, point: [f32; 3], radius: f32) -> Option<Closest> {
+        let mut search = Search::new(point, radius)?;
+        // The triangle of the point before gives a bound, which never changes the result. For points farther from each other than
+        // from the surface it is of no use.
+        if let Some(previous) = self.previous.as_ref().filter(|previous| previous.is_near(&point)) {
+            search.offer_result(previous);
+        }
+        self.search(&mut search);
+        self.previous = Some(search);
+        search.answer(radius)
     }
 
     fn search(&mut self, search: &mut Search) {

@@ -266,3 +266,39 @@ fn a_c_program_counts_crossings_and_finds_points_inside() {
     let expected = "1 1 1 1\n2 1 2 2\n2 1 2 2\n0 0 0 0\n0 0 0 0\n";
     assert_eq!(String::from_utf8_lossy(&out.stdout), expected);
 }
+
+#[test]
+fn a_c_program_finds_the_closest_points_that_rust_finds() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "closest") else { return };
+    let model = bth_scenes::blob::blob(200);
+    let corners: Vec<_> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let file = folder.path().join("blob.bth");
+    std::fs::write(&file, bth_tests::placed_soup::placed_soup(&corners, &[])).expect("a file");
+    let scene = bth::open(&file).expect("the blob opens");
+    let mut points: Vec<[f32; 3]> = corners.iter().step_by(20).map(|t| t[0].map(|x| x * 0.5)).collect();
+    points.extend([corners[0][1], [7.0, -2.0, 0.5], [0.0; 3]]);
+    points.truncate(16);
+    let input: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let output = run(&program, &[file.to_str().expect("UTF-8")], &input);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert_eq!(text.lines().count(), points.len());
+    let mut found = Vec::new();
+    for (line, point) in text.lines().zip(&points) {
+        let c = scene.closest(*point, f32::INFINITY).expect("a closest point");
+        let [x, y, z] = c.point;
+        let signed = scene.signed_distance(*point);
+        assert_eq!((signed.abs(), signed < 0.0), (c.distance, scene.contains(*point) && c.distance > 0.0));
+        scene.triangles_in_sphere(*point, c.distance, &mut found);
+        let (near, first) = (found.len(), found[0].triangle);
+        scene.triangles_in_box(c.point, c.point, &mut found);
+        let field: Vec<&str> = line.split(' ').collect();
+        let numbers: Vec<f32> =
+            [0, 1, 2, 3, 4, 5, 9].iter().map(|&i| field[i].parse().expect("a number")).collect();
+        assert_eq!(numbers, [c.distance, x, y, z, c.u, c.v, signed], "{point:?}");
+        let rest = [c.primitive.instance, c.primitive.triangle, c.feature.code(), near as u32, first];
+        let rest = rest.into_iter().chain([found.len() as u32]).map(|n| n.to_string());
+        assert!(rest.eq([6, 7, 8, 10, 11, 12].map(|i| field[i].to_owned())), "{line}");
+    }
+}

@@ -117,6 +117,35 @@ uint32_t bth_instance_count(const bth_scene *scene);
  * pointer is null. */
 int32_t bth_get_instance(const bth_scene *scene, uint32_t row, bth_instance *instance);
 
+/* The point of the triangles that is closest to a given point. 36 bytes. */
+typedef struct {
+    float distance;        /* in world space; infinite if there is none within the radius */
+    float point[3];        /* the closest point, in world space */
+    float u, v;            /* barycentric weights of the triangle's second and third vertex */
+    bth_surface surface;   /* the triangle; BTH_NONE in both fields if there is none */
+    uint32_t feature;      /* where on the triangle: 0 inside, 1 to 3 on the edge from the first, second or third vertex to the
+                              next, 4 to 6 at that vertex */
+} bth_closest;
+
+/* Stores for each of `count` points, x, y and z in world space, the closest point of the triangles whose distance is at most
+ * `radius`. There is none for a point that is not finite, or with a radius that is negative or NaN. Many points in
+ * one call are faster. Returns BTH_OK, or a negative code. */
+int32_t bth_closest_points(const bth_scene *scene, const float *points, float radius, bth_closest *closest, size_t count);
+
+/* Stores for each of `count` points the distance to the closest triangle, negative inside of closed meshes; infinite if nothing
+ * can be hit, NaN for a point that is not finite. Returns BTH_OK, or a negative code. */
+int32_t bth_signed_distances(const bth_scene *scene, const float *points, float *distances, size_t count);
+
+/* Stores the number of triangles that overlap an axis-aligned box in world space in *count, and the first `capacity` of them, by
+ * ascending instance and triangle, in `triangles`, which may be null if `capacity` is 0. Touching counts; the answer is exact.
+ * Returns BTH_OK, or a negative code. */
+int32_t bth_triangles_in_box(const bth_scene *scene, const float lower[3], const float upper[3], bth_surface *triangles,
+                             size_t capacity, size_t *count);
+
+/* As bth_triangles_in_box, for triangles whose distance from `center`, rounded to float, is at most `radius`. */
+int32_t bth_triangles_in_sphere(const bth_scene *scene, const float center[3], float radius, bth_surface *triangles,
+                                size_t capacity, size_t *count);
+
 /* Size in bytes of the sections that traversal reads; 0 if the scene is null. */
 uint64_t bth_resident_bytes(const bth_scene *scene);
 

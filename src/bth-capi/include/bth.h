@@ -7,8 +7,8 @@
  * space is world space.
  *
  * Every pointer must be null or valid. Functions that return a code return BTH_ERROR_ARGUMENT for a null pointer that is not
- * documented as allowed. Queries with a null scene, null rays or null results do nothing. The other functions treat a null scene
- * as one without instances.
+ * documented as allowed, and a query of no rays does nothing and returns BTH_OK. Functions that return no code treat a null scene
+ * as one without instances. From C++, bth.hpp closes scenes and throws errors.
  */
 #ifndef BTH_H
 #define BTH_H
@@ -72,6 +72,10 @@ typedef struct {
  * be done. */
 int32_t bth_open(const char *path, uint32_t flags, bth_scene **scene);
 
+/* As bth_open, for the `length` bytes of a compiled file in memory, which are copied and need no alignment; `flags` must be
+ * BTH_READ. */
+int32_t bth_open_memory(const uint8_t *bytes, size_t length, uint32_t flags, bth_scene **scene);
+
 /* Closes a scene and frees its memory; null is allowed. */
 void bth_close(bth_scene *scene);
 
@@ -79,14 +83,17 @@ void bth_close(bth_scene *scene);
  * can fail. */
 const char *bth_last_error(void);
 
+/* Version of this library, such as "0.1.0". */
+const char *bth_version(void);
+
 /* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
  * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
- * After an internal error all rays are misses. */
-void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
+ * Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all rays are misses. */
+int32_t bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
 /* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
- * the other arrays. After an internal error rays are misses. */
-void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
+ * the other arrays. Returns a code as bth_nearest does. */
+int32_t bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
 
 /* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
  * null. A file without scene sections has only frame 0, at one frame per second. */

@@ -25,6 +25,8 @@ pub struct CompileOptions {
     pub structure: Structure,
     /// Shading attributes to keep.
     pub attributes: mesh::Keep,
+    /// Materials whose alpha makes holes.
+    pub alpha: mesh::AlphaMode,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
@@ -52,6 +54,7 @@ impl Default for CompileOptions {
         Self {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
+            alpha: mesh::AlphaMode::default(),
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
             collapse: bvh::CollapseOptions::default(),

@@ -91,6 +91,9 @@ codes! {
     TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it maps each triangle that is a constrained face to that face, and others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
     Positions "F141" "Positions are finite."
+    OpacityRows "F145" "OPACITY has as many rows as the object has triangles, or none, and OPACITY_MICRO is empty then."
+    Opacity "F146" "A row of OPACITY is a state, or a level from 1 to 8 and the first of its words, which lie within OPACITY_MICRO."
+    MicroOpacity "F147" "States in OPACITY_MICRO are from 0 to 2; bits behind the last state of a triangle of level 1 are zero."
     Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and reserved fields of zero."
     Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
     NodeTransform "F152" "A node's transform is finite; one that is no matrix has a quaternion that is not zero and ends with two zeros."
@@ -295,6 +298,8 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::CORNERS => "CORNERS",
         kind::NORMALS => "NORMALS",
         kind::UVS => "UVS",
+        kind::OPACITY => "OPACITY",
+        kind::OPACITY_MICRO => "OPACITY_MICRO",
         kind::PROVENANCE => "PROVENANCE",
         kind::SCENE => "SCENE",
         kind::NODES => "NODES",

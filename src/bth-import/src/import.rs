@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cutout::{AlphaMode, Cutouts};
 use crate::error::{Error, Result};
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::mesh::{Attributes, Keep, Mesh, Report};
@@ -75,16 +76,55 @@ pub fn import_gltf_meshes(
     meshes.iter().map(one).collect()
 }
 
+/// The cut-outs of a model, whose triangles have the numbers that [`import`] gives them. Formats other than glTF have none.
+///
+/// # Errors
+/// As [`import`]; `BTH-I016` for an image that cannot be read, `BTH-L003` for one that is too large.
+pub fn import_cutouts(path: &Path, mode: AlphaMode, monitor: &dyn Monitor) -> Result<Cutouts> {
+    import_cutouts_bytes(path, &read_file(path)?, mode, monitor)
+}
+
+/// As [`import_cutouts`], from the bytes of a file, as [`import_bytes`] reads it.
+///
+/// # Errors
+/// As [`import_cutouts`].
+pub fn import_cutouts_bytes(
+    name: &Path,
+    data: &[u8],
+    mode: AlphaMode,
+    monitor: &dyn Monitor,
+) -> Result<Cutouts> {
+    let source = Source::new(name, data, monitor);
+    match format(&source)? {
+        Format::Gltf if mode != AlphaMode::None => gltf::cutout::flat(&source, mode),
+        _ => Ok(Cutouts::default()),
+    }
+}
+
+/// The cut-outs of meshes of a glTF file, whose triangles have the numbers that [`import_gltf_meshes`] gives them.
+///
+/// # Errors
+/// As [`import_cutouts`].
+pub fn import_gltf_cutouts(
+    path: &Path,
+    meshes: &[u32],
+    mode: AlphaMode,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Cutouts>> {
+    let data = read_file(path)?;
+    gltf::cutout::meshes(&Source::new(path, &data, monitor), mode, meshes)
+}
+
 /// The files that a model consists of: itself, then those that a glTF document refers to, in order. What is no glTF
 /// document refers to none.
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.
-pub fn source_files(path: &Path) -> Result<Vec<PathBuf>> {
+pub fn source_files(path: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>> {
     let mut files = vec![path.to_owned()];
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(gltf::external_files(path, &read_file(path)?));
+        files.extend(gltf::external_files(path, &read_file(path)?, alpha));
     }
     Ok(files)
 }
@@ -124,7 +164,7 @@ pub(crate) fn weld_and_count(
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
     }
     monitor.check()?;
-    let mesh = Mesh { positions: welded.positions, triangles, attributes };
+    let mesh = Mesh { positions: welded.positions, triangles, attributes, opacity: None };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {

@@ -25,6 +25,7 @@ mod intersect;
 mod masks;
 mod motion;
 mod object;
+mod opacity;
 mod query;
 pub mod rays;
 mod scene;
@@ -33,6 +34,7 @@ mod streams;
 mod tets;
 
 pub use batch::RayBatch;
+pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
 pub use closest::{Closest, Feature};
 pub use crossing::Crossings;

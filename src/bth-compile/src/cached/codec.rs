@@ -4,7 +4,7 @@ use super::rows::{HashedRows, RowReader, RowWriter};
 use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
-use bth_import::{self as mesh, Attributes, Mesh};
+use bth_import::{self as mesh, Attributes, Mesh, TriangleOpacities};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -47,6 +47,15 @@ fn shading(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of the opacity of a mesh's triangles, where some are not opaque.
+fn opacity(mesh: &Mesh) -> Option<Digest> {
+    let opacity = mesh.opacity.as_ref()?;
+    let mut hasher = HashedRows::new("opacity");
+    hasher.add(&opacity.rows);
+    hasher.add(&opacity.micro);
+    Some(hasher.finish())
+}
+
 /// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
@@ -56,12 +65,16 @@ pub(crate) struct MeshSummary {
     pub(crate) geometry: Digest,
     /// Hash of the shading attributes.
     pub(crate) shading: Option<Digest>,
+    /// Hash of the opacity.
+    #[serde(default)]
+    pub(crate) opacity: Option<Digest>,
 }
 
 impl MeshSummary {
     /// A mesh with its summary.
     pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
-        let summary = Self { report, geometry: geometry(&mesh), shading: shading(&mesh) };
+        let summary =
+            Self { report, geometry: geometry(&mesh), shading: shading(&mesh), opacity: opacity(&mesh) };
         (mesh, summary)
     }
 }
@@ -76,6 +89,11 @@ impl Codec for Mesh {
             to.add(&attributes.normals);
             to.add(&attributes.uvs);
         }
+        // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
+        if let Some(opacity) = &self.opacity {
+            to.add(&opacity.rows);
+            to.add(&opacity.micro);
+        }
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
@@ -84,14 +102,19 @@ impl Codec for Mesh {
             0 => None,
             _ => Some(Attributes { corners: from.take()?, normals: from.take()?, uvs: from.take()? }),
         };
+        let opacity = match from.is_empty() {
+            true => None,
+            false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
+        };
         let within =
             |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
         let attributes_fit = attributes.as_ref().is_none_or(|a| {
             a.corners.len() == triangles.len()
                 && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
         });
-        let fits = attributes_fit && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes })
+        let opacity_fits = opacity.as_ref().is_none_or(|o| o.rows.len() == triangles.len());
+        let fits = attributes_fit && opacity_fits && within(&triangles, positions.len());
+        fits.then_some(Mesh { positions, triangles, attributes, opacity })
     }
 }
 
@@ -162,13 +185,15 @@ mod tests {
     fn meshes_with_rows_out_of_range_do_not_come_back() {
         let attributes =
             Attributes { corners: vec![[0, 1, 0]], normals: vec![[0.0; 3]; 2], uvs: vec![[0.5; 2]; 2] };
+        let opacity = Some(TriangleOpacities { rows: vec![1], micro: vec![9] });
         let mesh = Mesh {
             positions: vec![[0.0; 3], [1.0; 3], [2.0; 3]],
             triangles: vec![[0, 1, 2]],
             attributes: Some(attributes),
+            opacity,
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, ..mesh.clone() };
+        let plain = Mesh { attributes: None, opacity: None, ..mesh.clone() };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);

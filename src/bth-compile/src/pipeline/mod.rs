@@ -40,7 +40,7 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let mut clock = Clock::default();
-    let digest = clock.time("hash", || SourceDigest::of(source))?;
+    let digest = clock.time("hash", || SourceDigest::of(source, options.alpha))?;
     let model = Model { path: source, digest: &digest };
     let (compiled, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);

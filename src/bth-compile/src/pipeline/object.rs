@@ -156,6 +156,10 @@ impl Object {
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };
+        if let Some(opacity) = &mesh.opacity {
+            parts.opacity = &opacity.rows;
+            parts.opacity_micro = &opacity.micro;
+        }
         if let Some(encoded) = &self.encoded {
             parts.record = Some(options.record);
             parts.tet_leaves = &encoded.leaves;
@@ -194,6 +198,8 @@ fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.tet_vertices)
         + size_of_val(parts.tet_faces)
         + size_of_val(parts.hull_faces)
-        + size_of_val(parts.triangle_faces);
+        + size_of_val(parts.triangle_faces)
+        + size_of_val(parts.opacity)
+        + size_of_val(parts.opacity_micro);
     bytes as u64
 }

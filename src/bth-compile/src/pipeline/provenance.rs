@@ -59,6 +59,9 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
     if options.coordinates != Default::default() {
         json["coordinates"] = json!(options.coordinates);
     }
+    if options.alpha != Default::default() {
+        json["alpha"] = json!(options.alpha);
+    }
     json
 }
 

@@ -40,6 +40,10 @@ pub struct ObjectParts<'a> {
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_faces: &'a [u32],
+    /// Opacity of each triangle; empty where all are opaque.
+    pub opacity: &'a [u32],
+    /// States of micro-triangles.
+    pub opacity_micro: &'a [u32],
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -109,6 +113,8 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::NORMALS, index, source.normals)?;
         builder.rows(kind::UVS, index, source.uvs)?;
     }
+    builder.rows(kind::OPACITY, index, parts.opacity)?;
+    builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     Ok(())
 }
 

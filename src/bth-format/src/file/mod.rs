@@ -150,8 +150,8 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = kind::OBJECT..=kind::TRIANGLE_FACES;
-        self.table().iter().filter(|e| e.object != NONE && traced.contains(&e.kind)).map(|e| e.length).sum()
+        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_required(e.kind);
+        self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
     /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before tracing.
@@ -237,6 +237,8 @@ impl File {
             corners: self.slice(object, kind::CORNERS),
             normals: self.slice(object, kind::NORMALS),
             uvs: self.slice(object, kind::UVS),
+            opacity: self.slice(object, kind::OPACITY),
+            opacity_micro: self.slice(object, kind::OPACITY_MICRO),
         })
     }
 

@@ -42,7 +42,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
         kind::LINES => size_of::<CacheLine>(),
-        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES => 4,
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::OPACITY | kind::OPACITY_MICRO => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::TETS => 0,
         kind::TET_VERTICES => size_of::<TetVertex>(),
@@ -68,9 +68,10 @@ fn max_count(kind: u32) -> u64 {
         kind::OBJECT => 1,
         kind::LINES => Child::INDEX_LIMIT as u64,
         kind::TETS => limits::MAX_TETS as u64,
-        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS => {
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS | kind::OPACITY => {
             limits::MAX_TRIANGLES as u64
         }
+        kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Links hold rows in 31 bits, other references in 32; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,

@@ -28,6 +28,10 @@ pub const CORNERS: u32 = 18;
 pub const NORMALS: u32 = 19;
 /// `[f32; 2]`: texture coordinates as in the source.
 pub const UVS: u32 = 20;
+/// `u32` per source triangle: a [`super::TriangleOpacity`].
+pub const OPACITY: u32 = 28;
+/// `u32`: states of micro-triangles, two bits each.
+pub const OPACITY_MICRO: u32 = 29;
 /// UTF-8 JSON: how the file came about. Not part of the content id.
 pub const PROVENANCE: u32 = 32;
 /// One [`super::Scene`]. This section and the following ones belong to the whole file.
@@ -55,5 +59,5 @@ pub const fn is_scene(kind: u32) -> bool {
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
-    (OBJECT <= kind && kind <= TRIANGLE_FACES) || is_scene(kind)
+    (OBJECT <= kind && kind <= TRIANGLE_FACES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
 }

@@ -10,6 +10,7 @@ mod grid;
 mod grid_leaves;
 pub mod kind;
 mod object;
+mod opacity;
 mod scene;
 mod tets;
 
@@ -18,6 +19,7 @@ pub use container::*;
 pub use grid::*;
 pub use grid_leaves::*;
 pub use object::*;
+pub use opacity::*;
 pub use scene::*;
 pub use tets::*;
 

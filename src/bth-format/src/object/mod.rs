@@ -6,6 +6,7 @@
 mod bounds;
 mod leaves;
 mod nodes;
+mod opacity;
 mod records;
 mod view;
 

@@ -16,11 +16,18 @@ use crate::raw::{NONE, Raw, RowKind, check_triangles};
 use crate::source::Source;
 
 /// A mesh at a place of the flat model.
-struct PlacedMesh {
+pub(super) struct PlacedMesh {
     /// `None` when the mesh is read in its own space.
     node: Option<usize>,
-    mesh: usize,
-    world: DAffine3,
+    pub(super) mesh: usize,
+    pub(super) world: DAffine3,
+}
+
+impl PlacedMesh {
+    /// A mesh in its own space.
+    pub(super) fn alone(mesh: usize) -> Self {
+        PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY }
+    }
 }
 
 /// Where the rows of one primitive of one node begin.
@@ -63,8 +70,7 @@ pub(crate) fn read_mesh<'a>(
     mesh: usize,
     keep: Keep,
 ) -> Result<Raw<'a>> {
-    let placed = PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY };
-    read_placed(source, document, binary, keep, &[placed])
+    read_placed(source, document, binary, keep, &[PlacedMesh::alone(mesh)])
 }
 
 fn read_placed<'a>(
@@ -102,7 +108,7 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Pla
 }
 
 /// The scene's nodes that have a mesh, in depth-first order, with their world transforms.
-fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
+pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
     let error =
         |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
     let roots = match document.scenes.get(document.scene.unwrap_or(0)) {

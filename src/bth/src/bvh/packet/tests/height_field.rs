@@ -150,6 +150,8 @@ impl HeightField {
             corners: &[],
             normals: &[],
             uvs: &[],
+            opacity: &[],
+            opacity_micro: &[],
         }
     }
 }

@@ -185,3 +185,28 @@ fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
     }
     assert_eq!((lines.next(), seen), (None, [1, 1]), "an error at frame 3, nothing to see at frame 4");
 }
+
+#[test]
+fn a_c_program_counts_crossings_and_finds_points_inside() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "inside") else { return };
+    let mut model = bth_scenes::Model::default();
+    // Two tetrahedra, one in the other, whose vertices lie on the grid.
+    for size in [8.0, 2.0] {
+        let first = model.positions.len() as u32;
+        model.positions.extend([[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]]);
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        model.triangles.extend(faces.map(|face: [u32; 3]| face.map(|v| first + v)));
+    }
+    let path = folder.path().join("model.ply");
+    bth_scenes::write::file(&model, &path).expect("a model");
+    let options =
+        CompileOptions { structure: bth_compile::pipeline::Structure::Bvh, ..CompileOptions::default() };
+    let (compiled, _) = compile(&path, &options, &Silent).expect("the model compiles");
+    let file = folder.path().join("model.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let out = run(&program, &[file.to_str().expect("UTF-8")], "3 2 1\n0.5 0.5 0.5\n0 0 0\n8 0 0\n-1 2 2\n");
+    assert!(out.status.success(), "{out:?}");
+    let expected = "1 1 1 1\n2 1 2 2\n2 1 2 2\n0 0 0 0\n0 0 0 0\n";
+    assert_eq!(String::from_utf8_lossy(&out.stdout), expected);
+}

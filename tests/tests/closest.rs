@@ -1,10 +1,11 @@
 //! Closest points agree with the exact oracle, whatever the shape of triangles, the scale, the structure, the transform of
 //! instances and the instruction set.
 
+use bth::rays::PrimitiveRef;
 use bth::{Closest, Feature, Isa, Scene};
 use bth_random::Rng;
 use bth_scenes::{blob::blob, gyroid::gyroid, hall::hall, knot::torus_knot};
-use bth_tests::oracle::{is_root_within, squared_distance, to_f64};
+use bth_tests::oracle::{is_root_within, overlaps_box, squared_distance, to_f64};
 use bth_tests::placed_soup::placed_soup;
 use bth_tests::structures::{Traced, every_structure};
 
@@ -212,24 +213,90 @@ fn matrix(rng: &mut Rng) -> [f64; 12] {
     std::array::from_fn(|i| f64::from(unit(rng)) * if i % 4 == 3 { spread } else { scale })
 }
 
+/// A scene of instances of triangles, and the corners of all of them in world space, rounded to f32. `None` if a transform is
+/// singular.
+fn placed_scene(rng: &mut Rng, triangles: &[Corners]) -> Option<(Scene, Vec<Corners>)> {
+    let matrices: Vec<_> = (0..1 + rng.below(30)).map(|_| matrix(rng)).collect();
+    let scene = bth::from_bytes(&placed_soup(triangles, &matrices)).ok()?;
+    let world = matrices.iter().flat_map(|m| {
+        let row = |p: [f64; 3], r: &[f64]| (r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3]) as f32;
+        let apply = move |p: [f32; 3]| [0, 4, 8].map(|r| row(p.map(f64::from), &m[r..]));
+        triangles.iter().map(move |corners| corners.map(apply))
+    });
+    Some((scene, world.collect()))
+}
+
+/// Checks boxes and balls about points of the triangles, given in world space. `count` is the number of triangles of an instance.
+fn check_overlaps(rng: &mut Rng, scene: &Scene, world: &[Corners], count: usize, scale: f32) -> [usize; 2] {
+    let (mut found, mut results) = (Vec::new(), [0; 2]);
+    let primitive = |i: usize| PrimitiveRef { instance: (i / count) as u32, triangle: (i % count) as u32 };
+    let (a, b) = (hostile_point(rng, world, scale), hostile_point(rng, world, scale));
+    let size = [0.0, 1e-6, 0.1, 1.0][rng.below(4) as usize] * scale;
+    let (lower, upper) = match rng.below(3) {
+        0 => ([0, 1, 2].map(|k| a[k].min(b[k])), [0, 1, 2].map(|k| a[k].max(b[k]))),
+        1 => (a.map(|x| x - size), a.map(|x| x + size)),
+        // A corner of the box on the triangle.
+        _ => (a, a.map(|x| x + size)),
+    };
+    scene.triangles_in_box(lower, upper, &mut found);
+    let expected: Vec<_> =
+        (0..world.len()).filter(|&i| overlaps_box(lower, upper, world[i])).map(primitive).collect();
+    assert_eq!(found, expected, "box {lower:?} {upper:?}");
+    assert_eq!(scene.overlaps_box(lower, upper), !expected.is_empty(), "box {lower:?} {upper:?}");
+    results[0] += expected.len();
+    let radius =
+        scene.closest(b, f32::INFINITY).map_or(0.0, |c| c.distance) * [1.0, 1.5][rng.below(2) as usize];
+    scene.triangles_in_sphere(a, radius, &mut found);
+    for (i, corners) in world.iter().enumerate() {
+        let (squared, is_found) = (squared_distance(a, *corners), found.contains(&primitive(i)));
+        let certain = to_f64(&squared).sqrt();
+        let slack = f64::from(radius) * 1e-7 + 1e-44;
+        let possible =
+            (certain - f64::from(radius)).abs() <= slack || (certain <= f64::from(radius)) == is_found;
+        assert!(possible, "ball {a:?} {radius}: triangle {i} at {certain}");
+    }
+    assert!(found.is_sorted_by_key(|p| (p.instance, p.triangle)));
+    assert_eq!(scene.overlaps_sphere(a, radius), !found.is_empty());
+    assert_eq!(scene.overlaps_sphere(a, radius), scene.closest(a, radius).is_some(), "ball {a:?} {radius}");
+    results[1] += found.len();
+    results
+}
+
+#[test]
+fn boxes_and_balls_overlap_the_triangles_that_exact_arithmetic_says() {
+    let mut rng = Rng::new(5);
+    let mut results = [0; 2];
+    for round in 0..240 {
+        let scale = [1.0, 1e-3, 1e30, 1e-30, 1e15][round % 5];
+        let triangles = hostile_triangles(&mut rng, 1 + round % 40, scale);
+        let Some((scene, world)) = (match round % 3 {
+            0 => placed_scene(&mut rng, &triangles),
+            _ => bth::from_bytes(&placed_soup(&triangles, &[])).ok().map(|scene| (scene, triangles.clone())),
+        }) else {
+            continue;
+        };
+        for _ in 0..3 {
+            let found = check_overlaps(&mut rng, &scene, &world, triangles.len(), scale);
+            (0..2).for_each(|i| results[i] += found[i]);
+        }
+    }
+    assert!(results.iter().all(|n| *n > 300), "{results:?}");
+    let scene = bth::from_bytes(&placed_soup(&[[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]], &[])).unwrap();
+    assert!(scene.overlaps_box([f32::NEG_INFINITY; 3], [f32::INFINITY; 3]));
+    assert!(!scene.overlaps_box([f32::NAN, 0.0, 0.0], [1.0; 3]));
+    assert!(!scene.overlaps_box([1.0; 3], [-1.0; 3]));
+    assert!(scene.overlaps_sphere([0.0, 0.0, 9.0], f32::INFINITY));
+    assert!(!scene.overlaps_sphere([0.0, 0.0, 9.0], f32::NAN) && !scene.overlaps_sphere([f32::NAN; 3], 1.0));
+}
+
 #[test]
 fn instances_are_measured_in_world_space() {
     let mut rng = Rng::new(3);
     let mut placed = 0;
     for round in 0..300 {
         let triangles = hostile_triangles(&mut rng, 1 + round % 40, 1.0);
-        let matrices: Vec<_> = (0..1 + rng.below(30)).map(|_| matrix(&mut rng)).collect();
-        let Ok(scene) = bth::from_bytes(&placed_soup(&triangles, &matrices)) else { continue };
+        let Some((scene, world)) = placed_scene(&mut rng, &triangles) else { continue };
         placed += 1;
-        // The corners in world space, rounded to f32.
-        let world: Vec<Corners> = matrices
-            .iter()
-            .flat_map(|m| {
-                let row = |p: [f64; 3], r: &[f64]| (r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3]) as f32;
-                let apply = move |p: [f32; 3]| [0, 4, 8].map(|r| row(p.map(f64::from), &m[r..]));
-                triangles.iter().map(move |corners| corners.map(apply))
-            })
-            .collect();
         let points: Vec<_> = (0..6).map(|_| hostile_point(&mut rng, &world, 1.0)).collect();
         for (point, found) in points.iter().zip(all_ways(&scene, &points)) {
             let found = found.map(|mut c| {

@@ -1,6 +1,8 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
+pub mod hits;
+pub mod inside;
 pub mod motion;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};

@@ -12,6 +12,7 @@ pub mod error;
 pub mod gltf;
 mod groups;
 mod import;
+mod memory;
 mod mesh;
 pub mod monitor;
 mod number;
@@ -31,7 +32,8 @@ pub use groups::{Group, Groups};
 pub use import::{
     import, import_bytes, import_cutouts, import_gltf_cutouts, import_gltf_meshes, source_files,
 };
-pub use mesh::{Attributes, Keep, Mesh, Wanted, OpacityReport, Report, TriangleOpacities};
+pub use memory::{MEMORY_FORMAT, import_triangles};
+pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};
 pub use source::read_file;
 pub use zero_area::is_zero_area;

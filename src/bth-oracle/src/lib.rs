@@ -17,6 +17,7 @@ mod crossing;
 mod geometry;
 mod intersection;
 mod nearest;
+mod overlap;
 mod world;
 
 pub use closest::{is_root_within, squared_distance};
@@ -24,4 +25,5 @@ pub use crossing::{crossings, winding};
 pub use geometry::{Triangle, triangles};
 pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};
+pub use overlap::overlaps_box;
 pub use world::World;

@@ -8,6 +8,7 @@ use std::mem::offset_of;
 pub fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(tree());
+    cases.extend(opacity());
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(groups());
@@ -293,6 +294,34 @@ fn tree() -> Vec<Case> {
         field("F140-triangles", base, kind::TRIANGLES, 0, 30),
         field("F140-corners", base, kind::CORNERS, 8, NONE),
         field("F141-nan", base, kind::POSITIONS, 4, nan),
+    ]
+}
+
+/// Faults of the opacity of triangles.
+fn opacity() -> Vec<Case> {
+    let base = "opacity";
+    let row = |name, triangle: usize, value| field(name, base, kind::OPACITY, 4 * triangle, value);
+    let micro = |name, word: usize, value| field(name, base, kind::OPACITY_MICRO, 4 * word, value);
+    let rows = |name: &str, kind: u32, count: u64| {
+        broken(name, base, Seal::Sections, |e| {
+            // What is no longer in the section is a gap, which is zero.
+            let rows = e.section_at(kind) + 4 * count as usize;
+            e.put(rows, &vec![0; 24 - 4 * count as usize]);
+            let at = e.entry_at(0, kind);
+            e.put(at + offset_of!(SectionEntry, length), &(4 * count).to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &count.to_le_bytes());
+        })
+    };
+    vec![
+        rows("F145-rows", kind::OPACITY, 5),
+        rows("F145-micro-alone", kind::OPACITY, 0),
+        row("F146-state", 0, 3 << 4),
+        row("F146-level", 0, 9),
+        row("F146-word", 3, 2 << 4 | 1),
+        row("F146-words", 4, 1 << 4 | 3),
+        row("F146-far", 4, u32::MAX - 13),
+        micro("F147-state", 1, 3 << 30),
+        micro("F147-behind-the-last", 0, 1 << 8),
     ]
 }
 

@@ -19,6 +19,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("grid-21", two_levels(Some(GridBits::B21), false)),
         Case::new("packed-nodes", two_levels(None, true)),
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
+        Case::new("opacity", opacity()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
         Case::new("unknown-optional-section", unknown_section()),
@@ -115,6 +116,33 @@ fn triangle() -> Vec<u8> {
     object(&mut builder, 0, &parts).unwrap();
     builder.provenance("{\"tool\":\"conformance\"}".into()).unwrap();
     builder.finish()
+}
+
+/// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once more at level 1 by the
+/// same word.
+fn opacity() -> Vec<u8> {
+    let corners: [[[f32; 3]; 3]; 6] =
+        std::array::from_fn(|k| CORNERS.map(|[x, y, z]| [x + 2.0 * k as f32, y, z]));
+    let lines = lines(raw(&corners, 0).as_bytes());
+    let micro = |level, word| TriangleOpacity::Micro { level, word };
+    let rows = [
+        TriangleOpacity::Whole(Opacity::Opaque),
+        TriangleOpacity::Whole(Opacity::Transparent),
+        TriangleOpacity::Whole(Opacity::Unknown),
+        micro(1, 0),
+        micro(2, 1),
+        micro(1, 0),
+    ];
+    file(&ObjectParts {
+        bounds: Some(bounds(corners.as_flattened())),
+        root: Child::Raw(0).code(),
+        triangles: 6,
+        lines: &lines,
+        triangle_ids: &[0, 1, 2, 3, 4, 5],
+        opacity: &rows.map(TriangleOpacity::code),
+        opacity_micro: &[0b10_01_00_01, 0x1864_9126],
+        ..ObjectParts::default()
+    })
 }
 
 fn triangle_bare() -> Vec<u8> {

@@ -63,36 +63,43 @@ impl Pyramid {
         found: Range,
         enough: &dyn Fn(Range) -> bool,
     ) -> Range {
-        let mut found = found;
-        // The squares still to be looked at: level, column, row.
-        let mut stack = vec![(self.levels.len() - 1, 0, 0)];
-        while let Some((level, x, y)) = stack.pop() {
-            let (width, height, squares) = &self.levels[level];
-            let first = [x << level, y << level];
-            let last = [(x + 1 << level) - 1, (y + 1 << level) - 1];
-            let apart =
-                first[0] > columns[1] || last[0] < columns[0] || first[1] > rows[1] || last[1] < rows[0];
-            if x >= *width || y >= *height || apart {
-                continue;
-            }
-            let square = squares[y * width + x];
-            if found.join(square) == found {
-                continue;
-            }
-            let inside =
-                columns[0] <= first[0] && last[0] <= columns[1] && rows[0] <= first[1] && last[1] <= rows[1];
-            if inside || level == 0 {
-                found = found.join(square);
-                if enough(found) {
-                    return found;
-                }
-            } else {
-                let (x, y) = (2 * x, 2 * y);
-                stack
-                    .extend([(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| (level - 1, x, y)));
-            }
+        let mut search = Search { pyramid: self, columns, rows, found, enough };
+        search.square(self.levels.len() - 1, [0, 0]);
+        search.found
+    }
+}
+
+/// A search for the range of a rectangle.
+struct Search<'a> {
+    pyramid: &'a Pyramid,
+    columns: Interval,
+    rows: Interval,
+    found: Range,
+    enough: &'a dyn Fn(Range) -> bool,
+}
+
+impl Search<'_> {
+    /// Joins the part of a square that lies in the rectangle. Returns whether that is enough.
+    fn square(&mut self, level: usize, [x, y]: [usize; 2]) -> bool {
+        let (width, height, squares) = &self.pyramid.levels[level];
+        let ([left, right], [top, bottom]) = (self.columns, self.rows);
+        let (first, last) = ([x << level, y << level], [((x + 1) << level) - 1, ((y + 1) << level) - 1]);
+        let apart = first[0] > right || last[0] < left || first[1] > bottom || last[1] < top;
+        if x >= *width || y >= *height || apart {
+            return false;
         }
-        found
+        let joined = self.found.join(squares[y * width + x]);
+        if joined == self.found {
+            return false;
+        }
+        if level == 0 || left <= first[0] && last[0] <= right && top <= first[1] && last[1] <= bottom {
+            self.found = joined;
+            return (self.enough)(joined);
+        }
+        let (x, y) = (2 * x, 2 * y);
+        [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
+            .into_iter()
+            .any(|square| self.square(level - 1, square))
     }
 }
 

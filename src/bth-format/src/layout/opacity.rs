@@ -106,6 +106,22 @@ pub fn micro_corners(level: u32, micro: u32) -> [[u32; 2]; 3] {
     }
 }
 
+/// The opacity at barycentric coordinates of a triangle, given the rows of `OPACITY` and `OPACITY_MICRO`. Opaque for what these say
+/// nothing about.
+#[inline]
+pub fn opacity_at(rows: &[u32], words: &[u32], triangle: u32, u: f32, v: f32) -> Opacity {
+    let Some(row) = rows.get(triangle as usize) else { return Opacity::Opaque };
+    match TriangleOpacity::from_code(*row) {
+        Some(TriangleOpacity::Whole(state)) => state,
+        Some(TriangleOpacity::Micro { level, word }) => {
+            let micro = micro_triangle(level, u, v) as usize;
+            let word = words.get(word as usize + micro / MICRO_PER_WORD).copied().unwrap_or(0);
+            Opacity::from_code(word >> (2 * (micro % MICRO_PER_WORD)) & 3).unwrap_or(Opacity::Unknown)
+        }
+        None => Opacity::Opaque,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

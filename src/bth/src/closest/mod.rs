@@ -1,8 +1,10 @@
 //! Closest points on the surface of a scene.
 //!
 //! [`search`] holds the best triangle so far and decides between triangles; [`walk`] walks the BVH of an object, nearest boxes
-//! first; [`placed`] bounds distances in the space of an instance's object; [`scene`] goes through the instances of a scene.
+//! first; [`placed`] bounds distances in the space of an instance's object; [`scene`] goes through the instances of a scene. [`overlap`] finds the
+//! triangles that overlap a box or a ball.
 
+mod overlap;
 mod placed;
 mod scene;
 mod search;

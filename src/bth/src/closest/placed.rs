@@ -18,6 +18,8 @@ pub(super) struct PlacedObject {
     placed: Placed,
     /// Upper bound of |A|.
     norm: f64,
+    /// Greatest |coordinate| of the world box.
+    extent: f64,
     /// Magnitude of the roundings in object space for a point at the origin of world space.
     magnitude: f64,
 }
@@ -29,7 +31,7 @@ impl PlacedObject {
         let origin = placed.origin.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         // Three coordinates of at most the greatest one have at most twice its length.
         let magnitude = 2.0 * (norm * (world + origin) + f64::from(object.bounds.greatest));
-        PlacedObject { placed, norm, magnitude }
+        PlacedObject { placed, norm, extent: world, magnitude }
     }
 
     /// Index of the object.
@@ -60,6 +62,21 @@ impl PlacedObject {
     pub(super) fn squared_in_object(&self, squared: f64, slack: f64) -> f64 {
         let distance = squared.sqrt() * self.norm + slack;
         distance * distance
+    }
+
+    /// A box in world space that contains all triangles of a box in object space.
+    pub(super) fn box_in_world(&self, lower: [f64; 3], upper: [f64; 3]) -> [[f64; 3]; 2] {
+        let pad = ROUNDING * self.extent;
+        let mut world = [[0.0; 3]; 2];
+        for (i, row) in self.placed.to_world.iter().enumerate() {
+            (world[0][i], world[1][i]) = (row[3] - pad, row[3] + pad);
+            for k in 0..3 {
+                let (x, y) = (row[k] * lower[k], row[k] * upper[k]);
+                world[0][i] += x.min(y);
+                world[1][i] += x.max(y);
+            }
+        }
+        world
     }
 
     /// Corners in world space.

@@ -8,6 +8,8 @@ use crate::instances::{INSTANCE, World};
 use crate::scene::Scene;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 impl Scene {
     /// The point of the scene's triangles that is closest to a point in world space, if its distance, rounded to f32 as reported,
@@ -39,7 +41,7 @@ impl Scene {
     /// If the slices differ in length.
     pub fn closest_batch(&self, points: &[[f32; 3]], radius: f32, closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "as many results as points");
-        let searcher = Searcher::new(self);
+        let mut searcher = Searcher::new(self);
         let mut previous: Option<Search> = None;
         for (point, closest) in points.iter().zip(closest) {
             let Some(mut search) = Search::new(*point, radius) else {
@@ -63,8 +65,8 @@ struct Searcher<'a> {
     scene: &'a Scene,
     /// The object and the index of the only visible instance, if its object space is world space.
     sole: Option<(&'a ObjectView<'a>, u32)>,
-    /// For each instance of a scene with a world its transform; `None` if it is not visible.
-    placed: Vec<Option<PlacedObject>>,
+    /// The instances that were searched before.
+    placed: HashMap<u32, PlacedObject>,
 }
 
 impl<'a> Searcher<'a> {
@@ -74,17 +76,10 @@ impl<'a> Searcher<'a> {
             Some(world) => world.sole().map(|(instance, object)| (object, instance)),
         };
         let sole = sole.map(|(object, instance)| (scene.view(object), instance));
-        let mut placed = Vec::new();
-        if let (Some(world), None) = (scene.world(), sole) {
-            placed.extend((0..world.placements.len() as u32).map(|instance| {
-                let place = world.placed(scene.file(), instance)?;
-                Some(PlacedObject::new(place, scene.view(place.object)))
-            }));
-        }
-        Searcher { scene, sole, placed }
+        Searcher { scene, sole, placed: HashMap::new() }
     }
 
-    fn search(&self, search: &mut Search) {
+    fn search(&mut self, search: &mut Search) {
         match (self.sole, self.scene.world()) {
             (Some((object, instance)), _) => search_object(object, instance, search),
             (None, Some(world)) => self.search_world(world, search),
@@ -97,7 +92,7 @@ impl<'a> Searcher<'a> {
     }
 
     /// Searches the instances of a scene, nearest boxes first.
-    fn search_world(&self, world: &World, search: &mut Search) {
+    fn search_world(&mut self, world: &World, search: &mut Search) {
         if world.top.is_empty() {
             return;
         }
@@ -108,9 +103,7 @@ impl<'a> Searcher<'a> {
             }
             if code & INSTANCE != 0 {
                 let instance = code & !INSTANCE;
-                if let Some(placed) = &self.placed[instance as usize] {
-                    search_placed(self.scene.view(placed.object()), placed, instance, search);
-                }
+                self.search_instance(world, instance, search);
                 continue;
             }
             let node = world.top.node(code);
@@ -130,5 +123,18 @@ impl<'a> Searcher<'a> {
             }
             stack[first..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         }
+    }
+
+    fn search_instance(&mut self, world: &World, instance: u32, search: &mut Search) {
+        let scene = self.scene;
+        let placed = match self.placed.entry(instance) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let Some(placed) = world.placed(scene.file(), instance) else { return };
+                let object = scene.view(placed.object);
+                entry.insert(PlacedObject::new(placed, object))
+            }
+        };
+        search_placed(scene.view(placed.object()), placed, instance, search);
     }
 }

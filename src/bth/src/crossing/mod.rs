@@ -10,6 +10,7 @@ use crate::intersect::crossing::crossing;
 use crate::query::TriangleRef;
 use crate::rays::Ray;
 use crate::scene::Scene;
+use std::cmp::Ordering;
 
 /// Passages of a ray through triangles, counted by the crossing rule of [`Scene::crossings`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,6 +76,17 @@ impl Scene {
         total
     }
 
+    /// As [`Self::crossings`], for each of the rays.
+    ///
+    /// # Panics
+    /// If there are not as many results as rays.
+    pub fn crossings_batch(&self, rays: &[Ray], crossings: &mut [Crossings]) {
+        assert_eq!(rays.len(), crossings.len(), "as many results as rays");
+        for (ray, crossings) in rays.iter().zip(crossings) {
+            *crossings = self.crossings(ray);
+        }
+    }
+
     /// The winding number of the scene's surfaces around a point in world space: for a closed mesh whose triangles are
     /// counterclockwise as seen from outside, how many times it encloses the point. 0 outside, 1 inside, 2 where
     /// two solids overlap; negative where the triangles are seen counterclockwise from inside.
@@ -132,6 +144,37 @@ impl Scene {
                 *inside = *winding != 0;
             }
         }
+    }
+
+    /// Whether the triangles of an object form a surface without boundary: whether every edge has as many triangles in one direction
+    /// as in the other, so that winding numbers are exact and do not depend on the direction of a ray. `None` if the file was
+    /// compiled without the triangles of its source. The time is that of sorting the edges.
+    ///
+    /// # Panics
+    /// If `object` is not less than [`Self::object_count`].
+    pub fn is_closed(&self, object: u32) -> Option<bool> {
+        let view = self.object(object);
+        if view.triangles.len() != view.header.triangles as usize {
+            return None;
+        }
+        // The edges from lower to higher rows of positions, and the others, turned round.
+        let (mut up, mut down) = (Vec::new(), Vec::new());
+        for [a, b, c] in view.triangles {
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                let edge = |low: u32, high: u32| u64::from(low) << 32 | u64::from(high);
+                match p.cmp(q) {
+                    Ordering::Less => up.push(edge(*p, *q)),
+                    Ordering::Greater => down.push(edge(*q, *p)),
+                    Ordering::Equal => {}
+                }
+            }
+        }
+        if up.len() != down.len() {
+            return Some(false);
+        }
+        up.sort_unstable();
+        down.sort_unstable();
+        Some(up == down)
     }
 
     /// Stores the winding number of each point.

@@ -7,7 +7,7 @@
 //! and [`prepare`] computes the per-ray constants of the box test and of the filter.
 //!
 //! The distance of a point to boxes and triangles is bounded in f32 in the same way ([`point_lanes`]) and decided in f64
-//! ([`point_triangle`]) or exactly ([`point_exact`]).
+//! ([`point_triangle`]) or exactly ([`point_exact`]). [`triangle_box`] decides whether triangles and boxes overlap.
 
 pub(crate) mod boxes;
 pub(crate) mod crossing;
@@ -19,3 +19,4 @@ pub(crate) mod point_exact;
 pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;
 pub(crate) mod prepare;
+pub(crate) mod triangle_box;

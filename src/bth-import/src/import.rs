@@ -89,8 +89,20 @@ pub fn import_gltf_meshes(
 /// # Errors
 /// As [`import`]; `BTH-I016` for an image that cannot be read, `BTH-L003` for one that is too large.
 pub fn import_cutouts(path: &Path, mode: AlphaMode, monitor: &dyn Monitor) -> Result<Cutouts> {
-    let data = read_file(path)?;
-    let source = Source::new(path, &data, monitor);
+    import_cutouts_bytes(path, &read_file(path)?, mode, monitor)
+}
+
+/// As [`import_cutouts`], from the bytes of a file, as [`import_bytes`] reads it.
+///
+/// # Errors
+/// As [`import_cutouts`].
+pub fn import_cutouts_bytes(
+    name: &Path,
+    data: &[u8],
+    mode: AlphaMode,
+    monitor: &dyn Monitor,
+) -> Result<Cutouts> {
+    let source = Source::new(name, data, monitor);
     match format(&source)? {
         Format::Gltf if mode != AlphaMode::None => gltf::cutout::flat(&source, mode),
         _ => Ok(Cutouts::default()),

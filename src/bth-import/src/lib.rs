@@ -30,7 +30,8 @@ pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTria
 pub use error::{Error, Place, Result};
 pub use groups::{Group, Groups};
 pub use import::{
-    import, import_bytes, import_cutouts, import_gltf_cutouts, import_gltf_meshes, source_files,
+    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_meshes,
+    source_files,
 };
 pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};

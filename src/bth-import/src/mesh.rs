@@ -1,5 +1,6 @@
 //! The triangle mesh that importers make, and their report about it.
 
+use crate::groups::Groups;
 use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0).
@@ -14,6 +15,8 @@ pub struct Mesh {
     pub attributes: Option<Attributes>,
     /// Where triangles let rays pass, in the form of the compiled file; `None` where all are opaque. The compiler fills it in.
     pub opacity: Option<TriangleOpacities>,
+    /// Groups of triangles, if the caller wants them.
+    pub groups: Option<Groups>,
 }
 
 /// Opacity of each triangle, as the sections OPACITY and OPACITY_MICRO of a compiled file have it.
@@ -66,6 +69,21 @@ pub enum Keep {
     Normals,
     /// Normals and texture coordinates.
     All,
+}
+
+/// What to read of a model besides positions and triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Shading attributes.
+    pub attributes: Keep,
+    /// Groups of triangles, with their names and materials (`--names`).
+    pub groups: bool,
+}
+
+impl From<Keep> for Wanted {
+    fn from(attributes: Keep) -> Self {
+        Self { attributes, groups: false }
+    }
 }
 
 /// What was found in a source. Counts are of triangles unless the field names another unit.

@@ -31,6 +31,7 @@ pub mod rays;
 mod scene;
 mod simd;
 mod streams;
+mod surface;
 mod tets;
 
 pub use batch::RayBatch;
@@ -46,3 +47,4 @@ pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
 pub use streams::{HitStreams, RayStreams};
+pub use surface::{Bounds, SurfacePoint};

@@ -91,6 +91,7 @@ impl Scene {
         for object in 0..file.object_count() {
             file.check(object)?;
         }
+        file.check_object_names()?;
         Scene::with_world(file)
     }
 

@@ -11,6 +11,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(opacity());
     cases.extend(tets());
     cases.extend(geometry());
+    cases.extend(groups());
     cases.extend(super::scenes::invalid());
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     cases
@@ -29,6 +30,47 @@ fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
     broken(name, base, Seal::Sections, |e| {
         e.put_u32(kind, at, value);
     })
+}
+
+/// Faults of groups and names.
+fn groups() -> Vec<Case> {
+    let case = |name: &str, kind, at: usize, value| field(name, "groups", kind, at, value);
+    let run = size_of::<GroupRun>();
+    let missing = |name: &str, kind| {
+        broken(name, "groups", Seal::Sections, |e| {
+            let at = e.entry_at(0, kind);
+            e.put(at + offset_of!(SectionEntry, length), &[0; 8]);
+            e.put(at + offset_of!(SectionEntry, count), &[0; 8]);
+            let (start, length) = (e.section_at(kind), if kind == kind::GROUPS { 48 } else { 32 });
+            e.put(start, &[0; 48][..length]);
+        })
+    };
+    vec![
+        missing("F142-no-runs", kind::GROUP_RUNS),
+        missing("F142-no-groups", kind::GROUPS),
+        case("F142-first-triangle", kind::GROUP_RUNS, 0, 1),
+        case("F142-not-ascending", kind::GROUP_RUNS, 2 * run, 1),
+        case("F142-beyond-the-triangles", kind::GROUP_RUNS, 3 * run, 4),
+        case("F142-group", kind::GROUP_RUNS, offset_of!(GroupRun, group), 3),
+        case("F143-material", kind::GROUPS, offset_of!(Group, material), 2),
+        case("F143-group-reserved", kind::GROUPS, offset_of!(Group, reserved), 1),
+        case("F143-material-reserved", kind::MATERIALS, offset_of!(Material, reserved) + 4, 1),
+        case("F144-group-name-beyond", kind::GROUPS, offset_of!(Group, name_length), 100),
+        case("F144-group-name-overflow", kind::GROUPS, offset_of!(Group, name), NONE),
+        case("F144-material-name-not-utf8", kind::MATERIALS, 16 + offset_of!(Material, name_length), 3),
+        broken("F148-row-missing", "groups", Seal::Sections, |e| {
+            let at = e.entry_at(NONE, kind::OBJECT_NAMES);
+            let start = e.bytes[at + offset_of!(SectionEntry, offset)..][..8].try_into().unwrap();
+            e.put(at + offset_of!(SectionEntry, length), &8u64.to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &1u64.to_le_bytes());
+            e.put(u64::from_le_bytes(start) as usize + 8, &[0; 8]);
+        }),
+        broken("F148-name-beyond", "groups", Seal::Sections, |e| {
+            let at = e.entry_at(NONE, kind::OBJECT_NAMES) + offset_of!(SectionEntry, offset);
+            let start = e.bytes[at..][..8].try_into().unwrap();
+            e.put(u64::from_le_bytes(start) as usize + 4, &9u32.to_le_bytes());
+        }),
+    ]
 }
 
 /// Faults of the container. A table of cases, hence its length.

@@ -3,7 +3,7 @@
 use super::Case;
 use bth_compile::bvh::Wide;
 use bth_compile::coordinates::pack;
-use bth_compile::write::{FileBuilder, ObjectParts, Source, object};
+use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, Source, object, object_names};
 use bth_format::layout::*;
 use zerocopy::IntoBytes;
 
@@ -21,6 +21,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
         Case::new("opacity", opacity()),
         Case::new("two-objects", two_objects()),
+        Case::new("groups", groups()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
@@ -239,6 +240,33 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     })
 }
 
+/// Four triangles in three groups of two materials, one group in two runs, one without a name; and an object without
+/// groups. Both objects have names.
+fn groups() -> Vec<u8> {
+    let triangles: Vec<_> = (0..4).map(|i| CORNERS.map(|[x, y, z]| [x, y, z + i as f32])).collect();
+    let lines = lines(indexed(&triangles, 0).as_bytes());
+    let group = |name: &str, material| bth_import::Group { name: name.into(), material };
+    let groups = GroupParts::of(&bth_import::Groups {
+        groups: vec![group("wheel", Some(0)), group("window, front", Some(1)), group("", None)],
+        materials: vec!["rubber".into(), "gl\u{e4}s".into()],
+        runs: vec![[0, 0], [1, 1], [2, 0], [3, 2]],
+    });
+    let parts = ObjectParts {
+        bounds: Some(bounds(triangles.as_flattened())),
+        root: Child::Indexed(0).code(),
+        triangles: 4,
+        lines: &lines,
+        triangle_ids: &[0, 1, 2, 3],
+        groups: Some(&groups),
+        ..ObjectParts::default()
+    };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &parts).unwrap();
+    object(&mut builder, 1, &ObjectParts { groups: None, ..parts }).unwrap();
+    object_names(&mut builder, ["car", "stone"]).unwrap();
+    builder.finish()
+}
+
 fn two_objects() -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let parts = ObjectParts {
@@ -319,6 +347,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         hull_faces: &parts.hulls,
         triangle_faces: &homes,
         source: Some(source),
+        ..ObjectParts::default()
     })
 }
 

@@ -55,7 +55,7 @@ pub(crate) fn compile_model(
     mut clock: Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let imported = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let imported = clock.time("mesh", || stages.import(model, options.wanted(), monitor))?;
     let (checked, report) = compile_imported(model, imported, options, stages, clock, monitor)?;
     Ok((checked.compiled, report))
 }

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::Model;
 use crate::{bvh, coordinates, marks, opacity, tets};
-use bth_import::{self as mesh, Keep, Mesh};
+use bth_import::{self as mesh, Mesh, Wanted};
 use std::path::Path;
 
 /// The stages of the pipeline whose results may come from elsewhere. The provided methods call the stages
@@ -20,10 +20,10 @@ pub(crate) trait Stages {
     fn import(
         &mut self,
         model: &Model<'_>,
-        keep: Keep,
+        wanted: Wanted,
         monitor: &dyn Monitor,
     ) -> Result<(Mesh, mesh::Report)> {
-        let (mut mesh, mut report) = mesh::import(model.path, keep, monitor)?;
+        let (mut mesh, mut report) = mesh::import(model.path, wanted, monitor)?;
         if model.digest.alpha != mesh::AlphaMode::None {
             let cutouts = mesh::import_cutouts(model.path, model.digest.alpha, monitor)?;
             opacity::add(&mut mesh, &mut report, &cutouts, monitor)?;

@@ -188,7 +188,11 @@ pub(super) fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
-    Ok(Some(cached::scene(&parts, &sources::contents(manifest, &plan.sources), context.options, tetgen)))
+    let mut contents = sources::contents(manifest, &plan.sources);
+    if context.options.names {
+        contents.extend(manifest.objects.iter().map(|object| object.name.clone()));
+    }
+    Ok(Some(cached::scene(&parts, &contents, context.options, tetgen)))
 }
 
 /// Compiles the objects and assembles the file.
@@ -221,6 +225,10 @@ pub(super) fn build(
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
+        if options.names {
+            let name = |report: &ObjectReport| report.names.first().cloned().unwrap_or_default();
+            write::object_names(&mut builder, objects.reports.iter().map(name))?;
+        }
         builder.provenance(provenance)?;
         builder.check_limits()?;
         let (content, table) = builder.content();

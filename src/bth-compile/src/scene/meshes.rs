@@ -62,7 +62,7 @@ impl SourceMesh {
 }
 
 fn key(file: &File<'_>, number: Option<u32>, context: &Context<'_>) -> Key {
-    cached::mesh(&file.digest, &file.full, &file.part(number), context.options.attributes)
+    cached::mesh(&file.digest, &file.full, &file.part(number), context.options.wanted())
 }
 
 /// The summary of a mesh that the cache has.
@@ -103,7 +103,8 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let shading = mesh.shading.as_ref().map(Digest::hex);
     let opacity =
         mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
-    blake3::hash(format!("mesh {} {shading:?}{opacity}", mesh.geometry.hex()).as_bytes())
+    let groups = mesh.groups.as_ref().map_or_else(String::new, |groups| format!(" groups {}", groups.hex()));
+    blake3::hash(format!("mesh {} {shading:?}{opacity}{groups}", mesh.geometry.hex()).as_bytes())
 }
 
 /// Adds the opacity of triangles to meshes of a file: the whole file's without numbers.
@@ -144,9 +145,9 @@ fn import(
     }
     let single: Vec<u32> = numbers.iter().filter_map(|number| *number).collect();
     let meshes = if single.is_empty() {
-        vec![mesh::import(&file.full, options.attributes, *monitor)?]
+        vec![mesh::import(&file.full, options.wanted(), *monitor)?]
     } else {
-        mesh::import_gltf_meshes(&file.full, &single, options.attributes, *monitor)?
+        mesh::import_gltf_meshes(&file.full, &single, options.wanted(), *monitor)?
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;

@@ -1,7 +1,7 @@
 //! The sections of an object.
 
-use super::FileBuilder;
 use super::builder::defect;
+use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
 use std::borrow::Cow;
@@ -44,6 +44,8 @@ pub struct ObjectParts<'a> {
     pub opacity: &'a [u32],
     /// States of micro-triangles.
     pub opacity_micro: &'a [u32],
+    /// Groups of triangles to keep.
+    pub groups: Option<&'a GroupParts>,
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -112,6 +114,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::CORNERS, index, source.corners)?;
         builder.rows(kind::NORMALS, index, source.normals)?;
         builder.rows(kind::UVS, index, source.uvs)?;
+    }
+    if let Some(groups) = parts.groups {
+        groups.write(builder, index)?;
     }
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;

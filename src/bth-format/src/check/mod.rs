@@ -7,6 +7,7 @@
 mod adjacency;
 mod bit_set;
 mod boxes;
+mod groups;
 mod header;
 mod leaves;
 mod nodes;
@@ -33,6 +34,7 @@ use crate::object::ObjectView;
 pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
     sources::check(view)?;
+    groups::check(view)?;
     opacity::check(view)?;
     tet_leaves::check(view)?;
     tree::check(view)?;

@@ -4,6 +4,7 @@
 //! may panic; it never reads out of bounds.
 
 mod bounds;
+mod groups;
 mod leaves;
 mod nodes;
 mod opacity;

@@ -136,7 +136,7 @@ fn a_c_program_gets_several_hits_under_conditions() {
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout).expect("text");
     let mut lines = text.lines();
-    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
     let everything = Accept::default();
     let mut counts = String::new();
     for accept in [everything, Accept { filter: Some(&even), ..everything }] {

@@ -34,6 +34,9 @@ pub unsafe extern "C" fn bth_crossings(
     }
 }
 
+/// The arguments of a query for points: the scene, the points, and for each its result.
+type Points<'a, T> = (&'a Scene, &'a [[f32; 3]], &'a mut [T]);
+
 /// The arguments of a query for points as slices; `None` if there are no points, or a pointer is null.
 ///
 /// # Safety
@@ -45,7 +48,7 @@ unsafe fn points<'a, T>(
     points: *const [f32; 3],
     results: *mut T,
     count: usize,
-) -> Option<(&'a Scene, &'a [[f32; 3]], &'a mut [T])> {
+) -> Option<Points<'a, T>> {
     if scene.is_null() || points.is_null() || results.is_null() || count == 0 {
         return None;
     }

@@ -234,18 +234,18 @@ typedef struct {
 /* Stores the crossings of triangles by each of `count` rays. Unlike hits, they never meet an edge, a vertex or the plane of a
  * triangle: they are those of the ray with its origin moved by an infinitely small vector, decided exactly. So a line crosses a
  * surface without boundary as often in as out, and each crossing lies in exactly one of two ranges of t that share an end.
- * `crossings` must not overlap the rays. After an internal error there are none. */
-void bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
+ * `crossings` must not overlap the rays. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL there are none. */
+int32_t bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
 
 /* Stores for each of `count` points in world space how often the closed surfaces of the scene enclose it: its winding number, 0
  * outside of all. It is exact where every mesh is closed and its triangles are seen counterclockwise from outside; elsewhere it is the
  * number of crossings, counted as above, by a ray along an axis to the nearest side of an object's bounds. A point on a surface counts
  * as if it were moved by an infinitely small vector. `points` holds x, y and z of each; `winding` must not overlap it. Points that are not
- * finite, and all points after an internal error, are outside. */
-void bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
+ * finite are outside. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all points are outside. */
+int32_t bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
 
 /* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
-void bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
+int32_t bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
 
 /* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
  * coordinates with --attributes, and groups, materials and names with --names. */

@@ -66,6 +66,8 @@ typedef struct {
 #define BTH_ERROR_INTERNAL (-5)    /* a defect of this library */
 #define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed at the given time: its transform cannot be inverted or
                                       is not finite; the text of the error gives the node */
+#define BTH_ERROR_MISSING (-7)     /* the file does not keep what is asked for, or there is none; the text of the error says
+                                      which option of the compiler keeps it */
 
 /* Opens a compiled file; path is in UTF-8. On success stores the scene in *scene and returns BTH_OK. On failure stores null,
  * unless path or scene is null, and returns a negative code; bth_last_error then describes what is wrong, where, and what can
@@ -244,6 +246,54 @@ int32_t bth_winding(const bth_scene *scene, const float *points, int32_t *windin
 
 /* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
 int32_t bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
+
+/* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
+ * coordinates with --attributes, and groups, materials and names with --names. */
+
+/* Version of the library, such as "0.9.0". Valid forever. */
+const char *bth_version(void);
+
+/* Stores in bounds[0] the lower and in bounds[1] the upper end of a box in world space that contains all visible instances at the
+ * scene's time, slightly enlarged to cover roundings. Returns BTH_OK, or BTH_ERROR_MISSING if nothing is visible. */
+int32_t bth_bounds(const bth_scene *scene, float bounds[2][3]);
+
+/* Number of objects of the file; 0 if the scene is null. */
+uint32_t bth_object_count(const bth_scene *scene);
+
+/* Number of groups of an object's triangles, at least 1, and of its materials; 0 if the scene is null or has no such object. */
+uint32_t bth_group_count(const bth_scene *scene, uint32_t object);
+uint32_t bth_material_count(const bth_scene *scene, uint32_t object);
+
+/* Stores the three vertices of a triangle in world space, at the scene's time. Returns BTH_OK; BTH_ERROR_MISSING if the file does
+ * not keep them; BTH_ERROR_ARGUMENT if there is no such instance or triangle. */
+int32_t bth_triangle_positions(const bth_scene *scene, bth_surface triangle, double positions[3][3]);
+
+/* Flag of bth_surface_point: the file has texture coordinates. */
+#define BTH_HAS_UV 1u
+
+/* The surface at a hit, in world space. Normals have length 1. 96 bytes. */
+typedef struct {
+    double position[3];         /* the point on the triangle */
+    double geometric_normal[3]; /* of the triangle's plane, on the side from which the object's vertices are seen counterclockwise */
+    double normal[3];           /* the source's normals interpolated, on whatever side it has them; the geometric normal where the
+                                   file keeps none */
+    float uv[2];                /* texture coordinates; zeros without BTH_HAS_UV */
+    uint32_t object;            /* index of the object */
+    uint32_t group;             /* index of the group of triangles; 0 if the file keeps no groups */
+    uint32_t material;          /* index of the object's material; BTH_NONE if there is none */
+    uint32_t flags;             /* BTH_HAS_UV or 0 */
+} bth_surface_point;
+
+/* Stores the surface at a hit of this scene, at the scene's time, in *point. Returns BTH_OK; BTH_ERROR_ARGUMENT for a miss;
+ * BTH_ERROR_MISSING if the file does not keep the positions of triangles, or the instance is hidden by now. */
+int32_t bth_surface_at(const bth_scene *scene, const bth_hit *hit, bth_surface_point *point);
+
+/* Copy the name of an object, or of a group or material of an object, to `name`, in UTF-8 with a zero at the end; where it does not fit
+ * into `capacity` bytes, only the characters that do. Return the length of the whole name in bytes, without the zero: 0 if there is no
+ * name. `name` may be null if the capacity is 0. */
+size_t bth_object_name(const bth_scene *scene, uint32_t object, char *name, size_t capacity);
+size_t bth_group_name(const bth_scene *scene, uint32_t object, uint32_t group, char *name, size_t capacity);
+size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t material, char *name, size_t capacity);
 
 #ifdef __cplusplus
 }

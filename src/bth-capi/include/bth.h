@@ -1,7 +1,7 @@
 /* C interface of bth: opens compiled BTH files and traces rays. Link with libbth.
  *
  * All functions may be called from any thread. Functions that take a const bth_scene may run on one scene at the same time;
- * bth_set_seconds, bth_set_frame and bth_close must not run at the same time as any other function on that scene.
+ * functions that take a bth_scene without const must not run at the same time as any other function on that scene.
  *
  * In a file without scene sections, such as a compiled model, each object has one instance with the same index, and object
  * space is world space.
@@ -66,6 +66,8 @@ typedef struct {
 #define BTH_ERROR_INTERNAL (-5)    /* a defect of this library */
 #define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed at the given time: its transform cannot be inverted or
                                       is not finite; the text of the error gives the node */
+#define BTH_ERROR_MISSING (-7)     /* the file does not keep what is asked for, or there is none; the text of the error says
+                                      which option of the compiler keeps it */
 
 /* Opens a compiled file; path is in UTF-8. On success stores the scene in *scene and returns BTH_OK. On failure stores null,
  * unless path or scene is null, and returns a negative code; bth_last_error then describes what is wrong, where, and what can
@@ -124,8 +126,174 @@ uint32_t bth_instance_count(const bth_scene *scene);
  * pointer is null. */
 int32_t bth_get_instance(const bth_scene *scene, uint32_t row, bth_instance *instance);
 
+/* The point of the triangles that is closest to a given point. 36 bytes. */
+typedef struct {
+    float distance;        /* in world space; infinite if there is none within the radius */
+    float point[3];        /* the closest point, in world space */
+    float u, v;            /* barycentric weights of the triangle's second and third vertex */
+    bth_surface surface;   /* the triangle; BTH_NONE in both fields if there is none */
+    uint32_t feature;      /* where on the triangle: 0 inside, 1 to 3 on the edge from the first, second or third vertex to the
+                              next, 4 to 6 at that vertex */
+} bth_closest;
+
+/* Stores for each of `count` points, x, y and z in world space, the closest point of the triangles whose distance is at most
+ * `radius`. There is none for a point that is not finite, or with a radius that is negative or NaN. Many points in
+ * one call are faster. Returns BTH_OK, or a negative code. */
+int32_t bth_closest_points(const bth_scene *scene, const float *points, float radius, bth_closest *closest, size_t count);
+
+/* Stores for each of `count` points the distance to the closest triangle, negative inside of closed meshes; infinite if nothing
+ * can be hit, NaN for a point that is not finite. Returns BTH_OK, or a negative code. */
+int32_t bth_signed_distances(const bth_scene *scene, const float *points, float *distances, size_t count);
+
+/* Stores the number of triangles that overlap an axis-aligned box in world space in *count, and the first `capacity` of them, by
+ * ascending instance and triangle, in `triangles`, which may be null if `capacity` is 0. Touching counts; the answer is exact.
+ * Returns BTH_OK, or a negative code. */
+int32_t bth_triangles_in_box(const bth_scene *scene, const float lower[3], const float upper[3], bth_surface *triangles,
+                             size_t capacity, size_t *count);
+
+/* As bth_triangles_in_box, for triangles whose distance from `center`, rounded to float, is at most `radius`. */
+int32_t bth_triangles_in_sphere(const bth_scene *scene, const float center[3], float radius, bth_surface *triangles,
+                                size_t capacity, size_t *count);
+
 /* Size in bytes of the sections that traversal reads; 0 if the scene is null. */
 uint64_t bth_resident_bytes(const bth_scene *scene);
+
+/* Queries for several hits and with conditions. Hits come in order: by ascending t, then instance, then triangle. Among hits of
+ * one instance whose t is equal as it is reported, rounded to float, those that are nearer before the rounding come first. A
+ * triangle is hit at most once. A ray through an edge or a vertex hits every triangle to which the edge or vertex belongs. */
+
+/* Decides about a hit: returns 0 to ignore it, any other value to accept it. `user` is that of bth_accept. Both pointers are valid
+ * during the call. Calls come in any order; for the nearest hits, only for hits nearer than those found so far. The function may
+ * be called on any thread, and on several at the same time if queries are. It must return, without a jump out of it. */
+typedef int32_t (*bth_filter)(void *user, const bth_ray *ray, const bth_hit *hit);
+
+/* Sides of triangles that are ignored. The front is the side from which the vertices appear counter-clockwise in object space; a
+ * transform that mirrors an instance does not exchange the sides. */
+#define BTH_CULL_NONE 0u
+#define BTH_CULL_BACK 1u  /* hits on the back are ignored */
+#define BTH_CULL_FRONT 2u /* hits on the front are ignored */
+
+/* What a ray is allowed to hit. 24 bytes where pointers have 8. */
+typedef struct {
+    uint32_t mask;     /* instances and groups whose mask has no bit in common with this one are not hit */
+    uint32_t cull;     /* one of BTH_CULL_NONE, BTH_CULL_BACK and BTH_CULL_FRONT */
+    bth_filter filter; /* null, or called for each hit that passes the conditions above */
+    void *user;        /* passed to the filter */
+} bth_accept;
+
+/* The initializer of a bth_accept that accepts everything. */
+#define BTH_ACCEPT_EVERYTHING {0xFFFFFFFFu, BTH_CULL_NONE, 0, 0}
+
+/* Stores the nearest hit of each of `count` rays that is accepted. If `accept` is null, everything is, as in the other queries
+ * below. They return BTH_OK or a negative code. After BTH_ERROR_INTERNAL the results are not valid. The results must not overlap
+ * the other arrays. */
+int32_t bth_nearest_accepted(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, bth_hit *hits,
+                             size_t count);
+
+/* Stores in `found` for each of `count` rays 1 if it has a hit that is accepted, else 0. */
+int32_t bth_any_accepted(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint8_t *found,
+                         size_t count);
+
+/* Stores in `counts` the number of hits of each of `count` rays that are accepted. */
+int32_t bth_count_hits(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint64_t *counts,
+                       size_t count);
+
+/* The hits of several rays, one ray after the other. */
+typedef struct {
+    uint64_t *offsets; /* one more number than there are rays: the hits of ray i are those from offsets[i] to offsets[i + 1] */
+    bth_hit *hits;     /* `capacity` hits; null is allowed if that is 0 */
+    uint64_t capacity;
+    uint64_t needed;   /* set by the query: number of all hits, of which those that exceed the capacity were not stored */
+} bth_hit_list;
+
+/* The number of hits with which bth_all_hits stores all. */
+#define BTH_ALL_HITS 0xFFFFFFFFFFFFFFFFull
+
+/* Stores in `list` the `most` nearest hits of each of `count` rays that are accepted, in order, or all with BTH_ALL_HITS. If the
+ * capacity does not suffice, the result is BTH_OK nevertheless; offsets and `needed` are those of a list that suffices. */
+int32_t bth_all_hits(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint64_t most,
+                     bth_hit_list *list, size_t count);
+
+/* Sets the mask of an instance, which has all bits set before: rays of the queries above meet the instance only if their mask has a
+ * bit in common with it. bth_nearest and bth_any ignore masks. Must not run at the same time as any other function on the scene.
+ * Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such instance. */
+int32_t bth_set_instance_mask(bth_scene *scene, uint32_t instance, uint32_t mask);
+
+/* As bth_set_instance_mask, for a group of triangles of an object in all its instances. Triangles of an object without groups form
+ * group 0. A ray meets a triangle only if its mask has a bit in common with the mask of the instance and one in common with the
+ * mask of the group. */
+int32_t bth_set_group_mask(bth_scene *scene, uint32_t object, uint32_t group, uint32_t mask);
+
+/* Crossings of surfaces by a ray. 8 bytes. */
+typedef struct {
+    uint32_t count;  /* crossings in the ray's range; each passage of a closed surface counts once */
+    int32_t winding; /* crossings from the back of a triangle to its front, from which its vertices are seen counterclockwise,
+                        minus those from the front to the back */
+} bth_crossing_count;
+
+/* Stores the crossings of triangles by each of `count` rays. Unlike hits, they never meet an edge, a vertex or the plane of a
+ * triangle: they are those of the ray with its origin moved by an infinitely small vector, decided exactly. So a line crosses a
+ * surface without boundary as often in as out, and each crossing lies in exactly one of two ranges of t that share an end.
+ * `crossings` must not overlap the rays. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL there are none. */
+int32_t bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
+
+/* Stores for each of `count` points in world space how often the closed surfaces of the scene enclose it: its winding number, 0
+ * outside of all. It is exact where every mesh is closed and its triangles are seen counterclockwise from outside; elsewhere it is the
+ * number of crossings, counted as above, by a ray along an axis to the nearest side of an object's bounds. A point on a surface counts
+ * as if it were moved by an infinitely small vector. `points` holds x, y and z of each; `winding` must not overlap it. Points that are not
+ * finite are outside. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all points are outside. */
+int32_t bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
+
+/* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
+int32_t bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
+
+/* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
+ * coordinates with --attributes, and groups, materials and names with --names. */
+
+/* Version of the library, such as "0.9.0". Valid forever. */
+const char *bth_version(void);
+
+/* Stores in bounds[0] the lower and in bounds[1] the upper end of a box in world space that contains all visible instances at the
+ * scene's time, slightly enlarged to cover roundings. Returns BTH_OK, or BTH_ERROR_MISSING if nothing is visible. */
+int32_t bth_bounds(const bth_scene *scene, float bounds[2][3]);
+
+/* Number of objects of the file; 0 if the scene is null. */
+uint32_t bth_object_count(const bth_scene *scene);
+
+/* Number of groups of an object's triangles, at least 1, and of its materials; 0 if the scene is null or has no such object. */
+uint32_t bth_group_count(const bth_scene *scene, uint32_t object);
+uint32_t bth_material_count(const bth_scene *scene, uint32_t object);
+
+/* Stores the three vertices of a triangle in world space, at the scene's time. Returns BTH_OK; BTH_ERROR_MISSING if the file does
+ * not keep them; BTH_ERROR_ARGUMENT if there is no such instance or triangle. */
+int32_t bth_triangle_positions(const bth_scene *scene, bth_surface triangle, double positions[3][3]);
+
+/* Flag of bth_surface_point: the file has texture coordinates. */
+#define BTH_HAS_UV 1u
+
+/* The surface at a hit, in world space. Normals have length 1. 96 bytes. */
+typedef struct {
+    double position[3];         /* the point on the triangle */
+    double geometric_normal[3]; /* of the triangle's plane, on the side from which the object's vertices are seen counterclockwise */
+    double normal[3];           /* the source's normals interpolated, on whatever side it has them; the geometric normal where the
+                                   file keeps none */
+    float uv[2];                /* texture coordinates; zeros without BTH_HAS_UV */
+    uint32_t object;            /* index of the object */
+    uint32_t group;             /* index of the group of triangles; 0 if the file keeps no groups */
+    uint32_t material;          /* index of the object's material; BTH_NONE if there is none */
+    uint32_t flags;             /* BTH_HAS_UV or 0 */
+} bth_surface_point;
+
+/* Stores the surface at a hit of this scene, at the scene's time, in *point. Returns BTH_OK; BTH_ERROR_ARGUMENT for a miss;
+ * BTH_ERROR_MISSING if the file does not keep the positions of triangles, or the instance is hidden by now. */
+int32_t bth_surface_at(const bth_scene *scene, const bth_hit *hit, bth_surface_point *point);
+
+/* Copy the name of an object, or of a group or material of an object, to `name`, in UTF-8 with a zero at the end; where it does not fit
+ * into `capacity` bytes, only the characters that do. Return the length of the whole name in bytes, without the zero: 0 if there is no
+ * name. `name` may be null if the capacity is 0. */
+size_t bth_object_name(const bth_scene *scene, uint32_t object, char *name, size_t capacity);
+size_t bth_group_name(const bth_scene *scene, uint32_t object, uint32_t group, char *name, size_t capacity);
+size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t material, char *name, size_t capacity);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,12 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
+pub mod closest;
+pub mod hits;
+pub mod inside;
 pub mod memory;
 pub mod motion;
+pub mod surface;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
@@ -23,6 +27,7 @@ const ERROR_FORMAT: i32 = -3;
 const ERROR_VERSION: i32 = -4;
 const ERROR_INTERNAL: i32 = -5;
 const ERROR_SCENE: i32 = -6;
+const ERROR_MISSING: i32 = -7;
 
 thread_local! {
     /// Result of [`bth_last_error`].

@@ -16,6 +16,8 @@
 
 mod batch;
 mod bvh;
+mod closest;
+mod crossing;
 mod enumerate;
 mod hits;
 mod instances;
@@ -23,14 +25,20 @@ mod intersect;
 mod masks;
 mod motion;
 mod object;
+mod opacity;
 mod query;
 pub mod rays;
 mod scene;
 mod simd;
+mod streams;
+mod surface;
 mod tets;
 
 pub use batch::RayBatch;
+pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
+pub use closest::{Closest, Feature};
+pub use crossing::Crossings;
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
@@ -38,3 +46,5 @@ pub use object::Hinted;
 pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
+pub use streams::{HitStreams, RayStreams};
+pub use surface::{Bounds, SurfacePoint};

@@ -4,11 +4,13 @@
 //! and each answer is checked in integer arithmetic: fast enough for 100 million rays.
 
 mod grid;
+mod inside;
 mod rays;
 mod shapes;
 mod statistics;
 
 pub use grid::{Grid, GridRay, LIMIT, Point, Quotient};
+pub use inside::{Corners, InsideStatistics, is_closed, run_inside};
 pub use rays::{Aimed, Kind, Target, rays};
 pub use shapes::{Shape, shapes};
 pub use statistics::Statistics;

@@ -23,5 +23,6 @@ mod world;
 
 pub(crate) use affine::ObjectRay;
 pub(crate) use placement::Placement;
+pub(crate) use top_level::INSTANCE;
 pub use world::Update;
-pub(crate) use world::World;
+pub(crate) use world::{Placed, World};

@@ -1,5 +1,6 @@
 //! `bthc info`: shows the contents of a compiled file.
 
+use super::holes::{Holes, holes};
 use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
@@ -55,6 +56,8 @@ fn describe(file: &File) -> Result<Value, Failure> {
             "boxes": if view.has_packed_nodes() { 8 } else { 32 },
             "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
+            "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
+                "transparent": h.shares[1], "unknown": h.shares[2]})),
             "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
     };
     let header = file.header();
@@ -108,6 +111,13 @@ fn summary(file: &File) -> Result<String, Failure> {
         }
         if view.has_packed_nodes() {
             facts.row(["boxes of nodes", "8 bits"]);
+        }
+        if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
+            facts.row(["triangles with holes", &count(triangles)]);
+            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+            facts.row(["  of their area opaque", &percent(opaque)]);
+            facts.row(["  transparent", &percent(transparent)]);
+            facts.row(["  unknown", &percent(unknown)]);
         }
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);

@@ -3,6 +3,7 @@
 mod accuracy;
 mod compare;
 mod costs;
+mod inside;
 mod load;
 mod models;
 mod output;
@@ -18,6 +19,7 @@ mod values;
 pub use accuracy::Accuracy;
 pub use compare::Compare;
 pub use costs::Costs;
+pub use inside::Inside;
 pub use load::{Load, LoadScenes, Probe, Start, Starts};
 pub use models::{Models, SeenFrom};
 pub use output::Output;
@@ -59,6 +61,8 @@ pub enum Command {
     LoadScenes(LoadScenes),
     /// Hard rays on hard surfaces, every answer checked exactly: misses, leaks, ghosts, errors of t.
     Stress(Stress),
+    /// Points inside and outside of closed models, every answer checked along two rays and samples exactly.
+    Inside(Inside),
     /// Predictions of the cost model against measurements.
     Costs(Costs),
     /// The paper's tables on our models.

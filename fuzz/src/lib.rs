@@ -39,13 +39,13 @@ fn trace(scene: &Scene, rng: &mut Rng) {
         .collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     let mut found = vec![false; rays.len()];
-    scene.nearest_batch(&rays, None, &mut hits);
-    scene.nearest_batch(&rays, Some(&from), &mut hits);
-    scene.any_batch(&rays, Some(&from), &mut found);
-    scene.any_batch(&rays, None, &mut found);
+    scene.batch(&rays).nearest(&mut hits);
+    scene.batch(&rays).from(&from[..]).nearest(&mut hits);
+    scene.batch(&rays).from(&from[..]).any(&mut found);
+    scene.batch(&rays).any(&mut found);
     for (ray, from) in rays.iter().zip(&from).take(8) {
-        scene.nearest(ray, *from);
-        scene.any(ray, PrimitiveRef::NONE);
+        scene.nearest_from(ray, *from);
+        scene.any(ray);
         scene.nearest_counted(ray, *from);
     }
 }

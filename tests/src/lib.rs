@@ -2,6 +2,7 @@
 
 pub mod conformance;
 pub mod crowd;
+pub mod placed_soup;
 pub mod rays;
 pub mod stress;
 pub mod structures;
@@ -61,5 +62,6 @@ pub fn worker() -> Option<&'static Path> {
 /// Compiles the Rust code of the readme and the guide.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
+#[doc = include_str!("../../docs/queries.md")]
 #[doc = include_str!("../../docs/rust.md")]
 pub struct Pages;

@@ -35,7 +35,7 @@ pub fn assorted(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<Ray> 
                 1 => corner[2],
                 _ => inside(3.0),
             };
-            let mut ray = Ray { origin, tmin: 0.0, direction: sub(target, origin), tmax: f32::INFINITY };
+            let mut ray = Ray::new(origin, sub(target, origin));
             match i % 11 {
                 0 | 1 => {
                     let k = rng.below(3) as usize;
@@ -70,7 +70,7 @@ pub fn onward(rays: &[Ray], hits: &[Hit], triangles: usize, seed: u64) -> Vec<(R
         let back = hit.t * (1.0 - 1e-4 * rng.unit_f32());
         let origin = [0, 1, 2].map(|k| ray.origin[k] + ray.direction[k] * back);
         let direction = [(); 3].map(|()| rng.unit_f32() - 0.5);
-        (Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }, hit.primitive)
+        (Ray::new(origin, direction), hit.primitive)
     };
     rays.iter().zip(hits).map(&mut from).collect()
 }

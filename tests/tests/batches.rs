@@ -1,7 +1,7 @@
 //! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene};
+use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
@@ -43,7 +43,7 @@ fn hinted_rays(
 ) -> Vec<(Ray, PrimitiveRef)> {
     let first = assorted(corners, count, seed);
     let mut hits = vec![Hit::MISS; first.len()];
-    plain.nearest_batch(&first, None, &mut hits);
+    plain.batch(&first).nearest(&mut hits);
     let mut rays = onward(&first, &hits, corners.len(), seed + 1);
     let mut rng = Rng::new(seed + 2);
     for i in 0..rays.len() {
@@ -77,7 +77,7 @@ fn hinted_rays(
             rays[i].0 = ray;
         }
         // Cut right about the hit.
-        let hit = plain.nearest(&ray, PrimitiveRef::NONE);
+        let hit = plain.nearest(&ray).unwrap_or(Hit::MISS);
         if hit.is_hit() {
             let t = [hit.t, hit.t.next_up(), hit.t.next_down()][i % 3];
             let cut = if i % 2 == 0 { Ray { tmax: t, ..ray } } else { Ray { tmin: t, ..ray } };
@@ -96,7 +96,7 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
     let plain = compiled(model, Structure::Bvh, RecordKind::Link32, false);
     let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) =
         hinted_rays(&plain, &corners, rays, seed).into_iter().unzip();
-    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray, PrimitiveRef::NONE)).collect();
+    let expected: Vec<Hit> = rays.iter().map(|ray| plain.nearest(ray).unwrap_or(Hit::MISS)).collect();
     let some_hits = expected.iter().filter(|hit| hit.is_hit()).count();
     assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits} of {} hit", rays.len());
     for (record, keep) in RecordKind::ALL.into_iter().zip([true, false, true, false]) {
@@ -107,9 +107,9 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
             isa.choose().expect("an instruction set that is available");
             hinted.choose();
             let mut hits = vec![Hit::MISS; rays.len()];
-            scene.nearest_batch(&rays, Some(&from), &mut hits);
+            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
             let mut any = vec![false; rays.len()];
-            scene.any_batch(&rays, Some(&from), &mut any);
+            scene.batch(&rays).from(&from[..]).any(&mut any);
             for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
                 let context = || format!("{isa}, {hinted:?}, {}: {ray:?} from {from:?}", record.name());
                 assert_eq!(bits(&hits[i]), bits(&expected[i]), "{}", context());
@@ -175,12 +175,97 @@ fn rays_through_two_points_of_a_surface_get_the_same_bits_on_every_instruction_s
     };
     let rays: Vec<Ray> = (0..20_000).map(|_| ray()).collect();
     let mut exact = vec![Hit::MISS; rays.len()];
-    scene.nearest_batch(&rays, None, &mut exact);
+    scene.batch(&rays).nearest(&mut exact);
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().unwrap();
         let mut hits = vec![Hit::MISS; rays.len()];
-        scene.nearest_batch(&rays, None, &mut hits);
+        scene.batch(&rays).nearest(&mut hits);
         assert!(exact.iter().zip(&hits).all(|(a, b)| bits(a) == bits(b)), "{isa}");
     }
     Isa::best().choose().unwrap();
+}
+
+#[test]
+fn a_batch_on_many_threads_has_the_answers_of_one() {
+    let _turn = turn();
+    let model = gyroid(2000);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    // More rays than one task takes, and not a multiple of that.
+    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) =
+        hinted_rays(&scene, &corners, 10_001, 5).into_iter().unzip();
+    let (mut alone, mut together) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+    scene.batch(&rays).nearest(&mut alone);
+    scene.batch(&rays).from(&from[..]).parallel().nearest(&mut together);
+    let (mut any_alone, mut any_together) = (vec![false; rays.len()], vec![false; rays.len()]);
+    scene.batch(&rays).any(&mut any_alone);
+    scene.batch(&rays).parallel().any(&mut any_together);
+    for i in 0..rays.len() {
+        assert_eq!(bits(&together[i]), bits(&alone[i]), "{:?}", rays[i]);
+    }
+    assert_eq!(any_together, any_alone);
+    assert!(any_alone.contains(&true) && any_alone.contains(&false));
+}
+
+#[test]
+fn streams_have_the_answers_of_batches() {
+    let _turn = turn();
+    let model = gyroid(2000);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    // More rays than a block holds, and not a multiple of that.
+    let rays = assorted(&corners, 2_501, 6);
+    let count = rays.len();
+    let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
+    scene.batch(&rays).nearest(&mut hits);
+    scene.batch(&rays).any(&mut found);
+    let column = |of: &dyn Fn(&Ray) -> f32| rays.iter().map(of).collect::<Vec<_>>();
+    let [ox, oy, oz] = [0, 1, 2].map(|k| column(&|ray| ray.origin[k]));
+    let [dx, dy, dz] = [0, 1, 2].map(|k| column(&|ray| ray.direction[k]));
+    let (tmin, tmax) = (column(&|ray| ray.tmin), column(&|ray| ray.tmax));
+    let streams =
+        RayStreams { origin: [&ox, &oy, &oz], direction: [&dx, &dy, &dz], tmin: &tmin, tmax: &tmax };
+    let (mut t, mut u, mut v) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+    let (mut instance, mut triangle) = (vec![0; count], vec![0; count]);
+    scene.nearest_streams(
+        &streams,
+        HitStreams { t: &mut t, u: &mut u, v: &mut v, instance: &mut instance, triangle: &mut triangle },
+    );
+    for i in 0..count {
+        let primitive = PrimitiveRef { instance: instance[i], triangle: triangle[i] };
+        assert_eq!(bits(&Hit { t: t[i], u: u[i], v: v[i], primitive }), bits(&hits[i]), "{:?}", rays[i]);
+    }
+    let mut of_streams = vec![false; count];
+    scene.any_streams(&streams, &mut of_streams);
+    assert_eq!(of_streams, found);
+    // Without ranges all rays begin at 0 and have no end.
+    let open: Vec<Ray> = rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect();
+    scene.batch(&open).any(&mut found);
+    scene.any_streams(&RayStreams { tmin: &[], tmax: &[], ..streams }, &mut of_streams);
+    assert_eq!(of_streams, found);
+}
+
+#[test]
+fn conditions_of_a_batch_are_those_of_its_rays() {
+    let _turn = turn();
+    let model = gyroid(2000);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let rays = assorted(&corners, 6_000, 7);
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let accept = Accept { filter: Some(&even), ..Accept::default() };
+    let (mut alone, mut together) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+    scene.batch(&rays).accept(&accept).nearest(&mut alone);
+    scene.batch(&rays).accept(&accept).parallel().nearest(&mut together);
+    let mut any = vec![false; rays.len()];
+    scene.batch(&rays).accept(&accept).parallel().any(&mut any);
+    let mut some_hits = 0;
+    for (i, ray) in rays.iter().enumerate() {
+        let expected = scene.nearest_accepted(ray, &accept);
+        assert_eq!(bits(&alone[i]), bits(&expected.unwrap_or(Hit::MISS)), "{ray:?}");
+        assert_eq!(bits(&together[i]), bits(&alone[i]), "{ray:?}");
+        assert_eq!(any[i], expected.is_some(), "{ray:?}");
+        some_hits += usize::from(expected.is_some());
+    }
+    assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits}");
 }

@@ -5,7 +5,7 @@
 #[allow(dead_code)]
 mod corpus_support;
 
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth::{Isa, Scene};
 use bth_compile::coordinates::CoordinateOptions;
 use bth_compile::pipeline::{Structure, compile};
@@ -135,12 +135,12 @@ fn check_answers(scene: &Scene) {
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().unwrap();
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        scene.nearest_batch(&rays, None, &mut hits);
-        scene.any_batch(&rays, None, &mut found);
+        scene.batch(&rays).nearest(&mut hits);
+        scene.batch(&rays).any(&mut found);
         for (i, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
             assert!(same(&hits[i], expected, ray, &triangles), "{isa}: {ray:?} {:?} {expected:?}", hits[i]);
             assert_eq!(found[i], expected.is_hit(), "{isa}: {ray:?}");
-            assert_eq!(bits(&scene.nearest(ray, PrimitiveRef::NONE)), bits(&hits[i]), "{isa}: {ray:?}");
+            assert_eq!(bits(&scene.nearest(ray).unwrap_or(Hit::MISS)), bits(&hits[i]), "{isa}: {ray:?}");
         }
     }
     Isa::best().choose().unwrap();

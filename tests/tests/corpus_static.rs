@@ -113,7 +113,7 @@ fn compare(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) -> usize {
             direction: [0, 1, 2].map(|k| target[k] - origin[k]),
             tmax: f32::INFINITY,
         };
-        let (a, b) = (tets.nearest(&ray, PrimitiveRef::NONE), bvh.nearest(&ray, PrimitiveRef::NONE));
+        let (a, b) = (tets.nearest(&ray).unwrap_or(Hit::MISS), bvh.nearest(&ray).unwrap_or(Hit::MISS));
         assert_eq!(a.t.to_bits(), b.t.to_bits(), "{}: {ray:?} gives {a:?} and {b:?}", model.display());
         // Where triangles meet, either may be reported; only the distance must agree.
         hits += usize::from(a.t.is_finite());
@@ -138,12 +138,12 @@ fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<PrimitiveRef>) {
         let [x, y] = [x, y].map(|x| (f32::from(x) / f32::from(SIDE) - 0.5) * size);
         let target = [middle[0] + x, middle[1] + y, middle[2] - x];
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
-        rays.push(Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY });
+        rays.push(Ray::new(origin, direction));
         from.push(PrimitiveRef::NONE);
     }
     let mut rng = Rng::new(5);
     for i in 0..rays.len() {
-        let hit = bvh.nearest(&rays[i], PrimitiveRef::NONE);
+        let hit = bvh.nearest(&rays[i]).unwrap_or(Hit::MISS);
         if hit.is_hit() {
             let (o, d) = (rays[i].origin, rays[i].direction);
             let origin = [0, 1, 2].map(|k| o[k] + hit.t * d[k]);
@@ -159,15 +159,15 @@ fn coherent_and_bounced(bvh: &bth::Scene) -> (Vec<Ray>, Vec<PrimitiveRef>) {
 /// Batches of both structures, with hints and without, give on every instruction set the bits of single rays.
 fn agree_in_batches(tets: &bth::Scene, bvh: &bth::Scene, model: &Path) {
     let (rays, from) = coherent_and_bounced(bvh);
-    let single = |(ray, from): (&Ray, &PrimitiveRef)| bvh.nearest(ray, *from);
+    let single = |(ray, from): (&Ray, &PrimitiveRef)| bvh.nearest_from(ray, *from).unwrap_or(Hit::MISS);
     let expected: Vec<Hit> = rays.iter().zip(&from).map(single).collect();
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
         isa.choose().expect("an instruction set that is available");
         for (scene, hinted) in [(tets, Hinted::Tets), (tets, Hinted::Bvh), (bvh, Hinted::Measured)] {
             hinted.choose();
             let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-            scene.nearest_batch(&rays, Some(&from), &mut hits);
-            scene.any_batch(&rays, Some(&from), &mut found);
+            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
+            scene.batch(&rays).from(&from[..]).any(&mut found);
             for (i, ray) in rays.iter().enumerate() {
                 let context =
                     || format!("{}, {isa}, {hinted:?}: {ray:?} from {:?}", model.display(), from[i]);

@@ -14,8 +14,8 @@ fn passes(bytes: &[u8]) -> bool {
             bth::rays::Ray { origin: [0.3, 0.2, 9.0], tmin: 0.0, direction: [0.0, 0.1, -1.0], tmax: 1e9 };
         for seconds in [-1.0, 0.3, 1.5, 1e300, f64::NAN] {
             let _ = scene.set_seconds(seconds);
-            scene.nearest(&ray, bth::rays::PrimitiveRef { instance: 1, triangle: 0 });
-            scene.any(&ray, bth::rays::PrimitiveRef::NONE);
+            scene.nearest_from(&ray, bth::rays::PrimitiveRef { instance: 1, triangle: 0 });
+            scene.any(&ray);
         }
     }
     if good {

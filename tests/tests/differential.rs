@@ -35,16 +35,16 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
     let traced = every_structure(model, whole);
     let plain = &traced[0].scene;
     let mut expected = vec![Hit::MISS; rays.len()];
-    plain.nearest_batch(&rays, None, &mut expected);
+    plain.batch(&rays).nearest(&mut expected);
     for (ray, hit) in rays.iter().zip(&expected) {
         check_against_oracle(&corners, ray, hit);
     }
     let onward = onward(&rays, &expected, corners.len(), seed + 1);
     for Traced { name, scene } in &traced {
         let mut hits = vec![Hit::MISS; rays.len()];
-        scene.nearest_batch(&rays, None, &mut hits);
+        scene.batch(&rays).nearest(&mut hits);
         let mut any = vec![false; rays.len()];
-        scene.any_batch(&rays, None, &mut any);
+        scene.batch(&rays).any(&mut any);
         for (i, ray) in rays.iter().enumerate() {
             assert_eq!(
                 bits(&hits[i]),
@@ -55,21 +55,24 @@ fn check(model: &Model, whole: bool, ray_count: usize, seed: u64) {
             );
             assert_eq!(any[i], expected[i].is_hit(), "{name}: any hit of {ray:?}");
             assert_eq!(
-                bits(&scene.nearest(ray, PrimitiveRef::NONE)),
+                bits(&scene.nearest(ray).unwrap_or(Hit::MISS)),
                 bits(&hits[i]),
                 "{name}: one ray at a time"
             );
         }
         for (ray, from) in &onward {
-            let (without, with) = (scene.nearest(ray, PrimitiveRef::NONE), scene.nearest(ray, *from));
+            let (without, with) = (
+                scene.nearest(ray).unwrap_or(Hit::MISS),
+                scene.nearest_from(ray, *from).unwrap_or(Hit::MISS),
+            );
             assert_eq!(
                 bits(&without),
                 bits(&with),
                 "{name}: a hint, {from:?}, changed {ray:?}: {without:?} {with:?}"
             );
-            assert_eq!(scene.any(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
+            assert_eq!(scene.any_from(ray, *from), with.is_hit(), "{name}: any hit of {ray:?} from {from:?}");
             assert_eq!(
-                bits(&plain.nearest(ray, PrimitiveRef::NONE)),
+                bits(&plain.nearest(ray).unwrap_or(Hit::MISS)),
                 bits(&with),
                 "{name}: {ray:?} differs from the BVH"
             );
@@ -145,7 +148,7 @@ fn a_cube_of_integers_where_all_is_degenerate_is_traced_exactly() {
 
 #[test]
 fn rays_without_a_line_hit_nothing() {
-    let ray = Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0, 0.0, 1.0], tmax: f32::INFINITY };
+    let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
     let bad = [
         Ray { direction: [0.0; 3], ..ray },
         Ray { direction: [f32::NAN, 0.0, 1.0], ..ray },
@@ -160,8 +163,8 @@ fn rays_without_a_line_hit_nothing() {
     ];
     for Traced { name, scene } in &every_structure(&torus_knot(400), true) {
         for ray in &bad {
-            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), Hit::MISS, "{name}: {ray:?}");
-            assert!(!scene.any(ray, PrimitiveRef { instance: 0, triangle: 0 }), "{name}: {ray:?}");
+            assert_eq!(scene.nearest(ray), None, "{name}: {ray:?}");
+            assert!(!scene.any_from(ray, PrimitiveRef { instance: 0, triangle: 0 }), "{name}: {ray:?}");
         }
     }
 }
@@ -177,7 +180,7 @@ fn tets_are_really_walked_and_hints_save_steps() {
     let corners: Corners = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let first = assorted(&corners, 4000, 9);
     let mut hits = vec![Hit::MISS; first.len()];
-    tets.nearest_batch(&first, None, &mut hits);
+    tets.batch(&first).nearest(&mut hits);
     let (mut plain, mut hinted, mut rays) = (Steps::default(), Steps::default(), 0);
     for (ray, from) in onward(&first, &hits, corners.len(), 10) {
         plain += tets.nearest_counted(&ray, PrimitiveRef::NONE).1;

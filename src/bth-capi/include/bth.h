@@ -1,14 +1,14 @@
 /* C interface of bth: opens compiled BTH files and traces rays. Link with libbth.
  *
  * All functions may be called from any thread. Functions that take a const bth_scene may run on one scene at the same time;
- * bth_set_seconds, bth_set_frame and bth_close must not run at the same time as any other function on that scene.
+ * functions that take a bth_scene without const must not run at the same time as any other function on that scene.
  *
  * In a file without scene sections, such as a compiled model, each object has one instance with the same index, and object
  * space is world space.
  *
  * Every pointer must be null or valid. Functions that return a code return BTH_ERROR_ARGUMENT for a null pointer that is not
- * documented as allowed. Queries with a null scene, null rays or null results do nothing. The other functions treat a null scene
- * as one without instances.
+ * documented as allowed, and a query of no rays does nothing and returns BTH_OK. Functions that return no code treat a null scene
+ * as one without instances. From C++, bth.hpp closes scenes and throws errors.
  */
 #ifndef BTH_H
 #define BTH_H
@@ -72,6 +72,10 @@ typedef struct {
  * be done. */
 int32_t bth_open(const char *path, uint32_t flags, bth_scene **scene);
 
+/* As bth_open, for the `length` bytes of a compiled file in memory, which are copied and need no alignment; `flags` must be
+ * BTH_READ. */
+int32_t bth_open_memory(const uint8_t *bytes, size_t length, uint32_t flags, bth_scene **scene);
+
 /* Closes a scene and frees its memory; null is allowed. */
 void bth_close(bth_scene *scene);
 
@@ -79,14 +83,17 @@ void bth_close(bth_scene *scene);
  * can fail. */
 const char *bth_last_error(void);
 
+/* Version of this library, such as "0.1.0". */
+const char *bth_version(void);
+
 /* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
  * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
- * After an internal error all rays are misses. */
-void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
+ * Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all rays are misses. */
+int32_t bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
 /* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
- * the other arrays. After an internal error rays are misses. */
-void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
+ * the other arrays. Returns a code as bth_nearest does. */
+int32_t bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
 
 /* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
  * null. A file without scene sections has only frame 0, at one frame per second. */
@@ -117,8 +124,126 @@ uint32_t bth_instance_count(const bth_scene *scene);
  * pointer is null. */
 int32_t bth_get_instance(const bth_scene *scene, uint32_t row, bth_instance *instance);
 
+/* The point of the triangles that is closest to a given point. 36 bytes. */
+typedef struct {
+    float distance;        /* in world space; infinite if there is none within the radius */
+    float point[3];        /* the closest point, in world space */
+    float u, v;            /* barycentric weights of the triangle's second and third vertex */
+    bth_surface surface;   /* the triangle; BTH_NONE in both fields if there is none */
+    uint32_t feature;      /* where on the triangle: 0 inside, 1 to 3 on the edge from the first, second or third vertex to the
+                              next, 4 to 6 at that vertex */
+} bth_closest;
+
+/* Stores for each of `count` points, x, y and z in world space, the closest point of the triangles whose distance is at most
+ * `radius`. There is none for a point that is not finite, or with a radius that is negative or NaN. Many points in
+ * one call are faster. Returns BTH_OK, or a negative code. */
+int32_t bth_closest_points(const bth_scene *scene, const float *points, float radius, bth_closest *closest, size_t count);
+
+/* Stores for each of `count` points the distance to the closest triangle, negative inside of closed meshes; infinite if nothing
+ * can be hit, NaN for a point that is not finite. Returns BTH_OK, or a negative code. */
+int32_t bth_signed_distances(const bth_scene *scene, const float *points, float *distances, size_t count);
+
+/* Stores the number of triangles that overlap an axis-aligned box in world space in *count, and the first `capacity` of them, by
+ * ascending instance and triangle, in `triangles`, which may be null if `capacity` is 0. Touching counts; the answer is exact.
+ * Returns BTH_OK, or a negative code. */
+int32_t bth_triangles_in_box(const bth_scene *scene, const float lower[3], const float upper[3], bth_surface *triangles,
+                             size_t capacity, size_t *count);
+
+/* As bth_triangles_in_box, for triangles whose distance from `center`, rounded to float, is at most `radius`. */
+int32_t bth_triangles_in_sphere(const bth_scene *scene, const float center[3], float radius, bth_surface *triangles,
+                                size_t capacity, size_t *count);
+
 /* Size in bytes of the sections that traversal reads; 0 if the scene is null. */
 uint64_t bth_resident_bytes(const bth_scene *scene);
+
+/* Queries for several hits and with conditions. Hits come in order: by ascending t, then instance, then triangle. Among hits of
+ * one instance whose t is equal as it is reported, rounded to float, those that are nearer before the rounding come first. A
+ * triangle is hit at most once. A ray through an edge or a vertex hits every triangle to which the edge or vertex belongs. */
+
+/* Decides about a hit: returns 0 to ignore it, any other value to accept it. `user` is that of bth_accept. Both pointers are valid
+ * during the call. Calls come in any order; for the nearest hits, only for hits nearer than those found so far. The function may
+ * be called on any thread, and on several at the same time if queries are. It must return, without a jump out of it. */
+typedef int32_t (*bth_filter)(void *user, const bth_ray *ray, const bth_hit *hit);
+
+/* Sides of triangles that are ignored. The front is the side from which the vertices appear counter-clockwise in object space; a
+ * transform that mirrors an instance does not exchange the sides. */
+#define BTH_CULL_NONE 0u
+#define BTH_CULL_BACK 1u  /* hits on the back are ignored */
+#define BTH_CULL_FRONT 2u /* hits on the front are ignored */
+
+/* What a ray is allowed to hit. 24 bytes where pointers have 8. */
+typedef struct {
+    uint32_t mask;     /* instances and groups whose mask has no bit in common with this one are not hit */
+    uint32_t cull;     /* one of BTH_CULL_NONE, BTH_CULL_BACK and BTH_CULL_FRONT */
+    bth_filter filter; /* null, or called for each hit that passes the conditions above */
+    void *user;        /* passed to the filter */
+} bth_accept;
+
+/* The initializer of a bth_accept that accepts everything. */
+#define BTH_ACCEPT_EVERYTHING {0xFFFFFFFFu, BTH_CULL_NONE, 0, 0}
+
+/* Stores the nearest hit of each of `count` rays that is accepted. If `accept` is null, everything is, as in the other queries
+ * below. They return BTH_OK or a negative code. After BTH_ERROR_INTERNAL the results are not valid. The results must not overlap
+ * the other arrays. */
+int32_t bth_nearest_accepted(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, bth_hit *hits,
+                             size_t count);
+
+/* Stores in `found` for each of `count` rays 1 if it has a hit that is accepted, else 0. */
+int32_t bth_any_accepted(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint8_t *found,
+                         size_t count);
+
+/* Stores in `counts` the number of hits of each of `count` rays that are accepted. */
+int32_t bth_count_hits(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint64_t *counts,
+                       size_t count);
+
+/* The hits of several rays, one ray after the other. */
+typedef struct {
+    uint64_t *offsets; /* one more number than there are rays: the hits of ray i are those from offsets[i] to offsets[i + 1] */
+    bth_hit *hits;     /* `capacity` hits; null is allowed if that is 0 */
+    uint64_t capacity;
+    uint64_t needed;   /* set by the query: number of all hits, of which those that exceed the capacity were not stored */
+} bth_hit_list;
+
+/* The number of hits with which bth_all_hits stores all. */
+#define BTH_ALL_HITS 0xFFFFFFFFFFFFFFFFull
+
+/* Stores in `list` the `most` nearest hits of each of `count` rays that are accepted, in order, or all with BTH_ALL_HITS. If the
+ * capacity does not suffice, the result is BTH_OK nevertheless; offsets and `needed` are those of a list that suffices. */
+int32_t bth_all_hits(const bth_scene *scene, const bth_ray *rays, const bth_accept *accept, uint64_t most,
+                     bth_hit_list *list, size_t count);
+
+/* Sets the mask of an instance, which has all bits set before: rays of the queries above meet the instance only if their mask has a
+ * bit in common with it. bth_nearest and bth_any ignore masks. Must not run at the same time as any other function on the scene.
+ * Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such instance. */
+int32_t bth_set_instance_mask(bth_scene *scene, uint32_t instance, uint32_t mask);
+
+/* As bth_set_instance_mask, for a group of triangles of an object in all its instances. Triangles of an object without groups form
+ * group 0. A ray meets a triangle only if its mask has a bit in common with the mask of the instance and one in common with the
+ * mask of the group. */
+int32_t bth_set_group_mask(bth_scene *scene, uint32_t object, uint32_t group, uint32_t mask);
+
+/* Crossings of surfaces by a ray. 8 bytes. */
+typedef struct {
+    uint32_t count;  /* crossings in the ray's range; each passage of a closed surface counts once */
+    int32_t winding; /* crossings from the back of a triangle to its front, from which its vertices are seen counterclockwise,
+                        minus those from the front to the back */
+} bth_crossing_count;
+
+/* Stores the crossings of triangles by each of `count` rays. Unlike hits, they never meet an edge, a vertex or the plane of a
+ * triangle: they are those of the ray with its origin moved by an infinitely small vector, decided exactly. So a line crosses a
+ * surface without boundary as often in as out, and each crossing lies in exactly one of two ranges of t that share an end.
+ * `crossings` must not overlap the rays. After an internal error there are none. */
+void bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
+
+/* Stores for each of `count` points in world space how often the closed surfaces of the scene enclose it: its winding number, 0
+ * outside of all. It is exact where every mesh is closed and its triangles are seen counterclockwise from outside; elsewhere it is the
+ * number of crossings, counted as above, by a ray along an axis to the nearest side of an object's bounds. A point on a surface counts
+ * as if it were moved by an infinitely small vector. `points` holds x, y and z of each; `winding` must not overlap it. Points that are not
+ * finite, and all points after an internal error, are outside. */
+void bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
+
+/* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
+void bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,10 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
+pub mod closest;
+pub mod hits;
+pub mod inside;
+pub mod memory;
 pub mod motion;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};
@@ -101,7 +105,7 @@ pub extern "C" fn bth_last_error() -> *const c_char {
 /// The arguments of a query: the scene, the rays, and for each ray the triangle on which it starts, if given.
 type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [PrimitiveRef]>);
 
-/// The arguments of a query as slices; `None` if there are no rays, or `scene` or `rays` is null.
+/// The arguments of a query as slices. `Err` is the result of the query if there are no rays, or `scene` or `rays` is null.
 ///
 /// # Safety
 /// `scene` is null or open. `rays` and `from` are each null or point to `count` elements. All of them outlive the result and are
@@ -111,16 +115,28 @@ unsafe fn batch<'a>(
     rays: *const Ray,
     from: *const PrimitiveRef,
     count: usize,
-) -> Option<Batch<'a>> {
+) -> Result<Batch<'a>, i32> {
     if scene.is_null() || rays.is_null() || count == 0 {
-        return None;
+        return Err(if count == 0 { OK } else { null_argument() });
     }
     // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` and `from` point to `count`
     // elements. `Ray` and `PrimitiveRef` have the layout of the C structs, and all bit patterns are valid for them.
     unsafe {
         let from = (!from.is_null()).then(|| std::slice::from_raw_parts(from, count));
-        Some((&*scene, std::slice::from_raw_parts(rays, count), from))
+        Ok((&*scene, std::slice::from_raw_parts(rays, count), from))
     }
+}
+
+/// The result of a query without a scene, rays or room for results.
+#[cold]
+fn null_argument() -> i32 {
+    fail(ERROR_ARGUMENT, "scene, rays and results of a query must not be null".into())
+}
+
+/// The result of a query that panicked, which would be a defect of the library.
+#[cold]
+fn defect() -> i32 {
+    fail(ERROR_INTERNAL, "internal error of a query".into())
 }
 
 /// Nearest hits; see `bth.h`.
@@ -135,19 +151,24 @@ pub unsafe extern "C" fn bth_nearest(
     from: *const PrimitiveRef,
     hits: *mut Hit,
     count: usize,
-) {
+) -> i32 {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let (scene, rays, from) = match unsafe { batch(scene, rays, from, count) } {
+        Ok(batch) => batch,
+        Err(code) => return code,
+    };
     if hits.is_null() {
-        return;
+        return null_argument();
     }
     // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
     // slices above. All bit patterns are valid for `Hit`.
     let hits = unsafe { std::slice::from_raw_parts_mut(hits, count) };
     // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
-    if catch_unwind(AssertUnwindSafe(|| scene.nearest_batch(rays, from, hits))).is_err() {
+    if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).nearest(hits))).is_err() {
         hits.fill(Hit::MISS);
+        return defect();
     }
+    OK
 }
 
 /// Whether rays hit anything; see `bth.h`.
@@ -161,11 +182,14 @@ pub unsafe extern "C" fn bth_any(
     from: *const PrimitiveRef,
     hit: *mut u8,
     count: usize,
-) {
+) -> i32 {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let (scene, rays, from) = match unsafe { batch(scene, rays, from, count) } {
+        Ok(batch) => batch,
+        Err(code) => return code,
+    };
     if hit.is_null() {
-        return;
+        return null_argument();
     }
     // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
     // above.
@@ -174,10 +198,11 @@ pub unsafe extern "C" fn bth_any(
     // the buffer of [`any_in_chunks`].
     if let [hit] = hit {
         let mut found = [false];
-        let traced = catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, &mut found)));
+        let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(&mut found)));
         *hit = (traced.is_ok() && found[0]).into();
+        if traced.is_ok() { OK } else { defect() }
     } else {
-        any_in_chunks(scene, rays, from, hit);
+        any_in_chunks(scene, rays, from, hit)
     }
 }
 
@@ -186,18 +211,21 @@ const CHUNK: usize = 1024;
 
 /// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
 #[inline(never)]
-fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) {
+fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) -> i32 {
+    let mut code = OK;
     let mut buffer = [false; CHUNK];
     for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
         let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);
         let found = &mut buffer[..rays.len()];
-        if catch_unwind(AssertUnwindSafe(|| scene.any_batch(rays, from, found))).is_err() {
+        if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(found))).is_err() {
             found.fill(false);
+            code = defect();
         }
         for (out, found) in hit.iter_mut().zip(found) {
             *out = (*found).into();
         }
     }
+    code
 }
 
 /// Bytes of the sections that traversal reads; see `bth.h`.

@@ -8,6 +8,7 @@
 //! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
+//! | [`memory`] | the pipeline and the scenes for triangles that are in memory |
 //! | [`scene`] | many objects, each by the pipeline, into one file |
 #![warn(missing_docs)]
 
@@ -18,6 +19,7 @@ pub mod coordinates;
 pub mod costs;
 pub mod jobs;
 pub mod marks;
+pub mod memory;
 mod options;
 pub mod pipeline;
 pub mod scene;

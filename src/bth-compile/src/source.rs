@@ -1,10 +1,24 @@
-//! The files of a model and the hashes of their contents.
+//! The files of a model, or the triangles in memory that take their place, and the hashes of their contents.
 
 use crate::error::{Error, Result};
 use bth_files::Digest;
 use bth_import::gltf::external_files;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use zerocopy::IntoBytes;
+
+/// A mesh in memory, in the space of its object.
+#[derive(Clone, Copy, Debug)]
+pub struct TriangleMesh<'a> {
+    /// The positions of vertices; equal ones are merged. Those of triangles must be finite.
+    pub positions: &'a [[f32; 3]],
+    /// For each triangle the rows of its corners in `positions`, counter-clockwise seen from the front. The row of a triangle
+    /// here is its id in hits.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// Name of a mesh in memory in messages.
+pub(crate) const MESH_NAME: &str = "mesh";
 
 /// Hashes of a model's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +44,19 @@ impl SourceDigest {
     pub fn of(path: &Path) -> Result<Self> {
         let others = files(path)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
         Ok(Self { file: digest(path)?, others })
+    }
+
+    /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian bytes.
+    pub(crate) fn of_triangles(mesh: TriangleMesh<'_>) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"triangles in memory");
+        for (count, bytes) in [
+            (mesh.positions.len(), mesh.positions.as_bytes()),
+            (mesh.triangles.len(), mesh.triangles.as_bytes()),
+        ] {
+            hasher.update(&(count as u64).to_le_bytes()).update(bytes);
+        }
+        Self { file: hasher.finalize().into(), others: Vec::new() }
     }
 
     /// Returns `read` if the files still have these hashes, which proves that it was read from the hashed content.

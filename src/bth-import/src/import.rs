@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
-use crate::mesh::{Keep, Mesh, Report};
+use crate::mesh::{Attributes, Keep, Mesh, Report};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
@@ -94,8 +94,8 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
     let attributes = attributes::collect(&raw, keep)?;
-    let mut triangles = std::mem::take(&mut raw.triangles);
-    let welded = weld::weld(&raw.positions, &mut triangles).map_err(|row| {
+    let triangles = std::mem::take(&mut raw.triangles);
+    let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
         input_error(
             NON_FINITE,
             (raw.locate)(RowKind::Position, row),
@@ -103,6 +103,22 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
             "remove the vertex and the faces that use it, or export the model again",
         )
     })?;
+    let format = raw.format.to_owned();
+    Ok((mesh, Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }))
+}
+
+/// Welds and counts triangles whose indices have been checked. The report's fields that depend on the format are empty.
+///
+/// # Errors
+/// `not_finite` of the row of the first used position that is not finite; cancellation.
+pub(crate) fn weld_and_count(
+    positions: &[[f32; 3]],
+    mut triangles: Vec<[u32; 3]>,
+    attributes: Option<Attributes>,
+    monitor: &dyn Monitor,
+    not_finite: impl FnOnce(usize) -> Error,
+) -> Result<(Mesh, Report)> {
+    let welded = weld::weld(positions, &mut triangles).map_err(not_finite)?;
     if welded.non_finite_unused > 0 {
         let count = welded.non_finite_unused;
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
@@ -112,18 +128,16 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {
-        format: raw.format.to_owned(),
         triangles: mesh.triangles.len() as u64,
-        positions_read: raw.positions.len() as u64,
+        positions_read: positions.len() as u64,
         positions: mesh.positions.len() as u64,
-        polygons: raw.polygons,
-        skipped: raw.skipped,
         degenerate: counts.degenerate,
         duplicate: counts.duplicate,
         boundary_edges: counts.boundary_edges,
         non_manifold_edges: counts.non_manifold_edges,
         components: counts.components,
         non_finite_unused: welded.non_finite_unused,
+        ..Report::default()
     };
     Ok((mesh, report))
 }

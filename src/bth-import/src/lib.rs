@@ -10,6 +10,7 @@ mod attributes;
 pub mod error;
 pub mod gltf;
 mod import;
+mod memory;
 mod mesh;
 pub mod monitor;
 mod number;
@@ -25,6 +26,7 @@ mod zero_area;
 
 pub use error::{Error, Place, Result};
 pub use import::{import, import_bytes, import_gltf_meshes, source_files};
+pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{Attributes, Keep, Mesh, Report};
 pub use monitor::{Monitor, Silent};
 pub use source::read_file;

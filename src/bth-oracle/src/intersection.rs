@@ -35,11 +35,11 @@ pub(crate) fn integer(x: f32) -> BigInt {
     if x.is_sign_negative() { -magnitude } else { magnitude }
 }
 
-fn sub(a: &Point, b: &Point) -> Point {
+pub(crate) fn sub(a: &Point, b: &Point) -> Point {
     [0, 1, 2].map(|k| &a[k] - &b[k])
 }
 
-fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
+pub(crate) fn determinant(a: &Point, b: &Point, c: &Point) -> BigInt {
     let minor = |i: usize, j: usize| &b[i] * &c[j] - &b[j] * &c[i];
     &a[0] * minor(1, 2) + &a[1] * minor(2, 0) + &a[2] * minor(0, 1)
 }
@@ -107,6 +107,14 @@ pub fn intersection(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<Intersection> {
     intersect_exactly(&ray.origin.map(integer), &ray.direction.map(integer), &corners.map(|p| p.map(integer)))
 }
 
+/// Whether the direction of a ray and the normal (b-a)×(c-a) of a triangle point to opposite sides, so that the ray comes from
+/// the side from which the corners appear counter-clockwise. False if they are perpendicular.
+pub fn is_front(ray: &Ray, corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(integer));
+    let whole = determinant(&ray.direction.map(integer), &sub(&b, &a), &sub(&c, &a));
+    whole.is_negative()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,7 +174,7 @@ mod tests {
             let target = [0, 1, 2].map(|k| (a * corners[0][k] + b * corners[1][k] + c * corners[2][k]) as f32);
             let (origin, scaled) = (f(origin), corners.map(f));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) / 4.0);
-            let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+            let ray = Ray::new(origin, direction);
             if let Some(found) = intersection(&ray, scaled) {
                 let eighth = |n: i32| BigRational::new(n.into(), 8.into());
                 prop_assert_eq!(found, Intersection { t: eighth(32), u: eighth(b), v: eighth(c) });

@@ -12,12 +12,18 @@
 //! A filter in f64 skips triangles that the line misses by far more than its rounding error, and decides nothing else.
 #![warn(missing_docs)]
 
+mod closest;
+mod crossing;
 mod geometry;
 mod intersection;
 mod nearest;
+mod overlap;
 mod world;
 
+pub use closest::{is_root_within, squared_distance};
+pub use crossing::{crossings, winding};
 pub use geometry::{Triangle, triangles};
-pub use intersection::{Intersection, intersection, to_f64};
+pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};
+pub use overlap::overlaps_box;
 pub use world::World;

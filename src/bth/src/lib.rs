@@ -1,13 +1,12 @@
 //! Runtime of BTH files: opens compiled files and traces rays through them, without copying or converting their sections.
 //!
 //! ```no_run
-//! use bth::rays::{PrimitiveRef, Ray};
+//! use bth::rays::Ray;
 //!
 //! let scene = bth::open("bunny.bth")?;
-//! let ray = Ray { origin: [0.0, 0.1, 1.0], tmin: 0.0, direction: [0.0, 0.0, -1.0], tmax: f32::INFINITY };
-//! let hit = scene.nearest(&ray, PrimitiveRef::NONE);
-//! if hit.is_hit() {
-//!     println!("triangle {} at t = {}", hit.primitive.triangle, hit.t);
+//! let ray = Ray::new([0.0, 0.1, 1.0], [0.0, 0.0, -1.0]);
+//! if let Some(hit) = scene.nearest(&ray) {
+//!     println!("triangle {} at {:?}", hit.primitive.triangle, ray.at(hit.t));
 //! }
 //! # Ok::<(), bth::Error>(())
 //! ```
@@ -15,21 +14,33 @@
 // Kernels loop over lanes by index: iterators and closures could be compiled as functions without the kernel's instruction set.
 #![allow(clippy::needless_range_loop)]
 
+mod batch;
 mod bvh;
+mod closest;
+mod crossing;
+mod enumerate;
+mod hits;
 mod instances;
 mod intersect;
+mod masks;
 mod motion;
 mod object;
 mod query;
 pub mod rays;
 mod scene;
 mod simd;
+mod streams;
 mod tets;
 
+pub use batch::RayBatch;
 pub use bth_format::{Code, Error};
+pub use closest::{Closest, Feature};
+pub use crossing::Crossings;
+pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use motion::{InstanceView, check_first_frame};
 pub use object::Hinted;
 pub use query::Steps;
-pub use scene::{Scene, from_bytes, map, open};
+pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
+pub use streams::{HitStreams, RayStreams};

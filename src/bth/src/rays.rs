@@ -20,6 +20,23 @@ pub struct Ray {
 }
 
 impl Ray {
+    /// A ray from `origin` without an end: `tmin` is 0 and `tmax` infinite.
+    pub const fn new(origin: [f32; 3], direction: [f32; 3]) -> Ray {
+        Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }
+    }
+
+    /// The same line with the hits of another range of t.
+    pub const fn with_range(self, tmin: f32, tmax: f32) -> Ray {
+        Ray { tmin, tmax, ..self }
+    }
+
+    /// The point `origin + t * direction`, computed in `f64` and rounded to `f32`.
+    pub fn at(&self, t: f32) -> [f32; 3] {
+        std::array::from_fn(|k| {
+            (f64::from(self.origin[k]) + f64::from(t) * f64::from(self.direction[k])) as f32
+        })
+    }
+
     /// For each ray the bits of its eight numbers, in the order of the fields.
     pub(crate) fn rows(rays: &[Ray]) -> &[[u32; 8]] {
         <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")

@@ -1,6 +1,7 @@
 //! Scenes: opening of compiled files and queries by rays in world space.
 
 use crate::instances::World;
+use crate::masks::Masks;
 use crate::object;
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
@@ -28,6 +29,8 @@ pub struct Scene {
     file: File,
     /// The instances at the scene's time; `None` if the file has no scene sections.
     world: Option<World>,
+    /// The masks of instances and of groups of triangles.
+    masks: Masks,
 }
 
 /// Reads a compiled file into memory and checks every index, so that tracing is safe for any contents of the file. The time is
@@ -49,6 +52,14 @@ pub fn open(path: impl AsRef<Path>) -> Result<Scene, Error> {
 /// As [`open`].
 pub fn from_bytes(bytes: &[u8]) -> Result<Scene, Error> {
     Scene::checked(File::from_bytes(bytes)?)
+}
+
+/// As [`open`], for an open file, which is neither copied nor read again.
+///
+/// # Errors
+/// As [`open`], except for those about reading, the header and the section table.
+pub fn from_file(file: File) -> Result<Scene, Error> {
+    Scene::checked(file)
 }
 
 /// Maps a compiled file into memory and checks only its header, section table and scene sections, so the time does not depend on
@@ -80,12 +91,22 @@ impl Scene {
     /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
         let world = World::new(&file)?;
-        Ok(Scene { file, world })
+        Ok(Scene { file, world, masks: Masks::default() })
     }
 
     /// The instances; `None` if the file has no scene sections.
     pub(crate) fn world(&self) -> Option<&World> {
         self.world.as_ref()
+    }
+
+    /// The masks of instances and of groups of triangles.
+    pub(crate) fn masks(&self) -> &Masks {
+        &self.masks
+    }
+
+    /// Mutable access to the masks.
+    pub(crate) fn masks_mut(&mut self) -> &mut Masks {
+        &mut self.masks
     }
 
     /// The file, and mutable access to the instances.
@@ -111,21 +132,22 @@ impl Scene {
         self.file.object(object).expect("an object below object_count, checked when opened")
     }
 
+    /// The sections of an object below [`Self::object_count`].
     #[inline]
-    fn view(&self, object: u32) -> &ObjectView<'_> {
+    pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
         self.file.view(object).expect("an object below object_count, checked when opened")
     }
 
     /// A scene with given instances.
     #[cfg(test)]
     pub(crate) fn with_instances(file: File, world: World) -> Scene {
-        Scene { file, world: Some(world) }
+        Scene { file, world: Some(world), masks: Masks::default() }
     }
 
     /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
     /// are then traced directly in the object, without the top level.
     #[inline(always)]
-    fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
+    pub(crate) fn sole(&self) -> Option<(&ObjectView<'_>, u32)> {
         let Some(world) = &self.world else {
             return (self.object_count() == 1).then(|| (self.view(0), 0));
         };
@@ -139,15 +161,32 @@ impl Scene {
         self.file.resident_bytes()
     }
 
-    /// Nearest hit of a ray in world space, or [`Hit::MISS`]. `from` is the triangle on which the ray starts, or
-    /// [`PrimitiveRef::NONE`]. It is a hint where a traversal of tetrahedra may begin, and never changes the result.
-    pub fn nearest(&self, ray: &Ray, from: PrimitiveRef) -> Hit {
-        let mut hit = Hit::MISS;
-        self.nearest_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut hit));
-        hit
+    /// Nearest hit of a ray in world space.
+    pub fn nearest(&self, ray: &Ray) -> Option<Hit> {
+        self.nearest_from(ray, PrimitiveRef::NONE)
     }
 
-    /// As [`Self::nearest`], with statistics of the traversal.
+    /// As [`Self::nearest`], for a ray that starts on a triangle, or [`PrimitiveRef::NONE`]. The triangle is a hint where a
+    /// traversal of tetrahedra may begin, and never changes the result.
+    pub fn nearest_from(&self, ray: &Ray, triangle: PrimitiveRef) -> Option<Hit> {
+        let mut hit = Hit::MISS;
+        self.nearest_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut hit));
+        hit.is_hit().then_some(hit)
+    }
+
+    /// Whether a ray in world space hits anything.
+    pub fn any(&self, ray: &Ray) -> bool {
+        self.any_from(ray, PrimitiveRef::NONE)
+    }
+
+    /// As [`Self::any`], with a hint as for [`Self::nearest_from`].
+    pub fn any_from(&self, ray: &Ray, triangle: PrimitiveRef) -> bool {
+        let mut found = false;
+        self.any_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut found));
+        found
+    }
+
+    /// As [`Self::nearest_from`], with statistics of the traversal. A miss is [`Hit::MISS`].
     pub fn nearest_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
@@ -167,22 +206,9 @@ impl Scene {
         (best, steps)
     }
 
-    /// Whether a ray in world space hits anything. `from` is a hint as for [`Self::nearest`].
-    pub fn any(&self, ray: &Ray, from: PrimitiveRef) -> bool {
-        let mut found = false;
-        self.any_batch(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(&mut found));
-        found
-    }
-
-    /// Stores the nearest hit of each ray, or [`Hit::MISS`], in `hits`. Rays are in world space. `from` holds for each ray the
-    /// triangle on which it starts, a hint as for [`Self::nearest`]; without hints it is `None`. Coherent rays that are adjacent
-    /// in the slice are traced fastest.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
+    /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
     #[inline]
-    pub fn nearest_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
-        check_lengths(rays, from, hits.len());
+    pub(crate) fn nearest_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
                 object::nearest_to(object, ray, hint(start_primitive(from, 0), instance), instance, hit);
@@ -191,7 +217,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::nearest_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
+    /// As [`Self::nearest_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
     fn nearest_general(
         &self,
@@ -230,13 +256,9 @@ impl Scene {
         }
     }
 
-    /// Stores in `found` for each ray in world space whether it hits anything. `from` is as for [`Self::nearest_batch`].
-    ///
-    /// # Panics
-    /// If the slices differ in length.
+    /// Stores for each ray whether it hits anything. `found`, and `from` if it is given, are as long as `rays`.
     #[inline]
-    pub fn any_batch(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
-        check_lengths(rays, from, found.len());
+    pub(crate) fn any_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
                 *found = object::any(object, ray, hint(start_primitive(from, 0), instance));
@@ -245,7 +267,7 @@ impl Scene {
         }
     }
 
-    /// As [`Self::any_batch`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
+    /// As [`Self::any_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
     #[inline(never)]
     fn any_general(
         &self,
@@ -277,11 +299,6 @@ impl Scene {
             }
         }
     }
-}
-
-fn check_lengths(rays: &[Ray], from: Option<&[PrimitiveRef]>, results: usize) {
-    assert_eq!(rays.len(), results, "as many results as rays");
-    assert!(from.is_none_or(|f| f.len() == rays.len()), "as many surfaces as rays");
 }
 
 /// The triangle on which a ray of a batch starts, or [`PrimitiveRef::NONE`].

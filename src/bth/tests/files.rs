@@ -65,14 +65,14 @@ fn trace(scene: &bth::Scene) -> usize {
     let from: Vec<PrimitiveRef> =
         (0..rays.len() as u32).map(|i| PrimitiveRef { instance: i % 2, triangle: i % 5 }).collect();
     let (mut hits, mut with_hints) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    scene.nearest_batch(&rays, None, &mut hits);
-    scene.nearest_batch(&rays, Some(&from), &mut with_hints);
+    scene.batch(&rays).nearest(&mut hits);
+    scene.batch(&rays).from(&from[..]).nearest(&mut with_hints);
     assert_eq!(hits, with_hints);
     let mut found = vec![false; rays.len()];
-    scene.any_batch(&rays, Some(&from), &mut found);
+    scene.batch(&rays).from(&from[..]).any(&mut found);
     for ((ray, hit), found) in rays.iter().zip(&hits).zip(found) {
         assert_eq!(hit.is_hit(), found);
-        assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), *hit);
+        assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *hit);
     }
     hits.iter().filter(|hit| hit.is_hit()).count()
 }

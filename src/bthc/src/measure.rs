@@ -82,11 +82,11 @@ fn once(scene: &Scene, rays: &Rays, query: QueryKind) -> f64 {
     let start = thread_seconds();
     for (batch, from) in rays.rays.chunks(BATCH).zip(rays.from.chunks(BATCH)) {
         match query {
-            QueryKind::Nearest => scene.nearest_batch(batch, Some(from), &mut hits[..batch.len()]),
-            QueryKind::Any => scene.any_batch(batch, Some(from), &mut found[..batch.len()]),
+            QueryKind::Nearest => scene.batch(batch).from(from).nearest(&mut hits[..batch.len()]),
+            QueryKind::Any => scene.batch(batch).from(from).any(&mut found[..batch.len()]),
             QueryKind::Single => {
                 for ((ray, from), hit) in batch.iter().zip(from).zip(&mut hits) {
-                    *hit = scene.nearest(ray, *from);
+                    *hit = scene.nearest_from(ray, *from).unwrap_or(Hit::MISS);
                 }
             }
         }

@@ -4,11 +4,13 @@
 //! and each answer is checked in integer arithmetic: fast enough for 100 million rays.
 
 mod grid;
+mod inside;
 mod rays;
 mod shapes;
 mod statistics;
 
 pub use grid::{Grid, GridRay, LIMIT, Point, Quotient};
+pub use inside::{Corners, InsideStatistics, is_closed, run_inside};
 pub use rays::{Aimed, Kind, Target, rays};
 pub use shapes::{Shape, shapes};
 pub use statistics::Statistics;
@@ -39,14 +41,14 @@ pub fn run(
             // The instruction sets take turns, so that each structure is traced with each of them.
             isas[(batch + i) % isas.len()].choose().expect("it is available");
             let mut hits = vec![Hit::MISS; rays.len()];
-            traced.scene.nearest_batch(&rays, None, &mut hits);
+            traced.scene.batch(&rays).nearest(&mut hits);
             if i == 0 {
                 expected = hits;
             } else {
                 statistics.different += differing(&expected, &hits);
             }
             let mut found = vec![false; rays.len()];
-            traced.scene.any_batch(&rays, None, &mut found);
+            traced.scene.batch(&rays).any(&mut found);
             statistics.different +=
                 expected.iter().zip(&found).filter(|(hit, found)| hit.is_hit() != **found).count() as u64;
             statistics.traced += 2 * rays.len() as u64;
@@ -69,11 +71,11 @@ pub fn run(
 fn hinted(traced: &Traced, rays: &[Ray], expected: &[Hit], statistics: &mut Statistics) {
     let from: Vec<PrimitiveRef> = expected.iter().map(|hit| hit.primitive).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
-    traced.scene.nearest_batch(rays, Some(&from), &mut hits);
+    traced.scene.batch(rays).from(&from[..]).nearest(&mut hits);
     statistics.different += differing(expected, &hits);
     statistics.traced += rays.len() as u64;
     for (ray, hit) in rays.iter().zip(expected).step_by(16) {
-        let one = traced.scene.nearest(ray, PrimitiveRef::NONE);
+        let one = traced.scene.nearest(ray).unwrap_or(Hit::MISS);
         statistics.different += u64::from(bits(&one) != bits(hit));
         statistics.traced += 1;
     }

@@ -1,7 +1,7 @@
 //! A file that is truncated while it is in use gives an error.
 
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_tests::structures::compiled;
 use std::fs::OpenOptions;
@@ -31,7 +31,7 @@ fn hits(scene: &Scene) -> Vec<Hit> {
         direction: [0.0, 0.0, -1.0],
         tmax: f32::INFINITY,
     };
-    (0..80).map(|i| scene.nearest(&ray(i), PrimitiveRef::NONE)).collect()
+    (0..80).map(|i| scene.nearest(&ray(i)).unwrap_or(Hit::MISS)).collect()
 }
 
 fn truncate(path: &Path) {

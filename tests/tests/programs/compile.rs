@@ -141,5 +141,5 @@ fn degenerate_triangles_are_counted_and_keep_their_ids() {
         direction: [0.0, 0.0, -1.0],
         tmax: f32::INFINITY,
     };
-    assert_eq!(scene.nearest(&ray, bth::rays::PrimitiveRef::NONE).primitive.triangle, 1);
+    assert_eq!(scene.nearest(&ray).map(|hit| hit.primitive.triangle), Some(1));
 }

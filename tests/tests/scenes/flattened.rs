@@ -44,7 +44,7 @@ fn rays(flat: &bth::Scene, count: usize, seed: u64) -> Vec<Ray> {
             let distance = if i % 2 == 0 { size } else { 0.02 * size };
             let origin = target.map(|x| x + distance * (rng.unit_f32() - 0.5));
             let direction = [0, 1, 2].map(|k| (target[k] - origin[k]) * 0.7);
-            Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }
+            Ray::new(origin, direction)
         })
         .collect()
 }
@@ -57,8 +57,8 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
         let (flat, first) = flatten(scene);
         let rays = rays(&flat, 4000, frame as u64 + 1);
         let (mut ours, mut theirs) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-        scene.nearest_batch(&rays, None, &mut ours);
-        flat.nearest_batch(&rays, None, &mut theirs);
+        scene.batch(&rays).nearest(&mut ours);
+        flat.batch(&rays).nearest(&mut theirs);
         let (mut graze, mut other_name) = (0, 0);
         for ((ray, a), b) in rays.iter().zip(&ours).zip(&theirs) {
             hit += usize::from(b.is_hit());
@@ -99,7 +99,7 @@ fn compare(name: &str, scene: &mut bth::Scene, frames: &[i32]) -> usize {
         assert!(other_name < rays.len() / 10, "{name} frame {frame}: {other_name} other surfaces");
         // Any-hit queries agree with nearest-hit queries.
         let mut found = vec![false; rays.len()];
-        scene.any_batch(&rays, None, &mut found);
+        scene.batch(&rays).any(&mut found);
         assert!(found.iter().zip(&ours).all(|(f, h)| *f == h.is_hit()), "{name} frame {frame}");
     }
     hit
@@ -121,7 +121,7 @@ fn shifted<'a>(flat: &'a bth::Scene, ray: &'a Ray) -> impl Iterator<Item = Hit> 
         let target = near([0, 1, 2].map(|k| ray.origin[k] + ray.direction[k]));
         let origin = near(ray.origin);
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
-        flat.nearest(&Ray { origin, direction, ..*ray }, PrimitiveRef::NONE)
+        flat.nearest(&Ray { origin, direction, ..*ray }).unwrap_or(Hit::MISS)
     })
 }
 

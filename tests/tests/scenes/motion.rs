@@ -11,14 +11,14 @@ fn rays(count: usize) -> Vec<Ray> {
             let origin = [(); 3].map(|()| 40.0 * rng.unit_f32() - 20.0);
             let target = [(); 3].map(|()| 12.0 * rng.unit_f32() - 6.0);
             let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
-            Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY }
+            Ray::new(origin, direction)
         })
         .collect()
 }
 
 fn hits(scene: &bth::Scene, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    scene.nearest_batch(rays, None, &mut hits);
+    scene.batch(rays).nearest(&mut hits);
     hits
 }
 
@@ -104,12 +104,12 @@ fn hidden_instances_are_hit_by_no_ray_and_others_are() {
             { node = "above", property = "scale", interpolation = "step", times = [0, 3], values = [[1, 1, 1], [1, 0, 1]] },
         ]"#;
     let (mut scene, _) = compiled(&manifest(text), folder.path());
-    let ray = Ray { origin: [0.1, 5.0, 0.3], tmin: 0.0, direction: [0.0, -1.0, 0.0], tmax: f32::INFINITY };
+    let ray = Ray::new([0.1, 5.0, 0.3], [0.0, -1.0, 0.0]);
     let from = PrimitiveRef { instance: 0, triangle: 0 };
     for (frame, seen) in [(0, true), (1, false), (2, false), (3, false), (0, true)] {
         scene.set_frame(frame).unwrap();
-        assert_eq!(scene.nearest(&ray, PrimitiveRef::NONE).is_hit(), seen, "frame {frame}");
-        assert_eq!(scene.any(&ray, from), seen, "frame {frame}");
+        assert_eq!(scene.nearest(&ray).is_some(), seen, "frame {frame}");
+        assert_eq!(scene.any_from(&ray, from), seen, "frame {frame}");
         assert_eq!(scene.instance(0).visible, seen, "frame {frame}");
     }
 }
@@ -197,10 +197,10 @@ fn starting_surfaces_change_no_answer_also_with_tetrahedra() {
         let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = onward.into_iter().unzip();
         let plain = hits(&scene, &rays);
         let mut found = vec![Hit::MISS; rays.len()];
-        scene.nearest_batch(&rays, Some(&from), &mut found);
+        scene.batch(&rays).from(&from[..]).nearest(&mut found);
         assert!(found == plain, "frame {frame}");
         let mut any = vec![false; rays.len()];
-        scene.any_batch(&rays, Some(&from), &mut any);
+        scene.batch(&rays).from(&from[..]).any(&mut any);
         assert!(any.iter().zip(&plain).all(|(any, hit)| *any == hit.is_hit()), "frame {frame}");
         hinted += from.iter().zip(&plain).filter(|(f, h)| f.instance > 1 && h.is_hit()).count();
     }

@@ -31,8 +31,8 @@ fn check(name: &str, model: &Model) {
     let corners: Vec<_> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let rays = assorted(&corners, 1000, 1);
     let (mut a, mut b) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
-    bth.nearest_batch(&rays, None, &mut a);
-    bvh.nearest_batch(&rays, None, &mut b);
+    bth.batch(&rays).nearest(&mut a);
+    bvh.batch(&rays).nearest(&mut b);
     for ((a, b), ray) in a.iter().zip(&b).zip(&rays) {
         assert_eq!(bits(a), bits(b), "{name}: {ray:?}");
     }

@@ -1,7 +1,7 @@
 //! Instances under transforms: closed surfaces stay closed, and hits stay within a documented distance of the exact ones.
 
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_oracle::World;
@@ -81,7 +81,7 @@ fn rays_from_inside(scene: &Scene, instance: u32, rng: &mut Rng) -> Vec<Ray> {
         let target = apply(&view.to_world, at);
         let direction = [0, 1, 2].map(|k| (target[k] - f64::from(origin[k])) as f32);
         if direction != [0.0; 3] {
-            return Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+            return Ray::new(origin, direction);
         }
     };
     (0..600).map(ray).collect()
@@ -103,12 +103,12 @@ fn closed_surfaces_stay_closed_under_transforms_and_t_keeps_its_bound() {
         let size = greatest(object.header.lower.into_iter().chain(object.header.upper).map(f64::from));
         let rays = rays_from_inside(&scene, instance, &mut rng);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        scene.nearest_batch(&rays, None, &mut hits);
-        scene.any_batch(&rays, None, &mut found);
+        scene.batch(&rays).nearest(&mut hits);
+        scene.batch(&rays).any(&mut found);
         let mut worst: f64 = 0.0;
         for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
             assert!(hit.is_hit() && found[i], "leak: {ray:?} within instance {instance}");
-            assert_eq!(scene.nearest(ray, PrimitiveRef::NONE), *hit);
+            assert_eq!(scene.nearest(ray).unwrap_or(Hit::MISS), *hit);
             let of = scene.instance(hit.primitive.instance);
             assert_eq!(hit.primitive.instance, instance, "instances stand apart: {ray:?}");
             let corners = object.triangles[hit.primitive.triangle as usize]
@@ -150,6 +150,33 @@ fn instances_take_less_than_200_bytes_whether_or_not_each_has_tracks_of_its_own(
                 each < 200.0,
                 "frame {frame}, own tracks {own_tracks}: {instances} and {hierarchy}, {each} each"
             );
+        }
+    }
+}
+
+/// The winding number of a point is that along any ray from it, however the instance is transformed, and a mirrored instance keeps
+/// its inside.
+#[test]
+fn points_inside_of_instances_are_found_under_every_transform() {
+    let scene = scene();
+    let mut rng = Rng::new(41);
+    for instance in 0..scene.instance_count() {
+        let view = scene.instance(instance);
+        let object = scene.object(view.object);
+        assert_eq!(scene.is_closed(view.object), Some(true));
+        for round in 0..200 {
+            let vertex = object.positions[rng.below(object.positions.len() as u64) as usize];
+            let share = [0.0, 0.5, 0.9, 1.25][round % 4];
+            let point = apply(&view.to_world, vertex.map(|x| f64::from(x) * share)).map(|x| x as f32);
+            let winding = scene.winding(point);
+            assert_eq!(winding, i32::from(share < 1.0), "instance {instance}: {point:?}");
+            assert_eq!(scene.contains(point), winding != 0);
+            // Towards another instance, most often.
+            let other = scene.instance(rng.below(u64::from(scene.instance_count())) as u32);
+            let target = apply(&other.to_world, [0.25, -0.125, 0.5]);
+            let ray = Ray::new(point, [0, 1, 2].map(|k| (target[k] - f64::from(point[k])) as f32));
+            assert_eq!(scene.crossings(&ray).winding, winding, "instance {instance}: {ray:?}");
+            assert_eq!(scene.crossings(&ray.with_range(f32::NEG_INFINITY, f32::INFINITY)).winding, 0);
         }
     }
 }

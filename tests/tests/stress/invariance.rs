@@ -15,7 +15,7 @@ const RAYS: usize = 1500;
 
 fn hits(scene: &Scene, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit::MISS; rays.len()];
-    scene.nearest_batch(rays, None, &mut hits);
+    scene.batch(rays).nearest(&mut hits);
     hits
 }
 

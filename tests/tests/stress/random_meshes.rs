@@ -1,6 +1,6 @@
 //! Random meshes, with and without defects, in every structure against the exact oracle.
 
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::Hit;
 use bth_scenes::Model;
 use bth_tests::oracle;
 use bth_tests::rays::assorted;
@@ -64,19 +64,13 @@ fn check(model: &Model, seed: u64) -> Result<(), TestCaseError> {
     let mut expected = vec![Hit::MISS; rays.len()];
     for (i, traced) in every_structure(model, false).iter().enumerate() {
         let mut hits = vec![Hit::MISS; rays.len()];
-        traced.scene.nearest_batch(&rays, None, &mut hits);
+        traced.scene.batch(&rays).nearest(&mut hits);
         if i == 0 {
             expected.clone_from(&hits);
         }
         for ((ray, hit), first) in rays.iter().zip(&hits).zip(&expected) {
             prop_assert_eq!(bits(hit), bits(first), "{}: {:?}", &traced.name, ray);
-            prop_assert_eq!(
-                traced.scene.any(ray, PrimitiveRef::NONE),
-                hit.is_hit(),
-                "{}: {:?}",
-                &traced.name,
-                ray
-            );
+            prop_assert_eq!(traced.scene.any(ray), hit.is_hit(), "{}: {:?}", &traced.name, ray);
         }
     }
     for (ray, hit) in rays.iter().zip(&expected) {

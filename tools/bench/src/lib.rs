@@ -1,7 +1,7 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `costs`, `paper`, `quality` and `scenes` are the measurements; `output` writes their records as Markdown, JSON and
+//! `stress`, `inside`, `costs`, `paper`, `quality` and `scenes` are the measurements; `output` writes their records as Markdown, JSON and
 //! SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
@@ -11,6 +11,7 @@ pub mod chart;
 pub mod clock;
 pub mod compare;
 pub mod costs;
+pub mod inside;
 pub mod isa;
 pub mod load;
 pub mod machine;

@@ -2,7 +2,9 @@
 
 use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
-use bth_bench::{accuracy, compare, costs, load, output, paper, quality, records, scenes, speed, stress};
+use bth_bench::{
+    accuracy, compare, costs, inside, load, output, paper, quality, records, scenes, speed, stress,
+};
 use clap::Parser;
 use std::process::ExitCode;
 
@@ -19,6 +21,7 @@ fn main() -> ExitCode {
         Command::Load(arguments) => load::run(&arguments),
         Command::LoadScenes(arguments) => load::scenes::run(&arguments),
         Command::Stress(arguments) => stress::run(&arguments),
+        Command::Inside(arguments) => inside::run(&arguments),
         Command::Costs(arguments) => costs::run(&arguments),
         Command::Paper(arguments) => paper::run(&arguments),
         Command::Quality(arguments) => quality::run(&arguments),

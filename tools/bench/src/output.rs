@@ -1,10 +1,11 @@
 //! Writes reports to standard output and to the files of `--json`, `--svg` and `--out`.
 
-use crate::args::Output;
+use crate::args::{Output, RunOptions};
 use crate::machine::{self, Machine};
+use crate::{isa, structures};
 use anyhow::{Context, Result};
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 
@@ -30,6 +31,28 @@ impl Head {
     pub fn now(measurement: &'static str, isa: String, options: Value) -> Head {
         let (date, commit, machine) = (machine::today(), machine::commit(), Machine::this());
         Head { measurement, date, commit, machine, isa, options }
+    }
+
+    /// The head of a measurement of ray sets that is made now, with the instruction set that `run` wants, and the number of rounds,
+    /// which is 1 where `run` is quick.
+    ///
+    /// # Errors
+    /// If there is no such instruction set or this machine lacks it.
+    pub fn of_ray_sets(
+        measurement: &'static str,
+        run: &RunOptions,
+        rays: usize,
+        rounds: usize,
+    ) -> Result<(Head, usize)> {
+        let isa = isa::select(run.isa.as_deref())?;
+        let rounds = if run.quick { 1 } else { rounds };
+        let options = json!({
+            "rays": rays,
+            "rounds": rounds,
+            "quick": run.quick,
+            "rays_per_batch": structures::BATCH,
+        });
+        Ok((Head::now(measurement, isa, options), rounds))
     }
 
     /// The head as a paragraph of Markdown.

@@ -170,24 +170,24 @@ impl Tracer for OurTracer {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         if self.usage == Use::Single {
             for (ray, hit) in batch.rays.iter().zip(hits) {
-                *hit = self.scene.nearest(ray, PrimitiveRef::NONE);
+                *hit = self.scene.nearest(ray).unwrap_or(Hit::MISS);
             }
             return;
         }
         for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.scene.nearest_batch(batch.rays, self.hints(&batch), hits);
+            self.scene.batch(batch.rays).from(self.hints(&batch)).nearest(hits);
         }
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
         if self.usage == Use::Single {
             for (ray, found) in batch.rays.iter().zip(found) {
-                *found = self.scene.any(ray, PrimitiveRef::NONE);
+                *found = self.scene.any(ray);
             }
             return;
         }
         for (batch, found) in batch.chunks(BATCH).zip(found.chunks_mut(BATCH)) {
-            self.scene.any_batch(batch.rays, self.hints(&batch), found);
+            self.scene.batch(batch.rays).from(self.hints(&batch)).any(found);
         }
     }
 

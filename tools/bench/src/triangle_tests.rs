@@ -119,7 +119,7 @@ mod tests {
             let corners: [[f32; 3]; 3] = [(); 3].map(|()| [(); 3].map(|()| rng.unit_f32() - 0.5));
             let origin = on_sphere(&mut rng).to_array().map(|x| x as f32);
             let target = [(); 3].map(|()| 0.5 * (rng.unit_f32() - 0.5));
-            let ray = Ray { origin, tmin: 0.0, direction: sub(target, origin), tmax: f32::INFINITY };
+            let ray = Ray::new(origin, sub(target, origin));
             let exact = bth_oracle::intersection(&ray, corners).map(|at| bth_oracle::to_f64(&at.t));
             let exact = exact.filter(|t| *t >= 0.0);
             let found = [
@@ -162,7 +162,7 @@ mod tests {
             let share = rng.unit_f32();
             let target: [f32; 3] = std::array::from_fn(|k| a[k] + share * (b[k] - a[k]));
             let origin = on_sphere(&mut rng).to_array().map(|x| 4.0 * x as f32);
-            let ray = Ray { origin, tmin: 0.0, direction: sub(target, origin), tmax: f32::INFINITY };
+            let ray = Ray::new(origin, sub(target, origin));
             let prepared = Watertight::new(&ray);
             let inside = |corners| prepared.intersect(corners, f32::INFINITY).is_some();
             // c and d on either side of the edge as the ray sees it: then the ray crosses one of the triangles.

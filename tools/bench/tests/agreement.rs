@@ -18,8 +18,8 @@ fn knot() -> (Model, bth::Scene) {
 
 fn exact(scene: &bth::Scene, set: &RaySet) -> (Vec<Hit>, Vec<bool>) {
     let (mut hits, mut found) = (vec![Hit::MISS; set.rays.len()], vec![false; set.rays.len()]);
-    scene.nearest_batch(&set.rays, None, &mut hits);
-    scene.any_batch(&set.rays, None, &mut found);
+    scene.batch(&set.rays).nearest(&mut hits);
+    scene.batch(&set.rays).any(&mut found);
     (hits, found)
 }
 

@@ -4,10 +4,11 @@ use super::{Cache, CachedStages, Miss, keys};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
-use crate::pipeline::{Clock, CompileReport, FileReport, compile_model, warn_over_limit};
-use crate::source::{Model, SourceDigest};
+use crate::pipeline::{Clock, CompileReport, FileReport, compile_imported, compile_model, warn_over_limit};
+use crate::source::{MESH_NAME, Model, SourceDigest, TriangleMesh};
 use crate::write::Content;
 use bth_cache::{Key, Record};
+use bth_import::import_triangles;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::borrow::Cow;
@@ -87,10 +88,42 @@ pub fn compile(
         let (compiled, report) = compile_model(&model, options, stages, clock, monitor)?;
         Ok((compiled.bytes.into(), report, true))
     })?;
-    if let Ok(file) = FileReport::deserialize(&outcome.report["file"]) {
+    warn_if_over_limit(&outcome.report, options, monitor);
+    Ok(outcome)
+}
+
+/// As [`compile`], for triangles in memory. The imported mesh itself is not kept.
+///
+/// # Errors
+/// As [`crate::memory::compile`].
+pub(crate) fn compile_triangles(
+    mesh: TriangleMesh<'_>,
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    needed: &dyn Fn(&Record) -> bool,
+    monitor: &dyn Monitor,
+) -> Result<CachedCompilation<CompileReport>> {
+    let mut clock = Clock::default();
+    let digest = clock.time("hash", || SourceDigest::of_triangles(mesh));
+    let model = Model { path: Path::new(MESH_NAME), digest: &digest };
+    let tetgen = tetgen_in_keys(options, cache, monitor)?;
+    let key = tetgen.map(|tetgen| keys::file(&digest, model.path, options, &tetgen));
+    let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
+        let import = || import_triangles(model.path, mesh.positions, mesh.triangles, monitor);
+        let imported = clock.time("mesh", import)?;
+        let stages = &mut CachedStages::of_model(cache);
+        let (checked, report) = compile_imported(&model, imported, options, stages, clock, monitor)?;
+        Ok((checked.compiled.bytes.into(), report, true))
+    })?;
+    warn_if_over_limit(&outcome.report, options, monitor);
+    Ok(outcome)
+}
+
+/// Warns if the file that a report is about is over the limit on bytes.
+fn warn_if_over_limit(report: &Value, options: &CompileOptions, monitor: &dyn Monitor) {
+    if let Ok(file) = FileReport::deserialize(&report["file"]) {
         warn_over_limit(&file, options, monitor);
     }
-    Ok(outcome)
 }
 
 /// Hashes a model. Returns its key too, if the compiled file may be kept.

@@ -20,7 +20,7 @@ pub use compile::{CachedCompilation, DryRun, compile, dry_run};
 pub use log::{Log, Miss};
 
 pub(crate) use codec::{Codec, MeshSummary, decode, encode};
-pub(crate) use compile::{compile_or_fetch, joined, tetgen_in_keys};
+pub(crate) use compile::{compile_or_fetch, compile_triangles, joined, tetgen_in_keys};
 pub(crate) use keys::{ObjectKeys, extension, file_index, mesh, scene};
 pub(crate) use rows::{RowReader, RowWriter};
 pub(crate) use stages::CachedStages;

@@ -16,8 +16,8 @@ pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
+pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
-pub(crate) use object::{Object, TracedMesh};
 pub(crate) use report::StageReports;
 pub use report::{CompileReport, FileReport};
 pub(crate) use stages::{Direct, Stages};
@@ -26,7 +26,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest};
 use crate::{coordinates, tets};
-use bth_import::Mesh;
+use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::path::Path;
 
@@ -55,13 +55,26 @@ pub(crate) fn compile_model(
     mut clock: Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let (mesh, import) = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let imported = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let (checked, report) = compile_imported(model, imported, options, stages, clock, monitor)?;
+    Ok((checked.compiled, report))
+}
+
+/// Compiles a model that has been imported.
+pub(crate) fn compile_imported(
+    model: &Model<'_>,
+    (mesh, import): (Mesh, mesh::Report),
+    options: &CompileOptions,
+    stages: &mut dyn Stages,
+    mut clock: Clock,
+    monitor: &dyn Monitor,
+) -> Result<(Checked, CompileReport)> {
     let (object, reports) = compile_mesh(model.path, mesh, options, stages, &mut clock, monitor)?;
     let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
     let provenance = provenance::of_model(&source_blake3, &import.format, tetgen, options)?;
-    let (compiled, file) = clock.time("file", || object.file(provenance, options))?;
-    Ok((compiled, CompileReport::new(source_blake3, clock, import, reports, file)))
+    let (checked, file) = clock.time("file", || object.file(provenance, options))?;
+    Ok((checked, CompileReport::new(source_blake3, clock, import, reports, file)))
 }
 
 /// Compiles a mesh into an object; `source` names the model in messages.

@@ -16,6 +16,12 @@ pub struct Compiled {
     pub bytes: Vec<u8>,
 }
 
+/// A compiled file, also as a reader has it who has checked every index.
+pub(crate) struct Checked {
+    pub(crate) compiled: Compiled,
+    pub(crate) file: bth_format::File,
+}
+
 /// A mesh with the vertices that are traced, and its binary BVH.
 pub(crate) struct TracedMesh {
     /// The mesh; its vertices are on the grid, if there is one.
@@ -106,22 +112,18 @@ pub fn assemble(
 ) -> Result<Compiled> {
     let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
     let (object, _) = join(traced, built.to_vec(), options, monitor)?;
-    Ok(object.file("{}".to_owned(), options)?.0)
+    Ok(object.file("{}".to_owned(), options)?.0.compiled)
 }
 
 impl Object {
     /// The file with this object only, after the checks of a reader.
-    pub(super) fn file(
-        &self,
-        provenance: String,
-        options: &CompileOptions,
-    ) -> Result<(Compiled, FileReport)> {
+    pub(super) fn file(&self, provenance: String, options: &CompileOptions) -> Result<(Checked, FileReport)> {
         let parts = self.parts(options);
         let mut builder = write::FileBuilder::new();
         write::object(&mut builder, 0, &parts)?;
         builder.provenance(provenance)?;
         let bytes = builder.finish();
-        write::self_check(&bytes, false)?;
+        let file = write::checked(&bytes)?;
         let resident_bytes = resident_bytes(&parts);
         let triangles = self.traced.mesh.triangles.len();
         let report = FileReport {
@@ -131,7 +133,7 @@ impl Object {
             resident_bytes,
             resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
         };
-        Ok((Compiled { bytes }, report))
+        Ok((Checked { compiled: Compiled { bytes }, file }, report))
     }
 
     /// The report on the coordinates, if vertices were moved.

@@ -94,7 +94,7 @@ pub fn compile_cached(
 }
 
 /// Warns if objects are over the limit on bytes.
-fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
+pub(super) fn warn_over_limit(objects: &[ObjectReport], options: &CompileOptions, monitor: &dyn Monitor) {
     let Some(most) = options.costs.max_bytes_per_triangle else { return };
     let each = |o: &ObjectReport| o.resident_bytes as f64 / o.triangles.max(1) as f64;
     let over: Vec<&ObjectReport> = objects.iter().filter(|o| each(o) > most).collect();
@@ -184,7 +184,7 @@ fn keep_index(named: &Digest, index: &FileIndex, context: &Context<'_>) {
 }
 
 /// The key of a scene, if it may be kept.
-fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
+pub(super) fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Result<Option<Key>> {
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
@@ -192,7 +192,7 @@ fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'_>) -> Resu
 }
 
 /// Compiles the objects and assembles the file.
-fn build(
+pub(super) fn build(
     manifest: &Manifest,
     plan: &ScenePlan<'_>,
     name: &Path,

@@ -4,6 +4,7 @@ use super::context::Context;
 use super::sources::File;
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
+use crate::source::TriangleMesh;
 use bth_cache::Key;
 use bth_files::Digest;
 use bth_import::{self as mesh, Mesh};
@@ -21,8 +22,12 @@ pub(super) struct SourceMesh {
 /// # Errors
 /// Those of the import.
 pub(super) fn read(file: &File<'_>, context: &Context<'_>) -> Result<Vec<SourceMesh>> {
-    let known: Vec<Option<MeshSummary>> =
-        file.parts.iter().map(|(number, _)| known(&key(file, *number, context), context)).collect();
+    // A mesh in memory is not kept: reading it from the cache would take longer than its import.
+    let in_cache = |number| match file.in_memory {
+        Some(_) => None,
+        None => known(&key(file, number, context), context),
+    };
+    let known: Vec<Option<MeshSummary>> = file.parts.iter().map(|(number, _)| in_cache(*number)).collect();
     let lacking: Vec<Option<u32>> =
         file.parts.iter().zip(&known).filter(|(_, k)| k.is_none()).map(|(p, _)| p.0).collect();
     let mut imported = import(file, &lacking, context)?.into_iter();
@@ -108,6 +113,10 @@ fn import(
         return Ok(Vec::new());
     }
     let Context { options, cache, monitor, .. } = context;
+    if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
+        let read = mesh::import_triangles(&file.full, positions, triangles, *monitor)?;
+        return Ok(vec![MeshSummary::of(read)]);
+    }
     let single: Vec<u32> = numbers.iter().filter_map(|number| *number).collect();
     let meshes = if single.is_empty() {
         vec![mesh::import(&file.full, options.attributes, *monitor)?]

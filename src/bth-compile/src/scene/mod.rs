@@ -1,12 +1,13 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is the entry; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
 //! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
 mod compile;
 mod context;
 mod encode;
 mod file_index;
+mod in_memory;
 mod meshes;
 mod object;
 mod objects;
@@ -20,4 +21,6 @@ mod visible;
 mod weights;
 
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
+pub use in_memory::Instance;
+pub(crate) use in_memory::compile_meshes;
 pub use report::{ObjectReport, SceneReport};

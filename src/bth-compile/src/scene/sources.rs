@@ -2,14 +2,14 @@
 
 use crate::cached;
 use crate::error::Result;
-use crate::source::SourceDigest;
+use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// A source file and its parts that are used.
+/// A source file and its parts that are used, or a mesh in memory in the place of one.
 pub(super) struct File<'a> {
     /// Path as in the manifest.
     pub(super) path: &'a str,
@@ -19,6 +19,8 @@ pub(super) struct File<'a> {
     /// Number of a mesh or object in the file (`None` for the whole file), and the manifest's objects that refer to it.
     pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
     pub(super) digest: SourceDigest,
+    /// What takes the place of the file's content.
+    pub(super) in_memory: Option<TriangleMesh<'a>>,
 }
 
 impl File<'_> {
@@ -69,7 +71,7 @@ pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) ->
         // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
         let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
             let full = folder.join(path);
-            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing() });
+            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing(), in_memory: None });
             files.len() - 1
         });
         let parts = &mut files[file].parts;

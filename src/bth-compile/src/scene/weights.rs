@@ -126,7 +126,7 @@ fn follow(
     for bounce in 0..=BOUNCES {
         let only: Vec<Ray> = rays.iter().map(|r| r.0).collect();
         let mut hits = vec![Hit::MISS; only.len()];
-        scene.nearest_batch(&only, None, &mut hits);
+        scene.batch(&only).nearest(&mut hits);
         let mut next = Vec::new();
         for ((ray, from), hit) in rays.iter().zip(&hits) {
             record(scene, ray, *from, hit, weights);

@@ -2,7 +2,7 @@
 //!
 //! Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 //! Predicates" (1997): a sum is kept as non-overlapping parts of growing size. Products of
-//! three f32 values lie between 2^-447 and 2^384, so nothing here over- or underflows.
+//! three f32 values lie between 2^-447 and 2^384, those of four between 2^-596 and 2^512, so nothing here over- or underflows.
 
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
@@ -114,6 +114,15 @@ impl<const PARTS: usize> Expansion<PARTS> {
         other.part[..other.len].iter().for_each(|&part| self.add(part));
     }
 
+    /// Adds another sum times a value of `f32` precision.
+    pub fn add_scaled<const OTHER: usize>(&mut self, other: &Expansion<OTHER>, factor: f64) {
+        for &part in &other.part[..other.len] {
+            let (product, error) = two_product(part, factor);
+            self.add(error);
+            self.add(product);
+        }
+    }
+
     /// Adds det[d, a-o, b-o]. Where `f64` does not hold the differences, the determinant is expanded into products of three
     /// inputs.
     pub fn add_edge(&mut self, o: [f64; 3], d: [f64; 3], a: [f64; 3], b: [f64; 3]) {
@@ -136,6 +145,18 @@ impl<const PARTS: usize> Expansion<PARTS> {
         self.add_determinant(-1.0, o, b, c);
         self.add_determinant(-1.0, a, o, c);
         self.add_determinant(-1.0, a, b, o);
+    }
+
+    /// Adds the product of two other sums. The parts of each, multiplied with one another, must neither over- nor underflow, as
+    /// is true of sums of products of two `f32` values.
+    pub fn add_product_of<const A: usize, const B: usize>(&mut self, a: &Expansion<A>, b: &Expansion<B>) {
+        for &x in &a.part[..a.len] {
+            for &y in &b.part[..b.len] {
+                let (product, error) = two_product(x, y);
+                self.add(error);
+                self.add(product);
+            }
+        }
     }
 
     /// The sum, rounded; its sign is exact.
@@ -166,6 +187,27 @@ mod tests {
             let want = a as i128 * b as i128 * c as i128;
             let got: i128 = e.part[..e.len].iter().map(|&x| x as i128).sum();
             assert_eq!(got, want);
+        }
+    }
+
+    #[test]
+    fn products_of_sums_are_exact_where_integers_can_tell() {
+        let mut rng = Rng::new(9);
+        for _ in 0..ROUNDS / 2 {
+            let mut draw = || {
+                let (mut sum, mut want) = (Expansion::<2>::new(), 0);
+                for shift in [0, 30] {
+                    let x = (rng.below(1 << 24) as i128 - (1 << 23)) << shift;
+                    want += x;
+                    sum.add(x as f64);
+                }
+                (sum, want)
+            };
+            let ((a, x), (b, y)) = (draw(), draw());
+            let mut product = Expansion::<8>::new();
+            product.add_product_of(&a, &b);
+            let got: i128 = product.part[..product.len].iter().map(|&x| x as i128).sum();
+            assert_eq!(got, x * y);
         }
     }
 

@@ -1,5 +1,7 @@
 //! Typed rows of glTF accessors (glTF 2.0 specification, §3.6), with every access checked.
 
+use glam::{DAffine3, DMat4};
+
 use crate::error::{Error, Result};
 use crate::gltf::buffer::Buffers;
 use crate::gltf::schema::{Accessor, GltfDocument};
@@ -119,6 +121,22 @@ impl Accessors<'_> {
             return Ok(rows.to_vec());
         }
         Ok(rows.iter().map(|row| row.map(|x| component.normalized(f64::from(x)))).collect())
+    }
+
+    /// Matrices of 4×4, of which the last row counts as (0, 0, 0, 1).
+    pub(crate) fn matrices(&self, index: usize) -> Result<Vec<DAffine3>> {
+        let (accessor, component) = self.accessor(index, "MAT4")?;
+        if component != ComponentType::F32 {
+            return Err(self.error(index, "expected matrices of 32-bit floats"));
+        }
+        let convert = |bytes: &[u8]| {
+            let mut columns = [0.0; 16];
+            for (value, bytes) in columns.iter_mut().zip(bytes.chunks_exact(4)) {
+                *value = f64::from(component.float(bytes, false));
+            }
+            DAffine3::from_mat4(DMat4::from_cols_array(&columns))
+        };
+        self.rows(index, accessor, 64, DAffine3::from_mat4(DMat4::ZERO), convert)
     }
 
     /// Rows of one number.

@@ -8,6 +8,7 @@ use crate::gltf::buffer::Buffers;
 use crate::gltf::document::{self, GRAPH};
 use crate::gltf::extensions::SUPPORTED;
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
+use crate::gltf::rest_pose::RestPose;
 use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
 use crate::gltf::transform;
 use crate::mesh::Keep;
@@ -39,19 +40,17 @@ struct Flattener<'r, 'a> {
     keep: Keep,
 }
 
-/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes. Skins and morph
-/// targets stay in the mesh's own pose. Lines count each segment, points each point as skipped.
+/// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest. Lines count each segment, points each point as skipped.
 pub(crate) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
     if document.extensions_used.iter().any(|name| name == "EXT_mesh_gpu_instancing") {
         source.monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
     }
     let placed = placed_meshes(source, &document)?;
-    if placed.iter().filter_map(|placed| placed.node).any(|node| document.nodes[node].skin.is_some()) {
-        source.monitor.warn("skins are ignored: skinned meshes are read in their bind pose");
-    }
-    if placed.iter().any(|placed| document.has_targets(placed.mesh)) {
-        source.monitor.warn("morph targets are ignored: meshes are read without them");
+    let has_skin = |placed: &PlacedMesh| placed.node.is_some_and(|node| document.nodes[node].skin.is_some());
+    let deforms = |placed: &PlacedMesh| has_skin(placed) || document.has_targets(placed.mesh);
+    if !document.animations.is_empty() && placed.iter().any(deforms) {
+        source.monitor.warn("animations are ignored: meshes with skins or morph targets are read at rest");
     }
     read_placed(source, &document, binary, keep, &placed)
 }
@@ -140,14 +139,20 @@ impl Flattener<'_, '_> {
                 placed.node.map_or_else(|| format!("mesh {}", placed.mesh), |node| format!("node {node}"));
             return Err(source.error_in_part(GRAPH, part, message, "export the model again"));
         };
+        let pose = RestPose::new(&self.accessors, placed.node, placed.mesh)?;
         for (index, primitive) in primitives.iter().enumerate() {
             source.monitor.check()?;
-            self.primitive(placed, index, primitive)?;
+            self.primitive((placed, &pose), index, primitive)?;
         }
         Ok(())
     }
 
-    fn primitive(&mut self, placed: &PlacedMesh, index: usize, primitive: &Primitive) -> Result<()> {
+    fn primitive(
+        &mut self,
+        (placed, pose): (&PlacedMesh, &RestPose),
+        index: usize,
+        primitive: &Primitive,
+    ) -> Result<()> {
         let part = format!("mesh {} primitive {index}", placed.mesh);
         let reader = PrimitiveReader { accessors: &self.accessors, primitive, part };
         let Some(kept) = reader.kept(self.keep)? else {
@@ -167,8 +172,10 @@ impl Flattener<'_, '_> {
             mesh: placed.mesh,
             primitive: index,
         });
-        let triangles = reader.read(&kept, self.raw.positions.len())?;
-        self.append(&triangles, &placed.world)
+        let mut triangles = reader.read(&kept, self.raw.positions.len())?;
+        pose.apply(&reader, &mut triangles)?;
+        let world = if pose.is_skinned() { DAffine3::IDENTITY } else { placed.world };
+        self.append(&triangles, &world)
     }
 
     /// Appends a primitive's rows in world space. A mirrored mesh keeps its front sides (specification, §3.7.4).

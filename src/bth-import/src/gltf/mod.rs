@@ -11,6 +11,7 @@ pub(crate) mod extensions;
 pub(crate) mod flatten;
 mod meshopt;
 mod primitive;
+mod rest_pose;
 pub mod scene;
 pub(crate) mod schema;
 mod source_files;

@@ -1,5 +1,9 @@
 //! The rows and corners of one glTF primitive in its mesh's own space, from accessors or from a Draco stream.
 
+use serde::Deserialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::draco::DracoPrimitive;
@@ -32,6 +36,8 @@ pub(super) struct Triangles {
     pub(super) uvs: Option<Vec<[f32; 2]>>,
     /// Faces that their indices leave incomplete.
     pub(super) skipped: u64,
+    /// The stream from which attributes were read.
+    draco: Option<DracoPrimitive>,
 }
 
 /// A primitive of a document and its name for messages.
@@ -63,6 +69,32 @@ impl PrimitiveReader<'_, '_> {
         };
         let uvs = coordinates.as_ref().and_then(|c| attributes.get(&c.attribute).copied());
         Ok(Some(KeptAttributes { positions, normals, uvs, coordinates }))
+    }
+
+    /// The accessors of the morph targets by the names of attributes.
+    ///
+    /// # Errors
+    /// `BTH-I002` for a malformed target.
+    pub(super) fn targets(&self) -> Result<Vec<BTreeMap<String, usize>>> {
+        let target = |value: &Value| {
+            BTreeMap::deserialize(value).map_err(|e| {
+                let message = format!("expected the accessors of a morph target, found: {e}");
+                let source = self.accessors.source;
+                source.error_in_part(MALFORMED, self.part.as_str(), message, "export the model again")
+            })
+        };
+        self.primitive.targets.iter().map(target).collect()
+    }
+
+    /// The rows of a further attribute of vertices that were read; `None` if the primitive does not have it.
+    pub(super) fn optional<const N: usize>(
+        &self,
+        triangles: &Triangles,
+        name: &str,
+    ) -> Result<Option<Vec<[f32; N]>>> {
+        let (draco, rows) = (triangles.draco.as_ref(), triangles.positions.len() as u64);
+        let accessor = self.primitive.attributes.get(name).copied();
+        accessor.map(|accessor| self.attribute(draco, name, accessor, rows)).transpose()
     }
 
     /// How many points or lines a primitive of them has; `None` for triangles. Lines count each segment.
@@ -116,7 +148,7 @@ impl PrimitiveReader<'_, '_> {
             coordinates.apply(&mut rows);
             uvs = Some(rows);
         }
-        Ok(Triangles { positions, corners, normals, uvs, skipped: incomplete(mode, indices.len()) })
+        Ok(Triangles { positions, corners, normals, uvs, skipped: incomplete(mode, indices.len()), draco })
     }
 
     fn mode(&self) -> u64 {
@@ -135,6 +167,11 @@ impl PrimitiveReader<'_, '_> {
         if let Some(values) = decoded.flatten() {
             return Ok(values);
         }
+        self.rows(accessor, rows)
+    }
+
+    /// The rows of an accessor of a vertex attribute, which must be as many as those of the positions.
+    pub(super) fn rows<const N: usize>(&self, accessor: usize, rows: u64) -> Result<Vec<[f32; N]>> {
         let found = self.accessors.count(accessor)?;
         if found != rows {
             return Err(

@@ -5,7 +5,6 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 
 /// Extensions by name, each parsed where it is read.
@@ -25,6 +24,7 @@ pub(crate) struct GltfDocument {
     pub(crate) accessors: Vec<Accessor>,
     pub(crate) buffer_views: Vec<BufferView>,
     pub(crate) buffers: Vec<Buffer>,
+    pub(crate) skins: Vec<GltfSkin>,
     /// Parsed as [`Animation`] lazily: a malformed animation must not fail mesh import.
     pub(crate) animations: Vec<Value>,
     /// Parsed as [`GltfCamera`] lazily, for the same reason.
@@ -61,6 +61,16 @@ pub(crate) struct GltfNode {
     pub(crate) translation: Option<[f64; 3]>,
     pub(crate) rotation: Option<[f64; 4]>,
     pub(crate) scale: Option<[f64; 3]>,
+    /// Weights of the mesh's morph targets, in place of those of the mesh.
+    pub(crate) weights: Option<Vec<f64>>,
+}
+
+/// A skin. Its skeleton root has no bearing on positions and is not read.
+#[derive(Deserialize, Default)]
+#[serde(default, rename_all = "camelCase")]
+pub(crate) struct GltfSkin {
+    pub(crate) inverse_bind_matrices: Option<usize>,
+    pub(crate) joints: Vec<usize>,
 }
 
 #[derive(Deserialize, Default)]
@@ -68,6 +78,8 @@ pub(crate) struct GltfNode {
 pub(crate) struct GltfMesh {
     pub(crate) name: String,
     pub(crate) primitives: Vec<Primitive>,
+    /// Default weights of the morph targets.
+    pub(crate) weights: Option<Vec<f64>>,
 }
 
 #[derive(Deserialize, Default)]
@@ -77,7 +89,8 @@ pub(crate) struct Primitive {
     pub(crate) indices: Option<usize>,
     pub(crate) material: Option<usize>,
     pub(crate) mode: Option<u64>,
-    pub(crate) targets: Vec<IgnoredAny>,
+    /// Morph targets: accessors by the names of attributes, parsed where they are read.
+    pub(crate) targets: Vec<Value>,
     pub(crate) extensions: Extensions,
 }
 

@@ -35,12 +35,16 @@ pub(super) fn normal(transform: &DAffine3, n: [f32; 3]) -> [f32; 3] {
     if transform.matrix3 == DMat3::IDENTITY {
         return n;
     }
-    let sign = if is_mirrored(transform) { -1.0 } else { 1.0 };
-    let n = DVec3::from_array(n.map(f64::from));
-    let cofactors = cofactors(transform.matrix3);
-    let transformed = DVec3::from_array([0, 1, 2].map(|k| sign * cofactors.row(k).dot(n)));
+    let transformed = direction_of_normal(transform, DVec3::from_array(n.map(f64::from)));
     let length = transformed.length();
     if length > 0.0 { (transformed / length).to_array().map(|x| x as f32) } else { [0.0; 3] }
+}
+
+/// A normal transformed by the inverse transpose, of any length; zero where the transform leaves it no direction.
+pub(super) fn direction_of_normal(transform: &DAffine3, n: DVec3) -> DVec3 {
+    let sign = if is_mirrored(transform) { -1.0 } else { 1.0 };
+    let cofactors = cofactors(transform.matrix3);
+    DVec3::from_array([0, 1, 2].map(|k| sign * cofactors.row(k).dot(n)))
 }
 
 /// The cofactor matrix: the determinant times the inverse transpose, which exists for singular matrices too.

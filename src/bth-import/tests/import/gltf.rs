@@ -184,17 +184,6 @@ fn quantized_and_sparse_positions_are_read() {
 }
 
 #[test]
-fn skins_and_morph_targets_are_told() {
-    let document = edited(|d| {
-        d["nodes"][0]["skin"] = 0.into();
-        d["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]);
-    });
-    let listener = Listener::default();
-    import_with("a.glb", &glb(&document, &binary()), Keep::None, &listener).unwrap();
-    assert!(listener.heard("skins") && listener.heard("morph"));
-}
-
-#[test]
 fn refuses_required_extensions_by_name() {
     for name in ["ACME_mesh_compression", "ACME_secret_geometry"] {
         assert_bad(|d| d["extensionsRequired"] = json!([name]), "BTH-I011", name, name);

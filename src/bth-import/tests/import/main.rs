@@ -7,6 +7,7 @@ mod obj;
 mod off;
 mod ply;
 mod quantized;
+mod rest_pose;
 mod stl;
 mod textures;
 

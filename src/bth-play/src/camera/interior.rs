@@ -52,10 +52,10 @@ fn candidate(bounds: &SceneBounds, up: Axis, index: u32) -> DVec3 {
 fn probe(scene: &Scene, eye: DVec3) -> Vec<Probe> {
     let origin = eye.as_vec3().to_array();
     let directions: Vec<DVec3> = fibonacci_sphere(DIRECTIONS).collect();
-    let ray = |d: &DVec3| Ray { origin, tmin: 0.0, direction: d.as_vec3().to_array(), tmax: f32::INFINITY };
+    let ray = |d: &DVec3| Ray::new(origin, d.as_vec3().to_array());
     let rays: Vec<Ray> = directions.iter().map(ray).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
-    scene.nearest_batch(&rays, None, &mut hits);
+    scene.batch(&rays).nearest(&mut hits);
     let result = |(direction, hit): (DVec3, &Hit)| Probe {
         direction,
         distance: f64::from(hit.t),

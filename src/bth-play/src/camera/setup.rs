@@ -119,6 +119,6 @@ fn is_enclosed(scene: &Scene, eye: DVec3) -> bool {
     };
     let rays: Vec<Ray> = fibonacci_sphere(DIRECTIONS).map(ray).collect();
     let mut blocked = vec![false; rays.len()];
-    scene.any_batch(&rays, None, &mut blocked);
+    scene.batch(&rays).any(&mut blocked);
     blocked.iter().filter(|b| **b).count() as u32 > DIRECTIONS * 9 / 10
 }

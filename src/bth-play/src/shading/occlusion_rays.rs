@@ -51,7 +51,7 @@ impl OcclusionRays {
     /// Whether each ray is blocked.
     pub(crate) fn trace(&self, scene: &Scene) -> Vec<bool> {
         let mut blocked = vec![false; self.rays.len()];
-        scene.any_batch(&self.rays, Some(&self.from), &mut blocked);
+        scene.batch(&self.rays).from(&self.from[..]).any(&mut blocked);
         blocked
     }
 }

@@ -95,7 +95,7 @@ pub(super) fn shade(
         let from: Vec<PrimitiveRef> = next.iter().map(|path| path.from).collect();
         hits.clear();
         hits.resize(rays.len(), Hit::MISS);
-        frame.scene.nearest_batch(&rays, Some(&from), &mut hits);
+        frame.scene.batch(&rays).from(&from[..]).nearest(&mut hits);
         counters.nearest_rays += rays.len() as u64;
         paths = next;
     }

@@ -15,7 +15,7 @@ pub(super) fn room_lamp(frame: &FrameContext<'_>, vertical: DVec3) -> DVec3 {
         tmax: (0.15 * frame.bounds.diagonal()) as f32,
     };
     let mut hit = [Hit::MISS];
-    frame.scene.nearest_batch(&[ray], None, &mut hit);
+    frame.scene.batch(&[ray]).nearest(&mut hit);
     let free = f64::from(hit[0].t).min(f64::from(ray.tmax));
     camera.eye + direction * (0.6 * free)
 }

@@ -57,7 +57,7 @@ impl Shader {
             return step_counts::shade(frame.scene, &rays, &mut counters.steps);
         }
         let mut hits = vec![Hit::MISS; rays.len()];
-        frame.scene.nearest_batch(&rays, None, &mut hits);
+        frame.scene.batch(&rays).nearest(&mut hits);
         match self {
             Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
             Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),

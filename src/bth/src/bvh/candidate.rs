@@ -51,7 +51,7 @@ pub(crate) trait Reader {
 }
 
 /// Reads the corners of the triangle.
-struct ReadCorners;
+pub(crate) struct ReadCorners;
 
 impl Reader for ReadCorners {
     type Output = [[f32; 3]; 3];

@@ -6,9 +6,12 @@
 //! - [`interleaved`]: a pool of rays ([`ray_pool`], [`ray_state`]) that step in turn, with their stacks ([`stack`]) and with hits
 //!   that are computed for sixteen rays at a time ([`deferred`]);
 //! - [`packet`]: coherent rays that enter nodes together.
+//!
+//! A fourth one, [`enumerate`], passes every triangle that a ray may hit to a receiver, for queries that report more than one hit.
 
 pub(crate) mod candidate;
 pub(crate) mod deferred;
+pub(crate) mod enumerate;
 pub(crate) mod interleaved;
 pub(crate) mod leaf;
 pub(crate) mod nodes;

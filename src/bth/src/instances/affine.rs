@@ -181,8 +181,13 @@ impl Inverse {
         let exponent = exponent.clamp(-100, 100);
         let scale = f64::from_bits(((1023 + exponent) as u64) << 52);
         let direction = direction.map(|x| (x / scale) as f32);
-        let t = |t: f32| (f64::from(t) * scale) as f32;
-        let ray = Ray { origin, direction, tmin: t(ray.tmin), tmax: t(ray.tmax) };
+        // Where the ends of the range are rounded because they leave the normal numbers of f32, they are rounded inwards, so that no
+        // hit outside of the range in world space counts.
+        let scaled = |t: f32| (f64::from(t) * scale, (f64::from(t) * scale) as f32);
+        let ((least, tmin), (greatest, tmax)) = (scaled(ray.tmin), scaled(ray.tmax));
+        let tmin = if f64::from(tmin) < least { tmin.next_up() } else { tmin };
+        let tmax = if greatest < f64::from(tmax) { tmax.next_down() } else { tmax };
+        let ray = Ray { origin, direction, tmin, tmax };
         ObjectRay { ray, t_scale: (1.0 / scale) as f32 }
     }
 

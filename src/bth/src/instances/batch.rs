@@ -10,7 +10,7 @@ use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::object::{self, Scratch};
 use crate::query::sink::{SceneRays, Sink, Visit};
-use crate::query::{self, Steps, better};
+use crate::query::{self, Query, Steps, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::file::File;
@@ -168,7 +168,7 @@ impl World {
 
     /// The placement of an instance that is in the top level.
     #[inline]
-    pub(super) fn placement(&self, instance: u32) -> &Placement {
+    pub(crate) fn placement(&self, instance: u32) -> &Placement {
         self.placements[instance as usize].as_ref().expect("the top level holds visible instances")
     }
 
@@ -205,6 +205,19 @@ impl World {
     }
 }
 
+/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
+fn trace_visits<Q: Query>(
+    batch: &SceneBatch<'_>,
+    object: &ObjectView<'_>,
+    (visits, object_rays): (&[Visit], &ObjectRays),
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
+    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
+    object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);
+}
+
 struct SceneNearest<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
@@ -229,15 +242,7 @@ impl SceneQuery for SceneNearest<'_> {
             return;
         }
         self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax.min(self.hits[ray].t));
-        let scene = SceneRays { rays: batch.rays, visits, t_scale: &self.object_rays.t_scale };
-        let mut sink = Sink::<query::Nearest>::of_scene(object.triangle_ids, self.hits, scene);
-        object::trace_batch(
-            object,
-            &self.object_rays.rays,
-            self.object_rays.hints(),
-            self.scratch,
-            &mut sink,
-        );
+        trace_visits::<query::Nearest>(batch, object, (visits, &self.object_rays), self.scratch, self.hits);
     }
 }
 
@@ -262,15 +267,7 @@ impl SceneQuery for SceneAny<'_> {
             return;
         }
         self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax);
-        let scene = SceneRays { rays: batch.rays, visits, t_scale: &self.object_rays.t_scale };
-        let mut sink = Sink::<query::Any>::of_scene(object.triangle_ids, self.found, scene);
-        object::trace_batch(
-            object,
-            &self.object_rays.rays,
-            self.object_rays.hints(),
-            self.scratch,
-            &mut sink,
-        );
+        trace_visits::<query::Any>(batch, object, (visits, &self.object_rays), self.scratch, self.found);
     }
 }
 

@@ -4,11 +4,13 @@
 //! inverse transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the
 //! boxes ([`top_level`]). A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others
 //! one by one ([`traverse`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's visits are
-//! transformed into its space ([`enter_object`]) and traced there together, with t unchanged.
+//! transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A ray whose query reports several
+//! hits goes through the top level alone ([`enumerate`]).
 
 mod affine;
 mod batch;
 mod enter_object;
+mod enumerate;
 mod hierarchy;
 mod packets;
 mod placement;
@@ -19,5 +21,8 @@ mod traverse;
 mod visit_queue;
 mod world;
 
+pub(crate) use affine::ObjectRay;
+pub(crate) use placement::Placement;
+pub(crate) use top_level::INSTANCE;
 pub use world::Update;
-pub(crate) use world::World;
+pub(crate) use world::{Placed, World};

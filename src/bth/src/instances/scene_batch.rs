@@ -12,7 +12,7 @@ pub(super) struct SceneBatch<'a> {
     pub(super) world: &'a World,
     pub(super) file: &'a File,
     pub(super) rays: &'a [Ray],
-    /// For each ray the triangle on which it starts; see [`Scene::nearest_batch`](crate::Scene::nearest_batch).
+    /// For each ray the triangle on which it starts; see [`RayBatch::from`](crate::RayBatch::from).
     pub(super) from: Option<&'a [PrimitiveRef]>,
 }
 

@@ -42,7 +42,7 @@ struct TopLevelRay {
 
 /// The constants of a ray for box tests, computed in f64. For rays from beyond [`TopLevel::reach`] they widen the boxes. `None`
 /// for rays that cannot hit anything.
-fn widened_slabs(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
+pub(super) fn widened_slabs(ray: &Ray, top: &TopLevel) -> Option<RaySlabs> {
     RaySlabs::widened(ray, top.greatest_coordinate(), |start| {
         if start > f64::from(top.reach) { f64::from(top.origin_slack) * start } else { 0.0 }
     })

@@ -1,5 +1,6 @@
 //! The instances of a scene at a time.
 
+use super::affine::Inverse;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::top_level::TopLevel;
@@ -22,6 +23,21 @@ pub struct Update {
     pub visible: usize,
     /// Time to rebuild the top level.
     pub top_level: Duration,
+}
+
+/// The transforms of a visible instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placed {
+    /// Index of the object.
+    pub(crate) object: u32,
+    /// From object space to world space: rows of four.
+    pub(crate) to_world: [[f64; 4]; 3],
+    /// Rows of the linear part of the inverse, and the origin of object space in world space.
+    pub(crate) inverse: [[f64; 3]; 3],
+    pub(crate) origin: [f64; 3],
+    /// The world box.
+    pub(crate) lower: [f32; 3],
+    pub(crate) upper: [f32; 3],
 }
 
 /// The instances of a file with scene sections at a time. The sections have been checked.
@@ -156,6 +172,21 @@ impl World {
             (self.hierarchy.to_world(&view, instance.node), file.object_header(instance.object));
         let placement = Placement::new(&world, instance.object, object, &PartBoxes::whole(object)).ok()?;
         Some((placement.lower, placement.upper))
+    }
+
+    /// The transforms and the world box of an instance; `None` if it is not visible.
+    pub(crate) fn placed(&self, file: &File, instance: u32) -> Option<Placed> {
+        let placement = self.placements[instance as usize].as_ref()?;
+        let node = file.scene().expect("checked when the scene was opened").instances[instance as usize].node;
+        let Inverse { linear, origin } = placement.inverse;
+        Some(Placed {
+            object: placement.object(),
+            to_world: self.node(file, node).0,
+            inverse: linear,
+            origin,
+            lower: placement.lower,
+            upper: placement.upper,
+        })
     }
 
     /// The transform from a node's space to world space, as rows of four, and whether the node is visible.

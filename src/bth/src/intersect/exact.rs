@@ -327,7 +327,7 @@ mod tests {
         let target = point(middle, size * 0.5);
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
         let [origin, direction] = [origin, direction].map(|v| v.map(|x| x * scale * 0.1));
-        let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+        let ray = Ray::new(origin, direction);
         Some((Line::new(&ray)?, corners.map(|p| wide(p.map(|x| x * scale * 0.1)))))
     }
 

@@ -40,7 +40,7 @@ impl<'a> TriangleRef<'a> {
         TriangleRef { value: index, is_index: true, ids }
     }
     /// The id.
-    fn read(&self) -> u32 {
+    pub(crate) fn read(&self) -> u32 {
         if self.is_index { self.ids[self.value as usize] } else { self.value }
     }
 }
@@ -93,7 +93,7 @@ pub(crate) trait Query: Copy {
 
 /// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
 /// and it has a relative error of 2^-28 ([`crate::intersect::exact::RATIO_ERROR`]), so one of two equal hits may appear nearer.
-fn widened(t: f64) -> f64 {
+pub(crate) fn widened(t: f64) -> f64 {
     const SLACK: f64 = 1.0 / (1 << 23) as f64;
     const LEAST: f64 = f32::from_bits(1) as f64;
     t + (t.abs() * SLACK + LEAST)
@@ -195,13 +195,13 @@ pub(crate) fn better(ray: &Ray, best: &Hit, hit: &Hit, t_scale: f32) -> Option<H
 }
 
 /// Whether a t between two values may lie between `tmin` and `limit` after rounding to f32.
-fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
+pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
     t[0] <= limit && (t[1] as f32).next_up() >= tmin
 }
 
 /// Whether a t that is already rounded for the answer lies in the ray's range.
 #[inline(always)]
-fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
+pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t < f32::INFINITY
 }
 

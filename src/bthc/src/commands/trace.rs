@@ -30,12 +30,12 @@ pub(crate) fn run(args: &Trace) -> Result<(), Failure> {
         } else if args.any {
             let mut found = vec![false; rays.len()];
             let tasks = rays.par_chunks(CHUNK).zip(found.par_chunks_mut(CHUNK)).enumerate();
-            tasks.for_each(|(i, (rays, found))| scene.any_batch(rays, hint(i, rays.len()), found));
+            tasks.for_each(|(i, (rays, found))| scene.batch(rays).from(hint(i, rays.len())).any(found));
             found.into_iter().map(ray_files::answer).collect()
         } else {
             let mut hits = vec![Hit::MISS; rays.len()];
             let tasks = rays.par_chunks(CHUNK).zip(hits.par_chunks_mut(CHUNK)).enumerate();
-            tasks.for_each(|(i, (rays, hits))| scene.nearest_batch(rays, hint(i, rays.len()), hits));
+            tasks.for_each(|(i, (rays, hits))| scene.batch(rays).from(hint(i, rays.len())).nearest(hits));
             hits
         };
         Ok::<_, Failure>((hits, start.elapsed().as_secs_f64()))

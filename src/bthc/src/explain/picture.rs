@@ -27,7 +27,7 @@ pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
     let rays = camera(of);
     let mut hits = vec![Hit::MISS; rays.len()];
     for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-        of.plain.nearest_batch(rays, None, hits);
+        of.plain.batch(rays).nearest(hits);
     }
     let kind = kinds(of);
     let costs: Vec<Option<f64>> = rays.iter().zip(&hits).map(|(ray, hit)| bounce(of, ray, hit)).collect();
@@ -81,7 +81,7 @@ fn camera(of: &Explained<'_>) -> Vec<Ray> {
         let (x, y) = (-radius * at(i % SIZE), radius * at(i / SIZE));
         let target = middle + x * right + y * up;
         let direction = unit(target - eye).to_array();
-        Ray { origin: eye.to_array(), tmin: 0.0, direction, tmax: f32::INFINITY }
+        Ray::new(eye.to_array(), direction)
     };
     (0..SIZE * SIZE).map(pixel).collect()
 }
@@ -135,7 +135,7 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
     // Off the triangle by more than the rounding of the hit point, on the side of the incoming ray.
     let lift = -2e-5 * diagonal * cosine.signum();
     let origin = (start + hit.t * incoming + lift * n).to_array();
-    let ray = Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY };
+    let ray = Ray::new(origin, direction);
     let from = PrimitiveRef { instance: 0, triangle: hit.primitive.triangle };
     let (_, steps) = of.compiled.nearest_counted(&ray, from);
     let costs = &of.costs.profile;

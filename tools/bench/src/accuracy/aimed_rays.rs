@@ -69,7 +69,7 @@ fn through(point: [f32; 3], diagonal: f64, rng: &mut Rng) -> Option<Ray> {
             return None;
         }
     }
-    (direction != [0.0; 3]).then_some(Ray { origin, tmin: 0.0, direction, tmax: f32::INFINITY })
+    (direction != [0.0; 3]).then_some(Ray::new(origin, direction))
 }
 
 /// The greatest power of two that a number is a multiple of; none for zero.

@@ -51,7 +51,7 @@ impl Geometry {
     /// If one of those differs: our BVH would be wrong then, and this measurement worthless.
     pub fn answers(&self, set: &RaySet, one_in: usize) -> Result<Vec<Exact>> {
         let mut hits = vec![Hit::MISS; set.rays.len()];
-        self.scene.nearest_batch(&set.rays, None, &mut hits);
+        self.scene.batch(&set.rays).nearest(&mut hits);
         let wrong = (0..set.rays.len()).into_par_iter().step_by(one_in.max(1)).find_any(|&i| {
             let (ray, hit) = (&set.rays[i], &hits[i]);
             let Some(truth) = bth_oracle::nearest(&self.corners, ray) else { return hit.is_hit() };
@@ -77,10 +77,10 @@ impl Geometry {
 /// Draws the exact picture.
 impl Tracer for Geometry {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
-        self.scene.nearest_batch(batch.rays, None, hits);
+        self.scene.batch(batch.rays).nearest(hits);
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        self.scene.any_batch(batch.rays, None, found);
+        self.scene.batch(batch.rays).any(found);
     }
 }

@@ -3,12 +3,14 @@
 mod accuracy;
 mod compare;
 mod costs;
+mod inside;
 mod load;
 mod models;
 mod output;
 mod paper;
 mod quality;
 mod records;
+mod run;
 mod scenes;
 mod speed;
 mod stress;
@@ -17,12 +19,14 @@ mod values;
 pub use accuracy::Accuracy;
 pub use compare::Compare;
 pub use costs::Costs;
+pub use inside::Inside;
 pub use load::{Load, LoadScenes, Probe, Start, Starts};
 pub use models::{Models, SeenFrom};
 pub use output::Output;
 pub use paper::Paper;
 pub use quality::Quality;
 pub use records::{RecordRows, Summary};
+pub use run::RunOptions;
 pub use scenes::Scenes;
 pub use speed::Speed;
 pub use stress::Stress;
@@ -57,6 +61,8 @@ pub enum Command {
     LoadScenes(LoadScenes),
     /// Hard rays on hard surfaces, every answer checked exactly: misses, leaks, ghosts, errors of t.
     Stress(Stress),
+    /// Points inside and outside of closed models, every answer checked along two rays and samples exactly.
+    Inside(Inside),
     /// Predictions of the cost model against measurements.
     Costs(Costs),
     /// The paper's tables on our models.

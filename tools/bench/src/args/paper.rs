@@ -1,6 +1,6 @@
 //! The options of `paper`.
 
-use super::output::Output;
+use super::run::RunOptions;
 use super::values::at_least_one;
 use clap::Args;
 
@@ -16,13 +16,7 @@ pub struct Paper {
     /// Triangles of the largest model that gets a k-d tree, which takes long to build.
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub most_kd: usize,
-    /// Vector instructions of our kernels; the best that the machine has when absent.
-    #[arg(long, value_name = "NAME")]
-    pub isa: Option<String>,
-    /// Small pictures: whether it works, not how fast it is.
-    #[arg(long)]
-    pub quick: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub output: Output,
+    pub run: RunOptions,
 }

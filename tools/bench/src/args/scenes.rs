@@ -1,6 +1,6 @@
 //! The options of `scenes`.
 
-use super::output::Output;
+use super::run::RunOptions;
 use super::values::at_least_one;
 use crate::names::Names;
 use clap::Args;
@@ -23,15 +23,9 @@ pub struct Scenes {
     /// Only these tracers; a star at the end stands for any ending.
     #[arg(long = "tracer", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub tracers: Names,
-    /// Vector instructions of our kernels; the best that the machine has when absent.
-    #[arg(long, value_name = "NAME")]
-    pub isa: Option<String>,
-    /// Small pictures: whether it works, not how fast it is.
-    #[arg(long)]
-    pub quick: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub output: Output,
+    pub run: RunOptions,
 }
 
 impl Scenes {

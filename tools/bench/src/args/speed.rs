@@ -1,7 +1,7 @@
 //! The options of `speed`.
 
 use super::models::Models;
-use super::output::Output;
+use super::run::RunOptions;
 use super::values::at_least_one;
 use crate::names::Names;
 use clap::Args;
@@ -27,13 +27,7 @@ pub struct Speed {
     /// Only these ray sets.
     #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub sets: Names,
-    /// Vector instructions of our kernels; the best that the machine has when absent.
-    #[arg(long, value_name = "NAME")]
-    pub isa: Option<String>,
-    /// Small pictures and one round: whether it works, not how fast it is.
-    #[arg(long)]
-    pub quick: bool,
     #[command(flatten)]
     #[allow(missing_docs)]
-    pub output: Output,
+    pub run: RunOptions,
 }

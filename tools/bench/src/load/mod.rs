@@ -122,6 +122,6 @@ fn measure_model(which: &str, arguments: &Load, isa: &str, progress: &Progress) 
 /// Rays of the camera, evenly spread over the picture, after one that hits.
 fn first_rays(primary: &RaySet, scene: &bth::Scene, count: usize) -> Option<Vec<Ray>> {
     let mut hits = vec![Hit::MISS; primary.rays.len()];
-    scene.nearest_batch(&primary.rays, None, &mut hits);
+    scene.batch(&primary.rays).nearest(&mut hits);
     first_of(&primary.rays, &hits, count)
 }

@@ -79,12 +79,12 @@ struct OpenedFile(bth::Scene);
 impl Tracer for OpenedFile {
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.0.nearest_batch(batch.rays, None, hits);
+            self.0.batch(batch.rays).nearest(hits);
         }
     }
 
     fn any(&self, batch: Batch<'_>, found: &mut [bool]) {
-        self.0.any_batch(batch.rays, None, found);
+        self.0.batch(batch.rays).any(found);
     }
 }
 

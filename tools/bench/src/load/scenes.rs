@@ -154,7 +154,7 @@ fn picture(scene: &bth::Scene, first: usize) -> Option<Vec<Ray>> {
     let (middle, diagonal) = (0.5 * (lower + upper), (upper - lower).length());
     let all = Camera::framing(&corners, middle, diagonal, DVec3::new(0.8, 0.5, 1.0), SIZE).rays();
     let mut hits = vec![Hit::MISS; all.len()];
-    scene.nearest_batch(&all, None, &mut hits);
+    scene.batch(&all).nearest(&mut hits);
     let mut rays = first_of(&all, &hits, first)?;
     rays.extend(&all);
     Some(rays)

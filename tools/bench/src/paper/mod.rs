@@ -47,14 +47,14 @@ const LEAST_TRIANGLES: u32 = 64;
 /// # Errors
 /// If an option or model cannot be used or a file cannot be written.
 pub fn run(arguments: &Paper) -> Result<()> {
-    let isa = isa::select(arguments.isa.as_deref())?;
+    let isa = isa::select(arguments.run.isa.as_deref())?;
     let progress = Progress::new();
     progress.show("calibrating the scalar traversals");
     let profile = calibrate::profile()?;
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let size = if arguments.quick { QUICK_SIZE } else { SIZE };
+    let size = if arguments.run.quick { QUICK_SIZE } else { SIZE };
     let options =
-        json!({"pixels": size, "rounds": arguments.rounds, "threads": threads, "quick": arguments.quick});
+        json!({"pixels": size, "rounds": arguments.rounds, "threads": threads, "quick": arguments.run.quick});
     let mut record = PaperRecord { head: Head::now("paper", isa, options), profile, scenes: Vec::new() };
     for name in &arguments.models {
         let model = Model::load(name)?;
@@ -67,7 +67,7 @@ pub fn run(arguments: &Paper) -> Result<()> {
     let body = markdown(&record);
     let json = serde_json::to_value(&record)?;
     Page { head: &record.head, title: "The paper's tables", body, json, charts: Vec::new() }
-        .write(&arguments.output)
+        .write(&arguments.run.output)
 }
 
 fn scene(

@@ -32,7 +32,7 @@ impl Views {
         let rays = rays.map(|rays| tiled(&rays, size));
         let expected = [0, 1].map(|i| {
             let mut hits = vec![Hit::MISS; rays[i].len()];
-            scene.nearest_batch(&rays[i], None, &mut hits);
+            scene.batch(&rays[i]).nearest(&mut hits);
             hits.iter().map(Hit::is_hit).collect()
         });
         Ok(Views { view, rays, expected })

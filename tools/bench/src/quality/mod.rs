@@ -21,11 +21,10 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::speed::Answers;
-use crate::{isa, structures};
+use crate::structures;
 use anyhow::{Result, bail, ensure};
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef};
-use serde_json::json;
 use std::collections::BTreeMap;
 use variations::BuiltVariation;
 
@@ -49,7 +48,7 @@ pub fn run(arguments: &Quality) -> Result<()> {
         json: serde_json::to_value(&record)?,
         charts: Vec::new(),
     }
-    .write(&arguments.output)?;
+    .write(&arguments.run.output)?;
     let rows = record.models.iter().flat_map(|m| m.rows.iter().map(move |r| (m, r)));
     let wrong: Vec<String> =
         rows.filter(|(_, r)| r.differ > 0).map(|(m, r)| format!("{} on {}", r.name, m.name)).collect();
@@ -62,15 +61,8 @@ pub fn run(arguments: &Quality) -> Result<()> {
 /// # Errors
 /// If a model cannot be used.
 pub fn measure(arguments: &Quality) -> Result<QualityRecord> {
-    let isa = isa::select(arguments.isa.as_deref())?;
-    let rounds = if arguments.quick { 1 } else { arguments.rounds };
-    let options = json!({
-        "rays": arguments.rays,
-        "rounds": rounds,
-        "quick": arguments.quick,
-        "rays_per_batch": structures::BATCH,
-    });
-    let mut record = QualityRecord { head: Head::now("bvh-quality", isa, options), models: Vec::new() };
+    let (head, rounds) = Head::of_ray_sets("bvh-quality", &arguments.run, arguments.rays, arguments.rounds)?;
+    let mut record = QualityRecord { head, models: Vec::new() };
     let progress = Progress::new();
     for which in &arguments.models.models {
         record.models.push(measure_model(which, arguments, rounds, &progress)?);
@@ -92,7 +84,7 @@ fn measure_model(
     }
     progress.show(format!("{}: making rays", model.name));
     let plain = bth::from_bytes(&built[0].1.bytes)?;
-    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
+    let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &plain), &options);
     let counted: Vec<RaySet> = sets.iter().filter(|s| STEPS_OF.contains(&s.name)).cloned().collect();
@@ -176,9 +168,9 @@ fn trace(scene: &Scene, set: &RaySet, hits: &mut [Hit], found: &mut [bool]) {
     for first in (0..set.rays.len()).step_by(structures::BATCH) {
         let part = first..set.rays.len().min(first + structures::BATCH);
         if set.any {
-            scene.any_batch(&set.rays[part.clone()], None, &mut found[part]);
+            scene.batch(&set.rays[part.clone()]).any(&mut found[part]);
         } else {
-            scene.nearest_batch(&set.rays[part.clone()], None, &mut hits[part]);
+            scene.batch(&set.rays[part.clone()]).nearest(&mut hits[part]);
         }
     }
 }

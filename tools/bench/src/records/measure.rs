@@ -2,7 +2,7 @@
 
 use super::definition::{Definition, Measurement};
 use super::row::Row;
-use crate::args::{Models, Output, SeenFrom, Speed};
+use crate::args::{Models, RunOptions, SeenFrom, Speed};
 use crate::machine;
 use crate::names::Names;
 use crate::rivals::embree;
@@ -37,9 +37,7 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
         threads: definition.threads.clone(),
         tracers: names(&definition.tracers),
         sets: names(&definition.sets),
-        isa: None,
-        quick,
-        output: Output::default(),
+        run: RunOptions { quick, ..RunOptions::default() },
     };
     Ok(rows_of_speed(&definition.benchmark, definition.rounds, &speed::measure(&arguments)?))
 }

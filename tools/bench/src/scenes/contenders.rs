@@ -136,7 +136,7 @@ impl Moving for OurScene {
 
     fn nearest(&self, batch: Batch<'_>, hits: &mut [Hit]) {
         for (batch, hits) in batch.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-            self.0.nearest_batch(batch.rays, batch.from, hits);
+            self.0.batch(batch.rays).from(batch.from).nearest(hits);
         }
     }
 }

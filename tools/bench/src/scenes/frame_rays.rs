@@ -32,7 +32,7 @@ pub(super) struct FrameRays {
 impl FrameRaySet {
     fn of(scene: &Scene, rays: Vec<Ray>, from: Option<Vec<PrimitiveRef>>, coherent: bool) -> FrameRaySet {
         let mut expected = vec![Hit::MISS; rays.len()];
-        scene.nearest_batch(&rays, None, &mut expected);
+        scene.batch(&rays).nearest(&mut expected);
         FrameRaySet { rays, from, coherent, expected }
     }
 

@@ -32,12 +32,12 @@ pub const SETS: [&str; 3] = ["camera", "diffuse", "later"];
 /// # Errors
 /// If an option or scene cannot be used, an answer of ours differs from that of our plain BVH, or a file cannot be written.
 pub fn run(arguments: &Scenes) -> Result<()> {
-    let isa = isa::select(arguments.isa.as_deref())?;
-    let size = if arguments.quick { (96, 64) } else { arguments.size() };
+    let isa = isa::select(arguments.run.isa.as_deref())?;
+    let size = if arguments.run.quick { (96, 64) } else { arguments.size() };
     let progress = Progress::new();
     let options = json!({
         "pixels": size, "frames": arguments.frames, "rounds": arguments.rounds, "bounces": frame_rays::BOUNCES,
-        "threads": 1, "quick": arguments.quick,
+        "threads": 1, "quick": arguments.run.quick,
     });
     let mut record = ScenesRecord { head: Head::now("scenes", isa, options), scenes: Vec::new() };
     for name in &arguments.scenes {
@@ -51,7 +51,7 @@ pub fn run(arguments: &Scenes) -> Result<()> {
     let body = markdown(&record);
     let json = serde_json::to_value(&record)?;
     Page { head: &record.head, title: "Scenes that move", body, json, charts: Vec::new() }
-        .write(&arguments.output)?;
+        .write(&arguments.run.output)?;
     let wrong = record.scenes.iter().flat_map(|s| &s.rows).find(|r| r.ours && r.differ > 0);
     ensure!(wrong.is_none(), "{} answers another than the plain BVH", wrong.map_or("", |r| r.name.as_str()));
     Ok(())

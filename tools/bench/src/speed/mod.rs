@@ -17,10 +17,9 @@ use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::medians;
 use crate::tracer::Contender;
-use crate::{isa, rivals, structures};
+use crate::{rivals, structures};
 use anyhow::{Result, bail, ensure};
 use bth::rays::{Hit, PrimitiveRef};
-use serde_json::json;
 use std::collections::BTreeMap;
 
 /// Measures, prints and writes the record.
@@ -43,7 +42,7 @@ pub fn run(arguments: &Speed) -> Result<()> {
         json: serde_json::to_value(&record)?,
         charts: draw(&record),
     }
-    .write(&arguments.output)?;
+    .write(&arguments.run.output)?;
     let wrong = record.models.iter().flat_map(|m| m.runs.iter().map(move |r| (m, r)));
     let wrong: Vec<String> = wrong
         .flat_map(|(model, run)| run.wrong().map(move |name| format!("{} on {}", name, model.name)))
@@ -57,15 +56,8 @@ pub fn run(arguments: &Speed) -> Result<()> {
 /// # Errors
 /// If a model cannot be used.
 pub fn measure(arguments: &Speed) -> Result<SpeedRecord> {
-    let isa = isa::select(arguments.isa.as_deref())?;
-    let rounds = if arguments.quick { 1 } else { arguments.rounds };
-    let options = json!({
-        "rays": arguments.rays,
-        "rounds": rounds,
-        "quick": arguments.quick,
-        "rays_per_batch": structures::BATCH,
-    });
-    let mut record = SpeedRecord { head: Head::now("speed", isa, options), models: Vec::new() };
+    let (head, rounds) = Head::of_ray_sets("speed", &arguments.run, arguments.rays, arguments.rounds)?;
+    let mut record = SpeedRecord { head, models: Vec::new() };
     let progress = Progress::new();
     for which in &arguments.models.models {
         record.models.push(measure_model(which, arguments, rounds, &progress)?);
@@ -93,7 +85,7 @@ fn measure_model(which: &str, arguments: &Speed, rounds: usize, progress: &Progr
     let scene = bth::from_bytes(&bvh.bytes)?;
 
     progress.show(format!("{}: making rays", model.name));
-    let size = if arguments.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
+    let size = if arguments.run.quick { rays::QUICK_PICTURE_SIZE } else { rays::PICTURE_SIZE };
     let options = rays::Options { size, most: arguments.rays, view: arguments.models.seen_from.view() };
     let (view, mut sets) = rays::sets(&Finder::new(&model, &scene), &options);
     sets.retain(|s| arguments.sets.select(s.name) && s.rays.len() >= rays::FEWEST_TIMED);
@@ -168,11 +160,11 @@ impl Answers {
     pub(crate) fn of_scene(scene: &bth::Scene, set: &RaySet) -> Answers {
         if set.any {
             let mut found = vec![false; set.rays.len()];
-            scene.any_batch(&set.rays, None, &mut found);
+            scene.batch(&set.rays).any(&mut found);
             Answers::Any(found)
         } else {
             let mut hits = vec![Hit::MISS; set.rays.len()];
-            scene.nearest_batch(&set.rays, None, &mut hits);
+            scene.batch(&set.rays).nearest(&mut hits);
             Answers::Nearest(hits)
         }
     }

@@ -132,7 +132,7 @@ impl Importer<'_> {
         };
         if self.document.has_targets(mesh) {
             let part = format!("mesh {mesh}");
-            self.ignore(&part, "its morph targets are ignored: it stays in its base shape".to_owned())?;
+            self.ignore(&part, "its morph targets are not animated: it stays at rest".to_owned())?;
         }
         let row = self.manifest.objects.len();
         let name = unique(&mut self.object_names, &found.name, format!("mesh {mesh}"));

@@ -174,7 +174,7 @@ impl<'a> App<'a> {
     fn distance(&self, camera: &Camera) -> f64 {
         let ray = camera.ray(DVec2::ZERO).to_ray();
         let mut hit = [Hit::MISS];
-        self.content.scene.nearest_batch(&[ray], None, &mut hit);
+        self.content.scene.batch(&[ray]).nearest(&mut hit);
         let bounds = &self.content.setup.bounds;
         let diagonal = bounds.diagonal();
         if hit[0].is_hit() {

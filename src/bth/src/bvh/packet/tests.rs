@@ -170,7 +170,7 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
         let spread = [0.3, 1.5, 3.0, 8.0][run / 3 % 4];
         for _ in 0..64 {
             let direction = [0, 1, 2].map(|k| target[k] + unit(&mut rng) * spread - eye[k]);
-            rays.push(Ray { origin: eye, tmin: 0.0, direction, tmax: f32::INFINITY });
+            rays.push(Ray::new(eye, direction));
         }
     }
     let [(count, hits), _] = check(&surface, &rays, ALWAYS);

@@ -1,0 +1,108 @@
+//! The compilation of a scene whose meshes and instances are in memory.
+
+use super::compile::{build, key, warn_over_limit};
+use super::context::Context;
+use super::plan::ScenePlan;
+use super::report::{ObjectReport, SceneReport};
+use super::sources::File;
+use crate::cached::{self, Cache, CachedCompilation};
+use crate::error::{Error, Place, Result};
+use crate::monitor::Monitor;
+use crate::options::CompileOptions;
+use crate::pipeline::Clock;
+use crate::source::{SourceDigest, TriangleMesh};
+use bth_scene::{Manifest, Node, Object, Source, Transform};
+use rayon::prelude::*;
+use serde::Deserialize;
+use std::path::Path;
+
+/// A mesh at a place in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Row of the mesh.
+    pub mesh: u32,
+    /// Rows of the transform from the mesh's space to the world, applied to columns (x, y, z, 1): finite and either
+    /// invertible or, for an invisible instance, without size.
+    pub to_world: [[f64; 4]; 3],
+}
+
+/// Name of the scene in messages.
+const SCENE_NAME: &str = "scene";
+
+/// See [`crate::memory::compile_scene`].
+pub(crate) fn compile_meshes(
+    meshes: &[TriangleMesh<'_>],
+    instances: &[Instance],
+    options: &CompileOptions,
+    cache: &Cache<'_>,
+    monitor: &dyn Monitor,
+) -> Result<CachedCompilation<SceneReport>> {
+    check(meshes.len(), instances)?;
+    let manifest = manifest(meshes.len(), instances);
+    let context = Context::new(options, cache, monitor)?;
+    let mut clock = Clock::default();
+    let plan = plan(&manifest, meshes, &mut clock);
+    let key = key(&manifest, &plan, &context)?;
+    let outcome = cached::compile_or_fetch(cache, key.as_ref(), &|_| true, monitor, || {
+        let (content, report, _) = build(&manifest, &plan, Path::new(SCENE_NAME), &context, clock)?;
+        Ok((content, report, false))
+    })?;
+    let objects = Vec::<ObjectReport>::deserialize(&outcome.report["objects"]).unwrap_or_default();
+    warn_over_limit(&objects, options, monitor);
+    Ok(outcome)
+}
+
+/// Refuses instances of no mesh and transforms that are not finite.
+fn check(meshes: usize, instances: &[Instance]) -> Result<()> {
+    for (row, instance) in instances.iter().enumerate() {
+        let refused = |code, message, hint: &str| {
+            let place = Place::Part(SCENE_NAME.into(), format!("instance {row}"));
+            Err(Error::Input { code, place, message, hint: hint.to_owned() })
+        };
+        if instance.mesh as usize >= meshes {
+            let message = format!("mesh {} of {meshes} meshes", instance.mesh);
+            return refused("BTH-I005", message, "meshes count from 0");
+        }
+        if let Some(x) = instance.to_world.as_flattened().iter().find(|x| !x.is_finite()) {
+            return refused("BTH-I004", format!("expected a finite transform, found {x}"), "");
+        }
+    }
+    Ok(())
+}
+
+/// The manifest of a scene in which each instance has a node of its own.
+fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
+    let object = |row| {
+        let name = format!("mesh {row}");
+        Object { source: Source::Model { path: name.clone(), mesh: None }, name }
+    };
+    let node = |(row, instance): (usize, &Instance)| Node {
+        name: format!("instance {row}"),
+        parent: None,
+        transform: Transform::Matrix(instance.to_world),
+        object: Some(instance.mesh as usize),
+        visible: true,
+    };
+    Manifest {
+        objects: (0..meshes).map(object).collect(),
+        nodes: instances.iter().enumerate().map(node).collect(),
+        ..Manifest::default()
+    }
+}
+
+/// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size were left out, those behind it
+/// would be renumbered.
+fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clock) -> ScenePlan<'a> {
+    let count = manifest.nodes.len();
+    let mut used = vec![false; meshes.len()];
+    manifest.nodes.iter().filter_map(|node| node.object).for_each(|object| used[object] = true);
+    let file = |row: usize| {
+        let path = manifest.objects[row].source.path();
+        let digest = SourceDigest::of_triangles(meshes[row]);
+        let in_memory = Some(meshes[row]);
+        File { path, full: path.into(), compiled: false, parts: vec![(None, vec![row])], digest, in_memory }
+    };
+    let rows: Vec<usize> = (0..meshes.len()).filter(|row| used[*row]).collect();
+    let sources = clock.time("hash", || rows.into_par_iter().map(file).collect());
+    ScenePlan { order: (0..count).collect(), visible: vec![true; count], used, sources }
+}

@@ -1,0 +1,97 @@
+//! Triangles that are in memory already.
+
+use crate::error::{Place, Result};
+use crate::import::weld_and_count;
+use crate::mesh::{Mesh, Report};
+use crate::monitor::Monitor;
+use crate::raw::{check_rows, check_triangles};
+use crate::source::{INDEX, NON_FINITE, input_error};
+use std::path::Path;
+
+/// Name of the format in reports about triangles from memory.
+pub const MEMORY_FORMAT: &str = "memory";
+
+/// A mesh of triangles in memory, welded and counted as the faces of a file are. Row i of `triangles` has the id i.
+/// `name` names the mesh in messages.
+///
+/// # Errors
+/// `BTH-I005` for an index that is not a row of `positions`, `BTH-I004` for a corner that is not finite, each with the
+/// triangle's row; `BTH-L001` and `BTH-L002` beyond the limits of the format; cancellation.
+pub fn import_triangles(
+    name: &Path,
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
+    monitor.stage("import", Some(triangles.len() as u64));
+    check_triangles(triangles.len() as u64)?;
+    check_rows(positions.len() as u64)?;
+    check_indices(name, positions.len(), triangles)?;
+    let (mesh, counted) = weld_and_count(positions, triangles.to_vec(), None, monitor, |row| {
+        let triangle = triangles.iter().position(|corners| corners.contains(&(row as u32)));
+        let message = format!("expected finite coordinates, found {:?} at position {row}", positions[row]);
+        let hint = "leave out the triangles with positions that are not finite";
+        input_error(NON_FINITE, place(name, triangle.unwrap_or_default()), message, hint)
+    })?;
+    monitor.advance(triangles.len() as u64);
+    Ok((mesh, Report { format: MEMORY_FORMAT.to_owned(), ..counted }))
+}
+
+fn check_indices(name: &Path, count: usize, triangles: &[[u32; 3]]) -> Result<()> {
+    let outside = |index: &u32| *index as usize >= count;
+    // The greatest index of all is found without a branch for each.
+    let greatest = triangles.as_flattened().iter().copied().max();
+    if !greatest.is_some_and(|index| outside(&index)) {
+        return Ok(());
+    }
+    let row = triangles.iter().position(|corners| corners.iter().any(outside)).unwrap_or_default();
+    let index = triangles[row].into_iter().find(outside).unwrap_or_default();
+    let message = format!("index {index} of {count} positions");
+    Err(input_error(INDEX, place(name, row), message, "indices count from 0"))
+}
+
+/// The place of a triangle.
+fn place(name: &Path, row: usize) -> Place {
+    Place::Part(name.to_owned(), format!("triangle {row}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::Silent;
+
+    fn import(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<(Mesh, Report)> {
+        import_triangles(Path::new("mesh"), positions, triangles, &Silent)
+    }
+
+    const CORNERS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, -0.0]];
+
+    #[test]
+    fn triangles_are_welded_and_counted_as_those_of_a_file() {
+        let triangles = [[0, 1, 2], [0, 3, 2], [1, 1, 1]];
+        let (mesh, report) = import(&CORNERS, &triangles).unwrap();
+        let text = "OFF\n4 3 0\n0 0 0\n1 0 0\n0 1 0\n1 0 -0\n3 0 1 2\n3 0 3 2\n3 1 1 1\n";
+        let keep = crate::Keep::None;
+        let (read, of_file) =
+            crate::import_bytes(Path::new("a.off"), text.as_bytes(), keep, &Silent).unwrap();
+        assert_eq!(mesh, read);
+        assert_eq!(report, Report { format: "memory".to_owned(), ..of_file });
+        assert_eq!((report.degenerate, report.duplicate, report.positions), (1, 1, 3));
+    }
+
+    #[test]
+    fn errors_name_the_row() {
+        let outside = import(&CORNERS, &[[0, 1, 2], [1, 9, 4]]).unwrap_err().to_string();
+        assert!(outside.starts_with("mesh: triangle 1: BTH-I005: index 9 of 4 positions"), "{outside}");
+        let mut positions = CORNERS;
+        positions[3][1] = f32::NAN;
+        assert_eq!(import(&positions, &[[0, 1, 2]]).unwrap().1.non_finite_unused, 1);
+        let bad = import(&positions, &[[0, 1, 2], [0, 3, 2]]).unwrap_err().to_string();
+        assert!(
+            bad.starts_with("mesh: triangle 1: BTH-I004: expected finite coordinates, found [1.0, NaN"),
+            "{bad}"
+        );
+        assert!(import(&[], &[[0, 0, 0]]).unwrap_err().to_string().contains("index 0 of 0 positions"));
+        assert!(import(&[], &[]).unwrap().0.triangles.is_empty());
+    }
+}

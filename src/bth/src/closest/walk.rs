@@ -1,0 +1,201 @@
+//! The walk of a point through the BVH of an object, nearest boxes first.
+
+use super::placed::PlacedObject;
+use super::search::Search;
+use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch};
+use crate::bvh::single_stack::SingleStack;
+use crate::intersect::filter::TriangleBlock;
+use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
+use crate::query::Nearest;
+use crate::rays::PrimitiveRef;
+use crate::simd::{Isa, Kernel, LANES, Simd};
+use bth_format::layout::{Child, NONE, RawLeaf, TetLeaf, WIDTH};
+use bth_format::object::ObjectView;
+
+/// An object in which closest triangles are searched.
+pub(super) struct ObjectWalk<'a> {
+    object: &'a ObjectView<'a>,
+    /// Instance that is reported.
+    instance: u32,
+    /// The transform of the instance and its slack for the point; `None` where object space is world space.
+    placed: Option<(&'a PlacedObject, f64)>,
+    /// The point in object space.
+    point: LanePoint,
+}
+
+/// Searches an object whose space is world space.
+#[inline(always)]
+pub(super) fn search_object(object: &ObjectView<'_>, instance: u32, search: &mut Search) {
+    let point = LanePoint::new(search.point, object.bounds.greatest);
+    walk(&ObjectWalk { object, instance, placed: None, point }, search);
+}
+
+/// Searches the object of an instance.
+pub(super) fn search_placed(
+    object: &ObjectView<'_>,
+    placed: &PlacedObject,
+    instance: u32,
+    search: &mut Search,
+) {
+    let point = LanePoint::new(placed.point(search.point), object.bounds.greatest);
+    let placed = Some((placed, placed.slack(search.point)));
+    walk(&ObjectWalk { object, instance, placed, point }, search);
+}
+
+#[inline(always)]
+fn walk(walk: &ObjectWalk<'_>, search: &mut Search) {
+    if walk.object.header.root != NONE {
+        Isa::chosen().run(WalkKernel { walk, search });
+    }
+}
+
+struct WalkKernel<'a> {
+    walk: &'a ObjectWalk<'a>,
+    search: &'a mut Search,
+}
+
+impl Kernel for WalkKernel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let WalkKernel { walk, search } = self;
+        let object = walk.object;
+        let node_base = object.node_base();
+        let point = walk.point.lanes(s);
+        let mut stack = SingleStack::new();
+        let mut code = object.header.root;
+        let mut stack = stack.start(code);
+        let mut limit = walk.limit(search);
+        loop {
+            while code & Child::LEAF_BIT == 0 {
+                let (child, (bits, squared)) = if code & Child::PACKED_BIT == 0 {
+                    let node = Wide::node(node_base, code);
+                    (&node.child, point.children(s, node, limit))
+                } else {
+                    let node = Packed::node(node_base, code);
+                    (&node.child, point.children(s, node, limit))
+                };
+                if bits & bits.wrapping_sub(1) == 0 {
+                    code = match bits {
+                        0 => stack.pop::<Nearest>(limit),
+                        _ => child[bits.trailing_zeros() as usize % WIDTH],
+                    };
+                    continue;
+                }
+                let free = stack.free_entries();
+                let children = s.load_u(child);
+                let (count, nearest) = s.sort_far_to_near(bits, squared, children, free.codes, free.keys);
+                code = child[nearest % WIDTH];
+                free.push(count);
+                // The entry below the new top is most often needed next.
+                prefetch(s, Wide, node_base, stack.below());
+            }
+            let (mut indexed, mut raw) = (None, None);
+            if let Some(leaf) = indexed_leaf(object, node_base, code, &mut indexed) {
+                walk.leaf(s, &point, leaf, limit, search);
+            } else {
+                match Child::from_code(code) {
+                    Some(Child::Raw(at)) => walk.leaf(s, &point, object.raw(at, &mut raw), limit, search),
+                    Some(Child::Tets(row)) => {
+                        let leaf = &object.tet_leaves[row as usize];
+                        if leaf.subtree != NONE {
+                            code = leaf.subtree;
+                            continue;
+                        }
+                        walk.faces(s, &point, leaf, search);
+                    }
+                    // An empty slot, or the bottom of the stack.
+                    _ if stack.is_empty() => break,
+                    _ => {}
+                }
+            }
+            limit = walk.limit(search);
+            code = stack.pop::<Nearest>(limit);
+        }
+    }
+}
+
+impl ObjectWalk<'_> {
+    /// Upper bound in scaled object space of squared distances that can change the result.
+    #[inline(always)]
+    fn limit(&self, search: &Search) -> f32 {
+        self.point.limit(match self.placed {
+            None => search.squared,
+            Some((placed, slack)) => placed.squared_in_object(search.squared, slack),
+        })
+    }
+
+    /// The triangles of `valid` that may be closer than `limit`, and than the others.
+    #[inline(always)]
+    fn candidates<S: Simd>(
+        &self,
+        s: S,
+        point: &PointLanes<S>,
+        block: &impl CornerLanes,
+        valid: u32,
+        limit: f32,
+    ) -> u32 {
+        if block.is_beyond(s, point, limit) {
+            return 0;
+        }
+        let bounds = TriangleLanes::new(s, &block.relative(s, point));
+        // In object space, the least upper bound says nothing about which triangle is closest in world space.
+        let least = if self.placed.is_none() { bounds.least_upper_bound(s, valid) } else { limit };
+        bounds.candidates(s, valid, least.min(limit))
+    }
+
+    /// Offers the triangles of a leaf.
+    #[inline(always)]
+    fn leaf<S: Simd, B: TriangleBlock + CornerLanes>(
+        &self,
+        s: S,
+        point: &PointLanes<S>,
+        block: &B,
+        limit: f32,
+        search: &mut Search,
+    ) {
+        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
+        let mut bits = self.candidates(s, point, block, valid, limit);
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let index = block.first() as usize + i;
+            self.offer(block.corners(i), || self.object.triangle_ids[index], search);
+        }
+    }
+
+    /// Offers the constrained faces of a tet leaf.
+    #[inline(always)]
+    fn faces<S: Simd>(&self, s: S, point: &PointLanes<S>, leaf: &TetLeaf, search: &mut Search) {
+        let faces = &self.object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize];
+        let mut block = RawLeaf { corner: [[[0.0; WIDTH]; 3]; 3], first: 0, triangles: 0, reserved: [0; 14] };
+        for faces in faces.chunks(LANES) {
+            for i in 0..faces.len() {
+                for c in 0..3 {
+                    let position = &self.object.tet_vertices[faces[i].vertex[c] as usize].position;
+                    for k in 0..3 {
+                        block.corner[c][k][i] = position[k];
+                    }
+                }
+            }
+            let valid = ((1u64 << faces.len()) - 1) as u32;
+            let mut bits = self.candidates(s, point, &block, valid, self.limit(search));
+            while bits != 0 {
+                let i = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                self.offer(block.corners(i), || faces[i].triangle, search);
+            }
+        }
+    }
+
+    /// Offers a triangle, given its corners in object space and a function that returns its id.
+    #[inline(always)]
+    fn offer(&self, corners: [[f32; 3]; 3], id: impl FnOnce() -> u32, search: &mut Search) {
+        let corners = match self.placed {
+            None => corners,
+            Some((placed, _)) => placed.corners_in_world(corners),
+        };
+        search.offer(corners, || PrimitiveRef { instance: self.instance, triangle: id() });
+    }
+}

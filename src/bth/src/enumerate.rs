@@ -1,0 +1,55 @@
+//! Enumeration of the instances of a scene that a ray may hit. That of the triangles of an object is
+//! [`bvh::enumerate`](crate::bvh::enumerate).
+
+use crate::instances::{ObjectRay, Placement};
+use crate::rays::Ray;
+use crate::scene::Scene;
+use bth_format::object::ObjectView;
+
+/// An instance that a ray may hit.
+pub(crate) struct EnteredInstance<'a> {
+    /// Its index.
+    pub(crate) instance: u32,
+    /// Index of its object.
+    pub(crate) object_index: u32,
+    pub(crate) object: &'a ObjectView<'a>,
+    /// `None` if the object's space is world space.
+    placement: Option<&'a Placement>,
+}
+
+impl EnteredInstance<'_> {
+    /// A ray in the space of the object. All queries transform rays as here, so t has the same bits in all of them.
+    pub(crate) fn object_ray(&self, ray: &Ray) -> ObjectRay {
+        self.placement.map_or(ObjectRay { ray: *ray, t_scale: 1.0 }, |placement| placement.inverse.ray(ray))
+    }
+}
+
+impl Scene {
+    /// Calls `visit` with each visible instance that a ray in world space may hit within its range of t. `visit` returns the
+    /// greatest t, in world space and rounded to f32, of hits that can still change the result, or `None` to end; instances that
+    /// lie beyond may be left out. Returns whether `visit` has ended the enumeration.
+    pub(crate) fn enumerate_instances(
+        &self,
+        ray: &Ray,
+        visit: &mut dyn FnMut(EnteredInstance<'_>) -> Option<f32>,
+    ) -> bool {
+        if let Some((object, instance)) = self.sole() {
+            let object_index = self.world().map_or(0, |world| world.placement(instance).object());
+            return visit(EnteredInstance { instance, object_index, object, placement: None }).is_none();
+        }
+        let Some(world) = self.world() else {
+            return (0..self.object_count()).any(|object_index| {
+                let object = self.view(object_index);
+                visit(EnteredInstance { instance: object_index, object_index, object, placement: None })
+                    .is_none()
+            });
+        };
+        world.enumerate(ray, &mut |instance| {
+            let placement = world.placement(instance);
+            let object_index = placement.object();
+            world.mark_traced(object_index);
+            let object = self.view(object_index);
+            visit(EnteredInstance { instance, object_index, object, placement: Some(placement) })
+        })
+    }
+}

@@ -1,0 +1,127 @@
+//! Collectors: what queries keep of the hits that are found.
+
+use crate::rays::Hit;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// A hit with its t before it is rounded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    /// As it is reported; t in world space.
+    pub(super) hit: Hit,
+    /// t in the space of the object, not rounded to f32. It is compared only with that of hits in the same instance.
+    pub(super) t: f64,
+}
+
+/// Hits are ordered by t as it is reported, then by instance, then by t before it is rounded, then by triangle. The first hit is
+/// then that of [`Scene::nearest`](crate::Scene::nearest).
+impl Ord for Found {
+    fn cmp(&self, other: &Found) -> Ordering {
+        // The additions turn -0.0 to 0.0; no t is NaN.
+        let (a, b) = (&self.hit, &other.hit);
+        (a.t + 0.0)
+            .total_cmp(&(b.t + 0.0))
+            .then(a.primitive.instance.cmp(&b.primitive.instance))
+            .then((self.t + 0.0).total_cmp(&(other.t + 0.0)))
+            .then(a.primitive.triangle.cmp(&b.primitive.triangle))
+    }
+}
+
+impl PartialOrd for Found {
+    fn partial_cmp(&self, other: &Found) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Found {
+    fn eq(&self, other: &Found) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Found {}
+
+/// What a query keeps of the hits of a ray.
+pub(super) trait Collector {
+    /// Greatest t, as it is reported, of hits that can still change the result.
+    fn limit(&self) -> f32 {
+        f32::INFINITY
+    }
+    /// Whether a hit would change the result.
+    fn wants(&self, _found: &Found) -> bool {
+        true
+    }
+    /// Takes a hit that it wants and that is accepted. Returns whether the result is complete.
+    fn take(&mut self, found: Found) -> bool;
+}
+
+/// Whether there is a hit.
+#[derive(Default)]
+pub(super) struct Any(pub(super) bool);
+
+impl Collector for Any {
+    fn take(&mut self, _: Found) -> bool {
+        self.0 = true;
+        true
+    }
+}
+
+/// The number of hits.
+#[derive(Default)]
+pub(super) struct Count(pub(super) usize);
+
+impl Collector for Count {
+    fn take(&mut self, _: Found) -> bool {
+        self.0 += 1;
+        false
+    }
+}
+
+/// All hits, in no particular order.
+impl Collector for Vec<Found> {
+    fn take(&mut self, found: Found) -> bool {
+        self.push(found);
+        false
+    }
+}
+
+/// The nearest hit.
+#[derive(Default)]
+pub(super) struct First(pub(super) Option<Found>);
+
+impl Collector for First {
+    fn limit(&self) -> f32 {
+        self.0.map_or(f32::INFINITY, |best| best.hit.t)
+    }
+    fn wants(&self, found: &Found) -> bool {
+        self.0.is_none_or(|best| *found < best)
+    }
+    fn take(&mut self, found: Found) -> bool {
+        self.0 = Some(found);
+        false
+    }
+}
+
+/// The `count` nearest hits; `count` is not 0.
+pub(super) struct FirstOf {
+    pub(super) count: usize,
+    /// The nearest hits so far, the farthest of them on top.
+    pub(super) hits: BinaryHeap<Found>,
+}
+
+impl Collector for FirstOf {
+    fn limit(&self) -> f32 {
+        let farthest = self.hits.peek().filter(|_| self.hits.len() >= self.count);
+        farthest.map_or(f32::INFINITY, |found| found.hit.t)
+    }
+    fn wants(&self, found: &Found) -> bool {
+        self.hits.len() < self.count || self.hits.peek().is_none_or(|farthest| found < farthest)
+    }
+    fn take(&mut self, found: Found) -> bool {
+        if self.hits.len() >= self.count {
+            self.hits.pop();
+        }
+        self.hits.push(found);
+        false
+    }
+}

@@ -1,0 +1,140 @@
+//! The search for the hits of a ray: all triangles that the f32 tests do not exclude are decided exactly, tested against what the
+//! ray is allowed to hit, and passed to a collector.
+
+use super::accept::Accept;
+use super::collect::{Collector, Found};
+use super::groups::group_of;
+use crate::bvh::candidate::intersect_exactly;
+use crate::bvh::enumerate::{Receiver, enumerate};
+use crate::enumerate::EnteredInstance;
+use crate::instances::ObjectRay;
+use crate::intersect::exact::{Estimate, Intersection, estimate, reported, wide};
+use crate::masks::Masks;
+use crate::query::{TriangleRef, in_range, may_be_in_range, widened};
+use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::scene::Scene;
+use bth_format::object::ObjectView;
+
+/// Passes to a collector the hits of a ray that are accepted and that it wants.
+pub(super) fn search(scene: &Scene, ray: &Ray, accept: &Accept<'_>, collector: &mut dyn Collector) {
+    let masks = scene.masks();
+    // Not `f32::min`, which would replace a `tmax` of NaN by a number.
+    let tmax = |limit: f32| if limit < ray.tmax { limit } else { ray.tmax };
+    scene.enumerate_instances(ray, &mut |entered| {
+        if accept.mask & masks.of_instance(entered.instance) != 0
+            && search_instance(&entered, (ray, tmax(collector.limit())), (accept, masks), collector)
+        {
+            return None;
+        }
+        Some(tmax(collector.limit()))
+    });
+}
+
+/// As [`search`], for the hits in an instance up to a greatest t. Returns whether the collector's result is complete.
+fn search_instance(
+    entered: &EnteredInstance<'_>,
+    (ray, tmax): (&Ray, f32),
+    (accept, masks): (&Accept<'_>, &Masks),
+    collector: &mut dyn Collector,
+) -> bool {
+    let object_ray = entered.object_ray(&Ray { tmax, ..*ray });
+    let mut hits = InstanceHits {
+        ray,
+        instance: entered.instance,
+        object: entered.object,
+        object_ray,
+        groups: masks.groups(entered.object_index),
+        accept,
+        collector,
+        limit: widened(object_ray.ray.tmax.into()),
+    };
+    enumerate(entered.object, &object_ray.ray, &mut hits)
+}
+
+/// The state of a search in an instance.
+struct InstanceHits<'a> {
+    /// In world space.
+    ray: &'a Ray,
+    instance: u32,
+    object: &'a ObjectView<'a>,
+    object_ray: ObjectRay,
+    /// The masks of the object's groups, if any was set.
+    groups: Option<&'a [u32]>,
+    accept: &'a Accept<'a>,
+    collector: &'a mut dyn Collector,
+    /// Upper bound of the exact t, in the space of the object, of hits that can change the result.
+    limit: f64,
+}
+
+impl InstanceHits<'_> {
+    /// The intersection of the ray's line with a triangle, unless its t certainly lies out of the range of hits that can change
+    /// the result.
+    fn intersection(&self, corners: [[f32; 3]; 3]) -> Option<Intersection> {
+        let ray = &self.object_ray.ray;
+        match estimate(wide(ray.origin), wide(ray.direction), corners.map(wide)) {
+            Estimate::Missed => None,
+            Estimate::Intersects(intersection) => Some(intersection),
+            Estimate::Open(_, t) if !may_be_in_range(t, ray.tmin, self.limit) => None,
+            Estimate::Open(..) => intersect_exactly(ray, corners),
+        }
+    }
+
+    /// t in world space as it is reported; `None` if it lies out of the ray's range.
+    fn reported_t(&self, t: f64) -> Option<f32> {
+        let ObjectRay { ray, t_scale } = &self.object_ray;
+        if !in_range(t as f32, ray.tmin, ray.tmax) {
+            return None;
+        }
+        let t = reported(t);
+        if *t_scale == 1.0 {
+            return Some(t);
+        }
+        let t = t * t_scale;
+        in_range(t, self.ray.tmin, self.ray.tmax).then_some(t)
+    }
+
+    /// Whether the mask of a triangle's group has a bit in common with that of the ray.
+    fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
+        self.groups.is_none_or(|groups| {
+            let group = group_of(self.object, triangle.read());
+            self.accept.mask & Masks::of_group(groups, group) != 0
+        })
+    }
+
+    /// Updates the limit after the collector has taken a hit.
+    fn shrink(&mut self) {
+        let (t, t_scale) = (self.collector.limit(), self.object_ray.t_scale);
+        if t < f32::INFINITY {
+            // The product of t in the object and the factor may have been rounded where it is denormal.
+            let t = if t_scale == 1.0 { f64::from(t) } else { f64::from(t.next_up()) / f64::from(t_scale) };
+            self.limit = widened(t).min(self.limit);
+        }
+    }
+}
+
+impl Receiver for InstanceHits<'_> {
+    fn receive(&mut self, triangle: TriangleRef<'_>, corners: [[f32; 3]; 3]) -> bool {
+        let Some(intersection) = self.intersection(corners) else { return false };
+        let Some(t) = self.reported_t(intersection.t) else { return false };
+        let [.., determinant] = intersection.weight;
+        // A hit beyond the limit is excluded before the id is read, which is often a cache miss.
+        if t > self.collector.limit() || !self.accept.cull.keeps(determinant) || !self.meets_group(triangle) {
+            return false;
+        }
+        let [u, v] = intersection.uv();
+        let primitive = PrimitiveRef { instance: self.instance, triangle: triangle.read() };
+        let found = Found { hit: Hit { t, u, v, primitive }, t: intersection.t };
+        if !self.collector.wants(&found)
+            || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))
+        {
+            return false;
+        }
+        let complete = self.collector.take(found);
+        self.shrink();
+        complete
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit
+    }
+}

@@ -8,9 +8,11 @@ use bth_cache::Store;
 use bth_compile::cached::Cache;
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
+use bth_compile::memory::{self, TriangleMesh};
 use bth_compile::{Monitor, write};
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::ImportOptions;
+use numpy::PyReadonlyArray2;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -158,16 +160,7 @@ pub(crate) fn compile_path(py: Python<'_>, path: PathBuf, keywords: &Bound<'_, P
     let output: Option<PathBuf> = keywords.value("output")?;
     let bytes = monitored(py, &keywords, |monitor| {
         let content = compile_file(&path, flatten, &gltf, &options, store.as_ref(), monitor)?;
-        let mut bytes = Vec::with_capacity(content.length() as usize);
-        content.write_to(&mut bytes).map_err(|e| bth_compile::Error::File {
-            code: "BTH-O001",
-            path: path.clone(),
-            message: e.to_string(),
-        })?;
-        if let Some(output) = &output {
-            write::write_content(output, &content)?;
-        }
-        Ok(bytes)
+        deliver(&content, output.as_deref())
     })?;
     let scene = py.detach(|| bth::from_bytes(&bytes));
     scene.map(NativeScene::new).map_err(|e| format_error(&e))
@@ -180,6 +173,52 @@ fn manifest_error(error: bth_scene::Error) -> bth_compile::Error {
         bth_scene::error::code::READ => bth_compile::Error::File { code: error.code, path, message },
         code => bth_compile::Error::Input { code, place: bth_compile::Place::File(path), message, hint: error.hint },
     }
+}
+
+/// Compiles triangles: float32 positions and uint32 indices, three a row.
+#[pyfunction]
+pub(crate) fn compile_mesh(
+    py: Python<'_>,
+    positions: PyReadonlyArray2<'_, f32>,
+    triangles: PyReadonlyArray2<'_, u32>,
+    keywords: &Bound<'_, PyDict>,
+) -> PyResult<NativeScene> {
+    let keywords = Keywords(keywords);
+    let options = options(&keywords)?;
+    let store = store(&keywords, false)?;
+    let output: Option<PathBuf> = keywords.value("output")?;
+    let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
+    let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let mesh = TriangleMesh { positions, triangles };
+    let opened = monitored(py, &keywords, |monitor| {
+        if store.is_none() && output.is_none() {
+            return memory::open(mesh, &options, monitor).map(Ok);
+        }
+        let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "mesh"));
+        let compiled = memory::compile_cached(mesh, &options, &cache, &|_| true, monitor)?;
+        let content = compiled.content.ok_or_else(no_content)?;
+        deliver(&content, output.as_deref()).map(|bytes| bth::from_bytes(&bytes))
+    })?;
+    opened.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+fn no_content() -> bth_compile::Error {
+    bth_compile::Error::Internal { code: "BTH-X082", message: "the compiler returned no file".to_owned() }
+}
+
+/// The bytes of a compiled file, which are also written to `output`.
+fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Result<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(content.length() as usize);
+    content.write_to(&mut bytes).map_err(|e| bth_compile::Error::File {
+        code: "BTH-O001",
+        path: "the compiled file".into(),
+        message: e.to_string(),
+    })?;
+    if let Some(output) = output {
+        write::write_content(output, content)?;
+    }
+    Ok(bytes)
 }
 
 /// Compiles a file as the program does: glTF files and manifests are scenes.
@@ -207,8 +246,5 @@ fn compile_file(
     } else {
         bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
     };
-    content.ok_or_else(|| bth_compile::Error::Internal {
-        code: "BTH-X082",
-        message: "the compiler returned no file".to_owned(),
-    })
+    content.ok_or_else(no_content)
 }

@@ -5,7 +5,8 @@
 //! |---|---|
 //! | `work` | runs a call's chunks on threads without the interpreter's lock, and lets signals through |
 //! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
-//! | `scene`, `queries` | a scene that is shared between threads, and its queries |
+//! | `scene`, `shared` | a scene that threads share
+//! | `queries`, `many`, `points` | its queries |
 //! | `options`, `compile` | the compiler |
 //! | `errors` | exceptions |
 
@@ -14,8 +15,10 @@
 
 mod compile;
 mod errors;
+mod many;
 mod options;
 mod output;
+mod points;
 mod queries;
 mod rays;
 mod scene;
@@ -36,6 +39,14 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(queries::nearest, module)?)?;
     module.add_function(wrap_pyfunction!(queries::any, module)?)?;
     module.add_function(wrap_pyfunction!(compile::compile_path, module)?)?;
+    module.add_function(wrap_pyfunction!(many::all_hits, module)?)?;
+    module.add_function(wrap_pyfunction!(many::count, module)?)?;
+    module.add_function(wrap_pyfunction!(many::crossings, module)?)?;
+    module.add_function(wrap_pyfunction!(points::contains, module)?)?;
+    module.add_function(wrap_pyfunction!(points::winding, module)?)?;
+    module.add_function(wrap_pyfunction!(points::signed_distance, module)?)?;
+    module.add_function(wrap_pyfunction!(points::closest, module)?)?;
+    module.add_function(wrap_pyfunction!(compile::compile_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(work::processors, module)?)?;
     module.add_function(wrap_pyfunction!(isa, module)?)?;
     Ok(())

@@ -1,7 +1,7 @@
-//! Queries by rays.
+//! Queries by rays: the nearest hit, whether there is one, and normals at hits.
 
 use crate::output::{HitArrays, chunks, chunks_of, numbers};
-use crate::rays::{CHUNK, RayArrays, StartArrays, Starts};
+use crate::rays::{RayArrays, StartArrays, Starts};
 use crate::scene::NativeScene;
 use crate::work;
 use bth::rays::{Hit, PrimitiveRef, Ray};
@@ -44,7 +44,7 @@ pub(crate) fn nearest(
         rays.read(range.clone(), read);
         hits.resize(range.len(), Hit::MISS);
         let from = read_starts(starts, range, from);
-        scene.read().nearest_batch(read, from, hits);
+        scene.read().batch(read).from(from).nearest(hits);
         columns.store(hits);
         SCRATCH.set(scratch);
     })
@@ -68,7 +68,7 @@ pub(crate) fn any(
         let Scratch { rays: read, starts: from, .. } = &mut scratch;
         rays.read(range.clone(), read);
         let from = read_starts(starts, range, from);
-        scene.read().any_batch(read, from, found);
+        scene.read().batch(read).from(from).any(found);
         SCRATCH.set(scratch);
     })
 }
@@ -125,5 +125,3 @@ pub(crate) fn normals(
     }
     Ok(normals)
 }
-
-const _: () = assert!(CHUNK >= 64);

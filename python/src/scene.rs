@@ -79,8 +79,9 @@ impl NativeScene {
             self.with(py, |scene| {
                 let triangles: Vec<u32> =
                     (0..scene.object_count()).map(|o| scene.object(o).header.triangles).collect();
-                let frames =
-                    scene.description().map(|d| (d.scene[0].first_frame, d.scene[0].last_frame, d.scene[0].rate));
+                let frames = scene
+                    .description()
+                    .map(|d| (d.scene[0].first_frame, d.scene[0].last_frame, d.scene[0].rate));
                 (
                     scene.file().bytes().len(),
                     scene.resident_bytes(),
@@ -182,8 +183,10 @@ impl NativeScene {
                 return Err(PyKeyError::new_err("the file has been compiled without its geometry"));
             }
             let rows = |rows: usize| (rows, 3);
-            let positions = Array2::from_shape_vec(rows(view.positions.len()), view.positions.as_flattened().to_vec());
-            let triangles = Array2::from_shape_vec(rows(view.triangles.len()), view.triangles.as_flattened().to_vec());
+            let positions =
+                Array2::from_shape_vec(rows(view.positions.len()), view.positions.as_flattened().to_vec());
+            let triangles =
+                Array2::from_shape_vec(rows(view.triangles.len()), view.triangles.as_flattened().to_vec());
             Ok((positions.expect("three a row"), triangles.expect("three a row")))
         })??;
         Ok((positions.into_pyarray(py), triangles.into_pyarray(py)))

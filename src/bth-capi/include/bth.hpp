@@ -66,25 +66,25 @@ public:
     /* The nearest hit of a ray, or a miss. `from` is the triangle on which the ray starts, a hint, or null. */
     bth_hit nearest(const bth_ray &ray, const bth_surface *from = nullptr) const {
         bth_hit hit;
-        check(bth_nearest(get(), &ray, from, &hit, 1));
+        bth_nearest(get(), &ray, from, &hit, 1);
         return hit;
     }
 
     /* Whether a ray hits anything. */
     bool any(const bth_ray &ray, const bth_surface *from = nullptr) const {
         std::uint8_t hit = 0;
-        check(bth_any(get(), &ray, from, &hit, 1));
+        bth_any(get(), &ray, from, &hit, 1);
         return hit != 0;
     }
 
     /* As bth_nearest. */
     void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count, const bth_surface *from = nullptr) const {
-        check(bth_nearest(get(), rays, from, hits, count));
+        bth_nearest(get(), rays, from, hits, count);
     }
 
     /* As bth_any. */
     void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count, const bth_surface *from = nullptr) const {
-        check(bth_any(get(), rays, from, hit, count));
+        bth_any(get(), rays, from, hit, count);
     }
 
     /* For any range of rays that are adjacent in memory: std::vector, std::array, std::span. */

@@ -42,6 +42,18 @@ int main(int argc, char **argv) {
     CHECK(scene.instance_count() == 1 && scene.instance(0).visible == 1 && scene.frames().rate == 1);
     CHECK(scene.resident_bytes() > 0 && scene.seconds() == 0);
 
+    const bth_accept no_back = {~0U, BTH_CULL_BACK, nullptr, nullptr};
+    const bth_ray up = {{0.25F, 0.25F, -2}, 0, {0, 0, 1}, INFINITY};
+    CHECK(scene.any(up) && !scene.any_accepted(up, no_back) && bth::is_miss(scene.nearest_accepted(up, no_back)));
+    const bth_ray diagonal = {{0.5F, 0.5F, 2}, 0, {0, 0, -1}, INFINITY};
+    CHECK(scene.count_hits(diagonal) == 2 && scene.all_hits(diagonal).size() == 2 && scene.all_hits(diagonal, 1).size() == 1);
+    CHECK(scene.all_hits(beside).empty() && scene.surface(hit).geometric_normal[2] == 1);
+    CHECK(!scene.contains({0.25F, 0.25F, -1}) && scene.closest({0.25F, 0.25F, -3}, 9).distance == 3);
+    CHECK(std::abs(scene.signed_distance({0.25F, 0.25F, 3})) == 3 && scene.object_name(0).empty());
+    scene.set_instance_mask(0, 2);
+    CHECK(bth::is_miss(scene.nearest_accepted(down, {1, BTH_CULL_NONE, nullptr, nullptr})));
+    CHECK(scene.winding({9, 9, 9}) == 0);
+
     int caught = 0;
     try {
         scene.instance(1);

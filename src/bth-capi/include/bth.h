@@ -85,9 +85,6 @@ void bth_close(bth_scene *scene);
  * can fail. */
 const char *bth_last_error(void);
 
-/* Version of this library, such as "0.1.0". */
-const char *bth_version(void);
-
 /* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
  * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
  * After an error, which bth_last_error tells, nothing is stored if an argument is null, and all rays are misses if the error is

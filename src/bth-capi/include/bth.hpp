@@ -122,6 +122,90 @@ public:
         return found;
     }
 
+    /* Hits with conditions and several hits of a ray: by ascending t, then instance, then triangle. */
+    bth_hit nearest_accepted(const bth_ray &ray, const bth_accept &accept) const {
+        bth_hit hit;
+        check(bth_nearest_accepted(get(), &ray, &accept, &hit, 1));
+        return hit;
+    }
+
+    bool any_accepted(const bth_ray &ray, const bth_accept &accept) const {
+        std::uint8_t found = 0;
+        check(bth_any_accepted(get(), &ray, &accept, &found, 1));
+        return found != 0;
+    }
+
+    std::uint64_t count_hits(const bth_ray &ray, const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        std::uint64_t count = 0;
+        check(bth_count_hits(get(), &ray, &accept, &count, 1));
+        return count;
+    }
+
+    /* The `most` nearest hits, all by default. */
+    std::vector<bth_hit> all_hits(const bth_ray &ray, std::uint64_t most = BTH_ALL_HITS,
+                                  const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        std::vector<bth_hit> hits(8);
+        for (;;) {
+            std::uint64_t offsets[2];
+            bth_hit_list list{offsets, hits.data(), hits.size(), 0};
+            check(bth_all_hits(get(), &ray, &accept, most, &list, 1));
+            const bool complete = list.needed <= hits.size();
+            hits.resize(static_cast<std::size_t>(list.needed));
+            if (complete) return hits;
+        }
+    }
+
+    void set_instance_mask(std::uint32_t instance, std::uint32_t mask) {
+        check(bth_set_instance_mask(get(), instance, mask));
+    }
+    void set_group_mask(std::uint32_t object, std::uint32_t group, std::uint32_t mask) {
+        check(bth_set_group_mask(get(), object, group, mask));
+    }
+
+    /* Whether closed surfaces enclose a point, x, y and z in world space, and how often. */
+    bool contains(const float (&point)[3]) const {
+        std::uint8_t inside = 0;
+        check(bth_contains(get(), point, &inside, 1));
+        return inside != 0;
+    }
+
+    std::int32_t winding(const float (&point)[3]) const {
+        std::int32_t found = 0;
+        check(bth_winding(get(), point, &found, 1));
+        return found;
+    }
+
+    /* The closest point of the triangles within a radius; its surface is BTH_NONE if there is none. */
+    bth_closest closest(const float (&point)[3], float radius) const {
+        bth_closest found;
+        check(bth_closest_points(get(), point, radius, &found, 1));
+        return found;
+    }
+
+    /* The distance to the closest triangle, negative inside of closed meshes. */
+    float signed_distance(const float (&point)[3]) const {
+        float distance = 0;
+        check(bth_signed_distances(get(), point, &distance, 1));
+        return distance;
+    }
+
+    /* The surface at a hit. */
+    bth_surface_point surface(const bth_hit &hit) const {
+        bth_surface_point point;
+        check(bth_surface_at(get(), &hit, &point));
+        return point;
+    }
+
+    std::string object_name(std::uint32_t object) const {
+        return name([&](char *to, std::size_t size) { return bth_object_name(get(), object, to, size); });
+    }
+    std::string group_name(std::uint32_t object, std::uint32_t group) const {
+        return name([&](char *to, std::size_t size) { return bth_group_name(get(), object, group, to, size); });
+    }
+    std::string material_name(std::uint32_t object, std::uint32_t material) const {
+        return name([&](char *to, std::size_t size) { return bth_material_name(get(), object, material, to, size); });
+    }
+
     std::uint64_t resident_bytes() const noexcept { return bth_resident_bytes(get()); }
 
     /* The scene for functions of bth.h; it stays open. */
@@ -133,6 +217,14 @@ private:
     };
 
     explicit scene(bth_scene *opened) noexcept : handle_(opened) {}
+
+    /* The text that a function copies to a buffer of some size. */
+    template <typename Copy>
+    static std::string name(Copy copy) {
+        std::string text(copy(nullptr, 0) + 1, '\0');
+        text.resize(copy(&text[0], text.size()));
+        return text;
+    }
 
     static scene open(const std::string &path, std::uint32_t flags) {
         bth_scene *opened = nullptr;

@@ -41,8 +41,8 @@ fn flat(alpha: AlphaMode, options: CompileOptions) -> Scene {
             assert_eq!(opacity.triangles, 4 * LEAVES as u64);
             assert_eq!(
                 (opacity.subdivided, opacity.patterns),
-                (opacity.triangles, 2),
-                "two halves of leaves"
+                (opacity.triangles, 4),
+                "two halves of leaves, and mirrored"
             );
             assert!(
                 opacity.unknown < 0.2 && opacity.opaque > 0.3 && opacity.transparent > 0.2,
@@ -181,7 +181,7 @@ fn rays_pass_through_the_holes_of_leaves_in_every_structure_and_on_every_instruc
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
             isa.choose().unwrap();
             let passed = compare(&opaque, &scene, &rays, true);
-            assert!(passed > rays.len() / 4, "{name}: {passed} transparent hits");
+            assert!(passed > rays.len() / 10, "{name}: {passed} transparent hits");
         }
         Isa::best().choose().unwrap();
     }
@@ -193,7 +193,7 @@ fn rays_pass_through_the_holes_of_instances() {
     let (opaque, scene) = (placed(AlphaMode::None), placed(AlphaMode::Mask));
     assert_eq!((scene.object_count(), scene.instance_count()), (1, 2));
     let passed = compare(&opaque, &scene, &rays(1500), false);
-    assert!(passed > 300, "{passed} transparent hits");
+    assert!(passed > 150, "{passed} transparent hits");
 }
 
 #[test]

@@ -187,7 +187,7 @@ class Scene:
         arguments = (most, _mask(mask), cull or "none", _threads.count(threads), counts)
         columns = _native.all_hits(self._native, rays, *arguments)
         offsets = np.zeros(len(counts) + 1, np.int64)
-        np.cumsum(counts, out=offsets[1:], dtype=np.int64, casting="unsafe")
+        np.cumsum(counts.astype(np.int64), out=offsets[1:])
         return AllHits(offsets, columns)
 
     def all_hits(self, origins, directions, tmin=0.0, tmax=math.inf, *, most=None, mask=NONE, cull=None, threads=None):
@@ -250,7 +250,7 @@ class Scene:
     def normals(self, instance, triangle):
         """Unit normals of triangles in world space, float64; zeros for bth.NONE and for triangles without area."""
         instance, triangle = np.broadcast_arrays(np.asarray(instance, np.uint32), np.asarray(triangle, np.uint32))
-        normals = _native.normals(self._native, instance.reshape(-1), triangle.reshape(-1))
+        normals = self._native.normals(instance.reshape(-1), triangle.reshape(-1))
         with np.errstate(all="ignore"):
             normals /= np.abs(normals).max(axis=1, keepdims=True, initial=0)
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)

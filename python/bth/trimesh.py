@@ -47,7 +47,7 @@ class RayMeshIntersector:
             triangles, rays = found.triangle.astype(np.int64), found.ray
             facing = np.einsum("ij,ij->i", self.mesh.face_normals[triangles], directions[rays]) > 0
             same = (rays[1:] == rays[:-1]) & (found.t[1:] == found.t[:-1]) & (facing[1:] == facing[:-1])
-            keep = np.concatenate([np.ones(len(rays) > 0, bool), ~same])
+            keep = np.concatenate([np.ones(min(len(rays), 1), bool), ~same])
             triangles, rays, t = triangles[keep], rays[keep], found.t[keep]
             rank = np.arange(len(rays)) - np.searchsorted(rays, rays)
             triangles, rays, t = (a[rank < max_hits] for a in (triangles, rays, t))

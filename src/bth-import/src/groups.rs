@@ -143,7 +143,10 @@ mod tests {
         named.name(12, "beyond".into());
         let groups = named.recorder.finish(12);
         let group = |name: &str, material| Group { name: name.into(), material };
-        assert_eq!(groups.groups, [group("", None), group("a", Some(0)), group("a", Some(1)), group("a", None)]);
+        assert_eq!(
+            groups.groups,
+            [group("", None), group("a", Some(0)), group("a", Some(1)), group("a", None)]
+        );
         assert_eq!(groups.materials, ["red", "blue"]);
         assert_eq!(groups.runs, [[0, 0], [2, 1], [5, 2], [7, 3], [10, 1]]);
     }

@@ -139,7 +139,9 @@ impl Codec for Mesh {
                 && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
         });
         let opacity_fits = opacity.as_ref().is_none_or(|o| o.rows.len() == triangles.len());
-        let groups_fit = groups.as_ref().is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()));
+        let groups_fit = groups
+            .as_ref()
+            .is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()));
         let fits = attributes_fit && opacity_fits && groups_fit && within(&triangles, positions.len());
         fits.then_some(Mesh { positions, triangles, attributes, opacity, groups })
     }

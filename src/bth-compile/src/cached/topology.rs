@@ -110,11 +110,7 @@ mod tests {
 
     #[test]
     fn what_is_no_tree_of_the_mesh_does_not_come_back() {
-        let mesh = Mesh {
-            positions: vec![[0.0; 3]; 3],
-            triangles: vec![[0, 1, 2]; 3],
-            ..Mesh::default()
-        };
+        let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 3], ..Mesh::default() };
         let good = Topology { left: vec![1, 1], order: vec![2, 0, 1] };
         assert!(good.clone().over(&mesh).is_some());
         for wrong in [

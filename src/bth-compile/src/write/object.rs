@@ -1,7 +1,7 @@
 //! The sections of an object.
 
-use super::{FileBuilder, GroupParts};
 use super::builder::defect;
+use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
 use std::borrow::Cow;

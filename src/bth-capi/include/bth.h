@@ -90,12 +90,13 @@ const char *bth_version(void);
 
 /* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
  * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
- * Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all rays are misses. */
-int32_t bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
+ * After an error, which bth_last_error tells, nothing is stored if an argument is null, and all rays are misses if the error is
+ * internal. bth_nearest_accepted with a null `accept` does the same and returns a code. */
+void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
 /* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
- * the other arrays. Returns a code as bth_nearest does. */
-int32_t bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
+ * the other arrays. Errors are those of bth_nearest; bth_any_accepted returns a code. */
+void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
 
 /* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
  * null. A file without scene sections has only frame 0, at one frame per second. */

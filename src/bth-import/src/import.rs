@@ -144,7 +144,7 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
     let attributes = attributes::collect(&raw, wanted.attributes)?;
     let triangles = std::mem::take(&mut raw.triangles);
     let groups = wanted.groups.then(|| std::mem::take(&mut raw.groups).finish(triangles.len()));
-    let (mut mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
+    let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
         input_error(
             NON_FINITE,
             (raw.locate)(RowKind::Position, row),
@@ -152,8 +152,8 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
             "remove the vertex and the faces that use it, or export the model again",
         )
     })?;
-    mesh.groups = groups;
     let format = raw.format.to_owned();
+    let mesh = Mesh { groups, ..mesh };
     Ok((mesh, Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }))
 }
 

@@ -126,6 +126,39 @@ fn a_c_program_opens_traces_and_reads_errors() {
 }
 
 #[test]
+fn a_c_program_reads_what_hits_lead_to() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "surface") else { return };
+    let model = folder.path().join("corner.obj");
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0.6 0.8\ng floor\nusemtl wood\n\
+                f 1/1/1 2/2/1 3/3/1\ng wall\nf 1/1/1 3/2/1 4/3/1\n";
+    std::fs::write(&model, text).expect("a model");
+    let attributes = bth_import::Keep::All;
+    let options = CompileOptions { attributes, names: true, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &options, &Silent).expect("it compiles");
+    let file = folder.path().join("corner.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let input = "0.25 0.5 3 0 0 -1\n3 0.5 0.25 -1 0 0\n9 9 9 1 0 0\n";
+    let output = run(&program, &[file.to_str().expect("UTF-8")], input);
+    assert!(output.status.success(), "{output:?}");
+    let expected = "bounds 0 0 0 1 1 1\nobject  groups 2 materials 1\n \
+        at 0.25 0.5 0 plane 0 0 1 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.25 0.5 object 0 group floor \
+        material wood flags 1\n \
+        at 0 0.5 0.25 plane 1 0 0 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.5 0.25 object 0 group wall \
+        material wood flags 1\nerror -1 bth_surface_at: there is no instance 4294967295\n";
+    assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
+
+    let nothing = CompileOptions { geometry: false, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &nothing, &Silent).expect("it compiles");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let text = run(&program, &[file.to_str().expect("UTF-8")], "0.25 0.5 3 0 0 -1\n").stdout;
+    assert!(
+        String::from_utf8_lossy(&text).contains("error -7 bth_surface_at: the file has no positions"),
+        "{text:?}"
+    );
+}
+
+#[test]
 fn a_c_program_gets_several_hits_under_conditions() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = c_program(folder.path(), "hits") else { return };

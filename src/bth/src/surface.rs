@@ -86,7 +86,10 @@ impl Scene {
         let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
         let object_geometric_normal = plane_normal(corners)?;
         let object_normal = interpolated_normal(&view, id, weights, object_geometric_normal);
-        let to_world = |normal: [f64; 3]| unit(self.normal_to_world(instance, normal)).unwrap_or(normal);
+        let to_world = |normal: [f64; 3]| match self.world() {
+            None => normal,
+            Some(_) => unit(self.normal_to_world(instance, normal)).unwrap_or(normal),
+        };
         let group = view.group_of(id);
         Some(SurfacePoint {
             position: transformed(&self.instance(instance).to_world, object_position),

@@ -62,7 +62,8 @@ fn explain_tells_why_nodes_were_chosen_or_refused() {
 #[test]
 fn info_lists_groups_and_materials() {
     let faces: String = (0..45).map(|i| format!("g part {i}\nf 1 2 3\n")).collect();
-    let model = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red \u{7}paint\no body\nf 1 2 3\nf 3 2 1\n{faces}");
+    let model =
+        format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red \u{7}paint\no body\nf 1 2 3\nf 3 2 1\n{faces}");
     let folder = folder(&[("car.obj", &model)]);
     bthc(folder.path(), &["compile", "car.obj", "--names"]).expect(0);
     bthc(folder.path(), &["verify", "car.bth"]).expect(0);
@@ -79,7 +80,10 @@ fn info_lists_groups_and_materials() {
 
     bthc(folder.path(), &["compile", "car.obj"]).expect(0);
     let json = bthc(folder.path(), &["info", "car.bth", "--json"]).expect(0).json();
-    assert_eq!((&json["objects"][0]["groups"], &json["objects"][0]["name"]), (&serde_json::json!([]), &"".into()));
+    assert_eq!(
+        (&json["objects"][0]["groups"], &json["objects"][0]["name"]),
+        (&serde_json::json!([]), &"".into())
+    );
 }
 
 #[test]

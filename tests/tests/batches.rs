@@ -1,7 +1,7 @@
 //! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Hinted, Isa, Scene};
+use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
@@ -205,4 +205,67 @@ fn a_batch_on_many_threads_has_the_answers_of_one() {
     }
     assert_eq!(any_together, any_alone);
     assert!(any_alone.contains(&true) && any_alone.contains(&false));
+}
+
+#[test]
+fn streams_have_the_answers_of_batches() {
+    let _turn = turn();
+    let model = gyroid(2000);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    // More rays than a block holds, and not a multiple of that.
+    let rays = assorted(&corners, 2_501, 6);
+    let count = rays.len();
+    let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
+    scene.batch(&rays).nearest(&mut hits);
+    scene.batch(&rays).any(&mut found);
+    let column = |of: &dyn Fn(&Ray) -> f32| rays.iter().map(of).collect::<Vec<_>>();
+    let [ox, oy, oz] = [0, 1, 2].map(|k| column(&|ray| ray.origin[k]));
+    let [dx, dy, dz] = [0, 1, 2].map(|k| column(&|ray| ray.direction[k]));
+    let (tmin, tmax) = (column(&|ray| ray.tmin), column(&|ray| ray.tmax));
+    let streams =
+        RayStreams { origin: [&ox, &oy, &oz], direction: [&dx, &dy, &dz], tmin: &tmin, tmax: &tmax };
+    let (mut t, mut u, mut v) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+    let (mut instance, mut triangle) = (vec![0; count], vec![0; count]);
+    scene.nearest_streams(
+        &streams,
+        HitStreams { t: &mut t, u: &mut u, v: &mut v, instance: &mut instance, triangle: &mut triangle },
+    );
+    for i in 0..count {
+        let primitive = PrimitiveRef { instance: instance[i], triangle: triangle[i] };
+        assert_eq!(bits(&Hit { t: t[i], u: u[i], v: v[i], primitive }), bits(&hits[i]), "{:?}", rays[i]);
+    }
+    let mut of_streams = vec![false; count];
+    scene.any_streams(&streams, &mut of_streams);
+    assert_eq!(of_streams, found);
+    // Without ranges all rays begin at 0 and have no end.
+    let open: Vec<Ray> = rays.iter().map(|ray| Ray::new(ray.origin, ray.direction)).collect();
+    scene.batch(&open).any(&mut found);
+    scene.any_streams(&RayStreams { tmin: &[], tmax: &[], ..streams }, &mut of_streams);
+    assert_eq!(of_streams, found);
+}
+
+#[test]
+fn conditions_of_a_batch_are_those_of_its_rays() {
+    let _turn = turn();
+    let model = gyroid(2000);
+    let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let rays = assorted(&corners, 6_000, 7);
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let accept = Accept { filter: Some(&even), ..Accept::default() };
+    let (mut alone, mut together) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+    scene.batch(&rays).accept(&accept).nearest(&mut alone);
+    scene.batch(&rays).accept(&accept).parallel().nearest(&mut together);
+    let mut any = vec![false; rays.len()];
+    scene.batch(&rays).accept(&accept).parallel().any(&mut any);
+    let mut some_hits = 0;
+    for (i, ray) in rays.iter().enumerate() {
+        let expected = scene.nearest_accepted(ray, &accept);
+        assert_eq!(bits(&alone[i]), bits(&expected.unwrap_or(Hit::MISS)), "{ray:?}");
+        assert_eq!(bits(&together[i]), bits(&alone[i]), "{ray:?}");
+        assert_eq!(any[i], expected.is_some(), "{ray:?}");
+        some_hits += usize::from(expected.is_some());
+    }
+    assert!(some_hits > rays.len() / 4 && some_hits < rays.len(), "{some_hits}");
 }

@@ -1,36 +1,46 @@
-//! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
+//! The C interface, used by C and C++ programs (`tests/c`) that include its headers and link its libraries only.
 
+use bth::Accept;
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
-use bth_compile::pipeline::{CompileOptions, compile};
+use bth_compile::cached::Cache;
+use bth_compile::memory::{self, Instance, TriangleMesh};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-#[allow(clippy::print_stdout)]
-/// Builds the library and the C program. Without a C compiler prints why not, and returns `None`.
+/// Builds the library and the C program; `None` without a C compiler.
 fn c_program(folder: &Path, name: &str) -> Option<PathBuf> {
+    program(folder, &format!("{name}.c"), &["bth"])
+}
+
+/// Builds the libraries and a program of `tests/c` that uses them. Without a compiler prints why not, and returns `None`.
+#[allow(clippy::print_stdout)]
+fn program(folder: &Path, source: &str, libraries: &[&str]) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let (variable, default, standard) = match source.ends_with(".cpp") {
+        true => ("CXX", "c++", "-std=c++17"),
+        false => ("CC", "cc", "-std=c11"),
+    };
+    let compiler = std::env::var(variable).unwrap_or_else(|_| default.into());
     if Command::new(&compiler).arg("--version").stdout(Stdio::null()).status().is_err() {
-        println!("SKIPPED: no C compiler {compiler}");
+        println!("SKIPPED: no compiler {compiler}");
         return None;
     }
-    let library = bth_tests::built(&["bth-capi"]);
-    let program = folder.join(name);
-    let compiled = Command::new(compiler)
-        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
-        .arg(root.join("src/bth-capi/include"))
-        .arg(root.join("tests/c").join(name).with_extension("c"))
-        .arg("-L")
-        .arg(&library)
-        .arg("-lbth")
-        .arg(format!("-Wl,-rpath,{}", library.display()))
-        .arg("-o")
-        .arg(&program)
-        .status()
-        .expect("the C compiler runs");
-    assert!(compiled.success(), "{name}.c compiles without a warning");
+    let packages = [("bth", "bth-capi"), ("bth_compile", "bth-compile-capi")];
+    let packages: Vec<_> = packages.iter().filter(|(library, _)| libraries.contains(library)).collect();
+    let built = bth_tests::built(&packages.iter().map(|(_, package)| *package).collect::<Vec<_>>());
+    let program = folder.join(source).with_extension("");
+    let mut command = Command::new(compiler);
+    command.args([standard, "-Wall", "-Wextra", "-Werror", "-O1"]);
+    for (_, package) in packages {
+        command.arg("-I").arg(root.join("src").join(package).join("include"));
+    }
+    command.arg(root.join("tests/c").join(source)).arg("-L").arg(&built);
+    command.args(libraries.iter().map(|library| format!("-l{library}")));
+    command.arg(format!("-Wl,-rpath,{}", built.display())).arg("-o").arg(&program);
+    assert!(command.status().expect("the compiler runs").success(), "{source} compiles without a warning");
     Some(program)
 }
 
@@ -45,6 +55,15 @@ fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
     // It may end before it reads.
     let _ = child.stdin.take().expect("piped").write_all(input.as_bytes());
     child.wait_with_output().expect("the C program ends")
+}
+
+/// Rays as the C programs read them.
+fn lines_of(rays: &[Ray]) -> String {
+    let line = |ray: &Ray| {
+        let ([a, b, c], [x, y, z]) = (ray.origin, ray.direction);
+        format!("{a} {b} {c} {} {x} {y} {z} {}\n", ray.tmin, ray.tmax)
+    };
+    rays.iter().map(line).collect()
 }
 
 #[test]
@@ -70,14 +89,7 @@ fn a_c_program_opens_traces_and_reads_errors() {
         (0..model.triangles.len()).map(|i| model.corners(i)).collect()
     };
     let rays: Vec<Ray> = bth_tests::rays::assorted(&corners, 16, 21);
-    let input: String = rays
-        .iter()
-        .map(|r| {
-            let [a, b, c] = r.origin;
-            let [x, y, z] = r.direction;
-            format!("{a} {b} {c} {} {x} {y} {z} {}\n", r.tmin, r.tmax)
-        })
-        .collect();
+    let input = lines_of(&rays);
     let hits: Vec<_> = rays.iter().map(|r| scene.nearest(r).unwrap_or(Hit::MISS)).collect();
     assert!(hits.iter().any(|h| h.is_hit()) && hits.iter().any(|h| !h.is_hit()));
     for flags in ["read", "map"] {
@@ -111,6 +123,92 @@ fn a_c_program_opens_traces_and_reads_errors() {
         assert_eq!(output.status.code(), Some(1));
         assert!(text.starts_with(&format!("error {code} null ")) && text.contains(says), "{text}");
     }
+}
+
+#[test]
+fn a_c_program_reads_what_hits_lead_to() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "surface") else { return };
+    let model = folder.path().join("corner.obj");
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0.6 0.8\ng floor\nusemtl wood\n\
+                f 1/1/1 2/2/1 3/3/1\ng wall\nf 1/1/1 3/2/1 4/3/1\n";
+    std::fs::write(&model, text).expect("a model");
+    let attributes = bth_import::Keep::All;
+    let options = CompileOptions { attributes, names: true, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &options, &Silent).expect("it compiles");
+    let file = folder.path().join("corner.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let input = "0.25 0.5 3 0 0 -1\n3 0.5 0.25 -1 0 0\n9 9 9 1 0 0\n";
+    let output = run(&program, &[file.to_str().expect("UTF-8")], input);
+    assert!(output.status.success(), "{output:?}");
+    let expected = "bounds 0 0 0 1 1 1\nobject  groups 2 materials 1\n \
+        at 0.25 0.5 0 plane 0 0 1 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.25 0.5 object 0 group floor \
+        material wood flags 1\n \
+        at 0 0.5 0.25 plane 1 0 0 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.5 0.25 object 0 group wall \
+        material wood flags 1\nerror -1 bth_surface_at: there is no instance 4294967295\n";
+    assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
+
+    let nothing = CompileOptions { geometry: false, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &nothing, &Silent).expect("it compiles");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let text = run(&program, &[file.to_str().expect("UTF-8")], "0.25 0.5 3 0 0 -1\n").stdout;
+    assert!(
+        String::from_utf8_lossy(&text).contains("error -7 bth_surface_at: the file has no positions"),
+        "{text:?}"
+    );
+}
+
+#[test]
+fn a_c_program_gets_several_hits_under_conditions() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "hits") else { return };
+    let model = bth_scenes::knot::torus_knot(720);
+    let corners: Vec<_> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let path = folder.path().join("knot.ply");
+    bth_scenes::write::file(&model, &path).expect("a model");
+    let options = bth_compile::pipeline::Structure::Bvh;
+    let options = CompileOptions { structure: options, ..CompileOptions::default() };
+    let (compiled, _) = compile(&path, &options, &Silent).expect("the knot compiles");
+    let file = folder.path().join("knot.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let scene = bth::open(&file).expect("the knot opens");
+
+    let rays: Vec<Ray> = bth_tests::rays::assorted(&corners, 16, 22);
+    let output = run(&program, &[file.to_str().expect("UTF-8")], &lines_of(&rays));
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    let mut lines = text.lines();
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
+    let everything = Accept::default();
+    let mut counts = String::new();
+    for accept in [everything, Accept { filter: Some(&even), ..everything }] {
+        for ray in &rays {
+            let mut hits = Vec::new();
+            scene.all_hits(ray, &accept, &mut hits);
+            let first = hits.first().copied().unwrap_or(Hit::MISS);
+            let field: Vec<&str> = lines.next().expect("a line for each ray").split(' ').collect();
+            let number = |i: usize| field[i].parse::<f32>().expect("a number").to_bits();
+            assert_eq!(field[0], u8::from(!hits.is_empty()).to_string());
+            assert_eq!(field[1], hits.len().to_string());
+            assert_eq!(number(2), first.t.to_bits(), "{ray:?}");
+            assert_eq!(field[3], first.primitive.triangle.to_string(), "{ray:?}");
+            assert_eq!(field.len(), 4 + 5 * hits.len(), "{ray:?}");
+            for (i, hit) in hits.iter().enumerate() {
+                let at = 4 + 5 * i;
+                assert_eq!(
+                    [number(at), number(at + 1), number(at + 2)],
+                    [hit.t, hit.u, hit.v].map(f32::to_bits)
+                );
+                assert_eq!(field[at + 3], hit.primitive.instance.to_string());
+                assert_eq!(field[at + 4], hit.primitive.triangle.to_string());
+            }
+            if accept.filter.is_none() {
+                counts += &format!("{} ", hits.len());
+            }
+        }
+    }
+    let none = "0 ".repeat(rays.len());
+    assert_eq!(lines.collect::<Vec<_>>(), [none.as_str(), &counts, &counts]);
 }
 
 /// A wheel that turns, and stands on its edge without any depth in frame 3.
@@ -209,4 +307,82 @@ fn a_c_program_counts_crossings_and_finds_points_inside() {
     assert!(out.status.success(), "{out:?}");
     let expected = "1 1 1 1\n2 1 2 2\n2 1 2 2\n0 0 0 0\n0 0 0 0\n";
     assert_eq!(String::from_utf8_lossy(&out.stdout), expected);
+}
+
+#[test]
+fn a_c_program_finds_the_closest_points_that_rust_finds() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "closest") else { return };
+    let model = bth_scenes::blob::blob(200);
+    let corners: Vec<_> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let file = folder.path().join("blob.bth");
+    std::fs::write(&file, bth_tests::placed_soup::placed_soup(&corners, &[])).expect("a file");
+    let scene = bth::open(&file).expect("the blob opens");
+    let mut points: Vec<[f32; 3]> = corners.iter().step_by(20).map(|t| t[0].map(|x| x * 0.5)).collect();
+    points.extend([corners[0][1], [7.0, -2.0, 0.5], [0.0; 3]]);
+    points.truncate(16);
+    let input: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let output = run(&program, &[file.to_str().expect("UTF-8")], &input);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert_eq!(text.lines().count(), points.len());
+    let mut found = Vec::new();
+    for (line, point) in text.lines().zip(&points) {
+        let c = scene.closest(*point, f32::INFINITY).expect("a closest point");
+        let [x, y, z] = c.point;
+        let signed = scene.signed_distance(*point);
+        assert_eq!((signed.abs(), signed < 0.0), (c.distance, scene.contains(*point) && c.distance > 0.0));
+        scene.triangles_in_sphere(*point, c.distance, &mut found);
+        let (near, first) = (found.len(), found[0].triangle);
+        scene.triangles_in_box(c.point, c.point, &mut found);
+        let field: Vec<&str> = line.split(' ').collect();
+        let numbers: Vec<f32> =
+            [0, 1, 2, 3, 4, 5, 9].iter().map(|&i| field[i].parse().expect("a number")).collect();
+        assert_eq!(numbers, [c.distance, x, y, z, c.u, c.v, signed], "{point:?}");
+        let rest = [c.primitive.instance, c.primitive.triangle, c.feature.code(), near as u32, first];
+        let rest = rest.into_iter().chain([found.len() as u32]).map(|n| n.to_string());
+        assert!(rest.eq([6, 7, 8, 10, 11, 12].map(|i| field[i].to_owned())), "{line}");
+    }
+}
+
+/// The mesh of `compile.c`.
+fn hills() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    const SIDE: u32 = 40;
+    let grid = |side: u32| (0..side).flat_map(move |y| (0..side).map(move |x| (x, y)));
+    let positions = grid(SIDE).map(|(x, y)| [x as f32, y as f32, (x * y % 7) as f32 / 8.0]).collect();
+    let faces = grid(SIDE - 1).map(|(x, y)| y * SIDE + x);
+    let triangles =
+        faces.flat_map(|at| [[at, at + 1, at + SIDE], [at + 1, at + SIDE + 1, at + SIDE]]).collect();
+    (positions, triangles)
+}
+
+#[test]
+fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = program(folder.path(), "compile.c", &["bth", "bth_compile"]) else { return };
+    let [mesh, scene] = ["mesh.bth", "scene.bth"].map(|name| folder.path().join(name));
+    let output = run(&program, &[&mesh, &scene].map(|path| path.to_str().expect("UTF-8")), "");
+    assert!(output.status.success(), "{output:?}");
+
+    let (positions, triangles) = hills();
+    let hills = TriangleMesh { positions: &positions, triangles: &triangles };
+    let mut options =
+        CompileOptions { structure: Structure::Bvh, keep_subtrees: false, ..CompileOptions::default() };
+    options.bvh.quality = bth_compile::bvh::Quality::Fast;
+    let (compiled, _) = memory::compile(hills, &options, &Silent).expect("it compiles");
+    assert!(std::fs::read(mesh).expect("a file") == compiled.bytes);
+    let instance = |z| Instance { mesh: 0, to_world: [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., z]] };
+    let instances = [instance(0.0), instance(-50.0)];
+    let outcome = memory::compile_scene(&[hills], &instances, &options, &Cache::none(), &Silent);
+    let content = outcome.expect("it compiles").content.expect("the content");
+    assert!(std::fs::read(scene).expect("a file") == content.bytes().expect("bytes").as_ref());
+}
+
+#[test]
+fn a_cpp_program_uses_scenes_that_close_themselves() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = program(folder.path(), "scene.cpp", &["bth", "bth_compile"]) else { return };
+    let absent = folder.path().join("absent.bth");
+    let output = run(&program, &[absent.to_str().expect("UTF-8")], "");
+    assert!(output.status.success(), "{output:?}");
 }

@@ -93,7 +93,7 @@ fn alpha(texture: &[u8], hit: &Hit, mirrored: bool) -> Option<f64> {
     }
     let (u, v) = (f64::from(hit.u), f64::from(hit.v));
     let (second, third) = if mirrored { (v, u) } else { (u, v) };
-    let uv = if in_mesh % 2 == 0 { [second + third, third] } else { [second, second + third] };
+    let uv = if in_mesh.is_multiple_of(2) { [second + third, third] } else { [second, second + third] };
     let n = f64::from(leaves::TEXELS);
     let [x, y] = uv.map(|x| x * n - 0.5);
     let texel = |x: f64, y: f64| {

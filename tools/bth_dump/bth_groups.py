@@ -38,12 +38,13 @@ class GroupsView:
         counts = [0] * len(self.groups)
         ends = [run.first for run in self.runs[1:]] + [self.view.triangles]
         for run, end in zip(self.runs, ends):
-            counts[run.group] += end - run.first
-        materials = [label(self.labels, m) for m in self.materials]
+            if run.group < len(counts):
+                counts[run.group] += end - run.first
+        materials = dict(enumerate(label(self.labels, m) for m in self.materials))
         return [
             {
                 "name": label(self.labels, g),
-                "material": None if g.material == NONE else materials[g.material],
+                "material": materials.get(g.material),
                 "triangles": count,
             }
             for g, count in zip(self.groups, counts)

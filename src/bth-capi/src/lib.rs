@@ -1,9 +1,12 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
+pub mod closest;
 pub mod hits;
 pub mod inside;
+pub mod memory;
 pub mod motion;
+pub mod surface;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
@@ -24,6 +27,7 @@ const ERROR_FORMAT: i32 = -3;
 const ERROR_VERSION: i32 = -4;
 const ERROR_INTERNAL: i32 = -5;
 const ERROR_SCENE: i32 = -6;
+const ERROR_MISSING: i32 = -7;
 
 thread_local! {
     /// Result of [`bth_last_error`].
@@ -103,7 +107,7 @@ pub extern "C" fn bth_last_error() -> *const c_char {
 /// The arguments of a query: the scene, the rays, and for each ray the triangle on which it starts, if given.
 type Batch<'a> = (&'a Scene, &'a [Ray], Option<&'a [PrimitiveRef]>);
 
-/// The arguments of a query as slices; `None` if there are no rays, or `scene` or `rays` is null.
+/// The arguments of a query as slices. `Err` is the result of the query if there are no rays, or `scene` or `rays` is null.
 ///
 /// # Safety
 /// `scene` is null or open. `rays` and `from` are each null or point to `count` elements. All of them outlive the result and are
@@ -113,16 +117,28 @@ unsafe fn batch<'a>(
     rays: *const Ray,
     from: *const PrimitiveRef,
     count: usize,
-) -> Option<Batch<'a>> {
+) -> Result<Batch<'a>, i32> {
     if scene.is_null() || rays.is_null() || count == 0 {
-        return None;
+        return Err(if count == 0 { OK } else { null_argument() });
     }
     // SAFETY: the pointers are not null, so by contract `scene` is an open scene, and `rays` and `from` point to `count`
     // elements. `Ray` and `PrimitiveRef` have the layout of the C structs, and all bit patterns are valid for them.
     unsafe {
         let from = (!from.is_null()).then(|| std::slice::from_raw_parts(from, count));
-        Some((&*scene, std::slice::from_raw_parts(rays, count), from))
+        Ok((&*scene, std::slice::from_raw_parts(rays, count), from))
     }
+}
+
+/// The result of a query without a scene, rays or room for results.
+#[cold]
+fn null_argument() -> i32 {
+    fail(ERROR_ARGUMENT, "scene, rays and results of a query must not be null".into())
+}
+
+/// The result of a query that panicked, which would be a defect of the library.
+#[cold]
+fn defect() -> i32 {
+    fail(ERROR_INTERNAL, "internal error of a query".into())
 }
 
 /// Nearest hits; see `bth.h`.
@@ -139,8 +155,9 @@ pub unsafe extern "C" fn bth_nearest(
     count: usize,
 ) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hits.is_null() {
+        null_argument();
         return;
     }
     // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
@@ -149,6 +166,7 @@ pub unsafe extern "C" fn bth_nearest(
     // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
     if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).nearest(hits))).is_err() {
         hits.fill(Hit::MISS);
+        defect();
     }
 }
 
@@ -165,8 +183,9 @@ pub unsafe extern "C" fn bth_any(
     count: usize,
 ) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Some((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
+    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hit.is_null() {
+        null_argument();
         return;
     }
     // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
@@ -178,6 +197,9 @@ pub unsafe extern "C" fn bth_any(
         let mut found = [false];
         let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(&mut found)));
         *hit = (traced.is_ok() && found[0]).into();
+        if traced.is_err() {
+            defect();
+        }
     } else {
         any_in_chunks(scene, rays, from, hit);
     }
@@ -195,6 +217,7 @@ fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit
         let found = &mut buffer[..rays.len()];
         if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(found))).is_err() {
             found.fill(false);
+            defect();
         }
         for (out, found) in hit.iter_mut().zip(found) {
             *out = (*found).into();

@@ -86,9 +86,7 @@ pub extern "C" fn bth_version() -> *const c_char {
 pub unsafe extern "C" fn bth_bounds(scene: *const Scene, bounds: *mut [[f32; 3]; 2]) -> i32 {
     let nothing = || (ERROR_MISSING, "nothing is visible".to_owned());
     // SAFETY: the contract of `store` is part of that of this function.
-    unsafe {
-        store("bth_bounds", scene, bounds, |scene| scene.bounds().map(Into::into).ok_or_else(nothing))
-    }
+    unsafe { store("bth_bounds", scene, bounds, |scene| scene.bounds().map(Into::into).ok_or_else(nothing)) }
 }
 
 /// Number of objects; see `bth.h`.

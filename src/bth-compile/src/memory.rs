@@ -75,7 +75,7 @@ pub fn compile_cached(
 ///
 /// # Errors
 /// As [`compile`], for each mesh; `BTH-I005` for an instance of no mesh, `BTH-I004` and `BTH-I050` for one whose transform is not
-/// finite or cannot be inverted.
+/// finite or flattens the mesh.
 pub fn compile_scene(
     meshes: &[TriangleMesh<'_>],
     instances: &[Instance],

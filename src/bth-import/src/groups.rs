@@ -54,7 +54,7 @@ impl GroupRecorder {
     }
 
     /// The groups of a mesh of so many triangles. Those before the first start are of a group without a name; groups and
-    /// materials without triangles are left out.
+    /// materials without triangles are left out. None at all, if there is but one without a name and a material.
     pub(super) fn finish(mut self, triangles: usize) -> Groups {
         self.runs.retain(|run| (run[0] as usize) < triangles);
         if triangles > 0 && self.runs.first().is_none_or(|run| run[0] > 0) {
@@ -77,7 +77,11 @@ impl GroupRecorder {
             });
             found.runs.push([first, row]);
         }
-        found
+        // The absence of groups says the same.
+        match found.groups.as_slice() {
+            [only] if *only == Group::default() => Groups::default(),
+            _ => found,
+        }
     }
 }
 
@@ -148,10 +152,12 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_has_a_group_if_it_has_triangles() {
+    fn one_group_without_a_name_is_none() {
         assert_eq!(GroupRecorder::default().finish(0), Groups::default());
-        let one = GroupRecorder::default().finish(3);
-        assert_eq!((one.groups.len(), one.runs.as_slice()), (1, &[[0, 0]][..]));
+        assert_eq!(GroupRecorder::default().finish(3), Groups::default());
+        let mut named = NamedGroups::default();
+        named.material(0, "red".into());
+        assert_eq!(named.recorder.finish(3).runs, [[0, 0]]);
     }
 
     #[test]

@@ -174,7 +174,7 @@ pub(crate) fn weld_and_count(
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
     }
     monitor.check()?;
-    let mesh = Mesh { positions: welded.positions, triangles, attributes, opacity: None, groups: None };
+    let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {

@@ -1,6 +1,8 @@
 //! Closest points of many points, with the time they take: `closest SCENE.bth POINTS.f32 [RESULTS.f32]`. Points are x, y and z as
 //! little-endian f32; results are the distances.
 
+#![allow(clippy::print_stdout)]
+
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

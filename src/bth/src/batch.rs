@@ -1,5 +1,6 @@
 //! Queries of many rays in one call.
 
+use crate::hits::Accept;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
 
@@ -29,6 +30,7 @@ pub struct RayBatch<'a> {
     scene: &'a Scene,
     rays: &'a [Ray],
     from: Option<&'a [PrimitiveRef]>,
+    accept: Option<&'a Accept<'a>>,
     #[cfg(feature = "rayon")]
     parallel: bool,
 }
@@ -45,6 +47,7 @@ impl Scene {
             scene: self,
             rays,
             from: None,
+            accept: None,
             #[cfg(feature = "rayon")]
             parallel: false,
         }
@@ -57,6 +60,13 @@ impl<'a> RayBatch<'a> {
     #[inline]
     pub fn from(self, triangles: impl Into<Option<&'a [PrimitiveRef]>>) -> Self {
         RayBatch { from: triangles.into(), ..self }
+    }
+
+    /// Sets what the rays are allowed to hit; by default everything. With conditions, rays are traced one at a time and hints are not
+    /// used, as by [`Scene::nearest_accepted`].
+    #[inline]
+    pub fn accept(self, accept: &'a Accept<'a>) -> Self {
+        RayBatch { accept: Some(accept), ..self }
     }
 
     /// Traces on all threads of the current pool of `rayon`. Answers do not depend on the number of threads.
@@ -77,7 +87,10 @@ impl<'a> RayBatch<'a> {
         if self.parallel {
             return self.in_tasks(hits, |part, hits| part.nearest(hits));
         }
-        self.scene.nearest_hits_of(self.rays, self.from, hits);
+        match self.accept {
+            None => self.scene.nearest_hits_of(self.rays, self.from, hits),
+            Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
+        }
     }
 
     /// Stores for each ray whether it hits anything.
@@ -91,7 +104,10 @@ impl<'a> RayBatch<'a> {
         if self.parallel {
             return self.in_tasks(found, |part, found| part.any(found));
         }
-        self.scene.any_hits_of(self.rays, self.from, found);
+        match self.accept {
+            None => self.scene.any_hits_of(self.rays, self.from, found),
+            Some(accept) => self.scene.any_accepted_batch(self.rays, accept, found),
+        }
     }
 
     #[inline]

@@ -30,6 +30,7 @@ mod query;
 pub mod rays;
 mod scene;
 mod simd;
+mod streams;
 mod surface;
 mod tets;
 
@@ -45,4 +46,5 @@ pub use object::Hinted;
 pub use query::Steps;
 pub use scene::{Scene, from_bytes, from_file, map, open};
 pub use simd::{Isa, IsaError};
+pub use streams::{HitStreams, RayStreams};
 pub use surface::{Bounds, SurfacePoint};

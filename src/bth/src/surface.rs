@@ -86,7 +86,10 @@ impl Scene {
         let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
         let object_geometric_normal = plane_normal(corners)?;
         let object_normal = interpolated_normal(&view, id, weights, object_geometric_normal);
-        let to_world = |normal: [f64; 3]| unit(self.normal_to_world(instance, normal)).unwrap_or(normal);
+        let to_world = |normal: [f64; 3]| match self.world() {
+            None => normal,
+            Some(_) => unit(self.normal_to_world(instance, normal)).unwrap_or(normal),
+        };
         let group = view.group_of(id);
         Some(SurfacePoint {
             position: transformed(&self.instance(instance).to_world, object_position),
@@ -194,18 +197,14 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
     let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
     let normal = products.map(|(p, q)| p - q);
     // The products of differences of f32 neither overflow nor underflow in f64. Each component has at most 7 roundings.
-    let error = products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
+    let error =
+        products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
     let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
 }
 
 /// The interpolated normal at barycentric weights, in the space of the object.
-fn interpolated_normal(
-    view: &ObjectView<'_>,
-    id: u32,
-    weights: [f64; 3],
-    geometric: [f64; 3],
-) -> [f64; 3] {
+fn interpolated_normal(view: &ObjectView<'_>, id: u32, weights: [f64; 3], geometric: [f64; 3]) -> [f64; 3] {
     let Some(corners) = attribute(view, view.normals, id) else { return geometric };
     let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
     if corners.iter().all(zero) {

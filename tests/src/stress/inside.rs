@@ -32,8 +32,6 @@ pub struct InsideStatistics {
     pub compared: u64,
     /// Those of them with a wrong answer.
     pub wrong: u64,
-    /// Seconds in the queries for points alone.
-    pub seconds: f64,
     /// Some of the rays with a different or wrong answer.
     pub examples: Vec<Ray>,
 }
@@ -159,9 +157,7 @@ pub fn run_inside(
         let points: Vec<[f32; 3]> = rays.iter().map(|ray| ray.origin).collect();
         isas[batch % isas.len()].choose().expect("it is available");
         let (mut winding, mut inside) = (vec![0; points.len()], vec![false; points.len()]);
-        let start = std::time::Instant::now();
         scene.winding_batch(&points, &mut winding);
-        statistics.seconds += start.elapsed().as_secs_f64();
         scene.contains_batch(&points, &mut inside);
         for (i, ray) in rays.iter().enumerate() {
             let found: Crossings = scene.crossings(ray);

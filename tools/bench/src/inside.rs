@@ -2,6 +2,7 @@
 //! (`bth-bench inside`).
 
 use crate::args::Inside;
+use crate::clock::Clock;
 use crate::markdown::{count, table};
 use crate::model::Model;
 use crate::output::{Head, Record};
@@ -10,6 +11,7 @@ use anyhow::{Result, ensure};
 use bth::Scene;
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
+use bth_random::Rng;
 use bth_tests::oracle;
 use bth_tests::stress::{Corners, InsideStatistics, is_closed, run_inside};
 use serde_json::{Value, json};
@@ -23,6 +25,34 @@ struct ModelRun {
     scene: Scene,
     corners: Vec<Corners>,
     statistics: InsideStatistics,
+    /// Nanoseconds of CPU time for a point in a batch: anywhere in the bounds, and anywhere in a call of its own.
+    nanoseconds: [f64; 2],
+}
+
+/// Times the winding numbers of points anywhere in the bounds: the least of some rounds.
+fn time(scene: &Scene) -> [f64; 2] {
+    const POINTS: usize = 100_000;
+    let header = scene.object(0).header;
+    let mut rng = Rng::new(5);
+    let points: Vec<[f32; 3]> = (0..POINTS)
+        .map(|_| {
+            std::array::from_fn(|k| {
+                rng.between(f64::from(header.lower[k]), f64::from(header.upper[k])) as f32
+            })
+        })
+        .collect();
+    let mut winding = vec![0; POINTS];
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..5 {
+        let batch = Clock::ThreadCpu.time(|| scene.winding_batch(&points, &mut winding));
+        let single = Clock::ThreadCpu.time(|| {
+            for (point, winding) in points.iter().zip(&mut winding) {
+                *winding = scene.winding(*point);
+            }
+        });
+        least = [least[0].min(batch), least[1].min(single)];
+    }
+    least.map(|seconds| seconds * 1e9 / POINTS as f64)
 }
 
 impl ModelRun {
@@ -34,7 +64,9 @@ impl ModelRun {
         let scene = bth::from_bytes(&compiled.bytes)?;
         let corners: Vec<Corners> = oracle::triangles(&scene.object(0)).iter().map(|t| t.corners).collect();
         ensure!(is_closed(&corners), "{}: not closed: some edge has more triangles on one side", model.name);
-        Ok(ModelRun { name: model.name, scene, corners, statistics: InsideStatistics::default() })
+        let nanoseconds = time(&scene);
+        let statistics = InsideStatistics::default();
+        Ok(ModelRun { name: model.name, scene, corners, statistics, nanoseconds })
     }
 }
 
@@ -90,7 +122,8 @@ fn body(runs: &[ModelRun]) -> String {
         "different",
         "compared with all",
         "wrong",
-        "ns per point",
+        "ns in a batch",
+        "ns alone",
     ];
     let rows: Vec<_> = runs.iter().map(ModelRun::row).collect();
     format!(
@@ -98,22 +131,19 @@ fn body(runs: &[ModelRun]) -> String {
          axis or in another direction passes exactly through a vertex or the middle of an edge (*aimed*: exactly at a \
          vertex in the other direction). *Different*: the winding number, the parity and `contains` do not agree along \
          an axis and in the other direction, or between a batch and a call for one point. *Wrong*: not the count of \
-         all triangles in exact arithmetic.\n\n{}",
+         all triangles in exact arithmetic. *ns*: CPU time of one thread for the winding number of a point anywhere in the \
+         bounds.\n\n{}",
         table(&head.map(str::to_owned), &rows)
     )
 }
 
 impl ModelRun {
-    fn nanoseconds(&self) -> f64 {
-        self.statistics.seconds * 1e9 / self.statistics.points.max(1) as f64
-    }
-
     fn row(&self) -> Vec<String> {
         let found = &self.statistics;
         let mut cells = vec![self.name.clone(), count(self.corners.len() as u64)];
         let numbers = [found.points, found.inside, found.aimed, found.different, found.compared, found.wrong];
         cells.extend(numbers.map(count));
-        cells.push(format!("{:.0}", self.nanoseconds()));
+        cells.extend(self.nanoseconds.map(|n| format!("{n:.0}")));
         cells
     }
 
@@ -128,7 +158,8 @@ impl ModelRun {
             "different": found.different,
             "compared": found.compared,
             "wrong": found.wrong,
-            "ns_per_point": self.nanoseconds(),
+            "ns_in_a_batch": self.nanoseconds[0],
+            "ns_alone": self.nanoseconds[1],
         })
     }
 }

@@ -76,7 +76,8 @@ impl<'a> Footprint<'a> {
         let state =
             decide(self.range(pyramid, [bounds(&corners, 0), bounds(&corners, 1)], Range::EMPTY, &unknown));
         let [top, bottom] = self.cells(1, bounds(&corners, 1));
-        if state != Opacity::Unknown || !thorough || !(bottom - top < MAX_ROWS && top.abs() < GREATEST_CELL) {
+        let few = bottom - top < MAX_ROWS && top.abs() < GREATEST_CELL;
+        if state != Opacity::Unknown || !thorough || !few {
             return state;
         }
         let mut found = Range::EMPTY;

@@ -21,8 +21,8 @@ use std::path::Path;
 pub struct Instance {
     /// Row of the mesh.
     pub mesh: u32,
-    /// Rows of the transform from the mesh's space to the world, applied to columns (x, y, z, 1). Must be finite and
-    /// invertible.
+    /// Rows of the transform from the mesh's space to the world, applied to columns (x, y, z, 1): finite and either
+    /// invertible or, for an invisible instance, without size.
     pub to_world: [[f64; 4]; 3],
 }
 
@@ -90,8 +90,8 @@ fn manifest(meshes: usize, instances: &[Instance]) -> Manifest {
     }
 }
 
-/// The plan of a manifest made by [`manifest`]. All instances count as visible, so that one without size is refused instead of
-/// left out, which would renumber those behind it.
+/// The plan of a manifest made by [`manifest`]. All instances count as visible: if one without size were left out, those behind it
+/// would be renumbered.
 fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clock) -> ScenePlan<'a> {
     let count = manifest.nodes.len();
     let mut used = vec![false; meshes.len()];

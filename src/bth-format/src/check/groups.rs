@@ -32,7 +32,13 @@ fn runs(view: &ObjectView) -> Result<()> {
     let wanted = !view.groups.is_empty() && triangles > 0;
     if wanted == runs.is_empty() {
         let expected = if wanted { "runs of triangles" } else { "none without groups or triangles" };
-        return error(Code::GroupRuns, kind::GROUP_RUNS, 0, expected.to_owned(), format!("{} rows", runs.len()));
+        return error(
+            Code::GroupRuns,
+            kind::GROUP_RUNS,
+            0,
+            expected.to_owned(),
+            format!("{} rows", runs.len()),
+        );
     }
     for (row, run) in runs.iter().enumerate() {
         let ascends = match row.checked_sub(1) {

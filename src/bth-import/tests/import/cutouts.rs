@@ -142,7 +142,8 @@ fn images_come_from_files_and_data_uris_too() {
 
 #[test]
 fn what_cannot_be_read_is_an_error_with_a_code_only_where_it_is_asked_for() {
-    let changes: [(&str, fn(&mut Value)); 11] = [
+    type Change = (&'static str, fn(&mut Value));
+    let changes: [Change; 11] = [
         ("BTH-I016", |d| d["images"][0] = json!({"bufferView": 0})),
         ("BTH-I016", |d| d["images"][0] = json!({})),
         ("BTH-I016", |d| d["images"][0] = json!({"uri": "data:image/png;base64,!"})),

@@ -4,6 +4,7 @@ mod compressed;
 mod cutouts;
 mod data;
 mod gltf;
+mod groups;
 mod obj;
 mod off;
 mod ply;

@@ -12,11 +12,14 @@ use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabLanes;
+use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Nearest, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
-use bth_format::layout::{Child, NONE, WIDTH};
+use crate::tets::flood::{FaceReceiver, VisitedSet};
+use crate::tets::walk::TetWalker;
+use bth_format::layout::{Child, NONE, TetFace, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Receiver of the triangles that a ray may hit.
@@ -45,12 +48,13 @@ pub(crate) fn enumerate(object: &ObjectView<'_>, ray: &Ray, receiver: &mut dyn R
         },
     };
     let stack = &mut SingleStack::new();
-    Isa::chosen().run(EnumerateKernel { object, prepared: &prepared, stack, receiver })
+    Isa::chosen().run(EnumerateKernel { object, ray, prepared: &prepared, stack, receiver })
 }
 
 /// The kernel of [`enumerate`]. The receiver is called through a table, so that there is one kernel per instruction set.
 struct EnumerateKernel<'a> {
     object: &'a ObjectView<'a>,
+    ray: &'a Ray,
     prepared: &'a PreparedRay,
     stack: &'a mut SingleStack,
     receiver: &'a mut dyn Receiver,
@@ -61,7 +65,7 @@ impl Kernel for EnumerateKernel<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
-        let EnumerateKernel { object, prepared, stack, receiver } = self;
+        let EnumerateKernel { object, ray, prepared, stack, receiver } = self;
         let (slabs, node_base) = (&prepared.slabs, object.node_base());
         let mut code = object.header.root;
         let mut stack = stack.start(code);
@@ -108,7 +112,7 @@ impl Kernel for EnumerateKernel<'_> {
                             code = subtree;
                             continue;
                         }
-                        if pass_faces(object, row, receiver) {
+                        if pass_faces(object, row, ray, receiver) {
                             return true;
                         }
                         0
@@ -152,13 +156,34 @@ fn pass_triangles(
     false
 }
 
-/// Passes all constrained faces of a tet leaf that has no subtree; returns whether the query is complete.
+/// Passes the constrained faces of a tet leaf that has no subtree, as far as the line may touch them; returns whether the query is
+/// complete. The faces are found by a flood fill, which reaches every face that the line touches, also where it passes through
+/// edges and vertices or lies in the plane of a face.
 #[cold]
 #[inline(never)]
-fn pass_faces(object: &ObjectView<'_>, row: u32, receiver: &mut dyn Receiver) -> bool {
-    let leaf = &object.tet_leaves[row as usize];
-    object.tet_faces[leaf.first_face as usize..][..leaf.faces as usize].iter().any(|face| {
-        let corners = face.vertex.map(|v| object.tet_vertices[v as usize].position);
-        receiver.receive(TriangleRef::id(face.triangle, object.triangle_ids), corners)
-    })
+fn pass_faces(object: &ObjectView<'_>, row: u32, ray: &Ray, receiver: &mut dyn Receiver) -> bool {
+    let Some(line) = Line::new(ray) else { return false };
+    let walker = TetWalker::new(object, row, &line);
+    walker.flood_faces(&mut PassedFaces { object, receiver, passed: VisitedSet::new() }, &mut ())
+}
+
+/// Passes the faces that a flood reaches to a receiver.
+struct PassedFaces<'a> {
+    object: &'a ObjectView<'a>,
+    receiver: &'a mut dyn Receiver,
+    /// Ids of the triangles that were passed: the flood may reach a face from both sides.
+    passed: VisitedSet,
+}
+
+impl FaceReceiver for PassedFaces<'_> {
+    fn receive(&mut self, face: &TetFace) -> bool {
+        if !self.passed.insert(face.triangle) {
+            return false;
+        }
+        let corners = face.vertex.map(|v| self.object.tet_vertices[v as usize].position);
+        self.receiver.receive(TriangleRef::id(face.triangle, self.object.triangle_ids), corners)
+    }
+    fn limit(&self) -> f64 {
+        self.receiver.limit()
+    }
 }

@@ -4,6 +4,7 @@
 //! first; [`placed`] bounds distances in the space of an instance's object; [`scene`] goes through the instances of a scene. [`overlap`] finds the
 //! triangles that overlap a box or a ball.
 
+mod order;
 mod overlap;
 mod placed;
 mod scene;

@@ -233,7 +233,7 @@ impl RegionWalk<'_> {
         id: impl Fn() -> u32,
         visit: &mut Visitor<'_>,
     ) -> ControlFlow<()> {
-        let corners = self.placed.map_or(corners, |placed| placed.to_world(corners));
+        let corners = self.placed.map_or(corners, |placed| placed.corners_in_world(corners));
         if !self.region.overlaps(corners) {
             return ControlFlow::Continue(());
         }

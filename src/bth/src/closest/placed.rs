@@ -80,7 +80,7 @@ impl PlacedObject {
     }
 
     /// Corners in world space.
-    pub(super) fn to_world(&self, corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    pub(super) fn corners_in_world(&self, corners: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
         corners.map(|p| {
             let [x, y, z] = p.map(f64::from);
             self.placed.to_world.map(|[a, b, c, d]| (a * x + b * y + c * z + d) as f32)

@@ -1,6 +1,7 @@
 //! Closest points in scenes.
 
 use super::Closest;
+use super::order::along_curve;
 use super::placed::PlacedObject;
 use super::search::Search;
 use super::walk::{search_object, search_placed};
@@ -34,31 +35,33 @@ impl Scene {
         closest
     }
 
-    /// Stores for each point what [`Self::closest`] returns. Points that are adjacent in the slice and close to each other are
-    /// fastest.
+    /// Stores for each point what [`Self::closest`] returns. Many points in one call are faster: they are searched in an order in
+    /// which each is close to the one before.
     ///
     /// # Panics
     /// If the slices differ in length.
     pub fn closest_batch(&self, points: &[[f32; 3]], radius: f32, closest: &mut [Option<Closest>]) {
         assert_eq!(points.len(), closest.len(), "as many results as points");
         let mut searcher = Searcher::new(self);
-        let mut previous: Option<Search> = None;
-        for (point, closest) in points.iter().zip(closest) {
-            let Some(mut search) = Search::new(*point, radius) else {
-                *closest = None;
+        let mut order = Vec::new();
+        for (points, closest) in points.chunks(CHUNK).zip(closest.chunks_mut(CHUNK)) {
+            if points.len() < MIN_ORDERED {
+                (0..points.len()).for_each(|i| closest[i] = searcher.closest(points[i], radius));
                 continue;
-            };
-            // The triangle of the point before gives a bound, which never changes the result. For points farther from each other
-            // than from the surface it is of no use.
-            if let Some(previous) = previous.as_ref().filter(|previous| previous.is_near(point)) {
-                search.offer_result(previous);
             }
-            searcher.search(&mut search);
-            *closest = search.answer(radius);
-            previous = Some(search);
+            along_curve(points, &mut order);
+            for entry in &order {
+                let i = *entry as u32 as usize;
+                closest[i] = searcher.closest(points[i], radius);
+            }
         }
     }
 }
+
+/// Number of points that are ordered together.
+const CHUNK: usize = 1 << 20;
+/// Fewer points are searched in the order in which they are given.
+const MIN_ORDERED: usize = 32;
 
 /// Searches of a scene.
 struct Searcher<'a> {
@@ -67,6 +70,8 @@ struct Searcher<'a> {
     sole: Option<(&'a ObjectView<'a>, u32)>,
     /// The instances that were searched before.
     placed: HashMap<u32, PlacedObject>,
+    /// The search of the point before.
+    previous: Option<Search>,
 }
 
 impl<'a> Searcher<'a> {
@@ -76,7 +81,20 @@ impl<'a> Searcher<'a> {
             Some(world) => world.sole().map(|(instance, object)| (object, instance)),
         };
         let sole = sole.map(|(object, instance)| (scene.view(object), instance));
-        Searcher { scene, sole, placed: HashMap::new() }
+        Searcher { scene, sole, placed: HashMap::new(), previous: None }
+    }
+
+    /// As [`Scene::closest`].
+    fn closest(&mut self, point: [f32; 3], radius: f32) -> Option<Closest> {
+        let mut search = Search::new(point, radius)?;
+        // The triangle of the point before gives a bound, which never changes the result. For points farther from each other than
+        // from the surface it is of no use.
+        if let Some(previous) = self.previous.as_ref().filter(|previous| previous.is_near(&point)) {
+            search.offer_result(previous);
+        }
+        self.search(&mut search);
+        self.previous = Some(search);
+        search.answer(radius)
     }
 
     fn search(&mut self, search: &mut Search) {
@@ -136,5 +154,40 @@ impl<'a> Searcher<'a> {
             }
         };
         search_placed(scene.view(placed.object()), placed, instance, search);
+    }
+}
+
+impl Scene {
+    /// The distance of a point in world space to the closest triangle as [`Self::closest`] reports it, negative if the scene
+    /// contains the point ([`Self::contains`]). Infinite if nothing can be hit; NaN if the point is not finite. The sign is as
+    /// good as the meshes are closed.
+    pub fn signed_distance(&self, point: [f32; 3]) -> f32 {
+        let mut distance = 0.0;
+        self.signed_distance_batch(&[point], std::slice::from_mut(&mut distance));
+        distance
+    }
+
+    /// As [`Self::signed_distance`], for each of the points.
+    ///
+    /// # Panics
+    /// If there are not as many distances as points.
+    pub fn signed_distance_batch(&self, points: &[[f32; 3]], distances: &mut [f32]) {
+        assert_eq!(points.len(), distances.len(), "as many distances as points");
+        const CHUNK: usize = 1024;
+        let (mut closest, mut inside) = (vec![None; CHUNK.min(points.len())], [false; CHUNK]);
+        for (points, distances) in points.chunks(CHUNK).zip(distances.chunks_mut(CHUNK)) {
+            let (closest, inside) = (&mut closest[..points.len()], &mut inside[..points.len()]);
+            self.closest_batch(points, f32::INFINITY, closest);
+            self.contains_batch(points, inside);
+            for i in 0..points.len() {
+                let is_finite = points[i].iter().all(|x| x.is_finite());
+                let distance = closest[i].map_or(f32::INFINITY, |closest| closest.distance);
+                distances[i] = match (is_finite, inside[i] && distance > 0.0) {
+                    (false, _) => f32::NAN,
+                    (true, true) => -distance,
+                    (true, false) => distance,
+                };
+            }
+        }
     }
 }

@@ -194,7 +194,7 @@ impl ObjectWalk<'_> {
     fn offer(&self, corners: [[f32; 3]; 3], id: impl FnOnce() -> u32, search: &mut Search) {
         let corners = match self.placed {
             None => corners,
-            Some((placed, _)) => placed.to_world(corners),
+            Some((placed, _)) => placed.corners_in_world(corners),
         };
         search.offer(corners, || PrimitiveRef { instance: self.instance, triangle: id() });
     }

@@ -77,8 +77,8 @@ impl AxisRay {
         for (sign, from, to) in [(-1.0, lower, &point), (1.0, &point, upper)] {
             for k in 0..3 {
                 let way = to[k] - from[k];
-                // The comparison fails for NaN, and the sign of a difference is exact.
-                if !(way >= 0.0) {
+                // The sign of a difference is exact.
+                if way < 0.0 || way.is_nan() {
                     return None;
                 }
                 if way < least {

@@ -12,8 +12,6 @@ mod batch;
 mod collect;
 mod groups;
 mod search;
-#[cfg(test)]
-mod tests;
 
 pub use accept::{Accept, Cull, Filter};
 

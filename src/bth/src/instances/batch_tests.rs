@@ -3,7 +3,12 @@
 use super::super::affine::Affine;
 use super::super::placement::PartBoxes;
 use super::*;
+use crate::bvh::candidate::{Candidate, ReadCorners};
+use crate::hits::Accept;
+use crate::intersect::exact::reported;
+use crate::intersect::line::Line;
 use crate::scene::Scene;
+use bth_format::layout::Child;
 use bth_random::Rng;
 
 const FILES: [&[u8]; 2] = [
@@ -244,4 +249,88 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
         ray_count += count;
     }
     assert!(hit_count > ray_count / 4, "{hit_count} of {ray_count} hit");
+}
+
+/// The triangles of an object with their ids, without any test of boxes.
+fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
+    let (mut found, mut stack) = (vec![], vec![object.header.root]);
+    while let Some(code) = stack.pop() {
+        let Some(child) = Child::from_code(code) else { continue };
+        let count = match child {
+            Child::Indexed(at) => object.indexed(at, &mut None).triangles,
+            Child::Raw(at) => object.raw(at, &mut None).triangles,
+            Child::Node(_) | Child::Packed(_) => {
+                stack.extend(object.unpacked_node(child).expect("a node").child);
+                continue;
+            }
+            Child::Tets(_) => panic!("a file without tetrahedra"),
+        };
+        for triangle in 0..count {
+            let candidate = Candidate { leaf: code, triangle };
+            let (index, corners) = candidate.read(object, ReadCorners).expect("a leaf");
+            found.push((object.triangle_ids[index as usize], corners));
+        }
+    }
+    found
+}
+
+/// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the documented order.
+fn hits_by_loop(world: &World, file: &File, ray: &Ray) -> Vec<Hit> {
+    let mut found = vec![];
+    for (instance, placement) in world.placements.iter().enumerate() {
+        let Some(placement) = placement else { continue };
+        let object_ray = placement.inverse.ray(ray);
+        let Some(line) = Line::new(&object_ray.ray) else { continue };
+        for (triangle, corners) in triangles(&file.object(placement.object()).unwrap()) {
+            let Some(at) = line.intersection(corners) else { continue };
+            let in_object = reported(at.t);
+            let t = if object_ray.t_scale == 1.0 { in_object } else { in_object * object_ray.t_scale };
+            let Ray { tmin, tmax, .. } = object_ray.ray;
+            if tmin <= in_object && in_object <= tmax && ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY {
+                let [u, v] = at.uv();
+                let primitive = PrimitiveRef { instance: instance as u32, triangle };
+                found.push((at.t, Hit { t, u, v, primitive }));
+            }
+        }
+    }
+    let order = |(exact, hit): &(f64, Hit)| (hit.t, hit.primitive.instance, *exact, hit.primitive.triangle);
+    found.sort_by(|a, b| order(a).partial_cmp(&order(b)).expect("no NaN"));
+    found.into_iter().map(|(_, hit)| hit).collect()
+}
+
+#[test]
+fn several_hits_are_those_of_a_loop_over_all_instances_and_triangles() {
+    let mut rng = Rng::new(41);
+    let (mut hit_count, mut ray_count, mut far_hits, mut several) = (0, 0, 0, 0);
+    for case in 0..300 {
+        let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
+        let (world, transforms) = world(&file, &mut rng, count);
+        let (reach, scene) = (world.top.reach, Scene::with_instances(file, world));
+        let (world, file) = (scene.world().expect("instances"), scene.file());
+        for ray in rays(&mut rng, &transforms, 20) {
+            let expected = hits_by_loop(world, file, &ray);
+            let mut hits = vec![Hit::MISS];
+            let all = |_: &Ray, _: &Hit| true;
+            for accept in [Accept::default(), Accept { filter: Some(&all), ..Accept::default() }] {
+                scene.all_hits(&ray, &accept, &mut hits);
+                assert_eq!(hits, expected, "case {case}: {ray:?}");
+                let first = expected.first().copied();
+                assert_eq!(scene.nearest_accepted(&ray, &accept), first, "case {case}: {ray:?}");
+                assert_eq!(scene.any_accepted(&ray, &accept), first.is_some(), "case {case}: {ray:?}");
+            }
+            let k = 1 + rng.below(4) as usize;
+            scene.nearest_hits(&ray, k, &Accept::default(), &mut hits);
+            assert_eq!(hits, expected[..k.min(expected.len())], "case {case}, {k}: {ray:?}");
+            let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+            far_hits += u32::from(!expected.is_empty() && start > reach);
+            several += u32::from(expected.len() > 1);
+            hit_count += u32::from(!expected.is_empty());
+            ray_count += 1;
+        }
+    }
+    assert!(
+        hit_count > ray_count / 3 && far_hits > 200 && several > 300,
+        "{hit_count} of {ray_count} hit, {far_hits} from afar, {several} several times"
+    );
 }

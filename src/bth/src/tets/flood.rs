@@ -10,27 +10,27 @@ use super::records::{Entered, ReadRecords};
 use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, Query};
-use bth_format::layout::{FACE_BIT, NONE};
+use bth_format::layout::{FACE_BIT, NONE, TetFace};
 use std::collections::HashSet;
 
-/// The tetrahedra that a flood has visited. Around most vertices these are about ten, around the center of a fan as many as the
-/// leaf holds.
-struct VisitedSet {
-    /// The tetrahedra that were inserted first. An array needs no allocation.
+/// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten, around the center of a fan as
+/// many as the leaf holds.
+pub(crate) struct VisitedSet {
+    /// The elements that were inserted first. An array needs no allocation.
     first: [u32; 48],
     /// Number of elements of `first` that are set.
     len: usize,
-    /// The tetrahedra that were inserted after `first` was full.
+    /// The elements that were inserted after `first` was full.
     rest: HashSet<u32>,
 }
 
 impl VisitedSet {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         VisitedSet { first: [0; 48], len: 0, rest: HashSet::new() }
     }
 
-    /// Adds a tetrahedron; returns false if it was already in the set.
-    fn insert(&mut self, tet: u32) -> bool {
+    /// Adds an element; returns false if it was already in the set.
+    pub(crate) fn insert(&mut self, tet: u32) -> bool {
         if self.first[..self.len].contains(&tet) {
             return false;
         }
@@ -43,11 +43,47 @@ impl VisitedSet {
     }
 }
 
+/// Receiver of the constrained faces that a flood reaches.
+pub(crate) trait FaceReceiver {
+    /// Receives a face that the line may touch, once or from both sides. Returns whether the query is complete.
+    fn receive(&mut self, face: &TetFace) -> bool;
+    /// Upper bound of the exact t of intersections that can still change the result.
+    fn limit(&self) -> f64;
+}
+
+/// Offers the faces to a query.
+struct Offering<'a, 'w, Q> {
+    walker: &'a TetWalker<'w>,
+    query: &'a mut Q,
+}
+
+impl<Q: Query> FaceReceiver for Offering<'_, '_, Q> {
+    #[inline(always)]
+    fn receive(&mut self, face: &TetFace) -> bool {
+        self.walker.offer(face, self.query)
+    }
+    #[inline(always)]
+    fn limit(&self) -> f64 {
+        self.query.limit()
+    }
+}
+
 impl TetWalker<'_> {
     /// Offers to the query all constrained faces of the leaf that the line can touch up to the query's limit. Returns `Done` if
     /// the query is complete, else `Left`.
     #[inline(never)]
     pub(crate) fn flood<Q: Query, C: Count>(&self, query: &mut Q, count: &mut C) -> WalkOutcome {
+        if self.flood_faces(&mut Offering { walker: self, query }, count) {
+            WalkOutcome::Done
+        } else {
+            WalkOutcome::Left
+        }
+    }
+
+    /// Passes all constrained faces of the leaf that the line can touch up to the receiver's limit. Returns whether the query is
+    /// complete.
+    #[inline(always)]
+    pub(crate) fn flood_faces(&self, receiver: &mut impl FaceReceiver, count: &mut impl Count) -> bool {
         count.flood();
         let mut visited = VisitedSet::new();
         let mut stack: Vec<(u32, Entered)> = Vec::new();
@@ -69,10 +105,10 @@ impl TetWalker<'_> {
                 }
                 let link = self.records.link(tet, &entered, entered.face[replaced]);
                 let constrained = link.next & FACE_BIT != 0 && link.next != NONE;
-                if constrained && self.offer(&self.faces[(link.next & !FACE_BIT) as usize], query) {
-                    return WalkOutcome::Done;
+                if constrained && receiver.receive(&self.faces[(link.next & !FACE_BIT) as usize]) {
+                    return true;
                 }
-                if self.line.t_range(projected.each_ref()).0 > query.limit() {
+                if self.line.t_range(projected.each_ref()).0 > receiver.limit() {
                     continue;
                 }
                 if let Some((next, apex, behind)) = self.beyond(tet, link, face)
@@ -82,7 +118,7 @@ impl TetWalker<'_> {
                 }
             }
         }
-        WalkOutcome::Left
+        false
     }
 
     /// Whether the line may touch the closed face; false only if it certainly does not.

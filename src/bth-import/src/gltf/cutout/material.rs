@@ -169,8 +169,8 @@ impl<'m, 'a> Materials<'m, 'a> {
     fn cutout(&mut self, material: &AlphaMaterial, cutoff: f64, part: &str) -> Result<CutoutMaterial> {
         let base = &material.pbr_metallic_roughness;
         let factor = base.base_color_factor.map_or(1.0, |factor| factor[3]);
-        let is_usable = (0.0..=1.0).contains(&factor) && cutoff >= 0.0 && cutoff.is_finite();
-        if !is_usable {
+        let is_valid = (0.0..=1.0).contains(&factor) && cutoff >= 0.0 && cutoff.is_finite();
+        if !is_valid {
             let message = format!(
                 "expected an alpha factor from 0 to 1 and a cutoff from 0, found {factor} and {cutoff}"
             );

@@ -1,0 +1,59 @@
+"""Arrays as callers pass them, to those that the native module takes."""
+
+import numpy as np
+
+
+def vectors(array, name):
+    """An aligned array of float32 or float64 whose last axis has three numbers; a copy only where it must be."""
+    array = np.asarray(array)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
+    if array.ndim == 0 or array.shape[-1] != 3:
+        if array.size == 0 and array.ndim <= 1:
+            return np.zeros((0, 3), np.float32)
+        raise ValueError(f"{name}: expected the shape (..., 3), got {array.shape}")
+    return _native_floats(array)
+
+
+def _native_floats(array):
+    if array.dtype not in (np.float32, np.float64) or not array.dtype.isnative:
+        array = array.astype(np.float32 if array.dtype == np.float16 else np.float64)
+    return array if array.flags.aligned else array.copy()
+
+
+def numbers(array, name, shape):
+    """A number, or an array of one number for each element of the shape."""
+    if isinstance(array, (int, float)):
+        return float(array)
+    array = np.asarray(array)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
+    if array.ndim == 0:
+        return float(array)
+    try:
+        return np.broadcast_to(_native_floats(array), shape).reshape(-1)
+    except ValueError:
+        raise ValueError(f"{name}: the shape {array.shape} does not fit {shape}, that of the rays") from None
+
+
+def together(first, first_name, second, second_name):
+    """Two arrays of vectors, broadcast to one shape and with their leading axes made one; and these leading axes."""
+    first, second = vectors(first, first_name), vectors(second, second_name)
+    try:
+        shape = np.broadcast_shapes(first.shape, second.shape)
+    except ValueError:
+        message = f"{first_name} and {second_name}: the shapes {first.shape} and {second.shape} do not fit together"
+        raise ValueError(message) from None
+    return rows(first, shape), rows(second, shape), shape[:-1]
+
+
+def rows(array, shape):
+    """The array with this shape, and all axes but the last made one."""
+    count = 1
+    for length in shape[:-1]:
+        count *= length
+    if array.ndim == 1:
+        return np.broadcast_to(array, (count, 3))
+    if array.shape != shape:
+        array = np.broadcast_to(array, shape)
+    return array if array.ndim == 2 else array.reshape(-1, 3)

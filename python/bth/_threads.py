@@ -1,0 +1,30 @@
+"""How many threads a call uses."""
+
+import operator
+import os
+
+from . import _native
+
+_default = None
+
+
+def set_threads(threads):
+    """Sets how many threads calls use that do not say so themselves; None for one for each processor (or BTH_THREADS)."""
+    global _default
+    _default = None if threads is None else count(threads)
+
+
+def count(threads):
+    """The number of threads of a call."""
+    if threads is not None:
+        threads = operator.index(threads)
+        if threads < 0:
+            raise ValueError(f"threads: expected a number from 0 (one for each processor), got {threads}")
+        return threads or _native.processors()
+    if _default is not None:
+        return _default
+    text = os.environ.get("BTH_THREADS", "")
+    try:
+        return int(text) if int(text) > 0 else _native.processors()
+    except ValueError:
+        return _native.processors()

@@ -1,0 +1,129 @@
+"""Open3D's `t.geometry.RaycastingScene` on arrays of numpy. Rays are (..., 6): origin and direction."""
+
+import numpy as np
+
+from . import _meshes
+from ._compile import compile
+
+_INVALID = 0xFFFFFFFF
+
+
+class RaycastingScene:
+    """A scene of triangle meshes, which is compiled by the first query."""
+
+    INVALID_ID = _INVALID
+
+    def __init__(self, nthreads=0):
+        self._threads = nthreads or None
+        self._parts = []
+        self._compiled = None
+
+    def add_triangles(self, vertices, triangles=None):
+        """Adds vertices (n, 3) and triangles (m, 3), or a mesh; returns its geometry's index."""
+        self._parts.append(_meshes.triangles_of(vertices if triangles is None else (vertices, triangles)))
+        self._compiled = None
+        return len(self._parts) - 1
+
+    def _scene(self):
+        if self._compiled is None:
+            first_vertex = np.cumsum([0] + [len(v) for v, _ in self._parts])
+            first_face = np.cumsum([0] + [len(f) for _, f in self._parts])
+            vertices = np.concatenate([np.zeros((0, 3), np.float32)] + [v for v, _ in self._parts])
+            faces = [f + np.uint32(first) for (_, f), first in zip(self._parts, first_vertex)]
+            faces = np.concatenate([np.zeros((0, 3), np.uint32)] + faces)
+            self._compiled = compile((vertices, faces), quality="fast"), first_face
+        return self._compiled
+
+    def _rays(self, rays, nthreads):
+        rays = np.asarray(rays)
+        if rays.ndim == 0 or rays.shape[-1] != 6:
+            raise ValueError(f"rays: expected the shape (..., 6), got {rays.shape}")
+        return rays[..., :3], rays[..., 3:], nthreads or self._threads
+
+    def _ids(self, triangles):
+        """Geometries, and triangles in them, of triangles of the scene; INVALID_ID for none."""
+        first = self._scene()[1]
+        geometry = np.searchsorted(first, triangles, side="right") - 1
+        none = triangles == _INVALID
+        local = triangles - first[np.where(none, 0, geometry)]
+        return np.where(none, _INVALID, geometry).astype(np.uint32), np.where(none, _INVALID, local).astype(np.uint32)
+
+    def cast_rays(self, rays, nthreads=0):
+        """Nearest hits: t_hit, geometry_ids, primitive_ids, primitive_uvs, primitive_normals."""
+        origins, directions, threads = self._rays(rays, nthreads)
+        hits = self._scene()[0].nearest(origins, directions, threads=threads)
+        geometry, primitive = self._ids(hits.triangle)
+        return {
+            "t_hit": hits.t, "geometry_ids": geometry, "primitive_ids": primitive,
+            "primitive_uvs": np.stack([hits.u, hits.v], axis=-1), "primitive_normals": hits.normal.astype(np.float32),
+        }
+
+    def test_occlusions(self, rays, tnear=0.0, tfar=float("inf"), nthreads=0):
+        """Whether rays hit anything between tnear and tfar."""
+        origins, directions, threads = self._rays(rays, nthreads)
+        return self._scene()[0].any(origins, directions, tmin=tnear, tmax=tfar, threads=threads)
+
+    def count_intersections(self, rays, nthreads=0):
+        """Number of triangles that rays hit."""
+        origins, directions, threads = self._rays(rays, nthreads)
+        return self._scene()[0].count(origins, directions, threads=threads).astype(np.int32)
+
+    def list_intersections(self, rays, nthreads=0):
+        """All hits: ray_splits (offsets), ray_ids, t_hit, geometry_ids, primitive_ids, primitive_uvs."""
+        origins, directions, threads = self._rays(rays, nthreads)
+        found = self._scene()[0].all_hits(origins, directions, threads=threads)
+        geometry, primitive = self._ids(found.triangle)
+        return {
+            "ray_splits": found.offsets, "ray_ids": found.ray, "t_hit": found.t, "geometry_ids": geometry,
+            "primitive_ids": primitive, "primitive_uvs": np.stack([found.u, found.v], axis=-1),
+        }
+
+    def compute_closest_points(self, query_points, nthreads=0):
+        """Closest points: points, geometry_ids, primitive_ids, primitive_uvs, primitive_normals."""
+        scene = self._scene()[0]
+        closest = scene.closest(query_points, threads=nthreads or self._threads)
+        geometry, primitive = self._ids(closest.triangle)
+        return {
+            "points": closest.point, "geometry_ids": geometry, "primitive_ids": primitive,
+            "primitive_uvs": np.stack([closest.u, closest.v], axis=-1),
+            "primitive_normals": scene.normals(closest.instance, closest.triangle).astype(np.float32),
+        }
+
+    def compute_distance(self, query_points, nthreads=0):
+        return self._scene()[0].closest(query_points, threads=nthreads or self._threads).distance
+
+    def compute_signed_distance(self, query_points, nthreads=0, nsamples=1):
+        """nsamples: one ray decides exactly; more would not change the answer."""
+        _odd(nsamples)
+        return self._scene()[0].signed_distance(query_points, threads=nthreads or self._threads)
+
+    def compute_occupancy(self, query_points, nthreads=0, nsamples=1):
+        """1 for points inside, else 0."""
+        _odd(nsamples)
+        return self._scene()[0].contains(query_points, threads=nthreads or self._threads).astype(np.float32)
+
+    @staticmethod
+    def create_rays_pinhole(intrinsic_matrix=None, extrinsic_matrix=None, width_px=None, height_px=None, *, fov_deg=None,
+                            center=None, eye=None, up=None):
+        """Rays (height, width, 6) of a pinhole camera: by its matrices, or by fov_deg, center, eye and up. z is 1 in the camera's space."""
+        if intrinsic_matrix is None:
+            eye, center, up = (np.asarray(a, np.float64) for a in (eye, center, up))
+            forward = (center - eye) / np.linalg.norm(center - eye)
+            right = np.cross(forward, up)
+            right /= np.linalg.norm(right)
+            rotation = np.stack([right, np.cross(forward, right), forward])
+            focal = 0.5 * width_px / np.tan(0.5 * np.deg2rad(fov_deg))
+            intrinsic_matrix = [[focal, 0, 0.5 * width_px], [0, focal, 0.5 * height_px], [0, 0, 1]]
+            extrinsic_matrix = np.eye(4)
+            extrinsic_matrix[:3, :3], extrinsic_matrix[:3, 3] = rotation, -rotation @ eye
+        intrinsic, extrinsic = np.asarray(intrinsic_matrix, np.float64), np.asarray(extrinsic_matrix, np.float64)
+        y, x = np.meshgrid(np.arange(height_px) + 0.5, np.arange(width_px) + 0.5, indexing="ij")
+        pixels = np.stack([x, y, np.ones_like(x)], axis=-1)
+        directions = pixels @ np.linalg.inv(intrinsic).T @ extrinsic[:3, :3]
+        origins = np.broadcast_to(-extrinsic[:3, :3].T @ extrinsic[:3, 3], directions.shape)
+        return np.concatenate([origins, directions], axis=-1).astype(np.float32)
+
+
+def _odd(nsamples):
+    if int(nsamples) < 1 or int(nsamples) % 2 == 0:
+        raise ValueError(f"nsamples: expected an odd number, got {nsamples}")

@@ -1,0 +1,262 @@
+//! The compiler: files and arrays to scenes.
+
+use crate::errors::{compile_error, format_error};
+use crate::options::{Keywords, options};
+use crate::scene::NativeScene;
+use crate::work;
+use bth_cache::Store;
+use bth_compile::cached::Cache;
+use bth_compile::memory::{self, TriangleMesh};
+use bth_compile::pipeline::CompileOptions;
+use bth_compile::scene::{CachePolicy, SceneSource};
+use bth_compile::{Monitor, write};
+use bth_import::gltf::Chosen;
+use bth_import::gltf::scene::ImportOptions;
+use numpy::PyReadonlyArray2;
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Progress of a compilation, which another thread looks at.
+#[derive(Default)]
+struct Progress {
+    cancelled: AtomicBool,
+    stage: Mutex<(&'static str, Option<u64>)>,
+    done: AtomicU64,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Monitor for Progress {
+    fn stage(&self, name: &'static str, total: Option<u64>) {
+        *work::lock(&self.stage) = (name, total);
+        self.done.store(0, Ordering::Relaxed);
+    }
+
+    fn advance(&self, units: u64) {
+        self.done.fetch_add(units, Ordering::Relaxed);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn warn(&self, message: &str) {
+        work::lock(&self.warnings).push(message.to_owned());
+    }
+}
+
+/// Where results are kept.
+#[derive(FromPyObject)]
+enum CacheKeyword {
+    Switch(bool),
+    Folder(PathBuf),
+}
+
+/// The store that the keywords name; `default` is whether there is one if they name none.
+fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Option<Store>> {
+    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
+    let (folder, asked) = match keywords.value::<CacheKeyword>("cache")? {
+        Some(CacheKeyword::Switch(false)) => return Ok(None),
+        None if !default || set("BTH_NO_CACHE").is_some() => return Ok(None),
+        Some(CacheKeyword::Folder(folder)) => (Some(folder), true),
+        Some(CacheKeyword::Switch(true)) | None => (bth_cache::folder(), false),
+    };
+    let Some(folder) = folder else { return Ok(None) };
+    let size = match set("BTH_CACHE_SIZE") {
+        Some(text) => bth_cache::parse_bytes(&text)
+            .map_err(|e| PyValueError::new_err(format!("BTH_CACHE_SIZE: {e}")))?,
+        None => bth_cache::DEFAULT_CAP,
+    };
+    match Store::open(&folder, size) {
+        Ok(store) => Ok(Some(store)),
+        // The default folder may be one that cannot be written to.
+        Err(_) if !asked => Ok(None),
+        Err(e) => Err(PyOSError::new_err(format!("{} cannot be the cache: {e}", folder.display()))),
+    }
+}
+
+/// The cache of a model, named by its path in messages about misses.
+fn cache<'a>(store: Option<&'a Store>, model: &Path) -> Cache<'a> {
+    let subject = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
+    store.map_or_else(Cache::none, |store| Cache::new(store, subject.to_string_lossy()))
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|e| extensions.iter().any(|wanted| e.eq_ignore_ascii_case(wanted)))
+}
+
+fn gltf_options(keywords: &Keywords<'_, '_>) -> PyResult<ImportOptions> {
+    let animation = match keywords.value::<String>("animation")?.as_deref() {
+        None | Some("all") => Chosen::All,
+        Some("none") => Chosen::None,
+        Some(name) => Chosen::One(name.to_owned()),
+    };
+    let rate = keywords.value("rate")?.unwrap_or(24.0);
+    if !(f64::is_finite(rate) && rate > 0.0) {
+        return Err(PyValueError::new_err(format!("rate: expected a number above 0, got {rate}")));
+    }
+    Ok(ImportOptions {
+        scene: keywords.value("scene")?,
+        animation,
+        rate,
+        strict: keywords.value("strict")?.unwrap_or(false),
+    })
+}
+
+/// Runs a compilation on threads of the pool; calls `progress` with stage, units done and units in all.
+pub(crate) fn monitored<T: Send>(
+    py: Python<'_>,
+    keywords: &Keywords<'_, '_>,
+    compile: impl FnOnce(&dyn Monitor) -> bth_compile::Result<T> + Send,
+) -> PyResult<T> {
+    let monitor = Progress::default();
+    let progress: Option<Py<PyAny>> = keywords.get("progress")?.map(Bound::unbind);
+    let threads: usize = keywords.value("threads")?.unwrap_or(0);
+    let warn = |py: Python<'_>| -> PyResult<()> {
+        for message in std::mem::take(&mut *work::lock(&monitor.warnings)) {
+            let text = std::ffi::CString::new(message.replace('\0', " ")).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<pyo3::exceptions::PyUserWarning>(), &text, 1)?;
+        }
+        Ok(())
+    };
+    let look = |py: Python<'_>| -> PyResult<()> {
+        if let Some(progress) = &progress {
+            let (stage, total) = *work::lock(&monitor.stage);
+            progress.call1(py, (stage, monitor.done.load(Ordering::Relaxed), total))?;
+        }
+        Ok(())
+    };
+    let work = || -> Result<T, Failure> {
+        if threads == 0 {
+            return work::pool().install(|| compile(&monitor)).map_err(Failure::Compile);
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.map_err(|e| Failure::Threads(e.to_string()))?
+            .install(|| compile(&monitor))
+            .map_err(Failure::Compile)
+    };
+    let result = work::run_cancellable(py, &monitor.cancelled, work, look)?;
+    warn(py)?;
+    result.map_err(|failure| match failure {
+        Failure::Compile(e) => compile_error(e),
+        Failure::Threads(e) => PyValueError::new_err(format!("threads: cannot start {threads}: {e}")),
+    })
+}
+
+enum Failure {
+    Compile(bth_compile::Error),
+    Threads(String),
+}
+
+/// Compiles a model or a scene from a file. Returns the bytes of the compiled file.
+#[pyfunction]
+pub(crate) fn compile_path(
+    py: Python<'_>,
+    path: PathBuf,
+    keywords: &Bound<'_, PyDict>,
+) -> PyResult<NativeScene> {
+    let keywords = Keywords(keywords);
+    let options = options(&keywords)?;
+    let store = store(&keywords, true)?;
+    let gltf = gltf_options(&keywords)?;
+    let flatten = keywords.value("flatten")?.unwrap_or(false);
+    let output: Option<PathBuf> = keywords.value("output")?;
+    let bytes = monitored(py, &keywords, |monitor| {
+        let content = compile_file(&path, flatten, &gltf, &options, store.as_ref(), monitor)?;
+        deliver(&content, output.as_deref())
+    })?;
+    let scene = py.detach(|| bth::from_bytes(&bytes));
+    scene.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+/// The error of the compiler for one of a manifest.
+fn manifest_error(error: bth_scene::Error) -> bth_compile::Error {
+    let (path, message) = (error.path.clone(), format!("{}:{}: {}", error.line, error.column, error.message));
+    match error.code {
+        bth_scene::error::code::READ => bth_compile::Error::File { code: error.code, path, message },
+        code => bth_compile::Error::Input {
+            code,
+            place: bth_compile::Place::File(path),
+            message,
+            hint: error.hint,
+        },
+    }
+}
+
+/// Compiles triangles: float32 positions and uint32 indices, three a row.
+#[pyfunction]
+pub(crate) fn compile_mesh(
+    py: Python<'_>,
+    positions: PyReadonlyArray2<'_, f32>,
+    triangles: PyReadonlyArray2<'_, u32>,
+    keywords: &Bound<'_, PyDict>,
+) -> PyResult<NativeScene> {
+    let keywords = Keywords(keywords);
+    let options = options(&keywords)?;
+    let store = store(&keywords, false)?;
+    let output: Option<PathBuf> = keywords.value("output")?;
+    let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
+    let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let mesh = TriangleMesh { positions, triangles };
+    let opened = monitored(py, &keywords, |monitor| {
+        if store.is_none() && output.is_none() {
+            return memory::open(mesh, &options, monitor).map(Ok);
+        }
+        let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "mesh"));
+        let compiled = memory::compile_cached(mesh, &options, &cache, &|_| true, monitor)?;
+        let content = compiled.content.ok_or_else(no_content)?;
+        deliver(&content, output.as_deref()).map(|bytes| bth::from_bytes(&bytes))
+    })?;
+    opened.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+fn no_content() -> bth_compile::Error {
+    bth_compile::Error::Internal { code: "BTH-X082", message: "the compiler returned no file".to_owned() }
+}
+
+/// The bytes of a compiled file, which are also written to `output`.
+fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Result<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(content.length() as usize);
+    content.write_to(&mut bytes).map_err(|e| bth_compile::Error::File {
+        code: "BTH-O001",
+        path: "the compiled file".into(),
+        message: e.to_string(),
+    })?;
+    if let Some(output) = output {
+        write::write_content(output, content)?;
+    }
+    Ok(bytes)
+}
+
+/// Compiles a file as the program does: glTF files and manifests are scenes.
+fn compile_file(
+    path: &Path,
+    flatten: bool,
+    gltf: &ImportOptions,
+    options: &CompileOptions,
+    store: Option<&Store>,
+    monitor: &dyn Monitor,
+) -> bth_compile::Result<write::Content> {
+    let cache = cache(store, path);
+    let content =
+        if has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten {
+            let manifest = match has_extension(path, &["manifest", "toml"]) {
+                true => bth_scene::read(path).map_err(manifest_error)?,
+                false => {
+                    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                    bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
+                }
+            };
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let source = SceneSource { folder, name: path };
+            let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+            bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
+        } else {
+            bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
+        };
+    content.ok_or_else(no_content)
+}

@@ -1,0 +1,41 @@
+//! Exceptions.
+
+use pyo3::create_exception;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+
+create_exception!(
+    bth,
+    BthError,
+    PyValueError,
+    "A model or a compiled file cannot be used. Its attribute `code` is stable, such as 'BTH-F001'."
+);
+
+/// An exception with a code.
+fn coded(code: &str, message: String) -> PyErr {
+    let error = BthError::new_err(message);
+    Python::attach(|py| {
+        // Without the attribute the message still has the code.
+        let _ = error.value(py).setattr("code", code);
+    });
+    error
+}
+
+/// The exception for an error of the file format: `OSError` where a file cannot be read, else `bth.Error`.
+pub(crate) fn format_error(error: &bth_format::Error) -> PyErr {
+    let code = error.code().as_str();
+    let text = error.to_string();
+    if code.starts_with("BTH-O") { PyOSError::new_err(text) } else { coded(code, text) }
+}
+
+/// The exception for an error of the compiler.
+pub(crate) fn compile_error(error: bth_compile::Error) -> PyErr {
+    use bth_compile::Error;
+    let text = error.to_string();
+    match error {
+        Error::Input { code, .. } | Error::Limit { code, .. } => coded(code, text),
+        Error::File { .. } => PyOSError::new_err(text),
+        Error::Internal { .. } => PyRuntimeError::new_err(text),
+        Error::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
+    }
+}

@@ -1,0 +1,59 @@
+//! The native module of the Python package `bth`. It holds what must be fast or needs the library; shapes, defaults and
+//! documentation are in the Python modules above it (`python/bth`).
+//!
+//! | file | |
+//! |---|---|
+//! | `work` | runs a call's chunks on threads without the interpreter's lock, and lets signals through |
+//! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
+//! | `scene`, `shared` | a scene that threads share
+//! | `queries`, `many`, `points` | its queries |
+//! | `options`, `compile` | the compiler |
+//! | `errors` | exceptions |
+
+// Functions take what Python passes, and return tuples of arrays.
+#![allow(clippy::too_many_arguments, clippy::type_complexity)]
+
+mod compile;
+mod errors;
+mod many;
+mod options;
+mod output;
+mod points;
+mod queries;
+mod rays;
+mod scene;
+mod shared;
+mod work;
+
+use pyo3::prelude::*;
+
+/// Native parts of the package `bth`.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("Error", py.get_type::<errors::BthError>())?;
+    module.add_class::<scene::NativeScene>()?;
+    module.add_function(wrap_pyfunction!(scene::open, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::load, module)?)?;
+    module.add_function(wrap_pyfunction!(queries::nearest, module)?)?;
+    module.add_function(wrap_pyfunction!(queries::any, module)?)?;
+    module.add_function(wrap_pyfunction!(compile::compile_path, module)?)?;
+    module.add_function(wrap_pyfunction!(many::all_hits, module)?)?;
+    module.add_function(wrap_pyfunction!(many::count, module)?)?;
+    module.add_function(wrap_pyfunction!(many::crossings, module)?)?;
+    module.add_function(wrap_pyfunction!(points::contains, module)?)?;
+    module.add_function(wrap_pyfunction!(points::winding, module)?)?;
+    module.add_function(wrap_pyfunction!(points::signed_distance, module)?)?;
+    module.add_function(wrap_pyfunction!(points::closest, module)?)?;
+    module.add_function(wrap_pyfunction!(compile::compile_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(work::processors, module)?)?;
+    module.add_function(wrap_pyfunction!(isa, module)?)?;
+    Ok(())
+}
+
+/// Name of the instruction set that queries use: `avx512`, `avx2` or `scalar`. The environment variable BTH_ISA names another.
+#[pyfunction]
+fn isa() -> String {
+    format!("{:?}", bth::Isa::chosen()).to_lowercase()
+}

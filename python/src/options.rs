@@ -1,0 +1,172 @@
+//! The options of a compilation, as keywords of Python.
+
+use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::{bvh, coordinates, costs};
+use bth_format::layout::{GridBits, RecordKind};
+use bth_import::Keep;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyAny, PyDict};
+use std::path::PathBuf;
+
+/// The keywords of a call; those that are missing or `None` have their defaults.
+pub(crate) struct Keywords<'a, 'py>(pub(crate) &'a Bound<'py, PyDict>);
+
+impl<'py> Keywords<'_, 'py> {
+    /// The value of a keyword.
+    pub(crate) fn get(&self, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        Ok(self.0.get_item(name)?.filter(|value| !value.is_none()))
+    }
+
+    /// The value of a keyword, as a type of Rust.
+    pub(crate) fn value<T>(&self, name: &str) -> PyResult<Option<T>>
+    where
+        T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
+    {
+        let Some(value) = self.get(name)? else { return Ok(None) };
+        let value = value.extract().map_err(|error: PyErr| {
+            let py = value.py();
+            PyErr::from_type(error.get_type(py), format!("{name}: {}", error.value(py)))
+        })?;
+        Ok(Some(value))
+    }
+
+    /// A positive finite number.
+    fn positive(&self, name: &str) -> PyResult<Option<f64>> {
+        match self.value::<f64>(name)? {
+            Some(x) if !(x.is_finite() && x > 0.0) => {
+                Err(PyValueError::new_err(format!("{name}: expected a number above 0, got {x}")))
+            }
+            x => Ok(x),
+        }
+    }
+
+    /// The choice that a keyword names.
+    fn choice<T: Clone>(&self, name: &str, choices: &[(&str, T)]) -> PyResult<Option<T>> {
+        let Some(value) = self.get(name)? else { return Ok(None) };
+        let text = value.str()?.to_string();
+        match choices.iter().find(|(choice, _)| *choice == text) {
+            Some((_, choice)) => Ok(Some(choice.clone())),
+            None => {
+                let all: Vec<String> = choices.iter().map(|(choice, _)| format!("'{choice}'")).collect();
+                let message = format!("{name}: expected {}, got '{text}'", all.join(", "));
+                Err(PyValueError::new_err(message))
+            }
+        }
+    }
+}
+
+/// The options of the compiler.
+pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
+    let structure = keywords
+        .choice("structure", &[("bth", Structure::Bth), ("bvh", Structure::Bvh), ("tets", Structure::Tets)])?
+        .unwrap_or(Structure::Bvh);
+    let compact = keywords.value::<bool>("compact")?.unwrap_or(false);
+    let record = keywords.choice(
+        "tets",
+        &[
+            ("link32", RecordKind::Link32),
+            ("tet32", RecordKind::Tet32),
+            ("tet20", RecordKind::Tet20),
+            ("tet16", RecordKind::Tet16),
+        ],
+    )?;
+    let subtrees = keywords.choice("subtrees", &[("keep", true), ("prune", false)])?;
+    if compact && (record.is_some() || subtrees.is_some()) {
+        return Err(PyValueError::new_err(
+            "compact stands for tets='tet16' and subtrees='prune': leave these out",
+        ));
+    }
+    let mut options = CompileOptions {
+        structure,
+        attributes: keywords
+            .choice("attributes", &[("none", Keep::None), ("normals", Keep::Normals), ("all", Keep::All)])?
+            .unwrap_or_default(),
+        record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
+        coordinates: coordinates(keywords)?,
+        keep_subtrees: subtrees.unwrap_or(structure == Structure::Bth && !compact),
+        geometry: keywords.value("geometry")?.unwrap_or(true),
+        ..CompileOptions::default()
+    };
+    selection(keywords, &mut options)?;
+    if let Some(seconds) = keywords.value::<u64>("tet_deadline")? {
+        options.tets.deadline = std::time::Duration::from_secs(seconds);
+        options.tets.deadline_per_triangle = std::time::Duration::ZERO;
+    }
+    if let Some(mib) = keywords.value::<u32>("tet_memory")? {
+        options.tets.memory = u64::from(mib) << 20;
+    }
+    Ok(options)
+}
+
+fn coordinates(keywords: &Keywords<'_, '_>) -> PyResult<coordinates::CoordinateOptions> {
+    let bits = keywords
+        .choice("coordinates", &[("f32", None), ("21", Some(GridBits::B21)), ("16", Some(GridBits::B16))])?;
+    let max_error = match keywords.value::<MaxError>("max_error")? {
+        None => None,
+        Some(MaxError::Text(text)) => Some(text),
+        Some(MaxError::Number(x)) => Some(x.to_string()),
+    };
+    let max_error = max_error
+        .map(|text| text.parse().map_err(|e| PyValueError::new_err(format!("max_error: {e}"))))
+        .transpose()?;
+    let (bits, max_error) = match bits {
+        // As in the program: f32 that is asked for keeps all vertices in place.
+        Some(None) => (None, None),
+        Some(bits) => (bits, max_error),
+        None => (None, max_error),
+    };
+    let boxes = [("f32", coordinates::Boxes::F32), ("8", coordinates::Boxes::Bytes)];
+    let boxes = keywords.choice("boxes", &boxes)?.unwrap_or(coordinates::Boxes::F32);
+    Ok(coordinates::CoordinateOptions { bits, max_error, boxes })
+}
+
+/// A distance as a number, or in words of the program.
+#[derive(FromPyObject)]
+enum MaxError {
+    Number(f64),
+    Text(String),
+}
+
+fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyResult<()> {
+    let quality =
+        [("fast", bvh::Quality::Fast), ("balanced", bvh::Quality::Balanced), ("best", bvh::Quality::Best)];
+    if let Some(quality) = keywords.choice("quality", &quality)? {
+        options.bvh.quality = quality;
+    }
+    let costs = &mut options.costs;
+    let estimators =
+        [("face-count", costs::Estimator::FaceCount), ("average-depth", costs::Estimator::AverageDepth)];
+    if let Some(estimator) = keywords.choice("estimator", &estimators)? {
+        costs.estimator = estimator;
+    }
+    if let Some(select) =
+        keywords.choice("select", &[("best", costs::Select::Best), ("paper", costs::Select::Paper)])?
+    {
+        costs.select = select;
+    }
+    let rays = [
+        ("camera", costs::OptimizeFor::Camera),
+        ("secondary", costs::OptimizeFor::Secondary),
+        ("balanced", costs::OptimizeFor::Balanced),
+    ];
+    if let Some(rays) = keywords.choice("optimize_for", &rays)? {
+        costs.optimize_for = rays;
+    }
+    if let Some(probe) =
+        keywords.choice("probe", &[("steps", costs::Probe::Steps), ("off", costs::Probe::Off)])?
+    {
+        costs.probe = probe;
+    }
+    if let Some(triangles) = keywords.value("min_tet_triangles")? {
+        costs.minimum_triangles = triangles;
+    }
+    costs.for_scene = keywords.value("for_scene")?.unwrap_or(false);
+    costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;
+    costs.budget = keywords.positive("budget")?;
+    costs.c_tet = keywords.positive("c_tet")?;
+    if let Some(profile) = keywords.value::<PathBuf>("profile")? {
+        costs.profile = costs::Profile::read(&profile).map_err(crate::errors::compile_error)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! Hits to arrays of numpy that the caller has allocated, split into the parts of the chunks.
+
+use crate::rays::CHUNK;
+use bth::rays::Hit;
+use numpy::{Element, PyReadwriteArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::ops::Range;
+
+/// A mutable array of so many numbers.
+pub(crate) fn numbers<'a, T: Element>(
+    array: &'a mut PyReadwriteArray1<'_, T>,
+    count: usize,
+) -> PyResult<&'a mut [T]> {
+    let numbers =
+        array.as_slice_mut().map_err(|_| PyValueError::new_err("an array of results is not contiguous"))?;
+    match numbers.len() == count {
+        true => Ok(numbers),
+        false => Err(PyValueError::new_err(format!("an array of results has not the length {count}"))),
+    }
+}
+
+/// The arrays of a call for its hits: t, u, v, instance, triangle.
+#[derive(FromPyObject)]
+pub(crate) struct HitArrays<'py> {
+    #[pyo3(item(0))]
+    t: PyReadwriteArray1<'py, f32>,
+    #[pyo3(item(1))]
+    u: PyReadwriteArray1<'py, f32>,
+    #[pyo3(item(2))]
+    v: PyReadwriteArray1<'py, f32>,
+    #[pyo3(item(3))]
+    instance: PyReadwriteArray1<'py, u32>,
+    #[pyo3(item(4))]
+    triangle: PyReadwriteArray1<'py, u32>,
+}
+
+/// Where the hits of some rays go.
+pub(crate) struct HitColumns<'a> {
+    t: &'a mut [f32],
+    u: &'a mut [f32],
+    v: &'a mut [f32],
+    instance: &'a mut [u32],
+    triangle: &'a mut [u32],
+}
+
+impl HitArrays<'_> {
+    /// The columns for so many hits.
+    pub(crate) fn columns(&mut self, count: usize) -> PyResult<HitColumns<'_>> {
+        Ok(HitColumns {
+            t: numbers(&mut self.t, count)?,
+            u: numbers(&mut self.u, count)?,
+            v: numbers(&mut self.v, count)?,
+            instance: numbers(&mut self.instance, count)?,
+            triangle: numbers(&mut self.triangle, count)?,
+        })
+    }
+}
+
+impl<'a> HitColumns<'a> {
+    /// Splits off the first rows.
+    pub(crate) fn split_off(&mut self, rows: usize) -> HitColumns<'a> {
+        HitColumns {
+            t: split_off(&mut self.t, rows),
+            u: split_off(&mut self.u, rows),
+            v: split_off(&mut self.v, rows),
+            instance: split_off(&mut self.instance, rows),
+            triangle: split_off(&mut self.triangle, rows),
+        }
+    }
+
+    /// Stores as many hits as there are rows.
+    pub(crate) fn store(&mut self, hits: &[Hit]) {
+        // Column by column, so that each is one loop over adjacent numbers.
+        self.t.iter_mut().zip(hits).for_each(|(t, hit)| *t = hit.t);
+        self.u.iter_mut().zip(hits).for_each(|(u, hit)| *u = hit.u);
+        self.v.iter_mut().zip(hits).for_each(|(v, hit)| *v = hit.v);
+        self.instance.iter_mut().zip(hits).for_each(|(i, hit)| *i = hit.primitive.instance);
+        self.triangle.iter_mut().zip(hits).for_each(|(i, hit)| *i = hit.primitive.triangle);
+    }
+}
+
+fn split_off<'a, T>(rows: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    rows.split_off_mut(..count).expect("as many rows as the caller has counted")
+}
+
+/// The chunks of so many rays, each with its part of the results, which `part` splits off.
+pub(crate) fn chunks<T>(count: usize, mut part: impl FnMut(usize) -> T) -> Vec<(Range<usize>, T)> {
+    (0..count)
+        .step_by(CHUNK)
+        .map(|first| {
+            let range = first..(first + CHUNK).min(count);
+            let part = part(range.len());
+            (range, part)
+        })
+        .collect()
+}
+
+/// As [`chunks`], for results in one array.
+pub(crate) fn chunks_of<T>(mut results: &mut [T]) -> Vec<(Range<usize>, &mut [T])> {
+    chunks(results.len(), |rows| split_off(&mut results, rows))
+}

@@ -1,0 +1,206 @@
+//! The class of scenes: opening, closing, what a scene consists of, and its time.
+
+use crate::errors::format_error;
+use crate::shared::{Handle, OpenScene};
+use numpy::ndarray::{Array2, Array3};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1};
+use pyo3::exceptions::{PyIndexError, PyKeyError};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A scene that is open until it is closed or freed.
+#[pyclass(frozen, module = "bth._native", name = "Scene")]
+pub(crate) struct NativeScene(pub(crate) Handle);
+
+/// Opens a compiled file. `mapped` maps it instead of reading it, and checks less.
+#[pyfunction]
+pub(crate) fn open(py: Python<'_>, path: PathBuf, mapped: bool) -> PyResult<NativeScene> {
+    let scene = py.detach(|| if mapped { map(&path) } else { bth::open(&path) });
+    scene.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+#[allow(unsafe_code)]
+fn map(path: &std::path::Path) -> Result<bth::Scene, bth::Error> {
+    // SAFETY: the documentation of `bth.open` passes the requirement that nobody changes the file on to the caller, who has to
+    // ask for mapping.
+    unsafe { bth::map(path) }
+}
+
+/// Opens the bytes of a compiled file.
+#[pyfunction]
+pub(crate) fn load(py: Python<'_>, bytes: &[u8]) -> PyResult<NativeScene> {
+    let scene = py.detach(|| bth::from_bytes(bytes));
+    scene.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+impl NativeScene {
+    pub(crate) fn new(scene: bth::Scene) -> NativeScene {
+        NativeScene(Handle::new(scene))
+    }
+
+    /// Calls `read` with the scene and without the interpreter's lock.
+    fn with<T: Send>(&self, py: Python<'_>, read: impl FnOnce(&bth::Scene) -> T + Send) -> PyResult<T> {
+        let scene = self.0.get()?;
+        Ok(py.detach(|| read(&scene.read())))
+    }
+
+    pub(crate) fn get(&self) -> PyResult<Arc<OpenScene>> {
+        self.0.get()
+    }
+}
+
+fn no_instance(instance: u32, count: u32) -> PyErr {
+    PyIndexError::new_err(format!("instance {instance} of {count}"))
+}
+
+#[pymethods]
+impl NativeScene {
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| self.0.close());
+    }
+
+    #[getter]
+    fn closed(&self) -> bool {
+        self.0.is_closed()
+    }
+
+    /// The bytes of the compiled file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let scene = self.get()?;
+        let read = scene.read_attached(py);
+        Ok(PyBytes::new(py, read.file().bytes()))
+    }
+
+    /// Counts and facts.
+    fn facts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (file_bytes, resident, objects, instances, mapped, id, triangles, frames) =
+            self.with(py, |scene| {
+                let triangles: Vec<u32> =
+                    (0..scene.object_count()).map(|o| scene.object(o).header.triangles).collect();
+                let frames = scene
+                    .description()
+                    .map(|d| (d.scene[0].first_frame, d.scene[0].last_frame, d.scene[0].rate));
+                (
+                    scene.file().bytes().len(),
+                    scene.resident_bytes(),
+                    scene.object_count(),
+                    scene.instance_count(),
+                    scene.file().is_mapped(),
+                    scene.file().content_id(),
+                    triangles,
+                    frames,
+                )
+            })?;
+        let facts = PyDict::new(py);
+        facts.set_item("file_bytes", file_bytes)?;
+        facts.set_item("resident_bytes", resident)?;
+        facts.set_item("objects", objects)?;
+        facts.set_item("instances", instances)?;
+        facts.set_item("mapped", mapped)?;
+        facts.set_item("content_id", PyBytes::new(py, &id))?;
+        facts.set_item("triangles", triangles)?;
+        facts.set_item("frames", frames)?;
+        Ok(facts)
+    }
+
+    fn seconds(&self, py: Python<'_>) -> PyResult<f64> {
+        self.with(py, bth::Scene::seconds)
+    }
+
+    /// Sets the time; returns the numbers of instances that moved.
+    fn set_seconds(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let updated = self.get()?.change(py, |scene| scene.set_seconds(seconds))?;
+        updated.map(drop).map_err(|e| format_error(&e))
+    }
+
+    fn set_frame(&self, py: Python<'_>, frame: i32) -> PyResult<()> {
+        let updated = self.get()?.change(py, |scene| scene.set_frame(frame))?;
+        updated.map(drop).map_err(|e| format_error(&e))
+    }
+
+    /// Object, node, whether visible, and box of an instance.
+    fn instance(
+        &self,
+        py: Python<'_>,
+        instance: u32,
+    ) -> PyResult<(u32, u32, bool, Option<([f32; 3], [f32; 3])>, Vec<Vec<f64>>)> {
+        self.with(py, |scene| {
+            if instance >= scene.instance_count() {
+                return Err(no_instance(instance, scene.instance_count()));
+            }
+            let view = scene.instance(instance);
+            let rows = view.to_world.iter().map(|row| row.to_vec()).collect();
+            Ok((view.object, view.node, view.visible, scene.instance_bounds(instance), rows))
+        })?
+    }
+
+    /// For each instance the 3×4 matrix that transforms its object's space to world space, and the indices of objects.
+    fn placements<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray3<f64>>, Vec<u32>, Vec<bool>)> {
+        let (matrices, objects, visible) = self.with(py, |scene| {
+            let count = scene.instance_count();
+            let mut matrices = Array3::zeros((count as usize, 3, 4));
+            let (mut objects, mut visible) = (Vec::new(), Vec::new());
+            for i in 0..count {
+                let view = scene.instance(i);
+                for (row, numbers) in view.to_world.iter().enumerate() {
+                    for (column, number) in numbers.iter().enumerate() {
+                        matrices[[i as usize, row, column]] = *number;
+                    }
+                }
+                objects.push(view.object);
+                visible.push(view.visible);
+            }
+            (matrices, objects, visible)
+        })?;
+        Ok((matrices.into_pyarray(py), objects, visible))
+    }
+
+    /// Lower and upper end of a box that contains all visible instances.
+    fn bounds(&self, py: Python<'_>) -> PyResult<Option<([f32; 3], [f32; 3])>> {
+        self.with(py, |scene| {
+            (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)).reduce(|a, b| {
+                let lower = std::array::from_fn(|k| a.0[k].min(b.0[k]));
+                let upper = std::array::from_fn(|k| a.1[k].max(b.1[k]));
+                (lower, upper)
+            })
+        })
+    }
+
+    /// Positions and triangles of an object, if the file has them.
+    fn geometry<'py>(
+        &self,
+        py: Python<'py>,
+        object: u32,
+    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>)> {
+        let (positions, triangles) = self.with(py, |scene| {
+            if object >= scene.object_count() {
+                return Err(PyIndexError::new_err(format!("object {object} of {}", scene.object_count())));
+            }
+            let view = scene.object(object);
+            if view.triangles.is_empty() && view.header.triangles > 0 {
+                return Err(PyKeyError::new_err("the file has been compiled without its geometry"));
+            }
+            let rows = |rows: usize| (rows, 3);
+            let positions =
+                Array2::from_shape_vec(rows(view.positions.len()), view.positions.as_flattened().to_vec());
+            let triangles =
+                Array2::from_shape_vec(rows(view.triangles.len()), view.triangles.as_flattened().to_vec());
+            Ok((positions.expect("three a row"), triangles.expect("three a row")))
+        })??;
+        Ok((positions.into_pyarray(py), triangles.into_pyarray(py)))
+    }
+
+    /// Geometric normals in world space of triangles of instances, not normalized; zeros for no triangle.
+    fn normals<'py>(
+        &self,
+        py: Python<'py>,
+        instances: PyReadonlyArray1<'_, u32>,
+        triangles: PyReadonlyArray1<'_, u32>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (instances, triangles) = (instances.as_array(), triangles.as_array());
+        let normals = self.with(py, |scene| crate::queries::normals(scene, instances, triangles))??;
+        Ok(normals.into_pyarray(py))
+    }
+}

@@ -1,0 +1,93 @@
+//! A scene that several threads use: many trace it, one at a time changes it, and any may close it.
+
+use crate::work;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, RwLock, RwLockReadGuard, TryLockError};
+use std::time::Duration;
+
+/// A scene that is open. It is freed when it has been closed and no call uses it any more.
+pub(crate) struct OpenScene {
+    scene: RwLock<bth::Scene>,
+    /// Threads that wait to change the scene; others let them go first.
+    changing: AtomicU32,
+}
+
+impl OpenScene {
+    pub(crate) fn new(scene: bth::Scene) -> Arc<OpenScene> {
+        Arc::new(OpenScene { scene: RwLock::new(scene), changing: AtomicU32::new(0) })
+    }
+
+    /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the scene needs it.
+    pub(crate) fn read(&self) -> RwLockReadGuard<'_, bth::Scene> {
+        // The handler of a signal is inside of a call, perhaps of this scene: it must not wait for whom that call keeps waiting.
+        while self.changing.load(Ordering::Relaxed) > 0 && !work::is_inside_call() {
+            std::thread::sleep(Duration::from_micros(100));
+        }
+        self.scene.read().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// As [`Self::read`], for a thread that holds the interpreter's lock.
+    pub(crate) fn read_attached(&self, py: Python<'_>) -> RwLockReadGuard<'_, bth::Scene> {
+        loop {
+            match self.scene.try_read() {
+                Ok(scene) => return scene,
+                Err(TryLockError::Poisoned(scene)) => return scene.into_inner(),
+                Err(TryLockError::WouldBlock) => {}
+            }
+            py.detach(|| drop(self.read()));
+        }
+    }
+
+    /// Changes the scene when no query uses it any more.
+    pub(crate) fn change<T: Send>(
+        &self,
+        py: Python<'_>,
+        change: impl FnOnce(&mut bth::Scene) -> T + Send,
+    ) -> PyResult<T> {
+        if work::is_inside_call() {
+            let message =
+                "a scene cannot be changed in the handler of a signal that interrupts a call of this package";
+            return Err(PyRuntimeError::new_err(message));
+        }
+        self.changing.fetch_add(1, Ordering::Relaxed);
+        let result = py.detach(|| {
+            // Not `write`, after whose call readers would wait, the handlers of signals too.
+            loop {
+                match self.scene.try_write() {
+                    Ok(mut scene) => return Ok(change(&mut scene)),
+                    Err(TryLockError::Poisoned(scene)) => return Ok(change(&mut scene.into_inner())),
+                    Err(TryLockError::WouldBlock) => work::check_signals()?,
+                }
+                std::thread::sleep(Duration::from_micros(200));
+            }
+        });
+        self.changing.fetch_sub(1, Ordering::Relaxed);
+        result
+    }
+}
+
+/// The scene of a Python object, until it is closed.
+pub(crate) struct Handle(Mutex<Option<Arc<OpenScene>>>);
+
+impl Handle {
+    pub(crate) fn new(scene: bth::Scene) -> Handle {
+        Handle(Mutex::new(Some(OpenScene::new(scene))))
+    }
+
+    /// The scene, which stays open for as long as the caller holds it.
+    pub(crate) fn get(&self) -> PyResult<Arc<OpenScene>> {
+        work::lock(&self.0).clone().ok_or_else(|| PyValueError::new_err("the scene is closed"))
+    }
+
+    /// Closes the scene. Calls that use it end first.
+    pub(crate) fn close(&self) {
+        let scene = work::lock(&self.0).take();
+        drop(scene);
+    }
+
+    pub(crate) fn is_closed(&self) -> bool {
+        work::lock(&self.0).is_none()
+    }
+}

@@ -1,0 +1,192 @@
+//! Runs the chunks of a call on threads without the interpreter's lock, and lets signals through.
+
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+/// How often a call looks for signals such as that of Ctrl-C. It takes the interpreter's lock for this.
+const SIGNALS_EVERY: Duration = Duration::from_millis(50);
+
+thread_local! {
+    /// How many calls this thread is in: more than one where the handler of a signal uses a scene.
+    static DEPTH: Cell<u32> = const { Cell::new(0) };
+}
+
+/// Whether this thread is inside of a call, as the handler of a signal that interrupts one.
+pub(crate) fn is_inside_call() -> bool {
+    DEPTH.get() > 0
+}
+
+/// Counts a call for as long as it exists.
+struct Inside;
+
+impl Inside {
+    fn new() -> Inside {
+        DEPTH.set(DEPTH.get() + 1);
+        Inside
+    }
+}
+
+impl Drop for Inside {
+    fn drop(&mut self) {
+        DEPTH.set(DEPTH.get() - 1);
+    }
+}
+
+/// Number of processors that this process may use.
+#[pyfunction]
+pub(crate) fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// A lock whose holder cannot leave what it guards half changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// The threads that all calls share, as many as processors. A child process after a fork has none of its parent's threads, so it starts its own.
+pub(crate) fn pool() -> Arc<ThreadPool> {
+    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    let process = std::process::id();
+    let mut pool = lock(&POOL);
+    if let Some((of, pool)) = &*pool
+        && *of == process
+    {
+        return pool.clone();
+    }
+    let threads = ThreadPoolBuilder::new().thread_name(|i| format!("bth-{i}")).num_threads(processors());
+    let new = Arc::new(threads.build().expect("threads can be started"));
+    // To drop the parent's would wait for threads that do not exist here.
+    std::mem::forget(pool.replace((process, new.clone())));
+    new
+}
+
+/// Lets the handlers of signals run. Fails with the exception that one raises.
+pub(crate) fn check_signals() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
+}
+
+/// Calls `work` with each of the jobs, on up to so many threads, without the interpreter's lock. One thread is the caller's own. Ends
+/// early with the exception that the handler of a signal raises; then some of the jobs have not been done.
+pub(crate) fn run<J: Send>(
+    py: Python<'_>,
+    threads: usize,
+    jobs: Vec<J>,
+    work: impl Fn(J) + Sync + Send,
+) -> PyResult<()> {
+    let threads = threads.min(jobs.len());
+    let queue = Mutex::new(jobs.into_iter());
+    let next = || lock(&queue).next();
+    let _inside = Inside::new();
+    py.detach(|| if threads <= 1 { alone(&next, &work) } else { together(threads, &next, &work) })
+}
+
+/// Does all jobs on the caller's thread.
+fn alone<J>(next: &impl Fn() -> Option<J>, work: &impl Fn(J)) -> PyResult<()> {
+    let mut looked = Instant::now();
+    while let Some(job) = next() {
+        work(job);
+        if looked.elapsed() > SIGNALS_EVERY {
+            check_signals()?;
+            looked = Instant::now();
+        }
+    }
+    Ok(())
+}
+
+/// How many threads are still at work.
+#[derive(Default)]
+struct Working {
+    count: Mutex<usize>,
+    changed: Condvar,
+}
+
+/// Counts a thread as being at work for as long as it exists.
+struct AtWork<'a>(&'a Working);
+
+impl Drop for AtWork<'_> {
+    fn drop(&mut self) {
+        *lock(&self.0.count) -= 1;
+        self.0.changed.notify_one();
+    }
+}
+
+/// Does all jobs on threads of the pool, while the caller's waits for them and looks for signals.
+fn together<J: Send>(
+    threads: usize,
+    next: &(impl Fn() -> Option<J> + Sync),
+    work: &(impl Fn(J) + Sync),
+) -> PyResult<()> {
+    let pool = pool();
+    let stop = AtomicBool::new(false);
+    let working = Working { count: Mutex::new(threads), ..Working::default() };
+    let mut outcome = Ok(());
+    pool.in_place_scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|_| {
+                let _at_work = AtWork(&working);
+                while !stop.load(Ordering::Relaxed)
+                    && let Some(job) = next()
+                {
+                    work(job);
+                }
+            });
+        }
+        outcome = wait(&working, &stop);
+    });
+    outcome
+}
+
+/// Waits until no thread is at work, looking for signals.
+fn wait(working: &Working, stop: &AtomicBool) -> PyResult<()> {
+    let mut outcome = Ok(());
+    let mut count = lock(&working.count);
+    while *count > 0 {
+        let (guard, waited) = working
+            .changed
+            .wait_timeout(count, SIGNALS_EVERY)
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        count = guard;
+        if waited.timed_out() && *count > 0 && outcome.is_ok() {
+            drop(count);
+            outcome = check_signals();
+            stop.store(outcome.is_err(), Ordering::Relaxed);
+            count = lock(&working.count);
+        }
+    }
+    outcome
+}
+
+/// Runs something that stops soon after `cancelled` is set on a thread of its own, without the interpreter's lock. `look` is called
+/// every now and then with the interpreter; if it fails, or the handler of a signal does, `cancelled` is set.
+pub(crate) fn run_cancellable<T: Send>(
+    py: Python<'_>,
+    cancelled: &AtomicBool,
+    work: impl FnOnce() -> T + Send,
+    look: impl Fn(Python<'_>) -> PyResult<()> + Sync + Send,
+) -> PyResult<T> {
+    let _inside = Inside::new();
+    py.detach(|| {
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(work);
+            let mut failure = None;
+            let mut pause = Duration::from_millis(1);
+            while !worker.is_finished() {
+                std::thread::sleep(pause);
+                pause = (pause * 2).min(SIGNALS_EVERY);
+                if failure.is_none()
+                    && pause == SIGNALS_EVERY
+                    && let Err(error) = Python::attach(|py| py.check_signals().and_then(|()| look(py)))
+                {
+                    failure = Some(error);
+                    cancelled.store(true, Ordering::Relaxed);
+                }
+            }
+            let result = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            failure.map_or(Ok(result), Err)
+        })
+    })
+}

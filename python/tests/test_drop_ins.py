@@ -1,0 +1,116 @@
+"""The drop-ins for trimesh, embreex and Open3D."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from conftest import hits_by_force
+
+import bth
+from bth.embreex.mesh_construction import ElementMesh, TriangleMesh
+from bth.embreex.rtcore import EmbreeDevice
+from bth.embreex.rtcore_scene import EmbreeScene
+from bth.open3d import RaycastingScene
+
+
+@pytest.fixture(scope="module")
+def trimesh_mesh(mesh):
+    trimesh = pytest.importorskip("trimesh")
+    return trimesh.Trimesh(*mesh, process=False)
+
+
+def test_trimesh(trimesh_mesh, mesh, rays):
+    import bth.trimesh
+
+    ray = bth.trimesh.RayMeshIntersector(trimesh_mesh)
+    origins, directions = rays
+    expected = [hits_by_force(*mesh, o, d) for o, d in zip(origins, directions)]
+    triangles, of_ray, locations = ray.intersects_id(origins, directions, return_locations=True)
+    assert triangles.tolist() == [f for hits in expected for _, f in hits]
+    assert of_ray.tolist() == [i for i, hits in enumerate(expected) for _ in hits]
+    t = np.array([t for hits in expected for t, _ in hits])
+    np.testing.assert_allclose(locations, origins[of_ray] + t[:, None] * directions[of_ray], atol=1e-9)
+    first = [hits[0][1] if hits else -1 for hits in expected]
+    assert ray.intersects_first(origins, directions).tolist() == first
+    assert ray.intersects_any(origins, directions).tolist() == [f >= 0 for f in first]
+    assert ray.intersects_location(origins, directions, multiple_hits=False)[2].tolist() == [f for f in first if f >= 0]
+    assert ray.contains_points([[0, 0, 0], [0, 0, 2]]).tolist() == [True, False]
+    for other in (copy.copy(ray), copy.deepcopy(ray), pickle.loads(pickle.dumps(ray))):
+        assert other.intersects_first(origins, directions).tolist() == first
+    with pytest.raises(ValueError):
+        ray.intersects_any(origins, directions[:5])
+
+
+def test_trimesh_counts_an_edge_once(mesh, trimesh_mesh):
+    import bth.trimesh
+
+    ray = bth.trimesh.RayMeshIntersector(trimesh_mesh, scale_to_box=False)
+    targets = mesh[0].astype(float)
+    triangles, of_ray = ray.intersects_id(np.zeros_like(targets), targets)
+    assert of_ray.tolist() == list(range(len(targets)))
+
+
+def test_embreex(mesh, rays):
+    scene = EmbreeScene(EmbreeDevice())
+    TriangleMesh(scene, *mesh)
+    TriangleMesh(scene, mesh[0][mesh[1]] * 0.5)
+    both = bth.compile((np.concatenate([mesh[0], mesh[0] * 0.5]), np.concatenate([mesh[1], mesh[1] + len(mesh[0])])))
+    hits = both.nearest(*rays)
+    out = scene.run(*rays, output=1)
+    assert (out["primID"] == np.where(hits.hit, hits.triangle.astype(int) % len(mesh[1]), -1)).all()
+    assert (out["geomID"] == np.where(hits.hit, hits.triangle.astype(int) // len(mesh[1]), -1)).all()
+    assert (out["tfar"] == np.where(hits.hit, hits.t, np.float32(1e37))).all()
+    assert not out["Ng"][~hits.hit].any() and not out["u"][~hits.hit].any()
+    assert (scene.run(*rays) == out["primID"]).all()
+    assert (scene.run(*rays, query="DISTANCE") == out["tfar"]).all()
+    assert ((scene.run(*rays, query="OCCLUDED") >= 0) == hits.hit).all()
+    assert (scene.run(*rays, dists=0.01, query="OCCLUDED") >= 0).sum() < hits.hit.sum()
+    with pytest.raises(ValueError):
+        scene.run(*rays, query="COLOUR")
+
+
+@pytest.mark.parametrize("corners, element", [
+    ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [0, 1, 2, 3]),
+    ([(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 1), (1, 1, 1), (0, 1, 1), (0, 0, 1)], list(range(8))),
+])
+def test_embreex_elements_are_closed(corners, element):
+    scene = EmbreeScene()
+    ElementMesh(scene, np.array(corners, np.float32), np.array([element]))
+    compiled, _ = scene._scene()
+    assert compiled.contains([[0.1, 0.1, 0.1], [-0.1, 0.1, 0.1], [0.1, 0.1, 1.5]]).tolist() == [True, False, False]
+    assert scene.run(np.array([[-0.1, 0.1, 0.2]]), np.array([[1.0, 0, 0]]), query="DISTANCE") == pytest.approx(0.1)
+
+
+def test_open3d(mesh, rays):
+    scene = RaycastingScene()
+    assert scene.add_triangles(*mesh) == 0 and scene.add_triangles((mesh[0] + [5, 0, 0], mesh[1])) == 1
+    packed = np.concatenate(rays, axis=-1).reshape(20, 20, 6)
+    single = bth.compile((np.concatenate([mesh[0], mesh[0] + np.float32([5, 0, 0])]), np.concatenate([mesh[1], mesh[1] + len(mesh[0])])))
+    hits, out = single.nearest(*rays), scene.cast_rays(packed)
+    assert out["t_hit"].shape == (20, 20) and (out["t_hit"].ravel() == hits.t).all()
+    assert (out["geometry_ids"].ravel() == np.where(hits.hit, hits.triangle // len(mesh[1]), scene.INVALID_ID)).all()
+    assert (out["primitive_ids"].ravel() == np.where(hits.hit, hits.triangle % len(mesh[1]), scene.INVALID_ID)).all()
+    assert out["primitive_normals"].shape == (20, 20, 3) and out["primitive_uvs"].shape == (20, 20, 2)
+    assert (scene.test_occlusions(packed).ravel() == hits.hit).all()
+    listed = scene.list_intersections(packed)
+    assert (np.diff(listed["ray_splits"]) == scene.count_intersections(packed).ravel()).all()
+    points = np.array([[0, 0, 0], [5, 0, 0], [2.5, 0, 0]], np.float32)
+    assert scene.compute_occupancy(points).tolist() == [1, 1, 0]
+    assert (np.sign(scene.compute_signed_distance(points)) == [-1, -1, 1]).all()
+    assert (np.abs(scene.compute_signed_distance(points)) == scene.compute_distance(points)).all()
+    assert scene.compute_closest_points(points)["points"].shape == (3, 3)
+    with pytest.raises(ValueError):
+        scene.cast_rays(np.zeros((4, 3)))
+    with pytest.raises(ValueError):
+        scene.compute_occupancy(points, nsamples=2)
+
+
+def test_open3d_camera():
+    rays = RaycastingScene.create_rays_pinhole(fov_deg=60, center=[0, 0, 0], eye=[0, 0, 4], up=[0, 1, 0], width_px=8, height_px=4)
+    assert rays.shape == (4, 8, 6) and rays.dtype == np.float32
+    np.testing.assert_allclose(rays[..., :3], np.broadcast_to([0, 0, 4], (4, 8, 3)), atol=1e-6)
+    np.testing.assert_allclose(rays[..., 5], -1, atol=1e-6)
+    # Columns go right, rows go down; half a pixel from the border is seen under nearly half of the angle.
+    np.testing.assert_allclose(rays[0, :, 3], (np.arange(8) - 3.5) / 4 * np.tan(np.pi / 6), atol=1e-6)
+    assert (np.diff(rays[:, 0, 4]) < 0).all()

@@ -1,0 +1,210 @@
+//! The part of the C interface for closest points and for triangles in boxes and balls.
+
+use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, fail};
+use runtime::Scene;
+use runtime::rays::PrimitiveRef;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+
+/// `bth_closest` of `bth.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Closest {
+    distance: f32,
+    point: [f32; 3],
+    u: f32,
+    v: f32,
+    primitive: PrimitiveRef,
+    feature: u32,
+}
+
+const _: () = assert!(size_of::<Closest>() == 36);
+
+impl Closest {
+    const NONE: Closest = Closest {
+        distance: f32::INFINITY,
+        point: [0.0; 3],
+        u: 0.0,
+        v: 0.0,
+        primitive: PrimitiveRef::NONE,
+        feature: 0,
+    };
+
+    fn new(closest: Option<runtime::Closest>) -> Closest {
+        closest.map_or(Closest::NONE, |c| Closest {
+            distance: c.distance,
+            point: c.point,
+            u: c.u,
+            v: c.v,
+            primitive: c.primitive,
+            feature: c.feature.code(),
+        })
+    }
+}
+
+/// Number of points that are searched together.
+const CHUNK: usize = 1024;
+
+/// Calls `answer` for chunks of the points and of the results, with an offset of both.
+///
+/// # Safety
+/// `scene` is null or open, `points` is null or points to `count` elements, and they are not written to during the call.
+unsafe fn in_chunks(
+    name: &str,
+    scene: *const Scene,
+    points: *const [f32; 3],
+    count: usize,
+    mut answer: impl FnMut(&Scene, &[[f32; 3]], usize),
+) -> i32 {
+    if count == 0 {
+        return OK;
+    }
+    if scene.is_null() || points.is_null() {
+        return fail(ERROR_ARGUMENT, format!("{name}: pointers must not be null"));
+    }
+    // SAFETY: they are not null, so by contract the scene is open and there are `count` points.
+    let (scene, points) = unsafe { (&*scene, std::slice::from_raw_parts(points, count)) };
+    let all = AssertUnwindSafe(|| {
+        points.chunks(CHUNK).enumerate().for_each(|(i, points)| answer(scene, points, i * CHUNK));
+    });
+    catch_unwind(all).map_or_else(|_| fail(ERROR_INTERNAL, format!("{name}: internal error")), |()| OK)
+}
+
+/// Closest points; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open. `points` and `closest` are each null or point to `count` elements; those of `closest` are valid for
+/// writes and do not overlap the others.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_closest_points(
+    scene: *const Scene,
+    points: *const [f32; 3],
+    radius: f32,
+    closest: *mut Closest,
+    count: usize,
+) -> i32 {
+    if closest.is_null() && count > 0 {
+        return fail(ERROR_ARGUMENT, "bth_closest_points: pointers must not be null".into());
+    }
+    let mut found = [None; CHUNK];
+    // SAFETY: the contract of `in_chunks` is part of that of this function. `closest` is valid for `count` writes by contract, and
+    // `first + i` is below `count`.
+    unsafe {
+        in_chunks("bth_closest_points", scene, points, count, |scene, points, first| {
+            let found = &mut found[..points.len()];
+            scene.closest_batch(points, radius, found);
+            for (i, found) in found.iter().enumerate() {
+                closest.add(first + i).write(Closest::new(*found));
+            }
+        })
+    }
+}
+
+/// Signed distances; see `bth.h`.
+///
+/// # Safety
+/// As for [`bth_closest_points`], with `distances` in place of `closest`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_signed_distances(
+    scene: *const Scene,
+    points: *const [f32; 3],
+    distances: *mut f32,
+    count: usize,
+) -> i32 {
+    if distances.is_null() && count > 0 {
+        return fail(ERROR_ARGUMENT, "bth_signed_distances: pointers must not be null".into());
+    }
+    let mut found = [0.0; CHUNK];
+    // SAFETY: as in `bth_closest_points`.
+    unsafe {
+        in_chunks("bth_signed_distances", scene, points, count, |scene, points, first| {
+            let found = &mut found[..points.len()];
+            scene.signed_distance_batch(points, found);
+            ptr::copy_nonoverlapping(found.as_ptr(), distances.add(first), found.len());
+        })
+    }
+}
+
+/// Stores triangles that a query finds; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open, `triangles` is null or valid for writes of `capacity` elements, and `count` is null or valid for
+/// writes.
+unsafe fn store_found(
+    name: &str,
+    scene: *const Scene,
+    (triangles, capacity): (*mut PrimitiveRef, usize),
+    count: *mut usize,
+    find: impl FnOnce(&Scene, &mut Vec<PrimitiveRef>),
+) -> i32 {
+    // SAFETY: by contract both are null, and then rejected, or valid.
+    let (Some(scene), Some(count)) = (unsafe { scene.as_ref() }, unsafe { count.as_mut() }) else {
+        return fail(ERROR_ARGUMENT, format!("{name}: scene and count must not be null"));
+    };
+    *count = 0;
+    if triangles.is_null() && capacity > 0 {
+        return fail(ERROR_ARGUMENT, format!("{name}: triangles must not be null with a capacity"));
+    }
+    let mut found = Vec::new();
+    if catch_unwind(AssertUnwindSafe(|| find(scene, &mut found))).is_err() {
+        return fail(ERROR_INTERNAL, format!("{name}: internal error"));
+    }
+    *count = found.len();
+    let stored = found.len().min(capacity);
+    if stored > 0 {
+        // SAFETY: it is not null as the capacity is not 0, so by contract it is valid for writes of that many elements.
+        unsafe { ptr::copy_nonoverlapping(found.as_ptr(), triangles, stored) };
+    }
+    OK
+}
+
+/// Triangles in a box; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open, `lower` and `upper` are null or point to three numbers, `triangles` is null or valid for writes of
+/// `capacity` elements, and `count` is null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_triangles_in_box(
+    scene: *const Scene,
+    lower: *const [f32; 3],
+    upper: *const [f32; 3],
+    triangles: *mut PrimitiveRef,
+    capacity: usize,
+    count: *mut usize,
+) -> i32 {
+    // SAFETY: by contract both are null, and then rejected, or valid for reads.
+    let (Some(lower), Some(upper)) = (unsafe { lower.as_ref() }, unsafe { upper.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, "bth_triangles_in_box: lower and upper must not be null".into());
+    };
+    // SAFETY: the contract of `store_found` is part of that of this function.
+    unsafe {
+        store_found("bth_triangles_in_box", scene, (triangles, capacity), count, |scene, found| {
+            scene.triangles_in_box(*lower, *upper, found);
+        })
+    }
+}
+
+/// Triangles in a ball; see `bth.h`.
+///
+/// # Safety
+/// As for [`bth_triangles_in_box`], with `center` in place of `lower` and `upper`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_triangles_in_sphere(
+    scene: *const Scene,
+    center: *const [f32; 3],
+    radius: f32,
+    triangles: *mut PrimitiveRef,
+    capacity: usize,
+    count: *mut usize,
+) -> i32 {
+    // SAFETY: by contract it is null, and then rejected, or valid for reads.
+    let Some(center) = (unsafe { center.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, "bth_triangles_in_sphere: center must not be null".into());
+    };
+    // SAFETY: the contract of `store_found` is part of that of this function.
+    unsafe {
+        store_found("bth_triangles_in_sphere", scene, (triangles, capacity), count, |scene, found| {
+            scene.triangles_in_sphere(*center, radius, found);
+        })
+    }
+}

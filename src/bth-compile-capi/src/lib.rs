@@ -1,0 +1,271 @@
+//! C interface of the compiler. Its documentation is the header `include/bth_compile.h`, which must be kept consistent with this
+//! crate. It is a library of its own because the runtime does not depend on the compiler.
+#![allow(unsafe_code)] // Functions take pointers from C.
+
+mod monitor;
+pub mod options;
+
+use bth_cache::{DEFAULT_CAP, Store};
+use compiler::cached::Cache;
+use compiler::memory::{self, Instance, TriangleMesh};
+use compiler::pipeline::CompileOptions;
+use compiler::write::Content;
+use compiler::{Error, Monitor};
+use monitor::Callbacks;
+use options::Options;
+use std::cell::RefCell;
+use std::ffi::{CStr, CString, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+// Results of functions, `BTH_COMPILE_OK` and `BTH_COMPILE_ERROR_*` in C.
+const OK: i32 = 0;
+const ERROR_ARGUMENT: i32 = -1;
+const ERROR_FILE: i32 = -2;
+const ERROR_INPUT: i32 = -3;
+const ERROR_LIMIT: i32 = -4;
+const ERROR_INTERNAL: i32 = -5;
+const ERROR_CANCELLED: i32 = -6;
+
+thread_local! {
+    /// Result of [`bth_compile_last_error`].
+    static LAST_ERROR: RefCell<CString> = RefCell::default();
+}
+
+/// A code and a text.
+pub(crate) struct Failure(i32, String);
+
+/// The failure of a caller who gave something that cannot be.
+pub(crate) fn argument(text: String) -> Failure {
+    Failure(ERROR_ARGUMENT, text)
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let code = match &error {
+            Error::Input { .. } => ERROR_INPUT,
+            Error::File { .. } => ERROR_FILE,
+            Error::Limit { .. } => ERROR_LIMIT,
+            Error::Internal { .. } => ERROR_INTERNAL,
+            Error::Cancelled => ERROR_CANCELLED,
+        };
+        Failure(code, error.to_string())
+    }
+}
+
+/// `bth_mesh` of `bth_compile.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Mesh {
+    positions: *const [f32; 3],
+    position_count: usize,
+    triangles: *const [u32; 3],
+    triangle_count: usize,
+}
+
+/// `bth_mesh_instance` of `bth_compile.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct MeshInstance {
+    to_world: [[f64; 4]; 3],
+    mesh: u32,
+    reserved: u32,
+}
+
+/// `bth_bytes` of `bth_compile.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Bytes {
+    data: *mut u8,
+    length: usize,
+}
+
+const NO_BYTES: Bytes = Bytes { data: std::ptr::null_mut(), length: 0 };
+
+/// Compiles a mesh; see `bth_compile.h`.
+///
+/// # Safety
+/// Each pointer, those in structures included, is null or valid as `bth_compile.h` says, and nobody writes to what they point to
+/// during the call; `bytes` is null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_mesh(
+    mesh: *const Mesh,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: by contract `mesh` is null or valid for reads, and so are its arrays.
+    let input = unsafe {
+        mesh.as_ref().ok_or_else(|| argument("mesh must not be null".into())).and_then(|mesh| mesh.view())
+    };
+    // SAFETY: the contract of `with_bytes` is part of that of this function.
+    unsafe {
+        with_bytes(options, bytes, input, |mesh, options, cache, monitor| {
+            Ok(memory::compile_cached(*mesh, options, cache, &|_| true, monitor)?.content)
+        })
+    }
+}
+
+/// Compiles a scene; see `bth_compile.h`.
+///
+/// # Safety
+/// As [`bth_compile_mesh`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_compile_scene(
+    meshes: *const Mesh,
+    mesh_count: usize,
+    instances: *const MeshInstance,
+    instance_count: usize,
+    options: *const Options,
+    bytes: *mut Bytes,
+) -> i32 {
+    // SAFETY: by contract the arrays, and those of the meshes, are null or valid for reads.
+    let input = unsafe { scene(meshes, mesh_count, instances, instance_count) };
+    // SAFETY: the contract of `with_bytes` is part of that of this function.
+    unsafe {
+        with_bytes(options, bytes, input, |(meshes, instances), options, cache, monitor| {
+            Ok(memory::compile_scene(meshes, instances, options, cache, monitor)?.content)
+        })
+    }
+}
+
+/// The meshes and instances of a scene.
+///
+/// # Safety
+/// As [`Mesh::view`], for these arrays and those of the meshes.
+unsafe fn scene<'a>(
+    meshes: *const Mesh,
+    mesh_count: usize,
+    instances: *const MeshInstance,
+    instance_count: usize,
+) -> Result<(Vec<TriangleMesh<'a>>, Vec<Instance>), Failure> {
+    // SAFETY: by contract the arrays are null or valid for reads.
+    let (meshes, instances) = unsafe {
+        let meshes = slice(meshes, mesh_count, "meshes")?.iter().map(|mesh| mesh.view());
+        (meshes.collect::<Result<_, _>>()?, slice(instances, instance_count, "instances")?)
+    };
+    let instance = |i: &MeshInstance| Instance { mesh: i.mesh, to_world: i.to_world };
+    Ok((meshes, instances.iter().map(instance).collect()))
+}
+
+impl Mesh {
+    /// The arrays as slices.
+    ///
+    /// # Safety
+    /// Each array is null or valid for reads, and not written to during the life of the result.
+    unsafe fn view<'a>(&self) -> Result<TriangleMesh<'a>, Failure> {
+        // SAFETY: the contract of this function is that of `slice`.
+        unsafe {
+            Ok(TriangleMesh {
+                positions: slice(self.positions, self.position_count, "positions")?,
+                triangles: slice(self.triangles, self.triangle_count, "triangles")?,
+            })
+        }
+    }
+}
+
+/// An array as a slice; null is one without elements.
+///
+/// # Safety
+/// `first` is null or points to `count` elements, which are not written to during the life of the result.
+unsafe fn slice<'a, T>(first: *const T, count: usize, name: &str) -> Result<&'a [T], Failure> {
+    if count == 0 {
+        return Ok(&[]);
+    }
+    if first.is_null() || count.checked_mul(size_of::<T>()).is_none_or(|bytes| bytes > isize::MAX as usize) {
+        return Err(argument(format!("{count} {name} expected, found null or more than fit into memory")));
+    }
+    // SAFETY: it is not null and the bytes fit into an `isize`; by contract it points to `count` elements. All bit patterns are
+    // valid for the types of this crate that C fills.
+    Ok(unsafe { std::slice::from_raw_parts(first, count) })
+}
+
+/// Runs a compilation with options of C and stores what it makes, or the error.
+///
+/// # Safety
+/// `options` is null or valid for reads, its paths are null or C strings, and its functions may be called by any thread; `bytes` is
+/// null or valid for writes.
+unsafe fn with_bytes<T: Sync>(
+    options: *const Options,
+    bytes: *mut Bytes,
+    input: Result<T, Failure>,
+    compile: impl FnOnce(&T, &CompileOptions, &Cache<'_>, &dyn Monitor) -> compiler::Result<Option<Content>>
+    + Send,
+) -> i32 {
+    let run = || {
+        if bytes.is_null() {
+            return Err(argument("bytes must not be null".into()));
+        }
+        let input = input?;
+        // SAFETY: by contract it is null or valid for reads.
+        let options = unsafe { options.as_ref() }.copied().unwrap_or_default();
+        // SAFETY: by contract its paths are null or C strings.
+        let (chosen, folder) = unsafe { (options.compiler()?, options.cache()?) };
+        let store = folder.map(|folder| {
+            let cannot = |e| Failure(ERROR_FILE, format!("{}: cannot be a cache: {e}", folder.display()));
+            Store::open(&folder, DEFAULT_CAP).map_err(cannot)
+        });
+        let store = store.transpose()?;
+        let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "memory"));
+        let monitor = Callbacks::new(&options);
+        let content = in_threads(options.threads, || Ok(compile(&input, &chosen, &cache, &monitor)?))?;
+        let content = content.ok_or_else(|| Failure(ERROR_INTERNAL, "no content".into()))?;
+        let made = content.bytes().map_err(|e| Failure(ERROR_FILE, e.to_string()))?;
+        Ok(made.into_owned())
+    };
+    let outcome = catch_unwind(AssertUnwindSafe(run))
+        .unwrap_or_else(|_| Err(Failure(ERROR_INTERNAL, "internal error".to_owned())));
+    let (stored, code) = match outcome {
+        Ok(made) => {
+            let made = Box::leak(made.into_boxed_slice());
+            (Bytes { data: made.as_mut_ptr(), length: made.len() }, OK)
+        }
+        Err(Failure(code, text)) => {
+            let text = CString::new(text.replace('\0', "?")).unwrap_or_default();
+            LAST_ERROR.with(|last| *last.borrow_mut() = text);
+            (NO_BYTES, code)
+        }
+    };
+    // SAFETY: by contract it is null, and then skipped, or valid for writes.
+    unsafe { bytes.as_mut() }.into_iter().for_each(|out| *out = stored);
+    code
+}
+
+/// Runs a function in a pool of so many threads; 0 for the pool that all share.
+fn in_threads<T: Send>(threads: u32, work: impl FnOnce() -> Result<T, Failure> + Send) -> Result<T, Failure> {
+    if threads == 0 {
+        return work();
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
+    pool.map_err(|e| Failure(ERROR_INTERNAL, format!("threads cannot be started: {e}")))?.install(work)
+}
+
+/// Frees bytes; see `bth_compile.h`.
+///
+/// # Safety
+/// `bytes` is null, or what it points to comes from this library or is null and 0.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_free_bytes(bytes: *mut Bytes) {
+    // SAFETY: by contract it is null or valid for reads and writes.
+    let Some(bytes) = (unsafe { bytes.as_mut() }) else { return };
+    let Bytes { data, length } = std::mem::replace(bytes, NO_BYTES);
+    if !data.is_null() {
+        // SAFETY: `with_bytes` leaked a boxed slice of this address and length, which by contract has not been freed.
+        drop(unsafe { Box::from_raw(std::ptr::slice_from_raw_parts_mut(data, length)) });
+    }
+}
+
+/// Text of the last error on this thread; see `bth_compile.h`.
+#[unsafe(no_mangle)]
+pub extern "C" fn bth_compile_last_error() -> *const c_char {
+    LAST_ERROR.with(|last| last.borrow().as_ptr())
+}
+
+/// Version of this library; see `bth_compile.h`.
+#[unsafe(no_mangle)]
+pub extern "C" fn bth_compile_version() -> *const c_char {
+    const VERSION: &CStr =
+        match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+            Ok(version) => version,
+            Err(_) => panic!("a version has no zero byte"),
+        };
+    VERSION.as_ptr()
+}

@@ -1,0 +1,130 @@
+//! The options of a compilation in C, and what they mean in Rust.
+
+use crate::{Failure, argument};
+use bth_format::layout::GridBits;
+use compiler::bvh::Quality;
+use compiler::coordinates::{Boxes, MaxError};
+use compiler::pipeline::{CompileOptions, Structure};
+use std::ffi::{CStr, c_char, c_void};
+use std::path::PathBuf;
+
+/// `bth_progress` of `bth_compile.h`.
+pub type Progress = unsafe extern "C" fn(*mut c_void, *const c_char, u64, u64) -> i32;
+/// `bth_warning` of `bth_compile.h`.
+pub type Warning = unsafe extern "C" fn(*mut c_void, *const c_char);
+
+/// `bth_compile_options` of `bth_compile.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct Options {
+    structure: u32,
+    quality: u32,
+    flags: u32,
+    coordinate_bits: u32,
+    max_error: f64,
+    pub(crate) threads: u32,
+    reserved: u32,
+    cache: *const c_char,
+    tetgen: *const c_char,
+    pub(crate) progress: Option<Progress>,
+    pub(crate) warning: Option<Warning>,
+    pub(crate) user: *mut c_void,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            structure: 0,
+            quality: 0,
+            flags: 0,
+            coordinate_bits: 0,
+            max_error: 0.0,
+            threads: 0,
+            reserved: 0,
+            cache: std::ptr::null(),
+            tetgen: std::ptr::null(),
+            progress: None,
+            warning: None,
+            user: std::ptr::null_mut(),
+        }
+    }
+}
+
+const NO_GEOMETRY: u32 = 1;
+const BYTE_BOXES: u32 = 2;
+/// Greatest number of threads; more are a mistake.
+const MOST_THREADS: u32 = 1 << 12;
+
+impl Options {
+    /// The options of the compiler.
+    ///
+    /// # Safety
+    /// `tetgen` is null or points to a C string.
+    pub(crate) unsafe fn compiler(&self) -> Result<CompileOptions, Failure> {
+        let unknown = |what: &str, value: u32| Err(argument(format!("unknown {what} {value}")));
+        let structure = match self.structure {
+            0 => Structure::Bth,
+            1 => Structure::Bvh,
+            2 => Structure::Tets,
+            other => return unknown("structure", other),
+        };
+        let mut options = CompileOptions {
+            structure,
+            // As the program does by default.
+            keep_subtrees: structure == Structure::Bth,
+            geometry: self.flags & NO_GEOMETRY == 0,
+            ..CompileOptions::default()
+        };
+        options.bvh.quality = match self.quality {
+            0 => Quality::Balanced,
+            1 => Quality::Fast,
+            2 => Quality::Best,
+            other => return unknown("quality", other),
+        };
+        options.coordinates.bits = match self.coordinate_bits {
+            0 => None,
+            16 => Some(GridBits::B16),
+            21 => Some(GridBits::B21),
+            other => return unknown("number of bits of a coordinate:", other),
+        };
+        options.coordinates.max_error = match self.max_error {
+            0.0 => None,
+            limit if limit.is_finite() && limit > 0.0 => Some(MaxError::Absolute(limit)),
+            limit => return Err(argument(format!("max_error must be 0 or above, found {limit}"))),
+        };
+        if self.flags & BYTE_BOXES != 0 {
+            options.coordinates.boxes = Boxes::Bytes;
+        }
+        if self.flags & !(NO_GEOMETRY | BYTE_BOXES) != 0 || self.reserved != 0 {
+            return unknown("flags", self.flags);
+        }
+        if self.threads > MOST_THREADS {
+            return unknown("number of threads", self.threads);
+        }
+        // SAFETY: the contract of this function is that of `path`.
+        options.tets.worker = unsafe { path(self.tetgen) }?;
+        Ok(options)
+    }
+
+    /// The folder of the cache.
+    ///
+    /// # Safety
+    /// `cache` is null or points to a C string.
+    pub(crate) unsafe fn cache(&self) -> Result<Option<PathBuf>, Failure> {
+        // SAFETY: the contract of this function is that of `path`.
+        unsafe { path(self.cache) }
+    }
+}
+
+/// A path in UTF-8, or none.
+///
+/// # Safety
+/// `text` is null or points to a C string.
+unsafe fn path(text: *const c_char) -> Result<Option<PathBuf>, Failure> {
+    if text.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: it is not null, so by contract it points to a C string.
+    let text = unsafe { CStr::from_ptr(text) }.to_str();
+    text.map(|text| Some(text.into())).map_err(|_| argument("a path is not UTF-8".to_owned()))
+}

@@ -1,0 +1,111 @@
+//! Queries of rays whose components are arrays of their own, as other tracers and array languages keep them.
+
+use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::scene::Scene;
+
+/// Rays in world space, each component an array with one element for each ray.
+#[derive(Clone, Copy, Debug)]
+pub struct RayStreams<'a> {
+    /// x, y and z of the origins.
+    pub origin: [&'a [f32]; 3],
+    /// x, y and z of the directions.
+    pub direction: [&'a [f32]; 3],
+    /// Least t of each ray's hits; 0 for all rays if it is empty.
+    pub tmin: &'a [f32],
+    /// Greatest t of each ray's hits; infinite for all rays if it is empty.
+    pub tmax: &'a [f32],
+}
+
+/// Hits, each component an array with one element for each ray. A ray that hits nothing has the values of [`Hit::MISS`].
+#[derive(Debug)]
+pub struct HitStreams<'a> {
+    /// t of each hit, infinite for a miss.
+    pub t: &'a mut [f32],
+    /// Barycentric weight of the triangle's second vertex.
+    pub u: &'a mut [f32],
+    /// Barycentric weight of the triangle's third vertex.
+    pub v: &'a mut [f32],
+    /// Index of the instance, `u32::MAX` for a miss.
+    pub instance: &'a mut [u32],
+    /// Index of the triangle, `u32::MAX` for a miss.
+    pub triangle: &'a mut [u32],
+}
+
+/// Rays that are converted at a time: they stay in the first levels of the cache.
+const BLOCK: usize = 1024;
+
+impl RayStreams<'_> {
+    /// Number of rays.
+    ///
+    /// # Panics
+    /// If the arrays differ in length.
+    fn len(&self) -> usize {
+        let len = self.origin[0].len();
+        assert!(self.origin.iter().chain(&self.direction).all(|c| c.len() == len), "arrays of one length");
+        assert!([self.tmin, self.tmax].iter().all(|c| c.is_empty() || c.len() == len), "one range a ray");
+        len
+    }
+
+    fn ray(&self, i: usize) -> Ray {
+        let (origin, direction) = (self.origin.map(|c| c[i]), self.direction.map(|c| c[i]));
+        let tmin = if self.tmin.is_empty() { 0.0 } else { self.tmin[i] };
+        let tmax = if self.tmax.is_empty() { f32::INFINITY } else { self.tmax[i] };
+        Ray { origin, tmin, direction, tmax }
+    }
+
+    /// Calls `trace` with the rays of each block and the index of the first.
+    fn in_blocks(&self, mut trace: impl FnMut(usize, &[Ray])) {
+        let mut rays = Vec::with_capacity(BLOCK);
+        let len = self.len();
+        for first in (0..len).step_by(BLOCK) {
+            rays.clear();
+            rays.extend((first..(first + BLOCK).min(len)).map(|i| self.ray(i)));
+            trace(first, &rays);
+        }
+    }
+}
+
+impl Scene {
+    /// As [`RayBatch::nearest`](crate::RayBatch::nearest), from arrays into arrays.
+    ///
+    /// ```no_run
+    /// use bth::{HitStreams, RayStreams};
+    ///
+    /// let scene = bth::open("bunny.bth")?;
+    /// let (zero, one) = ([0.0; 4], [1.0; 4]);
+    /// let rays = RayStreams { origin: [&[0.1, 0.2, 0.3, 0.4], &zero, &zero], direction: [&zero, &zero, &one], tmin: &[], tmax: &[] };
+    /// let (mut t, mut u, mut v) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    /// let (mut instance, mut triangle) = ([0; 4], [0; 4]);
+    /// let hits = HitStreams { t: &mut t, u: &mut u, v: &mut v, instance: &mut instance, triangle: &mut triangle };
+    /// scene.nearest_streams(&rays, hits);
+    /// println!("{t:?}");
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If the arrays differ in length.
+    pub fn nearest_streams(&self, rays: &RayStreams<'_>, hits: HitStreams<'_>) {
+        let HitStreams { t, u, v, instance, triangle } = hits;
+        let lengths = [t.len(), u.len(), v.len(), instance.len(), triangle.len()];
+        assert_eq!(lengths, [rays.len(); 5], "as many results as rays");
+        let mut block = vec![Hit::MISS; BLOCK];
+        rays.in_blocks(|first, rays| {
+            let block = &mut block[..rays.len()];
+            self.batch(rays).nearest(block);
+            for (i, hit) in block.iter().enumerate() {
+                let PrimitiveRef { instance: of_hit, triangle: id } = hit.primitive;
+                (t[first + i], u[first + i], v[first + i]) = (hit.t, hit.u, hit.v);
+                (instance[first + i], triangle[first + i]) = (of_hit, id);
+            }
+        });
+    }
+
+    /// As [`RayBatch::any`](crate::RayBatch::any), from arrays.
+    ///
+    /// # Panics
+    /// If the arrays differ in length.
+    pub fn any_streams(&self, rays: &RayStreams<'_>, found: &mut [bool]) {
+        assert_eq!(found.len(), rays.len(), "as many results as rays");
+        rays.in_blocks(|first, rays| self.batch(rays).any(&mut found[first..first + rays.len()]));
+    }
+}

@@ -142,9 +142,9 @@ fn a_c_program_reads_what_hits_lead_to() {
     let output = run(&program, &[file.to_str().expect("UTF-8")], input);
     assert!(output.status.success(), "{output:?}");
     let expected = "bounds 0 0 0 1 1 1\nobject  groups 2 materials 1\n \
-        at 0.25 0.5 0 plane 0 0 1 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.25 0.5 object 0 group floor \
+        at 0.25 0.5 0 plane 0 0 1 normal 0 0.60000000953674293 0.79999999284744272 corner 0 0 0 uv 0.25 0.5 object 0 group floor \
         material wood flags 1\n \
-        at 0 0.5 0.25 plane 1 0 0 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.5 0.25 object 0 group wall \
+        at 0 0.5 0.25 plane 1 0 0 normal 0 0.60000000953674293 0.79999999284744272 corner 0 0 0 uv 0.5 0.25 object 0 group wall \
         material wood flags 1\nerror -1 bth_surface_at: there is no instance 4294967295\n";
     assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
 

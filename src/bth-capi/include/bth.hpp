@@ -66,25 +66,25 @@ public:
     /* The nearest hit of a ray, or a miss. `from` is the triangle on which the ray starts, a hint, or null. */
     bth_hit nearest(const bth_ray &ray, const bth_surface *from = nullptr) const {
         bth_hit hit;
-        bth_nearest(get(), &ray, from, &hit, 1);
+        bth_nearest(opened(), &ray, from, &hit, 1);
         return hit;
     }
 
     /* Whether a ray hits anything. */
     bool any(const bth_ray &ray, const bth_surface *from = nullptr) const {
         std::uint8_t hit = 0;
-        bth_any(get(), &ray, from, &hit, 1);
+        bth_any(opened(), &ray, from, &hit, 1);
         return hit != 0;
     }
 
     /* As bth_nearest. */
     void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count, const bth_surface *from = nullptr) const {
-        bth_nearest(get(), rays, from, hits, count);
+        bth_nearest(opened(), rays, from, hits, count);
     }
 
     /* As bth_any. */
     void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count, const bth_surface *from = nullptr) const {
-        bth_any(get(), rays, from, hit, count);
+        bth_any(opened(), rays, from, hit, count);
     }
 
     /* For any range of rays that are adjacent in memory: std::vector, std::array, std::span. */
@@ -215,6 +215,12 @@ private:
     struct close {
         void operator()(bth_scene *scene) const noexcept { bth_close(scene); }
     };
+
+    /* The scene, if this object has one. */
+    bth_scene *opened() const {
+        if (!handle_) throw error(BTH_ERROR_ARGUMENT, "the scene was moved from");
+        return handle_.get();
+    }
 
     explicit scene(bth_scene *opened) noexcept : handle_(opened) {}
 

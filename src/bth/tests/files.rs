@@ -9,13 +9,15 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 18] = files![
+const VALID: [(&str, &[u8]); 20] = files![
     "grid-16",
     "grid-21",
+    "groups",
     "packed-nodes",
     "packed-nodes-grid-16",
     "no-objects",
     "nothing-to-hit",
+    "opacity",
     "scene-empty",
     "scene-moving",
     "scene-still",

@@ -139,6 +139,10 @@ impl ObjectWalk<'_> {
         if block.is_beyond(s, point, limit) {
             return 0;
         }
+        // Without vectors, bounds in lanes take as long as decisions, and much code.
+        if !S::HAS_VECTORS {
+            return valid;
+        }
         let bounds = TriangleLanes::new(s, &block.relative(s, point));
         // In object space, the least upper bound says nothing about which triangle is closest in world space.
         let least = if self.placed.is_none() { bounds.least_upper_bound(s, valid) } else { limit };

@@ -122,6 +122,12 @@ impl AxisRay {
     /// The signed number of crossings with the triangles of a leaf.
     #[inline(always)]
     fn leaf<S: Simd, B: TriangleBlock>(&self, s: S, block: &B) -> i32 {
+        // At most as many triangles as lanes, even if an unchecked file has a greater count.
+        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
+        // Without vectors, the filter in lanes takes as long as decisions, and much code.
+        if !S::HAS_VECTORS {
+            return decide(&self.ray, block, valid);
+        }
         let [a, b, c] = block.project(s, &self.filter);
         let x = s.max(s.max_abs(a[0], b[0]), s.abs(c[0]));
         let y = s.max(s.max_abs(a[1], b[1]), s.abs(c[1]));
@@ -132,8 +138,6 @@ impl AxisRay {
         let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
         // Comparisons with NaN, which an overflow may give, are false, and leave a triangle in doubt.
         let missed = s.and(s.lt(least, minus_error), s.lt(error, greatest));
-        // At most as many triangles as lanes, even if an unchecked file has a greater count.
-        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
         if valid & !s.mask_bits(missed) == 0 {
             return 0;
         }

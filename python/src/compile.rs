@@ -6,9 +6,9 @@ use crate::scene::NativeScene;
 use crate::work;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
+use bth_compile::memory::{self, TriangleMesh};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
-use bth_compile::memory::{self, TriangleMesh};
 use bth_compile::{Monitor, write};
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::ImportOptions;
@@ -134,7 +134,9 @@ pub(crate) fn monitored<T: Send>(
             return work::pool().install(|| compile(&monitor)).map_err(Failure::Compile);
         }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.map_err(|e| Failure::Threads(e.to_string()))?.install(|| compile(&monitor)).map_err(Failure::Compile)
+        pool.map_err(|e| Failure::Threads(e.to_string()))?
+            .install(|| compile(&monitor))
+            .map_err(Failure::Compile)
     };
     let result = work::run_cancellable(py, &monitor.cancelled, work, look)?;
     warn(py)?;
@@ -151,7 +153,11 @@ enum Failure {
 
 /// Compiles a model or a scene from a file. Returns the bytes of the compiled file.
 #[pyfunction]
-pub(crate) fn compile_path(py: Python<'_>, path: PathBuf, keywords: &Bound<'_, PyDict>) -> PyResult<NativeScene> {
+pub(crate) fn compile_path(
+    py: Python<'_>,
+    path: PathBuf,
+    keywords: &Bound<'_, PyDict>,
+) -> PyResult<NativeScene> {
     let keywords = Keywords(keywords);
     let options = options(&keywords)?;
     let store = store(&keywords, true)?;
@@ -171,7 +177,12 @@ fn manifest_error(error: bth_scene::Error) -> bth_compile::Error {
     let (path, message) = (error.path.clone(), format!("{}:{}: {}", error.line, error.column, error.message));
     match error.code {
         bth_scene::error::code::READ => bth_compile::Error::File { code: error.code, path, message },
-        code => bth_compile::Error::Input { code, place: bth_compile::Place::File(path), message, hint: error.hint },
+        code => bth_compile::Error::Input {
+            code,
+            place: bth_compile::Place::File(path),
+            message,
+            hint: error.hint,
+        },
     }
 }
 
@@ -231,20 +242,21 @@ fn compile_file(
     monitor: &dyn Monitor,
 ) -> bth_compile::Result<write::Content> {
     let cache = cache(store, path);
-    let content = if has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten {
-        let manifest = match has_extension(path, &["manifest", "toml"]) {
-            true => bth_scene::read(path).map_err(manifest_error)?,
-            false => {
-                let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
-            }
+    let content =
+        if has_extension(path, &["manifest", "toml"]) || has_extension(path, &["gltf", "glb"]) && !flatten {
+            let manifest = match has_extension(path, &["manifest", "toml"]) {
+                true => bth_scene::read(path).map_err(manifest_error)?,
+                false => {
+                    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                    bth_import::gltf::scene::import(path, &name, gltf, monitor)?.0
+                }
+            };
+            let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let source = SceneSource { folder, name: path };
+            let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
+            bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
+        } else {
+            bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
         };
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let source = SceneSource { folder, name: path };
-        let policy = CachePolicy { whole: false, needed: &|_| true, target: None };
-        bth_compile::scene::compile_cached(&manifest, source, options, &cache, policy, monitor)?.content
-    } else {
-        bth_compile::cached::compile(path, options, &cache, &|_| true, monitor)?.content
-    };
     content.ok_or_else(no_content)
 }

@@ -73,7 +73,9 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
     )?;
     let subtrees = keywords.choice("subtrees", &[("keep", true), ("prune", false)])?;
     if compact && (record.is_some() || subtrees.is_some()) {
-        return Err(PyValueError::new_err("compact stands for tets='tet16' and subtrees='prune': leave these out"));
+        return Err(PyValueError::new_err(
+            "compact stands for tets='tet16' and subtrees='prune': leave these out",
+        ));
     }
     let mut options = CompileOptions {
         structure,
@@ -151,7 +153,9 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
     if let Some(rays) = keywords.choice("optimize_for", &rays)? {
         costs.optimize_for = rays;
     }
-    if let Some(probe) = keywords.choice("probe", &[("steps", costs::Probe::Steps), ("off", costs::Probe::Off)])? {
+    if let Some(probe) =
+        keywords.choice("probe", &[("steps", costs::Probe::Steps), ("off", costs::Probe::Off)])?
+    {
         costs.probe = probe;
     }
     if let Some(triangles) = keywords.value("min_tet_triangles")? {

@@ -110,11 +110,8 @@ pub(crate) fn normals(
         let [a, b, c] = corners.map(|v| object.positions[v as usize].map(f64::from));
         let (ab, ac): ([f64; 3], [f64; 3]) =
             (std::array::from_fn(|k| b[k] - a[k]), std::array::from_fn(|k| c[k] - a[k]));
-        let normal = [
-            ab[1] * ac[2] - ab[2] * ac[1],
-            ab[2] * ac[0] - ab[0] * ac[2],
-            ab[0] * ac[1] - ab[1] * ac[0],
-        ];
+        let normal =
+            [ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]];
         if !scene.instance(instance).visible {
             continue;
         }

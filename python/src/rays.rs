@@ -203,8 +203,7 @@ impl<'a> Starts<'a> {
     /// The triangles of a range of rays.
     pub(crate) fn read(&self, range: Range<usize>, starts: &mut Vec<PrimitiveRef>) {
         starts.clear();
-        starts.extend(
-            range.map(|i| PrimitiveRef { instance: self.instances[i], triangle: self.triangles[i] }),
-        );
+        starts
+            .extend(range.map(|i| PrimitiveRef { instance: self.instances[i], triangle: self.triangles[i] }));
     }
 }

@@ -47,7 +47,8 @@ impl OpenScene {
         change: impl FnOnce(&mut bth::Scene) -> T + Send,
     ) -> PyResult<T> {
         if work::is_inside_call() {
-            let message = "a scene cannot be changed in the handler of a signal that interrupts a call of this package";
+            let message =
+                "a scene cannot be changed in the handler of a signal that interrupts a call of this package";
             return Err(PyRuntimeError::new_err(message));
         }
         self.changing.fetch_add(1, Ordering::Relaxed);

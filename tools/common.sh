@@ -40,6 +40,7 @@ install_missing() {
         command -v make >/dev/null || packages+=(make)
         command -v ninja >/dev/null || packages+=(ninja-build)
         command -v cmake >/dev/null || packages+=(cmake)
+        command -v pkg-config >/dev/null || packages+=(pkg-config)
         command -v git-lfs >/dev/null || packages+=(git-lfs)
     fi
     [ "$1" = plain ] || have_display || packages+=(xvfb xdotool libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0)

@@ -3,7 +3,7 @@
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
-use bth_import::{Keep, import_bytes};
+use bth_import::{AlphaMode, Keep, import_bytes, import_cutouts_bytes};
 use bth_random::Rng;
 use std::path::Path;
 
@@ -82,6 +82,12 @@ pub fn import(format: &str, bytes: &[u8]) {
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
     assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
     assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
+    if let Ok(cutouts) = import_cutouts_bytes(&name, bytes, AlphaMode::Blend, &Silent) {
+        let fits = |t: &bth_import::CutoutTriangle| {
+            (t.triangle as usize) < mesh.triangles.len() && (t.material as usize) < cutouts.materials.len()
+        };
+        assert!(cutouts.triangles.iter().all(fits));
+    }
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));

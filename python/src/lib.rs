@@ -10,8 +10,8 @@
 //! | `options`, `compile` | the compiler |
 //! | `errors` | exceptions |
 
-// The macros of PyO3 expand to functions that take what Python passes.
-#![allow(clippy::too_many_arguments)]
+// Functions take what Python passes, and return tuples of arrays.
+#![allow(clippy::too_many_arguments, clippy::type_complexity)]
 
 mod compile;
 mod errors;

@@ -18,15 +18,16 @@ int main(int argc, char **argv) {
     bth_crossing_count crossings[16];
     for (size_t i = 0; i < n; i++)
         ray[i] = (bth_ray){{points[i][0], points[i][1], points[i][2]}, 0, {0, 0, 1}, INFINITY};
-    bth_winding(scene, points[0], winding, n);
-    bth_contains(scene, points[0], inside, n);
-    bth_crossings(scene, ray, crossings, n);
+    if (bth_winding(scene, points[0], winding, n) != BTH_OK) return 2;
+    if (bth_contains(scene, points[0], inside, n) != BTH_OK) return 3;
+    if (bth_crossings(scene, ray, crossings, n) != BTH_OK) return 4;
     for (size_t i = 0; i < n; i++)
         printf("%d %d %u %d\n", winding[i], inside[i], crossings[i].count, crossings[i].winding);
-    bth_winding(NULL, points[0], winding, n);
-    bth_winding(scene, NULL, winding, n);
-    bth_contains(scene, points[0], NULL, n);
-    bth_crossings(scene, ray, NULL, n);
+    if (bth_winding(NULL, points[0], winding, n) != BTH_ERROR_ARGUMENT) return 5;
+    if (bth_winding(scene, NULL, winding, n) != BTH_ERROR_ARGUMENT) return 6;
+    if (bth_contains(scene, points[0], NULL, n) != BTH_ERROR_ARGUMENT) return 7;
+    if (bth_crossings(scene, ray, NULL, n) != BTH_ERROR_ARGUMENT || bth_last_error()[0] == 0) return 8;
+    if (bth_crossings(scene, NULL, NULL, 0) != BTH_OK) return 9;
     bth_close(scene);
     return 0;
 }

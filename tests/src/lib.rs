@@ -2,6 +2,7 @@
 
 pub mod conformance;
 pub mod crowd;
+pub mod leaves;
 pub mod placed_soup;
 pub mod rays;
 pub mod stress;

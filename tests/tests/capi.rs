@@ -1,37 +1,46 @@
-//! The C interface, used by C programs (`tests/c`) that include `bth.h` and link `libbth` only.
+//! The C interface, used by C and C++ programs (`tests/c`) that include its headers and link its libraries only.
 
 use bth::Accept;
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
-use bth_compile::pipeline::{CompileOptions, compile};
+use bth_compile::cached::Cache;
+use bth_compile::memory::{self, Instance, TriangleMesh};
+use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-#[allow(clippy::print_stdout)]
-/// Builds the library and the C program. Without a C compiler prints why not, and returns `None`.
+/// Builds the library and the C program; `None` without a C compiler.
 fn c_program(folder: &Path, name: &str) -> Option<PathBuf> {
+    program(folder, &format!("{name}.c"), &["bth"])
+}
+
+/// Builds the libraries and a program of `tests/c` that uses them. Without a compiler prints why not, and returns `None`.
+#[allow(clippy::print_stdout)]
+fn program(folder: &Path, source: &str, libraries: &[&str]) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
+    let (variable, default, standard) = match source.ends_with(".cpp") {
+        true => ("CXX", "c++", "-std=c++17"),
+        false => ("CC", "cc", "-std=c11"),
+    };
+    let compiler = std::env::var(variable).unwrap_or_else(|_| default.into());
     if Command::new(&compiler).arg("--version").stdout(Stdio::null()).status().is_err() {
-        println!("SKIPPED: no C compiler {compiler}");
+        println!("SKIPPED: no compiler {compiler}");
         return None;
     }
-    let library = bth_tests::built(&["bth-capi"]);
-    let program = folder.join(name);
-    let compiled = Command::new(compiler)
-        .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O1", "-I"])
-        .arg(root.join("src/bth-capi/include"))
-        .arg(root.join("tests/c").join(name).with_extension("c"))
-        .arg("-L")
-        .arg(&library)
-        .arg("-lbth")
-        .arg(format!("-Wl,-rpath,{}", library.display()))
-        .arg("-o")
-        .arg(&program)
-        .status()
-        .expect("the C compiler runs");
-    assert!(compiled.success(), "{name}.c compiles without a warning");
+    let packages = [("bth", "bth-capi"), ("bth_compile", "bth-compile-capi")];
+    let packages: Vec<_> = packages.iter().filter(|(library, _)| libraries.contains(library)).collect();
+    let built = bth_tests::built(&packages.iter().map(|(_, package)| *package).collect::<Vec<_>>());
+    let program = folder.join(source).with_extension("");
+    let mut command = Command::new(compiler);
+    command.args([standard, "-Wall", "-Wextra", "-Werror", "-O1"]);
+    for (_, package) in packages {
+        command.arg("-I").arg(root.join("src").join(package).join("include"));
+    }
+    command.arg(root.join("tests/c").join(source)).arg("-L").arg(&built);
+    command.args(libraries.iter().map(|library| format!("-l{library}")));
+    command.arg(format!("-Wl,-rpath,{}", built.display())).arg("-o").arg(&program);
+    assert!(command.status().expect("the compiler runs").success(), "{source} compiles without a warning");
     Some(program)
 }
 
@@ -117,6 +126,39 @@ fn a_c_program_opens_traces_and_reads_errors() {
 }
 
 #[test]
+fn a_c_program_reads_what_hits_lead_to() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "surface") else { return };
+    let model = folder.path().join("corner.obj");
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0.6 0.8\ng floor\nusemtl wood\n\
+                f 1/1/1 2/2/1 3/3/1\ng wall\nf 1/1/1 3/2/1 4/3/1\n";
+    std::fs::write(&model, text).expect("a model");
+    let attributes = bth_import::Keep::All;
+    let options = CompileOptions { attributes, names: true, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &options, &Silent).expect("it compiles");
+    let file = folder.path().join("corner.bth");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let input = "0.25 0.5 3 0 0 -1\n3 0.5 0.25 -1 0 0\n9 9 9 1 0 0\n";
+    let output = run(&program, &[file.to_str().expect("UTF-8")], input);
+    assert!(output.status.success(), "{output:?}");
+    let expected = "bounds 0 0 0 1 1 1\nobject  groups 2 materials 1\n \
+        at 0.25 0.5 0 plane 0 0 1 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.25 0.5 object 0 group floor \
+        material wood flags 1\n \
+        at 0 0.5 0.25 plane 1 0 0 normal 0 0.59999999105930333 0.80000000670552244 corner 0 0 0 uv 0.5 0.25 object 0 group wall \
+        material wood flags 1\nerror -1 bth_surface_at: there is no instance 4294967295\n";
+    assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
+
+    let nothing = CompileOptions { geometry: false, ..CompileOptions::default() };
+    let (compiled, _) = compile(&model, &nothing, &Silent).expect("it compiles");
+    std::fs::write(&file, &compiled.bytes).expect("a file");
+    let text = run(&program, &[file.to_str().expect("UTF-8")], "0.25 0.5 3 0 0 -1\n").stdout;
+    assert!(
+        String::from_utf8_lossy(&text).contains("error -7 bth_surface_at: the file has no positions"),
+        "{text:?}"
+    );
+}
+
+#[test]
 fn a_c_program_gets_several_hits_under_conditions() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = c_program(folder.path(), "hits") else { return };
@@ -136,7 +178,7 @@ fn a_c_program_gets_several_hits_under_conditions() {
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout).expect("text");
     let mut lines = text.lines();
-    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
     let everything = Accept::default();
     let mut counts = String::new();
     for accept in [everything, Accept { filter: Some(&even), ..everything }] {
@@ -301,4 +343,46 @@ fn a_c_program_finds_the_closest_points_that_rust_finds() {
         let rest = rest.into_iter().chain([found.len() as u32]).map(|n| n.to_string());
         assert!(rest.eq([6, 7, 8, 10, 11, 12].map(|i| field[i].to_owned())), "{line}");
     }
+}
+
+/// The mesh of `compile.c`.
+fn hills() -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    const SIDE: u32 = 40;
+    let grid = |side: u32| (0..side).flat_map(move |y| (0..side).map(move |x| (x, y)));
+    let positions = grid(SIDE).map(|(x, y)| [x as f32, y as f32, (x * y % 7) as f32 / 8.0]).collect();
+    let faces = grid(SIDE - 1).map(|(x, y)| y * SIDE + x);
+    let triangles =
+        faces.flat_map(|at| [[at, at + 1, at + SIDE], [at + 1, at + SIDE + 1, at + SIDE]]).collect();
+    (positions, triangles)
+}
+
+#[test]
+fn a_c_program_compiles_in_memory_and_gets_the_bytes_of_rust() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = program(folder.path(), "compile.c", &["bth", "bth_compile"]) else { return };
+    let [mesh, scene] = ["mesh.bth", "scene.bth"].map(|name| folder.path().join(name));
+    let output = run(&program, &[&mesh, &scene].map(|path| path.to_str().expect("UTF-8")), "");
+    assert!(output.status.success(), "{output:?}");
+
+    let (positions, triangles) = hills();
+    let hills = TriangleMesh { positions: &positions, triangles: &triangles };
+    let mut options =
+        CompileOptions { structure: Structure::Bvh, keep_subtrees: false, ..CompileOptions::default() };
+    options.bvh.quality = bth_compile::bvh::Quality::Fast;
+    let (compiled, _) = memory::compile(hills, &options, &Silent).expect("it compiles");
+    assert!(std::fs::read(mesh).expect("a file") == compiled.bytes);
+    let instance = |z| Instance { mesh: 0, to_world: [[1., 0., 0., 0.], [0., 1., 0., 0.], [0., 0., 1., z]] };
+    let instances = [instance(0.0), instance(-50.0)];
+    let outcome = memory::compile_scene(&[hills], &instances, &options, &Cache::none(), &Silent);
+    let content = outcome.expect("it compiles").content.expect("the content");
+    assert!(std::fs::read(scene).expect("a file") == content.bytes().expect("bytes").as_ref());
+}
+
+#[test]
+fn a_cpp_program_uses_scenes_that_close_themselves() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = program(folder.path(), "scene.cpp", &["bth", "bth_compile"]) else { return };
+    let absent = folder.path().join("absent.bth");
+    let output = run(&program, &[absent.to_str().expect("UTF-8")], "");
+    assert!(output.status.success(), "{output:?}");
 }

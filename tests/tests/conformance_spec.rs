@@ -70,6 +70,10 @@ fn byte_tables_are_those_of_the_structures() {
         IndexedLeaf21 { vertex high corner first triangles vertices reserved }
         RawLeaf16 { corner first triangles reserved }
         RawLeaf21 { corner high first triangles reserved }
+        Group { name name_length material reserved }
+        GroupRun { first group }
+        Material { name name_length reserved }
+        ObjectName { name name_length }
         TetLeaf { lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags }
         TetVertex { position reserved }
         TetFace { vertex triangle tet opposite }
@@ -120,7 +124,7 @@ fn kinds_have_the_names_and_strides_of_the_table() {
         let stride = bth_format::file::kind_stride(kind).unwrap();
         assert!(stride == 0 && kind == kind::TETS || stride.to_string() == row[3], "stride of {}", row[1]);
         assert_eq!(row[5] == "yes", kind::is_required(kind), "{}", row[1]);
-        assert_eq!(row[4] == "file", kind == kind::PROVENANCE || kind::is_scene(kind), "{}", row[1]);
+        assert_eq!(row[4] == "file", kind::is_of_file(kind), "{}", row[1]);
     }
 }
 

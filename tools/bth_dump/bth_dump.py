@@ -13,6 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bth_container import Container, Invalid, NONE, kind_name  # noqa: E402
 from bth_geometry import check_geometry  # noqa: E402
+from bth_groups import GroupsView, object_names  # noqa: E402
 from bth_indices import check_indices  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
 from bth_scene import SceneView, check_scene  # noqa: E402
@@ -22,10 +23,12 @@ def describe(container):
     """The header, the sections and the objects as a JSON-able value."""
     header = container.header
     objects = []
+    names = object_names(container)
     for i in range(container.objects):
         view = ObjectView(container, i)
         objects.append(
             {
+                "name": names[i] if names else "",
                 "lower": view.lower,
                 "upper": view.upper,
                 "record": view.record,
@@ -34,6 +37,7 @@ def describe(container):
                 "depth": view.depth,
                 "tet_leaves": len(view.tet_leaves),
                 "tets": len(view.tets),
+                "groups": GroupsView(view).describe(),
             }
         )
     return {
@@ -84,9 +88,11 @@ def check(data, level):
     if level != "open":
         for i in range(container.objects):
             view = ObjectView(container, i)
+            GroupsView(view).check()
             tets = check_indices(view)
             if level == "verify":
                 check_geometry(view, tets)
+        object_names(container)
         check_scene(SceneView(container))
     return container
 
@@ -106,6 +112,8 @@ def show(description):
         print(f"  bounds {o['lower']} to {o['upper']}")
         if o["tet_leaves"]:
             print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
+        if o["groups"]:
+            print(f"  {len(o['groups'])} groups of triangles")
     scene = description["scene"]
     if scene:
         counts = ", ".join(f"{len(scene[k])} {k}" for k in ("nodes", "instances", "tracks", "cameras", "lights"))

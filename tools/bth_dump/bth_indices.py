@@ -1,4 +1,4 @@
-"""The index check (format-spec/README.md, "Index check"): F101 to F141."""
+"""The index check (format-spec/README.md, "Index check"): F101 to F147."""
 
 import math
 import struct
@@ -29,6 +29,7 @@ def check_indices(view):
     """Checks an object; returns the derived tetrahedra of each tet leaf."""
     _header(view)
     _sources(view)
+    _opacity(view)
     _tet_ranges(view)
     _triangle_faces(view)
     _tree(view)
@@ -65,6 +66,25 @@ def _sources(view):
     for i, position in enumerate(view.positions):
         if not all(map(math.isfinite, position)):
             raise view.invalid("F141", f"position {position}", c.POSITIONS, 12 * i)
+
+
+def _opacity(view):
+    """F145 to F147."""
+    rows, words = view.opacity, view.opacity_micro
+    if len(rows) not in (0, view.triangles):
+        raise view.invalid("F145", f"{len(rows)} rows", c.OPACITY)
+    if words and not rows:
+        raise view.invalid("F145", f"{len(words)} words without OPACITY", c.OPACITY_MICRO)
+    for triangle, row in enumerate(rows):
+        level, payload = row % 16, row // 16
+        good = payload <= 2 if level == 0 else level <= 8 and payload + -(-(4**level) // 16) <= len(words)
+        if not good:
+            raise view.invalid("F146", f"row {row:#x}", c.OPACITY, 4 * triangle)
+        if level == 1 and words[payload] >> 8:
+            raise view.invalid("F147", f"word {words[payload]:#x} of level 1", c.OPACITY_MICRO, 4 * payload)
+    for at, word in enumerate(words):
+        if any(word >> 2 * k & 3 == 3 for k in range(16)):
+            raise view.invalid("F147", f"word {word:#x}", c.OPACITY_MICRO, 4 * at)
 
 
 def _tet_ranges(view):

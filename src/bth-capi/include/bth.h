@@ -66,6 +66,8 @@ typedef struct {
 #define BTH_ERROR_INTERNAL (-5)    /* a defect of this library */
 #define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed at the given time: its transform cannot be inverted or
                                       is not finite; the text of the error gives the node */
+#define BTH_ERROR_MISSING (-7)     /* the file does not keep what is asked for, or there is none; the text of the error says
+                                      which option of the compiler keeps it */
 
 /* Opens a compiled file; path is in UTF-8. On success stores the scene in *scene and returns BTH_OK. On failure stores null,
  * unless path or scene is null, and returns a negative code; bth_last_error then describes what is wrong, where, and what can
@@ -83,17 +85,15 @@ void bth_close(bth_scene *scene);
  * can fail. */
 const char *bth_last_error(void);
 
-/* Version of this library, such as "0.1.0". */
-const char *bth_version(void);
-
 /* Stores the nearest hits of `count` rays in `hits`. `from` is null or holds for each ray the triangle on which it starts, or
  * BTH_NONE in both fields. It is a hint for the traversal and never changes a result. `hits` must not overlap the other arrays.
- * Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all rays are misses. */
-int32_t bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
+ * After an error, which bth_last_error tells, nothing is stored if an argument is null, and all rays are misses if the error is
+ * internal. bth_nearest_accepted with a null `accept` does the same and returns a code. */
+void bth_nearest(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, bth_hit *hits, size_t count);
 
 /* Stores in `hit` for each of `count` rays 1 if it hits anything, else 0. `from` is as for bth_nearest. `hit` must not overlap
- * the other arrays. Returns a code as bth_nearest does. */
-int32_t bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
+ * the other arrays. Errors are those of bth_nearest; bth_any_accepted returns a code. */
+void bth_any(const bth_scene *scene, const bth_ray *rays, const bth_surface *from, uint8_t *hit, size_t count);
 
 /* Stores the first and the last frame and the number of frames per second of the scene; each of the three pointers may be
  * null. A file without scene sections has only frame 0, at one frame per second. */
@@ -232,18 +232,66 @@ typedef struct {
 /* Stores the crossings of triangles by each of `count` rays. Unlike hits, they never meet an edge, a vertex or the plane of a
  * triangle: they are those of the ray with its origin moved by an infinitely small vector, decided exactly. So a line crosses a
  * surface without boundary as often in as out, and each crossing lies in exactly one of two ranges of t that share an end.
- * `crossings` must not overlap the rays. After an internal error there are none. */
-void bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
+ * `crossings` must not overlap the rays. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL there are none. */
+int32_t bth_crossings(const bth_scene *scene, const bth_ray *rays, bth_crossing_count *crossings, size_t count);
 
 /* Stores for each of `count` points in world space how often the closed surfaces of the scene enclose it: its winding number, 0
  * outside of all. It is exact where every mesh is closed and its triangles are seen counterclockwise from outside; elsewhere it is the
  * number of crossings, counted as above, by a ray along an axis to the nearest side of an object's bounds. A point on a surface counts
  * as if it were moved by an infinitely small vector. `points` holds x, y and z of each; `winding` must not overlap it. Points that are not
- * finite, and all points after an internal error, are outside. */
-void bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
+ * finite are outside. Returns BTH_OK or a negative code; after BTH_ERROR_INTERNAL all points are outside. */
+int32_t bth_winding(const bth_scene *scene, const float *points, int32_t *winding, size_t count);
 
 /* Stores in `inside` for each of `count` points 1 if its winding number is not 0, else 0. The rest is as for bth_winding. */
-void bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
+int32_t bth_contains(const bth_scene *scene, const float *points, uint8_t *inside, size_t count);
+
+/* What hits lead to. A file keeps the positions of triangles by default (not with `bthc compile --no-geometry`), normals and texture
+ * coordinates with --attributes, and groups, materials and names with --names. */
+
+/* Version of the library, such as "0.9.0". Valid forever. */
+const char *bth_version(void);
+
+/* Stores in bounds[0] the lower and in bounds[1] the upper end of a box in world space that contains all visible instances at the
+ * scene's time, slightly enlarged to cover roundings. Returns BTH_OK, or BTH_ERROR_MISSING if nothing is visible. */
+int32_t bth_bounds(const bth_scene *scene, float bounds[2][3]);
+
+/* Number of objects of the file; 0 if the scene is null. */
+uint32_t bth_object_count(const bth_scene *scene);
+
+/* Number of groups of an object's triangles, at least 1, and of its materials; 0 if the scene is null or has no such object. */
+uint32_t bth_group_count(const bth_scene *scene, uint32_t object);
+uint32_t bth_material_count(const bth_scene *scene, uint32_t object);
+
+/* Stores the three vertices of a triangle in world space, at the scene's time. Returns BTH_OK; BTH_ERROR_MISSING if the file does
+ * not keep them; BTH_ERROR_ARGUMENT if there is no such instance or triangle. */
+int32_t bth_triangle_positions(const bth_scene *scene, bth_surface triangle, double positions[3][3]);
+
+/* Flag of bth_surface_point: the file has texture coordinates. */
+#define BTH_HAS_UV 1u
+
+/* The surface at a hit, in world space. Normals have length 1. 96 bytes. */
+typedef struct {
+    double position[3];         /* the point on the triangle */
+    double geometric_normal[3]; /* of the triangle's plane, on the side from which the object's vertices are seen counterclockwise */
+    double normal[3];           /* the source's normals interpolated, on whatever side it has them; the geometric normal where the
+                                   file keeps none */
+    float uv[2];                /* texture coordinates; zeros without BTH_HAS_UV */
+    uint32_t object;            /* index of the object */
+    uint32_t group;             /* index of the group of triangles; 0 if the file keeps no groups */
+    uint32_t material;          /* index of the object's material; BTH_NONE if there is none */
+    uint32_t flags;             /* BTH_HAS_UV or 0 */
+} bth_surface_point;
+
+/* Stores the surface at a hit of this scene, at the scene's time, in *point. Returns BTH_OK; BTH_ERROR_ARGUMENT for a miss;
+ * BTH_ERROR_MISSING if the file does not keep the positions of triangles, or the instance is hidden by now. */
+int32_t bth_surface_at(const bth_scene *scene, const bth_hit *hit, bth_surface_point *point);
+
+/* Copy the name of an object, or of a group or material of an object, to `name`, in UTF-8 with a zero at the end; where it does not fit
+ * into `capacity` bytes, only the characters that do. Return the length of the whole name in bytes, without the zero: 0 if there is no
+ * name. `name` may be null if the capacity is 0. */
+size_t bth_object_name(const bth_scene *scene, uint32_t object, char *name, size_t capacity);
+size_t bth_group_name(const bth_scene *scene, uint32_t object, uint32_t group, char *name, size_t capacity);
+size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t material, char *name, size_t capacity);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 //! The part of the C interface that counts crossings of surfaces and tells whether points lie inside of closed meshes.
 
-use crate::batch;
+use crate::{OK, batch, defect, null_argument};
 use runtime::rays::Ray;
 use runtime::{Crossings, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,11 +18,14 @@ pub unsafe extern "C" fn bth_crossings(
     rays: *const Ray,
     crossings: *mut Crossings,
     count: usize,
-) {
+) -> i32 {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let Some((scene, rays, _)) = (unsafe { batch(scene, rays, std::ptr::null(), count) }) else { return };
+    let (scene, rays, _) = match unsafe { batch(scene, rays, std::ptr::null(), count) } {
+        Ok(batch) => batch,
+        Err(code) => return code,
+    };
     if crossings.is_null() {
-        return;
+        return null_argument();
     }
     // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
     // rays. All bit patterns are valid for `Crossings`.
@@ -31,13 +34,15 @@ pub unsafe extern "C" fn bth_crossings(
     let counted = catch_unwind(AssertUnwindSafe(|| scene.crossings_batch(rays, crossings)));
     if counted.is_err() {
         crossings.fill(Crossings::default());
+        return defect();
     }
+    OK
 }
 
 /// The arguments of a query for points: the scene, the points, and for each its result.
 type Points<'a, T> = (&'a Scene, &'a [[f32; 3]], &'a mut [T]);
 
-/// The arguments of a query for points as slices; `None` if there are no points, or a pointer is null.
+/// The arguments of a query for points as slices. `Err` is the result of the query if there are no points, or a pointer is null.
 ///
 /// # Safety
 /// `scene` is null or open. `points` and `results` are each null or point to `count` elements; those of `results` are valid for
@@ -48,15 +53,18 @@ unsafe fn points<'a, T>(
     points: *const [f32; 3],
     results: *mut T,
     count: usize,
-) -> Option<Points<'a, T>> {
-    if scene.is_null() || points.is_null() || results.is_null() || count == 0 {
-        return None;
+) -> Result<Points<'a, T>, i32> {
+    if count == 0 {
+        return Err(OK);
+    }
+    if scene.is_null() || points.is_null() || results.is_null() {
+        return Err(null_argument());
     }
     // SAFETY: the pointers are not null, so by contract `scene` is an open scene and the others point to `count` elements, of which
     // the results are valid for writes and overlap nothing.
     unsafe {
         let results = std::slice::from_raw_parts_mut(results, count);
-        Some((&*scene, std::slice::from_raw_parts(points, count), results))
+        Ok((&*scene, std::slice::from_raw_parts(points, count), results))
     }
 }
 
@@ -71,12 +79,17 @@ pub unsafe extern "C" fn bth_winding(
     at: *const [f32; 3],
     winding: *mut i32,
     count: usize,
-) {
+) -> i32 {
     // SAFETY: the contract of `points` is part of that of this function, and all bit patterns are valid for i32.
-    let Some((scene, at, winding)) = (unsafe { points(scene, at, winding, count) }) else { return };
+    let (scene, at, winding) = match unsafe { points(scene, at, winding, count) } {
+        Ok(points) => points,
+        Err(code) => return code,
+    };
     if catch_unwind(AssertUnwindSafe(|| scene.winding_batch(at, winding))).is_err() {
         winding.fill(0);
+        return defect();
     }
+    OK
 }
 
 /// Points for which [`bth_contains`] asks together.
@@ -92,17 +105,23 @@ pub unsafe extern "C" fn bth_contains(
     at: *const [f32; 3],
     inside: *mut u8,
     count: usize,
-) {
+) -> i32 {
     // SAFETY: the contract of `points` is part of that of this function, and all bit patterns are valid for u8.
-    let Some((scene, at, inside)) = (unsafe { points(scene, at, inside, count) }) else { return };
+    let (scene, at, inside) = match unsafe { points(scene, at, inside, count) } {
+        Ok(points) => points,
+        Err(code) => return code,
+    };
+    let mut code = OK;
     let mut buffer = [0; CHUNK];
     for (at, inside) in at.chunks(CHUNK).zip(inside.chunks_mut(CHUNK)) {
         let winding = &mut buffer[..at.len()];
         if catch_unwind(AssertUnwindSafe(|| scene.winding_batch(at, winding))).is_err() {
             winding.fill(0);
+            code = defect();
         }
         for (inside, winding) in inside.iter_mut().zip(winding) {
             *inside = u8::from(*winding != 0);
         }
     }
+    code
 }

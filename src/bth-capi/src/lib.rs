@@ -6,6 +6,7 @@ pub mod hits;
 pub mod inside;
 pub mod memory;
 pub mod motion;
+pub mod surface;
 
 use runtime::rays::{Hit, PrimitiveRef, Ray};
 use runtime::{Code, Error, Scene};
@@ -26,6 +27,7 @@ const ERROR_FORMAT: i32 = -3;
 const ERROR_VERSION: i32 = -4;
 const ERROR_INTERNAL: i32 = -5;
 const ERROR_SCENE: i32 = -6;
+const ERROR_MISSING: i32 = -7;
 
 thread_local! {
     /// Result of [`bth_last_error`].
@@ -151,14 +153,12 @@ pub unsafe extern "C" fn bth_nearest(
     from: *const PrimitiveRef,
     hits: *mut Hit,
     count: usize,
-) -> i32 {
+) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let (scene, rays, from) = match unsafe { batch(scene, rays, from, count) } {
-        Ok(batch) => batch,
-        Err(code) => return code,
-    };
+    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hits.is_null() {
-        return null_argument();
+        null_argument();
+        return;
     }
     // SAFETY: it is not null, so by contract it points to `count` elements, which are valid for writes and do not overlap the
     // slices above. All bit patterns are valid for `Hit`.
@@ -166,9 +166,8 @@ pub unsafe extern "C" fn bth_nearest(
     // A panic must not unwind into C. After a panic, which would be a defect of the library, all rays are reported as misses.
     if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).nearest(hits))).is_err() {
         hits.fill(Hit::MISS);
-        return defect();
+        defect();
     }
-    OK
 }
 
 /// Whether rays hit anything; see `bth.h`.
@@ -182,14 +181,12 @@ pub unsafe extern "C" fn bth_any(
     from: *const PrimitiveRef,
     hit: *mut u8,
     count: usize,
-) -> i32 {
+) {
     // SAFETY: the contract of `batch` is part of that of this function.
-    let (scene, rays, from) = match unsafe { batch(scene, rays, from, count) } {
-        Ok(batch) => batch,
-        Err(code) => return code,
-    };
+    let Ok((scene, rays, from)) = (unsafe { batch(scene, rays, from, count) }) else { return };
     if hit.is_null() {
-        return null_argument();
+        null_argument();
+        return;
     }
     // SAFETY: it is not null, so by contract it points to `count` bytes, which are valid for writes and do not overlap the slices
     // above.
@@ -200,9 +197,11 @@ pub unsafe extern "C" fn bth_any(
         let mut found = [false];
         let traced = catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(&mut found)));
         *hit = (traced.is_ok() && found[0]).into();
-        if traced.is_ok() { OK } else { defect() }
+        if traced.is_err() {
+            defect();
+        }
     } else {
-        any_in_chunks(scene, rays, from, hit)
+        any_in_chunks(scene, rays, from, hit);
     }
 }
 
@@ -211,21 +210,19 @@ const CHUNK: usize = 1024;
 
 /// Whether rays hit anything, for [`CHUNK`] rays at a time. After a panic, the rays of a chunk are reported as misses.
 #[inline(never)]
-fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) -> i32 {
-    let mut code = OK;
+fn any_in_chunks(scene: &Scene, rays: &[Ray], from: Option<&[PrimitiveRef]>, hit: &mut [u8]) {
     let mut buffer = [false; CHUNK];
     for (i, (rays, hit)) in rays.chunks(CHUNK).zip(hit.chunks_mut(CHUNK)).enumerate() {
         let from = from.map(|f| &f[i * CHUNK..i * CHUNK + rays.len()]);
         let found = &mut buffer[..rays.len()];
         if catch_unwind(AssertUnwindSafe(|| scene.batch(rays).from(from).any(found))).is_err() {
             found.fill(false);
-            code = defect();
+            defect();
         }
         for (out, found) in hit.iter_mut().zip(found) {
             *out = (*found).into();
         }
     }
-    code
 }
 
 /// Bytes of the sections that traversal reads; see `bth.h`.

@@ -1,8 +1,7 @@
-//! The part of the C interface that opens files in memory, and the version.
+//! The part of the C interface that opens files in memory.
 
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, READ, code_of, fail};
 use runtime::Scene;
-use std::ffi::{CStr, c_char};
 use std::panic::catch_unwind;
 
 /// Opens the contents of a file; see `bth.h`.
@@ -38,15 +37,4 @@ pub unsafe extern "C" fn bth_open_memory(
         Ok(Err(error)) => fail(code_of(&error), error.to_string()),
         Err(_) => fail(ERROR_INTERNAL, "bth_open_memory: internal error".into()),
     }
-}
-
-/// Version of the library; see `bth.h`.
-#[unsafe(no_mangle)]
-pub extern "C" fn bth_version() -> *const c_char {
-    const VERSION: &CStr =
-        match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
-            Ok(version) => version,
-            Err(_) => panic!("a version has no zero byte"),
-        };
-    VERSION.as_ptr()
 }

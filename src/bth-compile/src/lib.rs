@@ -5,7 +5,7 @@
 //!
 //! | modules | |
 //! |---|---|
-//! | [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
+//! | [`opacity`], [`coordinates`], [`bvh`], [`marks`], [`costs`], [`tets`], [`mod@write`] | the stages |
 //! | [`pipeline`] | calls the stages in order, from a model to a file |
 //! | [`cached`] | the same through a cache of results, which wraps the stages from outside |
 //! | [`memory`] | the pipeline and the scenes for triangles that are in memory |
@@ -20,6 +20,7 @@ pub mod costs;
 pub mod jobs;
 pub mod marks;
 pub mod memory;
+pub mod opacity;
 mod options;
 pub mod pipeline;
 pub mod scene;

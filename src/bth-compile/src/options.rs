@@ -25,6 +25,10 @@ pub struct CompileOptions {
     pub structure: Structure,
     /// Shading attributes to keep.
     pub attributes: mesh::Keep,
+    /// Materials whose alpha makes holes.
+    pub alpha: mesh::AlphaMode,
+    /// Whether to keep groups of triangles, materials, and the names of these and of objects.
+    pub names: bool,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
@@ -52,6 +56,8 @@ impl Default for CompileOptions {
         Self {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
+            names: false,
+            alpha: mesh::AlphaMode::default(),
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
             collapse: bvh::CollapseOptions::default(),
@@ -66,6 +72,11 @@ impl Default for CompileOptions {
 }
 
 impl CompileOptions {
+    /// What to read of models.
+    pub fn wanted(&self) -> mesh::Wanted {
+        mesh::Wanted { attributes: self.attributes, groups: self.names }
+    }
+
     /// How tetrahedra will be stored; the size of the object without them is not set.
     pub fn storage(&self) -> costs::Storage {
         costs::Storage { record: self.record, keep_subtrees: self.keep_subtrees, plain_bytes: None }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use bth_files::Digest;
+use bth_import::AlphaMode;
 use bth_import::gltf::external_files;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -27,6 +28,8 @@ pub struct SourceDigest {
     pub file: Digest,
     /// BLAKE3 of the files that it refers to, in order.
     pub others: Vec<Digest>,
+    /// Which materials make holes: their images are among the files.
+    pub alpha: AlphaMode,
 }
 
 /// A model whose files have been hashed.
@@ -41,9 +44,9 @@ impl SourceDigest {
     ///
     /// # Errors
     /// `BTH-O001` when one cannot be read.
-    pub fn of(path: &Path) -> Result<Self> {
-        let others = files(path)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
-        Ok(Self { file: digest(path)?, others })
+    pub fn of(path: &Path, alpha: AlphaMode) -> Result<Self> {
+        let others = files(path, alpha)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
+        Ok(Self { file: digest(path)?, others, alpha })
     }
 
     /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian bytes.
@@ -56,7 +59,7 @@ impl SourceDigest {
         ] {
             hasher.update(&(count as u64).to_le_bytes()).update(bytes);
         }
-        Self { file: hasher.finalize().into(), others: Vec::new() }
+        Self { file: hasher.finalize().into(), others: Vec::new(), alpha: AlphaMode::None }
     }
 
     /// Returns `read` if the files still have these hashes, which proves that it was read from the hashed content.
@@ -64,7 +67,7 @@ impl SourceDigest {
     /// # Errors
     /// `BTH-O002` when they do not.
     pub(crate) fn unchanged<T>(&self, path: &Path, read: T) -> Result<T> {
-        if Self::of(path)? == *self {
+        if Self::of(path, self.alpha)? == *self {
             return Ok(read);
         }
         Err(Error::File {
@@ -85,11 +88,11 @@ impl SourceDigest {
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.
-pub fn files(path: &Path) -> Result<Vec<PathBuf>> {
+pub fn files(path: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut files = vec![path.to_owned()];
     if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(external_files(path, &bth_import::read_file(path)?));
+        files.extend(external_files(path, &bth_import::read_file(path)?, alpha));
     }
     Ok(files)
 }

@@ -91,6 +91,13 @@ codes! {
     TriangleFaces "F131" "TRIANGLE_FACES is empty without tet leaves; else it maps each triangle that is a constrained face to that face, and others to NONE."
     SourceRows "F140" "Rows of TRIANGLES and CORNERS lie within the sections that they refer to; normals and texture coordinates have equally many rows."
     Positions "F141" "Positions are finite."
+    GroupRuns "F142" "GROUP_RUNS is empty without GROUPS or without triangles; else its first triangles start at 0, ascend strictly and are below the number of triangles, and its groups are rows of GROUPS."
+    Group "F143" "A group's material is NONE or a row of MATERIALS; reserved fields of groups and materials are zero."
+    Label "F144" "Names of groups and materials lie within LABELS, are UTF-8 and have at most 4,096 bytes."
+    OpacityRows "F145" "OPACITY has as many rows as the object has triangles, or none, and OPACITY_MICRO is empty then."
+    Opacity "F146" "A row of OPACITY is a state, or a level from 1 to 8 and the first of its words, which lie within OPACITY_MICRO."
+    MicroOpacity "F147" "States in OPACITY_MICRO are from 0 to 2; bits behind the last state of a triangle of level 1 are zero."
+    ObjectName "F148" "OBJECT_NAMES has a row for each object or none; names lie within OBJECT_LABELS, are UTF-8 and have at most 4,096 bytes."
     Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and reserved fields of zero."
     Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
     NodeTransform "F152" "A node's transform is finite; one that is no matrix has a quaternion that is not zero and ends with two zeros."
@@ -295,7 +302,15 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::CORNERS => "CORNERS",
         kind::NORMALS => "NORMALS",
         kind::UVS => "UVS",
+        kind::GROUPS => "GROUPS",
+        kind::GROUP_RUNS => "GROUP_RUNS",
+        kind::MATERIALS => "MATERIALS",
+        kind::LABELS => "LABELS",
+        kind::OPACITY => "OPACITY",
+        kind::OPACITY_MICRO => "OPACITY_MICRO",
         kind::PROVENANCE => "PROVENANCE",
+        kind::OBJECT_NAMES => "OBJECT_NAMES",
+        kind::OBJECT_LABELS => "OBJECT_LABELS",
         kind::SCENE => "SCENE",
         kind::NODES => "NODES",
         kind::INSTANCES => "INSTANCES",

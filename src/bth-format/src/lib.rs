@@ -24,6 +24,7 @@ pub mod exact;
 pub mod file;
 pub mod layout;
 pub mod limits;
+mod names;
 pub mod object;
 mod scene_view;
 mod unpack;

@@ -9,5 +9,7 @@ pub const MAX_SECTIONS: u32 = 1 << 20;
 pub const MAX_TRIANGLES: u32 = 1 << 30;
 /// Tetrahedra of an object (BTH-F022).
 pub const MAX_TETS: u32 = 1 << 30;
-/// Bytes of the name of a node, camera or light (BTH-F153).
+/// Words of an object that hold states of micro-triangles (BTH-F022).
+pub const MAX_OPACITY_WORDS: u32 = 1 << 28;
+/// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node, camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;

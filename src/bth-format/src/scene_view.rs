@@ -1,7 +1,7 @@
 //! The scene sections as typed slices, zero-copy.
 
 use crate::layout::*;
-use crate::limits::MAX_NAME;
+use crate::names;
 
 /// The scene sections of a file. Sections that the file lacks are empty. Specification: "Scenes".
 #[derive(Clone, Copy, Debug)]
@@ -27,11 +27,8 @@ pub struct SceneView<'a> {
 }
 
 impl<'a> SceneView<'a> {
-    /// The name of `length` bytes from `first` on; `None` when it does not lie within `names` or is not UTF-8, which the check
-    /// rules out (BTH-F153).
     fn name(&self, first: u32, length: u32) -> Option<&'a str> {
-        let end = (first as usize).checked_add(length as usize)?;
-        std::str::from_utf8(self.names.get(first as usize..end)?).ok()
+        names::name(self.names, first, length)
     }
     /// Name of the node of a row; empty where it has none or the row does not exist.
     pub fn node_name(&self, node: u32) -> &'a str {
@@ -48,7 +45,7 @@ impl<'a> SceneView<'a> {
 
     /// BTH-F153: whether the bytes from `first` on are a name of an allowed length.
     pub(crate) fn is_name(&self, first: u32, length: u32) -> bool {
-        length <= MAX_NAME && self.name(first, length).is_some()
+        names::is_name(self.names, first, length)
     }
 
     /// Times and values of a track, given the numbers per key. Panics where they do not lie within their sections, which the

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::cutout::{AlphaMode, Cutouts};
 use crate::error::{Error, Result};
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
-use crate::mesh::{Attributes, Keep, Mesh, Report};
+use crate::mesh::{Attributes, Mesh, Report, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
@@ -27,8 +28,8 @@ enum Format {
 /// `BTH-O001` when the file cannot be read, `BTH-I…` with the place when it does not follow its
 /// format or uses a coordinate that is not finite, `BTH-L…` beyond the limits, and
 /// [`Error::Cancelled`](crate::Error::Cancelled).
-pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
-    import_bytes(path, &read_file(path)?, keep, monitor)
+pub fn import(path: &Path, wanted: impl Into<Wanted>, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+    import_bytes(path, &read_file(path)?, wanted, monitor)
 }
 
 /// As [`import`], from the bytes of a file. The extension of `name` decides about the format, messages contain it, and
@@ -36,18 +37,24 @@ pub fn import(path: &Path, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, R
 ///
 /// # Errors
 /// As [`import`].
-pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+pub fn import_bytes(
+    name: &Path,
+    data: &[u8],
+    wanted: impl Into<Wanted>,
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
+    let wanted = wanted.into();
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(name, data, monitor);
     let raw = match format(&source)? {
-        Format::Obj => obj::read(&source, keep)?,
-        Format::Gltf => gltf::flatten::read(&source, keep)?,
-        Format::Ply => ply::read(&source, keep)?,
+        Format::Obj => obj::read(&source, wanted)?,
+        Format::Gltf => gltf::flatten::read(&source, wanted)?,
+        Format::Ply => ply::read(&source, wanted.attributes)?,
         Format::Stl => stl::read(&source)?,
         Format::Off => off::read(&source)?,
     };
     source.progress(data.len())?;
-    finish(raw, keep, monitor)
+    finish(raw, wanted, monitor)
 }
 
 /// Reads meshes of a glTF or GLB file by their numbers, each in its own space, without the transforms of nodes.
@@ -57,9 +64,10 @@ pub fn import_bytes(name: &Path, data: &[u8], keep: Keep, monitor: &dyn Monitor)
 pub fn import_gltf_meshes(
     path: &Path,
     meshes: &[u32],
-    keep: Keep,
+    wanted: impl Into<Wanted>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<(Mesh, Report)>> {
+    let wanted = wanted.into();
     let data = read_file(path)?;
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(path, &data, monitor);
@@ -70,9 +78,49 @@ pub fn import_gltf_meshes(
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = gltf::document::read(&source, &supported)?;
     let one = |mesh: &u32| {
-        finish(gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, keep)?, keep, monitor)
+        let raw = gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, wanted)?;
+        finish(raw, wanted, monitor)
     };
     meshes.iter().map(one).collect()
+}
+
+/// The cut-outs of a model, whose triangles have the numbers that [`import`] gives them. Formats other than glTF have none.
+///
+/// # Errors
+/// As [`import`]; `BTH-I016` for an image that cannot be read, `BTH-L003` for one that is too large.
+pub fn import_cutouts(path: &Path, mode: AlphaMode, monitor: &dyn Monitor) -> Result<Cutouts> {
+    import_cutouts_bytes(path, &read_file(path)?, mode, monitor)
+}
+
+/// As [`import_cutouts`], from the bytes of a file, as [`import_bytes`] reads it.
+///
+/// # Errors
+/// As [`import_cutouts`].
+pub fn import_cutouts_bytes(
+    name: &Path,
+    data: &[u8],
+    mode: AlphaMode,
+    monitor: &dyn Monitor,
+) -> Result<Cutouts> {
+    let source = Source::new(name, data, monitor);
+    match format(&source)? {
+        Format::Gltf if mode != AlphaMode::None => gltf::cutout::flat(&source, mode),
+        _ => Ok(Cutouts::default()),
+    }
+}
+
+/// The cut-outs of meshes of a glTF file, whose triangles have the numbers that [`import_gltf_meshes`] gives them.
+///
+/// # Errors
+/// As [`import_cutouts`].
+pub fn import_gltf_cutouts(
+    path: &Path,
+    meshes: &[u32],
+    mode: AlphaMode,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Cutouts>> {
+    let data = read_file(path)?;
+    gltf::cutout::meshes(&Source::new(path, &data, monitor), mode, meshes)
 }
 
 /// The files that a model consists of: itself, then those that a glTF document refers to, in order. What is no glTF
@@ -80,21 +128,22 @@ pub fn import_gltf_meshes(
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.
-pub fn source_files(path: &Path) -> Result<Vec<PathBuf>> {
+pub fn source_files(path: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>> {
     let mut files = vec![path.to_owned()];
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(gltf::external_files(path, &read_file(path)?));
+        files.extend(gltf::external_files(path, &read_file(path)?, alpha));
     }
     Ok(files)
 }
 
 /// Collects attributes, welds and counts.
-fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
+fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
-    let attributes = attributes::collect(&raw, keep)?;
+    let attributes = attributes::collect(&raw, wanted.attributes)?;
     let triangles = std::mem::take(&mut raw.triangles);
+    let groups = wanted.groups.then(|| std::mem::take(&mut raw.groups).finish(triangles.len()));
     let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
         input_error(
             NON_FINITE,
@@ -104,6 +153,7 @@ fn finish(mut raw: Raw<'_>, keep: Keep, monitor: &dyn Monitor) -> Result<(Mesh, 
         )
     })?;
     let format = raw.format.to_owned();
+    let mesh = Mesh { groups, ..mesh };
     Ok((mesh, Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }))
 }
 
@@ -124,7 +174,7 @@ pub(crate) fn weld_and_count(
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
     }
     monitor.check()?;
-    let mesh = Mesh { positions: welded.positions, triangles, attributes };
+    let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {

@@ -7,8 +7,10 @@
 #![warn(missing_docs)]
 
 mod attributes;
+mod cutout;
 pub mod error;
 pub mod gltf;
+mod groups;
 mod import;
 mod memory;
 mod mesh;
@@ -24,10 +26,15 @@ mod topology;
 mod weld;
 mod zero_area;
 
+pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTriangle, Cutouts, Wrap};
 pub use error::{Error, Place, Result};
-pub use import::{import, import_bytes, import_gltf_meshes, source_files};
+pub use groups::{Group, Groups};
+pub use import::{
+    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_meshes,
+    source_files,
+};
 pub use memory::{MEMORY_FORMAT, import_triangles};
-pub use mesh::{Attributes, Keep, Mesh, Report};
+pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};
 pub use source::read_file;
 pub use zero_area::is_zero_area;

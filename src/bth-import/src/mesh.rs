@@ -1,5 +1,6 @@
 //! The triangle mesh that importers make, and their report about it.
 
+use crate::groups::Groups;
 use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0).
@@ -12,6 +13,38 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Shading attributes, if the source has some and the caller keeps them.
     pub attributes: Option<Attributes>,
+    /// Where triangles let rays pass, in the form of the compiled file; `None` where all are opaque. The compiler fills it in.
+    pub opacity: Option<TriangleOpacities>,
+    /// Groups of triangles, if the caller wants them.
+    pub groups: Option<Groups>,
+}
+
+/// Opacity of each triangle, as the sections OPACITY and OPACITY_MICRO of a compiled file have it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleOpacities {
+    /// A row for each triangle.
+    pub rows: Vec<u32>,
+    /// States of micro-triangles.
+    pub micro: Vec<u32>,
+}
+
+/// What the opacity of a mesh's triangles consists of. Shares are of the area of the triangles of cut-out materials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct OpacityReport {
+    /// Triangles of cut-out materials.
+    pub triangles: u64,
+    /// Those of them that are divided into micro-triangles.
+    pub subdivided: u64,
+    /// Different patterns of micro-triangles.
+    pub patterns: u64,
+    /// Share of the area that is opaque.
+    pub opaque: f64,
+    /// Share of the area that is transparent.
+    pub transparent: f64,
+    /// Share of the area that is neither: the edges of holes, where they are finer than micro-triangles.
+    pub unknown: f64,
+    /// Bytes of the sections.
+    pub bytes: u64,
 }
 
 /// Shading attributes per corner, indexed.
@@ -36,6 +69,21 @@ pub enum Keep {
     Normals,
     /// Normals and texture coordinates.
     All,
+}
+
+/// What to read of a model besides positions and triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Shading attributes.
+    pub attributes: Keep,
+    /// Groups of triangles, with their names and materials (`--names`).
+    pub groups: bool,
+}
+
+impl From<Keep> for Wanted {
+    fn from(attributes: Keep) -> Self {
+        Self { attributes, groups: false }
+    }
 }
 
 /// What was found in a source. Counts are of triangles unless the field names another unit.
@@ -65,6 +113,9 @@ pub struct Report {
     pub components: u64,
     /// Positions that are not finite and that no face uses. Used ones are an error.
     pub non_finite_unused: u64,
+    /// Opacity of triangles, where some are not opaque.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<OpacityReport>,
 }
 
 impl Mesh {

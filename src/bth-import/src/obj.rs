@@ -1,11 +1,12 @@
-//! Reads Wavefront OBJ: polygons with normals and texture coordinates. Materials, groups and smoothing are ignored.
+//! Reads Wavefront OBJ: polygons with normals and texture coordinates, and groups of them. Smoothing and what materials are is ignored.
 //!
 //! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
 use std::borrow::Cow;
 
 use crate::error::{Error, Result};
-use crate::mesh::Keep;
+use crate::groups::NamedGroups;
+use crate::mesh::{Keep, Wanted};
 use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{NONE, Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
@@ -65,15 +66,16 @@ struct Reader<'a, 's> {
     raw: Raw<'a>,
     normals: bool,
     uvs: bool,
+    groups: NamedGroups,
     forward: Vec<Forward>,
     face: Vec<u32>,
     face_normals: Vec<u32>,
     face_uvs: Vec<u32>,
 }
 
-/// Reads an OBJ file. A polyline counts as one skipped element, as does a free-form curve or surface; each point of a
+/// Reads an OBJ file. A group is what has the same name, by the last statement `o` or `g`, and the same material. A polyline counts as one skipped element, as does a free-form curve or surface; each point of a
 /// point statement counts as one.
-pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
+pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
     if let Some(byte) = source.data.iter().take(4096).position(|&c| c == 0) {
         let hint = "save it as UTF-8 or ASCII text, or give it the extension of its format";
         return Err(source.error_at_byte(UNSUPPORTED, byte, "expected text, found a zero byte", hint));
@@ -82,8 +84,9 @@ pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
     let mut reader = Reader {
         source,
         raw: Raw::new("obj", Box::new(locate)),
-        normals: keep != Keep::None,
-        uvs: keep == Keep::All,
+        normals: wanted.attributes != Keep::None,
+        uvs: wanted.attributes == Keep::All,
+        groups: NamedGroups::default(),
         forward: Vec::new(),
         face: Vec::new(),
         face_normals: Vec::new(),
@@ -109,6 +112,12 @@ pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
                 reader.raw.uvs.push([u, v]);
             }
             Some(b"f" | b"fo") => reader.face(number, words)?,
+            Some(b"g" | b"o") if wanted.groups => {
+                reader.groups.name(reader.raw.triangles.len(), rest(words));
+            }
+            Some(b"usemtl") if wanted.groups => {
+                reader.groups.material(reader.raw.triangles.len(), rest(words));
+            }
             Some(b"p") => reader.raw.skipped += words.count() as u64,
             Some(b"l" | b"curv" | b"curv2" | b"surf") => reader.raw.skipped += 1,
             Some(keyword) if KNOWN.contains(&keyword) => {}
@@ -126,6 +135,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
         source.monitor.warn(&message);
     }
     let mut raw = reader.raw;
+    raw.groups = reader.groups.recorder;
     if raw.normals.is_empty() {
         raw.normal_rows.clear();
     }
@@ -232,6 +242,12 @@ impl Reader<'_, '_> {
             None => Ok(()),
         }
     }
+}
+
+/// The words of a name, with single spaces between them. Bytes that are not UTF-8 become the replacement character.
+fn rest<'w>(words: impl Iterator<Item = &'w [u8]>) -> String {
+    let words: Vec<_> = words.map(String::from_utf8_lossy).collect();
+    words.join(" ")
 }
 
 /// The next line and its number. While a line ends in a backslash, the following line is joined to it.

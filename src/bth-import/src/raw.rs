@@ -1,6 +1,7 @@
 //! The mesh that a format's reader makes: the source's own rows, not welded.
 
 use crate::error::{Error, Place, Result};
+use crate::groups::GroupRecorder;
 use bth_format::limits::MAX_TRIANGLES;
 
 /// Row of an attribute that a corner does not have.
@@ -40,6 +41,8 @@ pub(super) struct Raw<'a> {
     pub(super) polygons: u64,
     /// Points, lines and faces of fewer than three corners.
     pub(super) skipped: u64,
+    /// Groups of triangles, if the caller wants them and the source has some.
+    pub(super) groups: GroupRecorder,
     /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }
@@ -57,6 +60,7 @@ impl<'a> Raw<'a> {
             uv_rows: Vec::new(),
             polygons: 0,
             skipped: 0,
+            groups: GroupRecorder::default(),
             locate,
         }
     }

@@ -23,7 +23,7 @@ pub(super) fn is_binary_size(data: &[u8]) -> bool {
     binary_count(data).is_some_and(|n| data.len() as u64 == HEADER as u64 + FACET as u64 * u64::from(n))
 }
 
-/// Reads an STL file. Facet normals are not shading attributes and are ignored.
+/// Reads an STL file. Each solid of a text is a group. Facet normals are not shading attributes and are ignored.
 pub(super) fn read<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
     let data = source.data;
     let text = !is_binary_size(data)
@@ -74,7 +74,12 @@ fn read_text<'a>(source: &'a Source<'_>) -> Result<Raw<'a>> {
         let Some(keyword) = words.next() else { continue };
         let malformed = |message: String| source.error_at_line(MALFORMED, number, message, MALFORMED_HINT);
         match (keyword.to_ascii_lowercase().as_slice(), &mut open) {
-            (b"solid", None) if !in_solid => in_solid = true,
+            (b"solid", None) if !in_solid => {
+                in_solid = true;
+                let name: Vec<_> = words.map(String::from_utf8_lossy).collect();
+                let group = raw.groups.group(name.join(" "), None);
+                raw.groups.start(raw.triangles.len(), group);
+            }
             (b"endsolid", None) if in_solid => in_solid = false,
             (b"facet" | b"endfacet", None) if in_solid => {}
             (b"outer", None) if in_solid => open = Some(Vec::with_capacity(3)),

@@ -175,7 +175,7 @@ mod tests {
                 faces.iter().map(|f| f.map(|v| (v % positions.len()) as u32)).collect();
             let positions: Vec<_> = positions.iter().map(|p| p.map(f32::from)).collect();
             let positions = crate::weld::weld(&positions, &mut triangles).unwrap().positions;
-            let mesh = Mesh { positions, triangles, attributes: None };
+            let mesh = Mesh { positions, triangles, ..Mesh::default() };
             prop_assert_eq!(topology(&mesh), slow_topology(&mesh));
         }
     }
@@ -189,7 +189,7 @@ mod tests {
     fn topology_is_the_same_at_any_thread_count() {
         let positions = (0..60_000).map(|i| [i as f32, (i % 97) as f32, 0.0]).collect();
         let triangles = (0..60_000u32).map(|i| [i, (i * 7 + 1) % 60_000, (i * 13 + 2) % 60_000]).collect();
-        let mesh = Mesh { positions, triangles, attributes: None };
+        let mesh = Mesh { positions, triangles, ..Mesh::default() };
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| topology(&mesh))

@@ -7,6 +7,7 @@ use crate::intersection::{
 use crate::nearest::{ExactHit, nearest_of};
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth_format::layout::{Opacity, opacity_at};
 use num_bigint::BigInt;
 
 /// The units of f64, 2^-1074, and of f32, 2^-149.
@@ -15,7 +16,7 @@ const UNITS: [u32; 2] = [1074, 149];
 /// The visible instances of a scene at the time to which it is set. Vertices are transformed to world space by the f64
 /// matrix of the instance without any rounding, whereas the runtime transforms the ray into the space of the object and
 /// rounds it there. Answers for transformed instances therefore differ from the runtime's by that rounding; answers for
-/// instances without a transform are those of the runtime.
+/// instances without a transform are those of the runtime. Transparent parts of triangles are not hit.
 #[derive(Debug)]
 pub struct World {
     instances: Vec<Instance>,
@@ -27,6 +28,8 @@ struct Instance {
     /// From object to world space, rows of the matrix; `None` for the identity.
     to_world: Option<[[f64; 4]; 3]>,
     triangles: Vec<Triangle>,
+    /// Rows of OPACITY and OPACITY_MICRO.
+    opacity: [Vec<u32>; 2],
 }
 
 /// A finite f64 as an integer, in units of 2^-1074.
@@ -47,10 +50,12 @@ impl World {
             std::array::from_fn(|row| std::array::from_fn(|k| f64::from(u8::from(row == k))));
         let instance = |number: u32| {
             let view = scene.instance(number);
+            let object = scene.object(view.object);
             view.visible.then(|| Instance {
                 number,
                 to_world: Some(view.to_world).filter(|rows| *rows != identity),
-                triangles: triangles(&scene.object(view.object)),
+                triangles: triangles(&object),
+                opacity: [object.opacity.to_vec(), object.opacity_micro.to_vec()],
             })
         };
         World { instances: (0..scene.instance_count()).filter_map(instance).collect() }
@@ -91,7 +96,10 @@ impl World {
                     None => intersection(ray, triangle.corners)?,
                     Some(rows) => intersection_in_world(ray, rows, triangle.corners)?,
                 };
-                Some((primitive, at))
+                let [rows, words] = &instance.opacity;
+                let [u, v] = [&at.u, &at.v].map(|x| to_f64(x) as f32);
+                let passes = opacity_at(rows, words, triangle.id, u, v) == Opacity::Transparent;
+                (!passes).then_some((primitive, at))
             })
         })
     }

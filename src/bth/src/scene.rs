@@ -7,7 +7,7 @@ use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::error::Error;
 use bth_format::file::File;
-use bth_format::layout::NONE;
+use bth_format::layout::{NONE, kind};
 use bth_format::object::ObjectView;
 use std::path::Path;
 
@@ -24,11 +24,17 @@ use std::path::Path;
 /// acceleration structures in the file. In a file with scene sections, a ray is first transformed into the object's space, where
 /// each component of its origin and direction is rounded to f32 (relative error 2^-24). Among hits of equal t in several
 /// instances that of least index is reported.
+///
+/// In files with opacity (`bthc compile --alpha`) rays pass through the transparent parts of triangles: nearest and any hits,
+/// counts, and all other hits are those on parts that are not transparent. Crossings, winding numbers, [`Self::contains`] and
+/// closest points are about the surface itself and look at no opacity.
 #[derive(Debug)]
 pub struct Scene {
     file: File,
     /// The instances at the scene's time; `None` if the file has no scene sections.
     world: Option<World>,
+    /// Whether some triangle of some object may let rays pass.
+    has_opacity: bool,
     /// The masks of instances and of groups of triangles.
     masks: Masks,
 }
@@ -85,13 +91,15 @@ impl Scene {
         for object in 0..file.object_count() {
             file.check(object)?;
         }
+        file.check_object_names()?;
         Scene::with_world(file)
     }
 
     /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
         let world = World::new(&file)?;
-        Ok(Scene { file, world, masks: Masks::default() })
+        let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
+        Ok(Scene { file, world, has_opacity, masks: Masks::default() })
     }
 
     /// The instances; `None` if the file has no scene sections.
@@ -141,7 +149,7 @@ impl Scene {
     /// A scene with given instances.
     #[cfg(test)]
     pub(crate) fn with_instances(file: File, world: World) -> Scene {
-        Scene { file, world: Some(world), masks: Masks::default() }
+        Scene { file, world: Some(world), has_opacity: false, masks: Masks::default() }
     }
 
     /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
@@ -188,6 +196,12 @@ impl Scene {
 
     /// As [`Self::nearest_from`], with statistics of the traversal. A miss is [`Hit::MISS`].
     pub fn nearest_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
+        let counted = self.nearest_of_all_counted(ray, from);
+        if self.has_opacity { self.counted_not_transparent(ray, counted) } else { counted }
+    }
+
+    /// As [`Self::nearest_counted`], as if every triangle were opaque.
+    fn nearest_of_all_counted(&self, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         if let Some((object, instance)) = self.sole() {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
         }
@@ -209,6 +223,15 @@ impl Scene {
     /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
     #[inline]
     pub(crate) fn nearest_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
+        if self.has_opacity {
+            return self.nearest_not_transparent(rays, from, hits);
+        }
+        self.nearest_of_all(rays, from, hits);
+    }
+
+    /// As [`Self::nearest_hits_of`], as if every triangle were opaque.
+    #[inline(always)]
+    pub(crate) fn nearest_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         match (self.sole(), rays, &mut *hits) {
             (Some((object, instance)), [ray], [hit]) => {
                 object::nearest_to(object, ray, hint(start_primitive(from, 0), instance), instance, hit);
@@ -259,6 +282,15 @@ impl Scene {
     /// Stores for each ray whether it hits anything. `found`, and `from` if it is given, are as long as `rays`.
     #[inline]
     pub(crate) fn any_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
+        if self.has_opacity {
+            return self.any_not_transparent(rays, from, found);
+        }
+        self.any_of_all(rays, from, found);
+    }
+
+    /// As [`Self::any_hits_of`], as if every triangle were opaque.
+    #[inline(always)]
+    pub(crate) fn any_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         match (self.sole(), rays, &mut *found) {
             (Some((object, instance)), [ray], [found]) => {
                 *found = object::any(object, ray, hint(start_primitive(from, 0), instance));

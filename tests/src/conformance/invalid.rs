@@ -8,8 +8,10 @@ use std::mem::offset_of;
 pub fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(tree());
+    cases.extend(opacity());
     cases.extend(tets());
     cases.extend(geometry());
+    cases.extend(groups());
     cases.extend(super::scenes::invalid());
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     cases
@@ -28,6 +30,47 @@ fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
     broken(name, base, Seal::Sections, |e| {
         e.put_u32(kind, at, value);
     })
+}
+
+/// Faults of groups and names.
+fn groups() -> Vec<Case> {
+    let case = |name: &str, kind, at: usize, value| field(name, "groups", kind, at, value);
+    let run = size_of::<GroupRun>();
+    let missing = |name: &str, kind| {
+        broken(name, "groups", Seal::Sections, |e| {
+            let at = e.entry_at(0, kind);
+            e.put(at + offset_of!(SectionEntry, length), &[0; 8]);
+            e.put(at + offset_of!(SectionEntry, count), &[0; 8]);
+            let (start, length) = (e.section_at(kind), if kind == kind::GROUPS { 48 } else { 32 });
+            e.put(start, &[0; 48][..length]);
+        })
+    };
+    vec![
+        missing("F142-no-runs", kind::GROUP_RUNS),
+        missing("F142-no-groups", kind::GROUPS),
+        case("F142-first-triangle", kind::GROUP_RUNS, 0, 1),
+        case("F142-not-ascending", kind::GROUP_RUNS, 2 * run, 1),
+        case("F142-beyond-the-triangles", kind::GROUP_RUNS, 3 * run, 4),
+        case("F142-group", kind::GROUP_RUNS, offset_of!(GroupRun, group), 3),
+        case("F143-material", kind::GROUPS, offset_of!(Group, material), 2),
+        case("F143-group-reserved", kind::GROUPS, offset_of!(Group, reserved), 1),
+        case("F143-material-reserved", kind::MATERIALS, offset_of!(Material, reserved) + 4, 1),
+        case("F144-group-name-beyond", kind::GROUPS, offset_of!(Group, name_length), 100),
+        case("F144-group-name-overflow", kind::GROUPS, offset_of!(Group, name), NONE),
+        case("F144-material-name-not-utf8", kind::MATERIALS, 16 + offset_of!(Material, name_length), 3),
+        broken("F148-row-missing", "groups", Seal::Sections, |e| {
+            let at = e.entry_at(NONE, kind::OBJECT_NAMES);
+            let start = e.bytes[at + offset_of!(SectionEntry, offset)..][..8].try_into().unwrap();
+            e.put(at + offset_of!(SectionEntry, length), &8u64.to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &1u64.to_le_bytes());
+            e.put(u64::from_le_bytes(start) as usize + 8, &[0; 8]);
+        }),
+        broken("F148-name-beyond", "groups", Seal::Sections, |e| {
+            let at = e.entry_at(NONE, kind::OBJECT_NAMES) + offset_of!(SectionEntry, offset);
+            let start = e.bytes[at..][..8].try_into().unwrap();
+            e.put(u64::from_le_bytes(start) as usize + 4, &9u32.to_le_bytes());
+        }),
+    ]
 }
 
 /// Faults of the container. A table of cases, hence its length.
@@ -251,6 +294,34 @@ fn tree() -> Vec<Case> {
         field("F140-triangles", base, kind::TRIANGLES, 0, 30),
         field("F140-corners", base, kind::CORNERS, 8, NONE),
         field("F141-nan", base, kind::POSITIONS, 4, nan),
+    ]
+}
+
+/// Faults of the opacity of triangles.
+fn opacity() -> Vec<Case> {
+    let base = "opacity";
+    let row = |name, triangle: usize, value| field(name, base, kind::OPACITY, 4 * triangle, value);
+    let micro = |name, word: usize, value| field(name, base, kind::OPACITY_MICRO, 4 * word, value);
+    let rows = |name: &str, kind: u32, count: u64| {
+        broken(name, base, Seal::Sections, |e| {
+            // What is no longer in the section is a gap, which is zero.
+            let rows = e.section_at(kind) + 4 * count as usize;
+            e.put(rows, &vec![0; 24 - 4 * count as usize]);
+            let at = e.entry_at(0, kind);
+            e.put(at + offset_of!(SectionEntry, length), &(4 * count).to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &count.to_le_bytes());
+        })
+    };
+    vec![
+        rows("F145-rows", kind::OPACITY, 5),
+        rows("F145-micro-alone", kind::OPACITY, 0),
+        row("F146-state", 0, 3 << 4),
+        row("F146-level", 0, 9),
+        row("F146-word", 3, 2 << 4 | 1),
+        row("F146-words", 4, 1 << 4 | 3),
+        row("F146-far", 4, u32::MAX - 13),
+        micro("F147-state", 1, 3 << 30),
+        micro("F147-behind-the-last", 0, 1 << 8),
     ]
 }
 

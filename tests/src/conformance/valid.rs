@@ -3,7 +3,7 @@
 use super::Case;
 use bth_compile::bvh::Wide;
 use bth_compile::coordinates::pack;
-use bth_compile::write::{FileBuilder, ObjectParts, Source, object};
+use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, Source, object, object_names};
 use bth_format::layout::*;
 use zerocopy::IntoBytes;
 
@@ -19,7 +19,9 @@ pub fn valid() -> Vec<Case> {
         Case::new("grid-21", two_levels(Some(GridBits::B21), false)),
         Case::new("packed-nodes", two_levels(None, true)),
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
+        Case::new("opacity", opacity()),
         Case::new("two-objects", two_objects()),
+        Case::new("groups", groups()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
@@ -114,6 +116,33 @@ fn triangle() -> Vec<u8> {
     object(&mut builder, 0, &parts).unwrap();
     builder.provenance("{\"tool\":\"conformance\"}".into()).unwrap();
     builder.finish()
+}
+
+/// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once more at level 1 by the
+/// same word.
+fn opacity() -> Vec<u8> {
+    let corners: [[[f32; 3]; 3]; 6] =
+        std::array::from_fn(|k| CORNERS.map(|[x, y, z]| [x + 2.0 * k as f32, y, z]));
+    let lines = lines(raw(&corners, 0).as_bytes());
+    let micro = |level, word| TriangleOpacity::Micro { level, word };
+    let rows = [
+        TriangleOpacity::Whole(Opacity::Opaque),
+        TriangleOpacity::Whole(Opacity::Transparent),
+        TriangleOpacity::Whole(Opacity::Unknown),
+        micro(1, 0),
+        micro(2, 1),
+        micro(1, 0),
+    ];
+    file(&ObjectParts {
+        bounds: Some(bounds(corners.as_flattened())),
+        root: Child::Raw(0).code(),
+        triangles: 6,
+        lines: &lines,
+        triangle_ids: &[0, 1, 2, 3, 4, 5],
+        opacity: &rows.map(TriangleOpacity::code),
+        opacity_micro: &[0b10_01_00_01, 0x1864_9126],
+        ..ObjectParts::default()
+    })
 }
 
 fn triangle_bare() -> Vec<u8> {
@@ -211,6 +240,33 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
     })
 }
 
+/// Four triangles in three groups of two materials, one group in two runs, one without a name; and an object without
+/// groups. Both objects have names.
+fn groups() -> Vec<u8> {
+    let triangles: Vec<_> = (0..4).map(|i| CORNERS.map(|[x, y, z]| [x, y, z + i as f32])).collect();
+    let lines = lines(indexed(&triangles, 0).as_bytes());
+    let group = |name: &str, material| bth_import::Group { name: name.into(), material };
+    let groups = GroupParts::of(&bth_import::Groups {
+        groups: vec![group("wheel", Some(0)), group("window, front", Some(1)), group("", None)],
+        materials: vec!["rubber".into(), "gl\u{e4}s".into()],
+        runs: vec![[0, 0], [1, 1], [2, 0], [3, 2]],
+    });
+    let parts = ObjectParts {
+        bounds: Some(bounds(triangles.as_flattened())),
+        root: Child::Indexed(0).code(),
+        triangles: 4,
+        lines: &lines,
+        triangle_ids: &[0, 1, 2, 3],
+        groups: Some(&groups),
+        ..ObjectParts::default()
+    };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &parts).unwrap();
+    object(&mut builder, 1, &ObjectParts { groups: None, ..parts }).unwrap();
+    object_names(&mut builder, ["car", "stone"]).unwrap();
+    builder.finish()
+}
+
 fn two_objects() -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
     let parts = ObjectParts {
@@ -291,6 +347,7 @@ fn tets(record: RecordKind) -> Vec<u8> {
         hull_faces: &parts.hulls,
         triangle_faces: &homes,
         source: Some(source),
+        ..ObjectParts::default()
     })
 }
 

@@ -60,6 +60,33 @@ fn explain_tells_why_nodes_were_chosen_or_refused() {
 }
 
 #[test]
+fn info_lists_groups_and_materials() {
+    let faces: String = (0..45).map(|i| format!("g part {i}\nf 1 2 3\n")).collect();
+    let model =
+        format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red \u{7}paint\no body\nf 1 2 3\nf 3 2 1\n{faces}");
+    let folder = folder(&[("car.obj", &model)]);
+    bthc(folder.path(), &["compile", "car.obj", "--names"]).expect(0);
+    bthc(folder.path(), &["verify", "car.bth"]).expect(0);
+    let json = bthc(folder.path(), &["info", "car.bth", "--json"]).expect(0).json();
+    let object = &json["objects"][0];
+    assert_eq!(object["materials"], serde_json::json!(["red \u{7}paint"]));
+    assert_eq!(object["groups"].as_array().map(Vec::len), Some(46));
+    assert_eq!(object["groups"][0], serde_json::json!({"name": "body", "triangles": 2, "material": 0}));
+    assert_eq!(json["provenance"]["options"]["names"], true);
+    let text = bthc(folder.path(), &["info", "car.bth"]).expect(0).stdout;
+    let row = text.lines().find(|line| line.contains("body")).expect("a row of the group");
+    assert_eq!(row.split_whitespace().collect::<Vec<_>>(), ["0", "0", "body", "red", "\\u{7}paint", "2"]);
+    assert!(text.contains("6 more, see --json") && !text.contains('\u{7}'), "{text}");
+
+    bthc(folder.path(), &["compile", "car.obj"]).expect(0);
+    let json = bthc(folder.path(), &["info", "car.bth", "--json"]).expect(0).json();
+    assert_eq!(
+        (&json["objects"][0]["groups"], &json["objects"][0]["name"]),
+        (&serde_json::json!([]), &"".into())
+    );
+}
+
+#[test]
 fn completions_and_manual_are_printed() {
     let folder = folder(&[]);
     for shell in ["bash", "zsh", "fish"] {

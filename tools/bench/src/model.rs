@@ -70,7 +70,7 @@ impl Model {
             path.display()
         );
         let (positions, triangles) = (object.positions.to_vec(), object.triangles.to_vec());
-        let mesh = Mesh { positions, triangles, attributes: None };
+        let mesh = Mesh { positions, triangles, ..Mesh::default() };
         Ok(Model { name, path: path.to_owned(), mesh, _folder: None })
     }
 

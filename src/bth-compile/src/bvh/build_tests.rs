@@ -39,7 +39,7 @@ fn no_triangle_gives_no_node() {
 #[test]
 fn triangles_without_area_are_left_out_and_counted() {
     let positions = vec![[0.0; 3], [1.0; 3], [2.0; 3], [0.0, 1.0, 0.0]];
-    let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 1, 3], [1, 1, 3]], attributes: None };
+    let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 1, 3], [1, 1, 3]], ..Mesh::default() };
     let (bvh, report) = built(&mesh, Quality::Balanced);
     assert_eq!(bvh.order, [1]);
     assert_eq!((report.triangles, report.dropped), (1, 2));
@@ -105,9 +105,9 @@ fn better_quality_costs_fewer_visits() {
 
 #[test]
 fn bad_indices_and_positions_are_reported() {
-    let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]], attributes: None };
+    let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 3]], ..Mesh::default() };
     assert!(matches!(build(&mesh, &BvhOptions::default(), &Silent), Err(Error::Internal { .. })));
-    let mesh = Mesh { positions: vec![[f32::NAN; 3]; 3], triangles: vec![[0, 1, 2]], attributes: None };
+    let mesh = Mesh { positions: vec![[f32::NAN; 3]; 3], triangles: vec![[0, 1, 2]], ..Mesh::default() };
     assert!(matches!(build(&mesh, &BvhOptions::default(), &Silent), Err(Error::Internal { .. })));
 }
 

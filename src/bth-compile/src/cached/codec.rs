@@ -4,7 +4,7 @@ use super::rows::{HashedRows, RowReader, RowWriter};
 use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
-use bth_import::{self as mesh, Attributes, Mesh};
+use bth_import::{self as mesh, Attributes, Group, Groups, Mesh, TriangleOpacities};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -47,6 +47,24 @@ fn shading(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of the opacity of a mesh's triangles, where some are not opaque.
+fn opacity(mesh: &Mesh) -> Option<Digest> {
+    let opacity = mesh.opacity.as_ref()?;
+    let mut hasher = HashedRows::new("opacity");
+    hasher.add(&opacity.rows);
+    hasher.add(&opacity.micro);
+    Some(hasher.finish())
+}
+
+/// Hash of a mesh's groups, if they are wanted.
+fn groups(mesh: &Mesh) -> Option<Digest> {
+    let mut rows = RowWriter::default();
+    mesh.groups.as_ref()?.write(&mut rows);
+    let mut hasher = HashedRows::new("groups");
+    hasher.add(&rows.finish());
+    Some(hasher.finish())
+}
+
 /// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
@@ -56,12 +74,24 @@ pub(crate) struct MeshSummary {
     pub(crate) geometry: Digest,
     /// Hash of the shading attributes.
     pub(crate) shading: Option<Digest>,
+    /// Hash of the opacity.
+    #[serde(default)]
+    pub(crate) opacity: Option<Digest>,
+    /// Hash of the groups.
+    #[serde(default)]
+    pub(crate) groups: Option<Digest>,
 }
 
 impl MeshSummary {
     /// A mesh with its summary.
     pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
-        let summary = Self { report, geometry: geometry(&mesh), shading: shading(&mesh) };
+        let summary = Self {
+            report,
+            geometry: geometry(&mesh),
+            shading: shading(&mesh),
+            opacity: opacity(&mesh),
+            groups: groups(&mesh),
+        };
         (mesh, summary)
     }
 }
@@ -70,19 +100,37 @@ impl Codec for Mesh {
     fn write(&self, to: &mut RowWriter) {
         to.add(&self.positions);
         to.add(&self.triangles);
-        to.add(&[u8::from(self.attributes.is_some())]);
+        let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
+        to.add(&[u8::from(self.attributes.is_some()) | has_groups]);
         if let Some(attributes) = &self.attributes {
             to.add(&attributes.corners);
             to.add(&attributes.normals);
             to.add(&attributes.uvs);
         }
+        if let Some(groups) = &self.groups {
+            groups.write(to);
+        }
+        // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
+        if let Some(opacity) = &self.opacity {
+            to.add(&opacity.rows);
+            to.add(&opacity.micro);
+        }
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let (positions, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>) = (from.take()?, from.take()?);
-        let attributes = match from.one::<u8>()? {
+        let parts = from.one::<u8>()?;
+        let attributes = match parts & 1 {
             0 => None,
             _ => Some(Attributes { corners: from.take()?, normals: from.take()?, uvs: from.take()? }),
+        };
+        let groups = match parts & HAS_GROUPS {
+            0 => None,
+            _ => Some(Groups::read(from)?),
+        };
+        let opacity = match from.is_empty() {
+            true => None,
+            false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
         };
         let within =
             |rows: &[[u32; 3]], count: usize| rows.as_flattened().iter().all(|r| (*r as usize) < count);
@@ -90,8 +138,49 @@ impl Codec for Mesh {
             a.corners.len() == triangles.len()
                 && [a.normals.len(), a.uvs.len()].iter().all(|&n| n == 0 || within(&a.corners, n))
         });
-        let fits = attributes_fit && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes })
+        let opacity_fits = opacity.as_ref().is_none_or(|o| o.rows.len() == triangles.len());
+        let groups_fit = groups
+            .as_ref()
+            .is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()));
+        let fits = attributes_fit && opacity_fits && groups_fit && within(&triangles, positions.len());
+        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups })
+    }
+}
+
+/// Bit of the byte that says what follows the triangles of a mesh; the lowest stands for attributes.
+const HAS_GROUPS: u8 = 2;
+
+impl Codec for Groups {
+    fn write(&self, to: &mut RowWriter) {
+        let names = self.groups.iter().map(|group| group.name.as_str());
+        let names: Vec<&str> = names.chain(self.materials.iter().map(String::as_str)).collect();
+        let material = |group: &Group| group.material.unwrap_or(u32::MAX);
+        to.add(&self.groups.iter().map(material).collect::<Vec<u32>>());
+        to.add(&names.iter().map(|name| name.len() as u32).collect::<Vec<u32>>());
+        to.add(names.concat().as_bytes());
+        to.add(&self.runs);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        let (materials, lengths, text): (Vec<u32>, Vec<u32>, Vec<u8>) =
+            (from.take()?, from.take()?, from.take()?);
+        let runs: Vec<[u32; 2]> = from.take()?;
+        let mut rest = std::str::from_utf8(&text).ok()?;
+        let mut names = Vec::with_capacity(lengths.len());
+        for length in lengths {
+            let (name, behind) = rest.split_at_checked(length as usize)?;
+            names.push(name.to_owned());
+            rest = behind;
+        }
+        let material_names = (materials.len() <= names.len()).then(|| names.split_off(materials.len()))?;
+        let known = |row: u32| row == u32::MAX || (row as usize) < material_names.len();
+        let fits = rest.is_empty()
+            && materials.iter().all(|row| known(*row))
+            && runs.iter().all(|run| (run[1] as usize) < materials.len())
+            && runs.is_sorted_by(|a, b| a[0] < b[0]);
+        let group = |(name, row): (String, u32)| Group { name, material: (row != u32::MAX).then_some(row) };
+        let groups = names.into_iter().zip(materials).map(group).collect();
+        fits.then_some(Groups { groups, materials: material_names, runs })
     }
 }
 
@@ -162,16 +251,30 @@ mod tests {
     fn meshes_with_rows_out_of_range_do_not_come_back() {
         let attributes =
             Attributes { corners: vec![[0, 1, 0]], normals: vec![[0.0; 3]; 2], uvs: vec![[0.5; 2]; 2] };
+        let opacity = Some(TriangleOpacities { rows: vec![1], micro: vec![9] });
         let mesh = Mesh {
             positions: vec![[0.0; 3], [1.0; 3], [2.0; 3]],
             triangles: vec![[0, 1, 2]],
             attributes: Some(attributes),
+            opacity,
+            groups: Some(Groups {
+                groups: vec![Group { name: "wheel".into(), material: Some(0) }],
+                materials: vec!["rubber".into()],
+                runs: vec![[0, 0]],
+            }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, ..mesh.clone() };
+        let plain = Mesh { attributes: None, opacity: None, groups: None, ..mesh.clone() };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);
+        let changes: [fn(&mut Groups); 3] =
+            [|g| g.runs[0][1] = 1, |g| g.runs[0][0] = 1, |g| g.groups[0].material = Some(1)];
+        for change in changes {
+            let mut other = mesh.clone();
+            change(other.groups.as_mut().unwrap());
+            assert_eq!(decode::<Mesh>(&encode(&other)), None);
+        }
         let mut other = mesh;
         other.attributes.as_mut().unwrap().corners[0] = [0, 2, 0];
         assert_eq!(decode::<Mesh>(&encode(&other)), None);

@@ -11,7 +11,7 @@ use crate::source::SourceDigest;
 use crate::write::SceneParts;
 use bth_cache::Key;
 use bth_files::Digest;
-use bth_import::Keep;
+use bth_import::{AlphaMode, Wanted};
 use serde::Serialize;
 use std::path::Path;
 
@@ -23,17 +23,26 @@ const MARKS: &str = "1";
 const COSTS: &str = "3";
 const TETS: &str = "1";
 const COLLAPSE: &str = "1";
+const OPACITY: &str = "1";
+const NAMES: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
 /// A mesh read from a model. A supported extension determines the format in which the file is read.
-pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, keep: Keep) -> Key {
-    Key::new("mesh")
+pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wanted) -> Key {
+    let mut key = Key::new("mesh")
         .with("source", source.text())
         .with("format", extension(path))
         .with("part", part)
-        .with("attributes", text(&keep))
-        .with("mesh version", MESH)
+        .with("attributes", text(&wanted.attributes))
+        .with("mesh version", MESH);
+    if wanted.groups {
+        key = key.with("names", "true").with("names version", NAMES);
+    }
+    match source.alpha {
+        AlphaMode::None => key,
+        alpha => key.with("alpha", text(&alpha)).with("opacity version", OPACITY),
+    }
 }
 
 pub(crate) fn extension(path: &Path) -> String {
@@ -91,6 +100,8 @@ impl ObjectKeys {
         Key::new("object")
             .with("geometry", mesh.geometry.hex())
             .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
+            .with_all(mesh.opacity.iter().map(|opacity| ("opacity".to_owned(), opacity.hex())))
+            .with_all(mesh.groups.iter().map(|groups| ("groups".to_owned(), groups.hex())))
             .with_all(self.0.iter().cloned())
     }
 }
@@ -149,6 +160,12 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         ("collapse version", COLLAPSE.to_owned()),
         ("file version", format!("{FILE}.{}", bth_format::layout::WRITER_VERSION)),
     ];
+    if options.alpha != AlphaMode::None {
+        all.extend([("alpha", text(&options.alpha)), ("opacity version", OPACITY.to_owned())]);
+    }
+    if options.names {
+        all.extend([("names", "true".to_owned()), ("names version", NAMES.to_owned())]);
+    }
     if options.collapse.plan != Default::default() {
         all.push(("plan", format!("{:?}", options.collapse.plan)));
     }

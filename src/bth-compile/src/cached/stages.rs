@@ -11,7 +11,7 @@ use crate::pipeline::{Direct, Stages, timed};
 use crate::source::Model;
 use crate::{bvh, marks, tets};
 use bth_files::Digest;
-use bth_import::{self as mesh, Keep, Mesh};
+use bth_import::{self as mesh, Mesh, Wanted};
 use std::path::Path;
 
 /// The stages of one object.
@@ -44,18 +44,18 @@ impl Stages for CachedStages<'_> {
     fn import(
         &mut self,
         model: &Model<'_>,
-        keep: Keep,
+        wanted: Wanted,
         monitor: &dyn Monitor,
     ) -> Result<(Mesh, mesh::Report)> {
         if self.cache.store().is_none() {
-            return Direct.import(model, keep, monitor);
+            return Direct.import(model, wanted, monitor);
         }
         let (mesh, summary) = self.cache.get_or_build(
-            (keys::mesh(model.digest, model.path, "flat", keep), ""),
+            (keys::mesh(model.digest, model.path, "flat", wanted), ""),
             monitor,
             decode,
             encode,
-            || Ok(MeshSummary::of(Direct.import(model, keep, monitor)?)),
+            || Ok(MeshSummary::of(Direct.import(model, wanted, monitor)?)),
         )?;
         self.geometry = Some(summary.geometry);
         Ok((mesh, summary.report))

@@ -101,7 +101,7 @@ mod tests {
         ) {
             let positions: Vec<_> = positions.iter().map(|p| p.map(|x| f32::from(x) * 0.3)).collect();
             let triangles = faces.iter().map(|f| f.map(|v| (v % positions.len()) as u32)).collect();
-            let mesh = Mesh { positions, triangles, attributes: None };
+            let mesh = Mesh { positions, triangles, ..Mesh::default() };
             let (bvh, _) = crate::bvh::build(&mesh, &Default::default(), &crate::Silent).unwrap();
             let topology: Topology = decode(&encode(&Topology::of(&bvh))).unwrap();
             prop_assert_eq!(topology.over(&mesh), Some(bvh));
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn what_is_no_tree_of_the_mesh_does_not_come_back() {
-        let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 3], attributes: None };
+        let mesh = Mesh { positions: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 3], ..Mesh::default() };
         let good = Topology { left: vec![1, 1], order: vec![2, 0, 1] };
         assert!(good.clone().over(&mesh).is_some());
         for wrong in [

@@ -40,7 +40,7 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let mut clock = Clock::default();
-    let digest = clock.time("hash", || SourceDigest::of(source))?;
+    let digest = clock.time("hash", || SourceDigest::of(source, options.alpha))?;
     let model = Model { path: source, digest: &digest };
     let (compiled, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);
@@ -55,7 +55,7 @@ pub(crate) fn compile_model(
     mut clock: Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
-    let imported = clock.time("mesh", || stages.import(model, options.attributes, monitor))?;
+    let imported = clock.time("mesh", || stages.import(model, options.wanted(), monitor))?;
     let (checked, report) = compile_imported(model, imported, options, stages, clock, monitor)?;
     Ok((checked.compiled, report))
 }

@@ -52,6 +52,8 @@ pub(crate) struct Object {
     packed_nodes: bool,
     /// Absent without tet leaves.
     encoded: Option<tets::Encoded>,
+    /// Absent where no groups are kept.
+    groups: Option<write::GroupParts>,
     pub(crate) tet_leaves: u64,
     pub(crate) tet_triangles: u64,
 }
@@ -73,7 +75,8 @@ pub(super) fn join(
         (!meshes.is_empty()).then(|| tets::encode(&meshes, &wide.subtrees, options.record, triangles));
     let tet_leaves = meshes.len() as u64;
     let tet_triangles = meshes.iter().map(|m| m.faces.len() as u64).sum();
-    Ok((Object { traced, wide, packed_nodes, encoded, tet_leaves, tet_triangles }, collapse))
+    let groups = traced.mesh.groups.as_ref().map(write::GroupParts::of);
+    Ok((Object { traced, wide, packed_nodes, encoded, groups, tet_leaves, tet_triangles }, collapse))
 }
 
 /// A wide BVH as it will be stored.
@@ -153,9 +156,14 @@ impl Object {
             triangle_ids: &self.wide.triangle_ids,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
             packed_nodes: self.packed_nodes,
+            groups: self.groups.as_ref(),
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };
+        if let Some(opacity) = &mesh.opacity {
+            parts.opacity = &opacity.rows;
+            parts.opacity_micro = &opacity.micro;
+        }
         if let Some(encoded) = &self.encoded {
             parts.record = Some(options.record);
             parts.tet_leaves = &encoded.leaves;
@@ -194,6 +202,8 @@ fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.tet_vertices)
         + size_of_val(parts.tet_faces)
         + size_of_val(parts.hull_faces)
-        + size_of_val(parts.triangle_faces);
+        + size_of_val(parts.triangle_faces)
+        + size_of_val(parts.opacity)
+        + size_of_val(parts.opacity_micro);
     bytes as u64
 }

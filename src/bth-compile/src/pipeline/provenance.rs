@@ -56,8 +56,14 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
         "keep_subtrees": options.keep_subtrees,
         "geometry": options.geometry,
     });
+    if options.names {
+        json["names"] = json!(true);
+    }
     if options.coordinates != Default::default() {
         json["coordinates"] = json!(options.coordinates);
+    }
+    if options.alpha != Default::default() {
+        json["alpha"] = json!(options.alpha);
     }
     json
 }

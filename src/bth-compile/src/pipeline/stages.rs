@@ -5,26 +5,30 @@ use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::Model;
-use crate::{bvh, coordinates, marks, tets};
-use bth_import::{self as mesh, Keep, Mesh};
+use crate::{bvh, coordinates, marks, opacity, tets};
+use bth_import::{self as mesh, Mesh, Wanted};
 use std::path::Path;
 
 /// The stages of the pipeline whose results may come from elsewhere. The provided methods call the stages
 /// and store their times in the reports; a decorator overrides them, returns an earlier result where it has one, and calls
 /// [`Direct`] otherwise.
 pub(crate) trait Stages {
-    /// Reads the mesh of a model whose files have been hashed.
+    /// Reads the mesh of a model whose files have been hashed, and finds where its triangles let rays pass.
     ///
     /// # Errors
     /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
     fn import(
         &mut self,
         model: &Model<'_>,
-        keep: Keep,
+        wanted: Wanted,
         monitor: &dyn Monitor,
     ) -> Result<(Mesh, mesh::Report)> {
-        let read = mesh::import(model.path, keep, monitor)?;
-        model.digest.unchanged(model.path, read)
+        let (mut mesh, mut report) = mesh::import(model.path, wanted, monitor)?;
+        if model.digest.alpha != mesh::AlphaMode::None {
+            let cutouts = mesh::import_cutouts(model.path, model.digest.alpha, monitor)?;
+            opacity::add(&mut mesh, &mut report, &cutouts, monitor)?;
+        }
+        model.digest.unchanged(model.path, (mesh, report))
     }
 
     /// Moves the vertices to a grid.

@@ -36,7 +36,7 @@ pub fn compile(
     let cache = Cache::none();
     let context = Context::of(options, &cache, None, monitor);
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, folder, &mut clock)?;
+    let plan = ScenePlan::of(manifest, folder, options.alpha, &mut clock)?;
     let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
     warn_over_limit(&report.objects, options, monitor);
     Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
@@ -78,7 +78,7 @@ pub fn compile_cached(
 ) -> Result<CachedCompilation<SceneReport>> {
     let mut context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, source.folder, &mut clock)?;
+    let plan = ScenePlan::of(manifest, source.folder, options.alpha, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
     let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, || {
         context.previous = previous(policy.target, &context);
@@ -124,7 +124,7 @@ pub fn compile_objects(
 ) -> Result<u64> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let mut plan = ScenePlan::of(manifest, source.folder, &mut clock)?;
+    let mut plan = ScenePlan::of(manifest, source.folder, options.alpha, &mut clock)?;
     let mut row = 0;
     for file in &mut plan.sources {
         file.parts.retain(|_| {
@@ -151,7 +151,7 @@ pub fn dry_run(
 ) -> Result<DryRun> {
     let mut context = Context::new(options, cache, monitor)?;
     context.previous = previous(target, &context);
-    let plan = ScenePlan::of(manifest, source.folder, &mut Clock::default())?;
+    let plan = ScenePlan::of(manifest, source.folder, options.alpha, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
@@ -188,7 +188,11 @@ pub(super) fn key(manifest: &Manifest, plan: &ScenePlan<'_>, context: &Context<'
     let Some(tetgen) = &context.tetgen else { return Ok(None) };
     let as_they_are: Vec<_> = (0..manifest.objects.len() as u32).map(Some).collect();
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &as_they_are)?;
-    Ok(Some(cached::scene(&parts, &sources::contents(manifest, &plan.sources), context.options, tetgen)))
+    let mut contents = sources::contents(manifest, &plan.sources);
+    if context.options.names {
+        contents.extend(manifest.objects.iter().map(|object| object.name.clone()));
+    }
+    Ok(Some(cached::scene(&parts, &contents, context.options, tetgen)))
 }
 
 /// Compiles the objects and assembles the file.
@@ -221,6 +225,10 @@ pub(super) fn build(
         let mut builder = FileBuilder::new();
         objects.write(&mut builder)?;
         write::scene(&mut builder, &parts)?;
+        if options.names {
+            let name = |report: &ObjectReport| report.names.first().cloned().unwrap_or_default();
+            write::object_names(&mut builder, objects.reports.iter().map(name))?;
+        }
         builder.provenance(provenance)?;
         builder.check_limits()?;
         let (content, table) = builder.content();

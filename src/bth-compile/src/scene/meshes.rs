@@ -4,6 +4,7 @@ use super::context::Context;
 use super::sources::File;
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
+use crate::opacity;
 use crate::source::TriangleMesh;
 use bth_cache::Key;
 use bth_files::Digest;
@@ -61,7 +62,7 @@ impl SourceMesh {
 }
 
 fn key(file: &File<'_>, number: Option<u32>, context: &Context<'_>) -> Key {
-    cached::mesh(&file.digest, &file.full, &file.part(number), context.options.attributes)
+    cached::mesh(&file.digest, &file.full, &file.part(number), context.options.wanted())
 }
 
 /// The summary of a mesh that the cache has.
@@ -100,7 +101,32 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
 /// A hash of a mesh's content, which does not depend on the file of the mesh.
 pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let shading = mesh.shading.as_ref().map(Digest::hex);
-    blake3::hash(format!("mesh {} {shading:?}", mesh.geometry.hex()).as_bytes())
+    let opacity =
+        mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
+    let groups = mesh.groups.as_ref().map_or_else(String::new, |groups| format!(" groups {}", groups.hex()));
+    blake3::hash(format!("mesh {} {shading:?}{opacity}{groups}", mesh.geometry.hex()).as_bytes())
+}
+
+/// Adds the opacity of triangles to meshes of a file: the whole file's without numbers.
+fn with_opacity(
+    file: &File<'_>,
+    numbers: &[u32],
+    mut meshes: Vec<(Mesh, mesh::Report)>,
+    context: &Context<'_>,
+) -> Result<Vec<(Mesh, mesh::Report)>> {
+    let Context { options, monitor, .. } = context;
+    if options.alpha == mesh::AlphaMode::None {
+        return Ok(meshes);
+    }
+    let cutouts = if numbers.is_empty() {
+        vec![mesh::import_cutouts(&file.full, options.alpha, *monitor)?]
+    } else {
+        mesh::import_gltf_cutouts(&file.full, numbers, options.alpha, *monitor)?
+    };
+    for ((mesh, report), cutouts) in meshes.iter_mut().zip(&cutouts) {
+        opacity::add(mesh, report, cutouts, *monitor)?;
+    }
+    Ok(meshes)
 }
 
 /// Imports meshes of a file and keeps them in the cache.
@@ -119,10 +145,11 @@ fn import(
     }
     let single: Vec<u32> = numbers.iter().filter_map(|number| *number).collect();
     let meshes = if single.is_empty() {
-        vec![mesh::import(&file.full, options.attributes, *monitor)?]
+        vec![mesh::import(&file.full, options.wanted(), *monitor)?]
     } else {
-        mesh::import_gltf_meshes(&file.full, &single, options.attributes, *monitor)?
+        mesh::import_gltf_meshes(&file.full, &single, options.wanted(), *monitor)?
     };
+    let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
     let keep = |(number, read): (&Option<u32>, (Mesh, mesh::Report))| {
         let (mesh, summary) = MeshSummary::of(read);

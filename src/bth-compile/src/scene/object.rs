@@ -80,6 +80,7 @@ fn build_or_fetch(
         degenerate: mesh.summary.report.degenerate,
         tet_leaves: built.tet_leaves,
         tet_triangles: built.tet_triangles,
+        opacity: mesh.summary.report.opacity,
         ..ObjectReport::default()
     };
     let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);

@@ -2,6 +2,7 @@
 
 use crate::pipeline::StageTime;
 use crate::tets::WorkerStatus;
+use bth_import::OpacityReport;
 use serde::{Deserialize, Serialize};
 
 /// CompileReport on an object of the file.
@@ -20,6 +21,9 @@ pub struct ObjectReport {
     /// Bytes of its sections that tracing reads.
     #[serde(default)]
     pub resident_bytes: u64,
+    /// Opacity of its triangles, where some are not opaque; not known of objects that were taken from an earlier file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<OpacityReport>,
     /// Whether it was copied unchanged from a compiled file.
     pub copied: bool,
 }

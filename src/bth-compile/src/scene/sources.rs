@@ -4,6 +4,7 @@ use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
+use bth_import::AlphaMode;
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -32,7 +33,11 @@ impl File<'_> {
 
     /// Identity of a part by content, which does not depend on the path of the file.
     pub(super) fn content(&self, part: Option<u32>) -> String {
-        format!("{} {} {}", self.digest.text(), self.part(part), cached::extension(&self.full))
+        let alpha = match self.digest.alpha {
+            AlphaMode::None => String::new(),
+            mode => format!(" {mode:?}"),
+        };
+        format!("{} {} {}{alpha}", self.digest.text(), self.part(part), cached::extension(&self.full))
     }
 
     /// The name of a part in explanations of misses.
@@ -57,9 +62,14 @@ pub(super) fn contents(manifest: &Manifest, sources: &[File<'_>]) -> Vec<String>
 ///
 /// # Errors
 /// When one cannot be read.
-pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) -> Result<Vec<File<'a>>> {
+pub(super) fn files<'a>(
+    manifest: &'a Manifest,
+    folder: &Path,
+    used: &[bool],
+    alpha: AlphaMode,
+) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new() };
+    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), alpha };
     let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
     let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
@@ -82,7 +92,7 @@ pub(super) fn files<'a>(manifest: &'a Manifest, folder: &Path, used: &[bool]) ->
         parts[place].1.push(row);
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
-    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full)).collect();
+    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, alpha)).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;
     }

@@ -101,7 +101,7 @@ mod tests {
             let mesh = Mesh {
                 positions: vec![[offset, offset, offset], [offset, offset + 1.0, 2.0], [offset, 3.0, offset]],
                 triangles: vec![[0, 1, 2]],
-                attributes: None,
+                ..Mesh::default()
             };
             let node = crate::bvh::Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 1, right: 0 };
             let bvh = BinaryBvh { nodes: vec![node], order: vec![0] };

@@ -3,6 +3,7 @@
 mod atomic;
 mod builder;
 mod content;
+mod groups;
 mod object;
 mod scene;
 mod whole;
@@ -12,6 +13,7 @@ pub use builder::FileBuilder;
 pub(crate) use builder::SectionHead;
 pub(crate) use content::Bytes;
 pub use content::Content;
+pub use groups::{GroupParts, object_names};
 pub use object::{ObjectParts, Source, object};
 pub use scene::{SceneParts, scene};
 pub use whole::name_if_whole;
@@ -26,6 +28,7 @@ use crate::error::{Error, Result};
 pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     let file = bth_format::File::from_bytes(bytes).map_err(defect)?;
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
+    file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
     Ok(file)
 }

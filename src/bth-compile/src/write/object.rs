@@ -1,7 +1,7 @@
 //! The sections of an object.
 
-use super::FileBuilder;
 use super::builder::defect;
+use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
 use std::borrow::Cow;
@@ -40,6 +40,12 @@ pub struct ObjectParts<'a> {
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_faces: &'a [u32],
+    /// Opacity of each triangle; empty where all are opaque.
+    pub opacity: &'a [u32],
+    /// States of micro-triangles.
+    pub opacity_micro: &'a [u32],
+    /// Groups of triangles to keep.
+    pub groups: Option<&'a GroupParts>,
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -109,6 +115,11 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::NORMALS, index, source.normals)?;
         builder.rows(kind::UVS, index, source.uvs)?;
     }
+    if let Some(groups) = parts.groups {
+        groups.write(builder, index)?;
+    }
+    builder.rows(kind::OPACITY, index, parts.opacity)?;
+    builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     Ok(())
 }
 

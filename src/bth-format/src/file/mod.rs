@@ -11,6 +11,7 @@ pub use table::{content_id, hash128, kind_stride};
 use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
+use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
 use buffer::Buffer;
@@ -150,8 +151,8 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = kind::OBJECT..=kind::TRIANGLE_FACES;
-        self.table().iter().filter(|e| e.object != NONE && traced.contains(&e.kind)).map(|e| e.length).sum()
+        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_required(e.kind);
+        self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
     /// The sections of an object, whose **indices are not checked**: use [`Self::check`] before tracing.
@@ -237,6 +238,12 @@ impl File {
             corners: self.slice(object, kind::CORNERS),
             normals: self.slice(object, kind::NORMALS),
             uvs: self.slice(object, kind::UVS),
+            groups: self.slice(object, kind::GROUPS),
+            group_runs: self.slice(object, kind::GROUP_RUNS),
+            materials: self.slice(object, kind::MATERIALS),
+            labels: self.slice(object, kind::LABELS),
+            opacity: self.slice(object, kind::OPACITY),
+            opacity_micro: self.slice(object, kind::OPACITY_MICRO),
         })
     }
 
@@ -263,11 +270,43 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], and `BTH-F101` to `BTH-F141`.
+    /// As [`Self::object`], and `BTH-F101` to `BTH-F147`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
         Ok(view)
+    }
+
+    /// The name of an object; empty where the file keeps none or there is no such object.
+    pub fn object_name(&self, object: u32) -> &str {
+        let rows: &[ObjectName] = self.slice(NONE, kind::OBJECT_NAMES);
+        let row = rows.get(object as usize);
+        row.and_then(|n| names::name(self.slice(NONE, kind::OBJECT_LABELS), n.name, n.name_length))
+            .unwrap_or_default()
+    }
+
+    /// Checks the names of objects. Costs O(their bytes).
+    ///
+    /// # Errors
+    /// `BTH-F148`.
+    pub fn check_object_names(&self) -> Result<()> {
+        let rows: &[ObjectName] = self.slice(NONE, kind::OBJECT_NAMES);
+        let text: &[u8] = self.slice(NONE, kind::OBJECT_LABELS);
+        let error = |offset: usize, expected: String, found: String| {
+            let error =
+                Error::within_file(Code::ObjectName, kind::OBJECT_NAMES, offset as u64, expected, found);
+            Err(self.locate(error, NONE))
+        };
+        if !rows.is_empty() && rows.len() != self.object_count() as usize {
+            return error(0, format!("{} rows or none", self.object_count()), rows.len().to_string());
+        }
+        match rows.iter().position(|n| !names::is_name(text, n.name, n.name_length)) {
+            None => Ok(()),
+            Some(row) => {
+                let expected = "a name of at most 4096 bytes within OBJECT_LABELS".to_owned();
+                error(size_of::<ObjectName>() * row, expected, format!("{:?}", rows[row]))
+            }
+        }
     }
 
     /// The OBJECT row of an object. Panics when there is no such object.

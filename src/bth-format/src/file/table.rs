@@ -42,7 +42,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
     Some(match kind {
         kind::OBJECT => size_of::<Object>(),
         kind::LINES => size_of::<CacheLine>(),
-        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES => 4,
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::OPACITY | kind::OPACITY_MICRO => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
         kind::TETS => 0,
         kind::TET_VERTICES => size_of::<TetVertex>(),
@@ -50,7 +50,11 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::HULL_FACES => size_of::<HullFace>(),
         kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
         kind::UVS => 8,
-        kind::PROVENANCE | kind::NAMES => 1,
+        kind::GROUPS => size_of::<Group>(),
+        kind::GROUP_RUNS => size_of::<GroupRun>(),
+        kind::MATERIALS => size_of::<Material>(),
+        kind::OBJECT_NAMES => size_of::<ObjectName>(),
+        kind::PROVENANCE | kind::NAMES | kind::LABELS | kind::OBJECT_LABELS => 1,
         kind::SCENE => size_of::<Scene>(),
         kind::NODES => size_of::<Node>(),
         kind::INSTANCES => size_of::<Instance>(),
@@ -68,13 +72,17 @@ fn max_count(kind: u32) -> u64 {
         kind::OBJECT => 1,
         kind::LINES => Child::INDEX_LIMIT as u64,
         kind::TETS => limits::MAX_TETS as u64,
-        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS => {
+        kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS | kind::OPACITY => {
             limits::MAX_TRIANGLES as u64
         }
+        kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Links hold rows in 31 bits, other references in 32; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,
         kind::POSITIONS | kind::NORMALS | kind::UVS => (NONE - 1) as u64,
+        kind::GROUP_RUNS => limits::MAX_TRIANGLES as u64,
+        kind::GROUPS | kind::MATERIALS | kind::LABELS => (NONE - 1) as u64,
+        kind::OBJECT_NAMES | kind::OBJECT_LABELS => (NONE - 1) as u64,
         kind if kind::is_scene(kind) => (NONE - 1) as u64,
         _ => u64::MAX,
     }
@@ -249,13 +257,12 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         let whole_file = e.object == NONE;
         let first = !whole_file && e.object == objects;
         let wrong = if whole_file {
-            kind_stride(e.kind).is_some() && e.kind != kind::PROVENANCE && !kind::is_scene(e.kind)
+            kind_stride(e.kind).is_some() && !kind::is_of_file(e.kind)
         } else if e.kind == kind::OBJECT {
             !first || e.count != 1
         } else {
             // Kind 1 sorts first (kind 0 is not assigned), so an object's other sections follow its OBJECT.
-            let of_file = e.kind == kind::PROVENANCE || kind::is_scene(e.kind);
-            e.object + 1 != objects || of_file || e.kind == 0
+            e.object + 1 != objects || kind::is_of_file(e.kind) || e.kind == 0
         };
         if wrong {
             let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + offset_of!(SectionEntry, object) as u64;

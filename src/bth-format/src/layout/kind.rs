@@ -28,8 +28,24 @@ pub const CORNERS: u32 = 18;
 pub const NORMALS: u32 = 19;
 /// `[f32; 2]`: texture coordinates as in the source.
 pub const UVS: u32 = 20;
+/// [`super::Group`]s: the groups of the object's triangles.
+pub const GROUPS: u32 = 21;
+/// [`super::GroupRun`]s: which triangles belong to which group.
+pub const GROUP_RUNS: u32 = 22;
+/// [`super::Material`]s that groups refer to.
+pub const MATERIALS: u32 = 23;
+/// UTF-8 bytes of the names of groups and materials.
+pub const LABELS: u32 = 24;
+/// `u32` per source triangle: a [`super::TriangleOpacity`].
+pub const OPACITY: u32 = 28;
+/// `u32`: states of micro-triangles, two bits each.
+pub const OPACITY_MICRO: u32 = 29;
 /// UTF-8 JSON: how the file came about. Not part of the content id.
 pub const PROVENANCE: u32 = 32;
+/// [`super::ObjectName`]s, one per object of the file.
+pub const OBJECT_NAMES: u32 = 33;
+/// UTF-8 bytes of the names of objects.
+pub const OBJECT_LABELS: u32 = 34;
 /// One [`super::Scene`]. This section and the following ones belong to the whole file.
 pub const SCENE: u32 = 48;
 /// [`super::Node`]s, parents before children.
@@ -53,7 +69,11 @@ pub const NAMES: u32 = 56;
 pub const fn is_scene(kind: u32) -> bool {
     SCENE <= kind && kind <= NAMES
 }
+/// Whether sections of this kind belong to the whole file.
+pub const fn is_of_file(kind: u32) -> bool {
+    kind == PROVENANCE || kind == OBJECT_NAMES || kind == OBJECT_LABELS || is_scene(kind)
+}
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
-    (OBJECT <= kind && kind <= TRIANGLE_FACES) || is_scene(kind)
+    (OBJECT <= kind && kind <= TRIANGLE_FACES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
 }

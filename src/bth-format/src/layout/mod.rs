@@ -8,8 +8,10 @@ mod bvh;
 mod container;
 mod grid;
 mod grid_leaves;
+mod groups;
 pub mod kind;
 mod object;
+mod opacity;
 mod scene;
 mod tets;
 
@@ -17,7 +19,9 @@ pub use bvh::*;
 pub use container::*;
 pub use grid::*;
 pub use grid_leaves::*;
+pub use groups::*;
 pub use object::*;
+pub use opacity::*;
 pub use scene::*;
 pub use tets::*;
 

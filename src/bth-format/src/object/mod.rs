@@ -4,8 +4,10 @@
 //! may panic; it never reads out of bounds.
 
 mod bounds;
+mod groups;
 mod leaves;
 mod nodes;
+mod opacity;
 mod records;
 mod view;
 

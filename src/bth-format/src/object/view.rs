@@ -39,6 +39,18 @@ pub struct ObjectView<'a> {
     pub normals: &'a [[f32; 3]],
     /// Texture coordinates, if kept.
     pub uvs: &'a [[f32; 2]],
+    /// Groups of triangles, if kept.
+    pub groups: &'a [Group],
+    /// Which triangles belong to which group, ascending by triangle.
+    pub group_runs: &'a [GroupRun],
+    /// Materials of the groups.
+    pub materials: &'a [Material],
+    /// Bytes of the names of groups and materials.
+    pub labels: &'a [u8],
+    /// Per source triangle a [`TriangleOpacity`]; empty where every triangle is opaque.
+    pub opacity: &'a [u32],
+    /// States of the micro-triangles of triangles that are opaque in part, two bits each.
+    pub opacity_micro: &'a [u32],
 }
 
 impl ObjectView<'_> {

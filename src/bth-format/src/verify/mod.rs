@@ -39,6 +39,7 @@ pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
             .and_then(|view| object::check(&view, &mut report).map_err(|e| file.locate(e, object)));
         errors.extend(checked.err());
     }
+    errors.extend(file.check_object_names().err());
     errors.extend(file.check_scene().err());
     if errors.is_empty() { Ok(report) } else { Err(errors) }
 }

@@ -1,6 +1,7 @@
 //! Flat models: the default scene's meshes in world space, in node traversal order, or single meshes in their own space.
 
 use glam::DAffine3;
+use std::collections::HashMap;
 
 use crate::error::{Place, Result};
 use crate::gltf::accessor::Accessors;
@@ -11,16 +12,23 @@ use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::gltf::rest_pose::RestPose;
 use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
 use crate::gltf::transform;
-use crate::mesh::Keep;
+use crate::mesh::{Keep, Wanted};
 use crate::raw::{NONE, Raw, RowKind, check_triangles};
 use crate::source::Source;
 
 /// A mesh at a place of the flat model.
-struct PlacedMesh {
+pub(super) struct PlacedMesh {
     /// `None` when the mesh is read in its own space.
     node: Option<usize>,
-    mesh: usize,
-    world: DAffine3,
+    pub(super) mesh: usize,
+    pub(super) world: DAffine3,
+}
+
+impl PlacedMesh {
+    /// A mesh in its own space.
+    pub(super) fn alone(mesh: usize) -> Self {
+        PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY }
+    }
 }
 
 /// Where the rows of one primitive of one node begin.
@@ -32,16 +40,27 @@ struct Span {
     primitive: usize,
 }
 
+/// The groups and materials so far.
+#[derive(Default)]
+struct GroupNumbers {
+    /// By the numbers of mesh and primitive.
+    groups: HashMap<(usize, usize), u32>,
+    /// By the number of the material.
+    materials: HashMap<usize, u32>,
+}
+
 /// Appends primitives to a raw mesh.
 struct Flattener<'r, 'a> {
     accessors: Accessors<'r>,
     raw: Raw<'a>,
     spans: Vec<Span>,
     keep: Keep,
+    /// `None` where the caller does not want groups.
+    groups: Option<GroupNumbers>,
 }
 
 /// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest. Lines count each segment, points each point as skipped.
-pub(crate) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
+pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>> {
     let (document, binary) = document::read(source, &SUPPORTED)?;
     if document.extensions_used.iter().any(|name| name == "EXT_mesh_gpu_instancing") {
         source.monitor.warn("EXT_mesh_gpu_instancing is ignored: each of its meshes is read once");
@@ -52,7 +71,7 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, keep: Keep) -> Result<Raw<'a>> {
     if !document.animations.is_empty() && placed.iter().any(deforms) {
         source.monitor.warn("animations are ignored: meshes with skins or morph targets are read at rest");
     }
-    read_placed(source, &document, binary, keep, &placed)
+    read_placed(source, &document, binary, wanted, &placed)
 }
 
 /// Reads one mesh of a document in its own space.
@@ -61,22 +80,27 @@ pub(crate) fn read_mesh<'a>(
     document: &GltfDocument,
     binary: Option<&[u8]>,
     mesh: usize,
-    keep: Keep,
+    wanted: Wanted,
 ) -> Result<Raw<'a>> {
-    let placed = PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY };
-    read_placed(source, document, binary, keep, &[placed])
+    read_placed(source, document, binary, wanted, &[PlacedMesh::alone(mesh)])
 }
 
 fn read_placed<'a>(
     source: &'a Source<'a>,
     document: &GltfDocument,
     binary: Option<&[u8]>,
-    keep: Keep,
+    wanted: Wanted,
     placed: &[PlacedMesh],
 ) -> Result<Raw<'a>> {
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
-    let mut flattener = Flattener { accessors, raw: Raw::new("gltf", no_place), spans: Vec::new(), keep };
+    let mut flattener = Flattener {
+        accessors,
+        raw: Raw::new("gltf", no_place),
+        spans: Vec::new(),
+        keep: wanted.attributes,
+        groups: wanted.groups.then(GroupNumbers::default),
+    };
     for (done, mesh) in placed.iter().enumerate() {
         source.progress(source.data.len() / placed.len() * done)?;
         flattener.mesh(mesh)?;
@@ -102,7 +126,7 @@ fn locate(source: &Source<'_>, spans: &[Span], kind: RowKind, row: usize) -> Pla
 }
 
 /// The scene's nodes that have a mesh, in depth-first order, with their world transforms.
-fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
+pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Result<Vec<PlacedMesh>> {
     let error =
         |part: String, message: &str| source.error_in_part(GRAPH, part, message, "export the model again");
     let roots = match document.scenes.get(document.scene.unwrap_or(0)) {
@@ -174,8 +198,28 @@ impl Flattener<'_, '_> {
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
         pose.apply(&reader, &mut triangles)?;
+        self.start_group(placed.mesh, index, primitive.material);
         let world = if pose.is_skinned() { DAffine3::IDENTITY } else { placed.world };
         self.append(&triangles, &world)
+    }
+
+    /// Notes that the triangles of a primitive follow. It is the same group wherever its mesh is placed.
+    fn start_group(&mut self, mesh: usize, index: usize, material: Option<usize>) {
+        let Some(GroupNumbers { groups, materials }) = &mut self.groups else { return };
+        let (document, recorder) = (self.accessors.document, &mut self.raw.groups);
+        let group = *groups.entry((mesh, index)).or_insert_with(|| {
+            let material = material.map(|number| {
+                let add = || recorder.material(material_name(document, number));
+                *materials.entry(number).or_insert_with(add)
+            });
+            let GltfMesh { name, primitives, .. } = &document.meshes[mesh];
+            let mut name = if name.is_empty() { format!("mesh {mesh}") } else { name.clone() };
+            if primitives.len() > 1 {
+                name = format!("{name}/{index}");
+            }
+            recorder.group(name, material)
+        });
+        recorder.start(self.raw.triangles.len(), group);
     }
 
     /// Appends a primitive's rows in world space. A mirrored mesh keeps its front sides (specification, §3.7.4).
@@ -211,4 +255,10 @@ impl Flattener<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// The name of a material, or its number where it has none.
+fn material_name(document: &GltfDocument, number: usize) -> String {
+    let name = document.materials.get(number).and_then(|material| material.get("name")?.as_str());
+    name.filter(|name| !name.is_empty()).map_or_else(|| format!("material {number}"), str::to_owned)
 }

@@ -1,10 +1,12 @@
 //! glTF and GLB, in the order of the data: `container` splits a GLB, `document` reads its JSON into `schema`, `buffer`
 //! gives the bytes of views (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
-//! decompresses them, `texture` chooses texture coordinates), and `flatten` a model. [`scene`] makes a manifest instead.
+//! decompresses them, `texture` chooses texture coordinates), and `flatten` a model. `cutout` reads which materials make
+//! holes. [`scene`] makes a manifest instead.
 
 pub(crate) mod accessor;
 pub(crate) mod buffer;
 mod container;
+pub(crate) mod cutout;
 pub(crate) mod document;
 mod draco;
 pub(crate) mod extensions;

@@ -113,12 +113,7 @@ impl PrimitiveReader<'_, '_> {
 
     /// Reads the vertices and triangles; `rows_before` are those that the model has already.
     pub(super) fn read(&self, kept: &KeptAttributes, rows_before: usize) -> Result<Triangles> {
-        let draco = match self.primitive.extensions.get(DRACO) {
-            Some(value) if !self.accessors.has_data(kept.positions) => {
-                Some(DracoPrimitive::decode(self.accessors, value, &self.part)?)
-            }
-            _ => None,
-        };
+        let draco = self.draco(kept)?;
         // Refuse before anything large is made.
         let rows = match &draco {
             Some(draco) => draco.rows(),
@@ -149,6 +144,31 @@ impl PrimitiveReader<'_, '_> {
             uvs = Some(rows);
         }
         Ok(Triangles { positions, corners, normals, uvs, skipped: incomplete(mode, indices.len()), draco })
+    }
+
+    /// The rows of one more attribute of a primitive whose other attributes are read already.
+    pub(super) fn single_attribute<const N: usize>(
+        &self,
+        kept: &KeptAttributes,
+        name: &str,
+        accessor: usize,
+    ) -> Result<Vec<[f32; N]>> {
+        let draco = self.draco(kept)?;
+        let rows = match &draco {
+            Some(draco) => draco.rows(),
+            None => self.accessors.count(kept.positions)?,
+        };
+        self.attribute(draco.as_ref(), name, accessor, rows)
+    }
+
+    /// The Draco stream of a primitive, if its rows are there and nowhere else.
+    fn draco(&self, kept: &KeptAttributes) -> Result<Option<DracoPrimitive>> {
+        match self.primitive.extensions.get(DRACO) {
+            Some(value) if !self.accessors.has_data(kept.positions) => {
+                DracoPrimitive::decode(self.accessors, value, &self.part).map(Some)
+            }
+            _ => Ok(None),
+        }
     }
 
     fn mode(&self) -> u64 {

@@ -4,25 +4,29 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use crate::cutout::AlphaMode;
 use crate::gltf::container::split;
+use crate::gltf::cutout;
 use crate::gltf::extensions::MESHOPT;
 use crate::gltf::schema::{Buffer, GltfDocument, MeshoptFallback};
 use crate::gltf::uri::beside;
 use crate::monitor::Silent;
 use crate::source::Source;
 
-/// The files beside a glTF document that hold its buffers, in order; none for what is no document, which reading it
+/// The files beside a glTF document that hold its buffers and the images of its cut-out materials, in order; none for what is no document, which reading it
 /// reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not read.
-pub fn external_files(path: &Path, data: &[u8]) -> Vec<PathBuf> {
+pub fn external_files(path: &Path, data: &[u8], alpha: AlphaMode) -> Vec<PathBuf> {
     let source = Source::new(path, data, &Silent);
-    let document =
-        split(&source).ok().and_then(|(json, _)| serde_json::from_slice::<GltfDocument>(json).ok());
+    let json = split(&source).map_or(&[][..], |(json, _)| json);
+    let document = serde_json::from_slice::<GltfDocument>(json).ok();
+    let images = cutout::files(json, alpha);
+    let images = images.iter().filter_map(|uri| beside(path, uri));
     let buffers = document.into_iter().flat_map(|document| document.buffers);
     let file = |buffer: Buffer| {
         let uri = buffer.uri.as_deref().filter(|uri| !uri.starts_with("data:"))?;
         beside(path, uri).filter(|file| !is_fallback(&buffer) || file.exists())
     };
-    buffers.filter_map(file).collect()
+    buffers.filter_map(file).chain(images).collect()
 }
 
 fn is_fallback(buffer: &Buffer) -> bool {

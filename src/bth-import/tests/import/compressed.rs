@@ -118,12 +118,12 @@ fn a_fallback_buffer_is_a_source_file_only_if_it_exists() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, with_fallback("fallback.bin")).unwrap();
-    assert_eq!(bth_import::source_files(&path).unwrap(), [path.as_path()]);
+    assert_eq!(bth_import::source_files(&path, bth_import::AlphaMode::None).unwrap(), [path.as_path()]);
     #[cfg(feature = "meshopt")]
     assert_eq!(import(&path, Keep::None, &Silent).unwrap().0.triangles.len(), 24);
     let fallback = folder.path().join("fallback.bin");
     std::fs::write(&fallback, [0; 624]).unwrap();
-    assert_eq!(bth_import::source_files(&path).unwrap(), [path, fallback]);
+    assert_eq!(bth_import::source_files(&path, bth_import::AlphaMode::None).unwrap(), [path, fallback]);
 }
 
 #[cfg(not(feature = "meshopt"))]

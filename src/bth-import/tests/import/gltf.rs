@@ -91,7 +91,7 @@ fn buffers_may_be_external_or_embedded() {
         assert_eq!(import(&path, Keep::None, &Silent).unwrap().0.triangles.len(), 2);
         let external = indexed.then(|| folder.path().join("a b.bin"));
         let files: Vec<_> = std::iter::once(path.clone()).chain(external).collect();
-        assert_eq!(bth_import::source_files(&path).unwrap(), files);
+        assert_eq!(bth_import::source_files(&path, bth_import::AlphaMode::None).unwrap(), files);
     }
     for uri in ["/etc/hostname", "http://x/y.bin", "data:,abc"] {
         std::fs::write(&path, edited(|d| d["buffers"][0]["uri"] = uri.into()).to_string()).unwrap();

@@ -1,8 +1,10 @@
 //! Import of models: what each format yields, what is refused and where, and the collected test models.
 
 mod compressed;
+mod cutouts;
 mod data;
 mod gltf;
+mod groups;
 mod obj;
 mod off;
 mod ply;
@@ -122,6 +124,7 @@ fn the_report_counts_what_was_read_and_found() {
             non_manifold_edges: 1,
             components: 1,
             non_finite_unused: 1,
+            opacity: None,
         }
     );
     assert!(listener.heard("1 positions are not finite"));

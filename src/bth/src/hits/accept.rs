@@ -61,7 +61,7 @@ pub struct Accept<'a> {
     pub cull: Cull,
     /// If set, it is called with the ray and with a hit in the ray's range that passes the other conditions, and returns whether
     /// the hit counts. The hit has the t, u and v, the instance and the triangle with which it is reported. Calls come in any
-    /// order, on any thread, and not for hits that cannot change the result: for the nearest hit only for hits nearer than the best
+    /// order, on any thread, not on transparent parts of triangles (see [`Scene::opacity`](crate::Scene::opacity)), and not for hits that cannot change the result: for the nearest hit only for hits nearer than the best
     /// one so far, for the k nearest only while fewer than k are nearer. No hit is passed twice. The result of a query does not
     /// depend on the order if the filter depends on nothing but its arguments.
     pub filter: Option<&'a Filter<'a>>,

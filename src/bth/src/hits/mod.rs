@@ -115,14 +115,14 @@ impl Scene {
     }
 
     /// As [`Self::nearest_accepted`], always by [`search`].
-    fn search_nearest(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
+    pub(crate) fn search_nearest(&self, ray: &Ray, accept: &Accept<'_>) -> Option<Hit> {
         let mut first = First::default();
         search(self, ray, accept, &mut first);
         first.0.map(|found| found.hit)
     }
 
     /// As [`Self::any_accepted`], always by [`search`].
-    fn search_any(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
+    pub(crate) fn search_any(&self, ray: &Ray, accept: &Accept<'_>) -> bool {
         let mut any = Any::default();
         search(self, ray, accept, &mut any);
         any.0

@@ -13,6 +13,7 @@ use crate::masks::Masks;
 use crate::query::{TriangleRef, in_range, may_be_in_range, widened};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::scene::Scene;
+use bth_format::layout::Opacity;
 use bth_format::object::ObjectView;
 
 /// Passes to a collector the hits of a ray that are accepted and that it wants.
@@ -123,6 +124,9 @@ impl Receiver for InstanceHits<'_> {
         }
         let [u, v] = intersection.uv();
         let primitive = PrimitiveRef { instance: self.instance, triangle: triangle.read() };
+        if self.object.opacity_at(primitive.triangle, u, v) == Opacity::Transparent {
+            return false;
+        }
         let found = Found { hit: Hit { t, u, v, primitive }, t: intersection.t };
         if !self.collector.wants(&found)
             || self.accept.filter.is_some_and(|accepts| !accepts(self.ray, &found.hit))

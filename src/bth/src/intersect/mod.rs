@@ -15,7 +15,7 @@ pub(crate) mod exact;
 pub(crate) mod exact_lanes;
 pub(crate) mod filter;
 pub(crate) mod line;
-mod point_exact;
+pub(crate) mod point_exact;
 pub(crate) mod point_lanes;
 pub(crate) mod point_triangle;
 pub(crate) mod prepare;

@@ -74,6 +74,27 @@ pub(crate) enum Record {
     Tet16,
 }
 
+/// Which materials make holes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Alpha {
+    /// None: every triangle is opaque.
+    None,
+    /// Those of alpha mode MASK.
+    Mask,
+    /// Also those of alpha mode BLEND, with a cutoff of 0.5.
+    Blend,
+}
+
+impl From<Alpha> for bth_import::AlphaMode {
+    fn from(alpha: Alpha) -> Self {
+        match alpha {
+            Alpha::None => Self::None,
+            Alpha::Mask => Self::Mask,
+            Alpha::Blend => Self::Blend,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Attributes {
     /// Positions only.

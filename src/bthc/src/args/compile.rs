@@ -51,6 +51,12 @@ pub(crate) struct Compile {
     /// Shading attributes to keep.
     #[arg(long, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
+    /// Keep groups of triangles, materials and names, so that hits lead back to parts of the source: see docs/models.md.
+    #[arg(long)]
+    pub(crate) names: bool,
+    /// glTF materials whose alpha makes holes, through which rays pass: see docs/models.md.
+    #[arg(long, value_enum, default_value_t = Alpha::None, value_name = "MATERIALS")]
+    pub(crate) alpha: Alpha,
     /// The BVH under each tet leaf: rays that do not start on a known surface take it, and are much faster so.
     /// By default kept with `--structure bth` and pruned with `tets`.
     #[arg(long, value_enum)]
@@ -174,6 +180,8 @@ impl Compile {
         let mut options = bth_compile::pipeline::CompileOptions {
             structure: self.structure.into(),
             attributes: self.attributes.into(),
+            names: self.names,
+            alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),
             keep_subtrees: match self.subtrees {

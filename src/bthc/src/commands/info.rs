@@ -1,5 +1,6 @@
 //! `bthc info`: shows the contents of a compiled file.
 
+use super::holes::{Holes, holes};
 use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
@@ -55,6 +56,10 @@ fn describe(file: &File) -> Result<Value, Failure> {
             "boxes": if view.has_packed_nodes() { 8 } else { 32 },
             "displacement": h.displacement, "record": record(&view), "tet_leaves": view.tet_leaves.len(),
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
+            "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
+                "transparent": h.shares[1], "unknown": h.shares[2]})),
+            "name": file.object_name(i), "groups": groups(&view),
+            "materials": (0..view.materials.len() as u32).map(|m| view.material_name(m)).collect::<Vec<_>>(),
             "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
     };
     let header = file.header();
@@ -69,6 +74,46 @@ fn describe(file: &File) -> Result<Value, Failure> {
         "sections": file.sections().map(section).collect::<Vec<_>>(),
         "provenance": provenance(file),
     }))
+}
+
+/// The groups of an object with their numbers of triangles; empty where the file keeps none.
+fn groups(view: &ObjectView<'_>) -> Vec<Value> {
+    let rows = (0..view.groups.len() as u32).zip(view.triangles_of_groups());
+    rows.map(|(group, triangles)| {
+        let material = view.material_of(group);
+        json!({"name": view.group_name(group), "triangles": triangles, "material": material})
+    })
+    .collect()
+}
+
+/// Most groups of an object that the table shows.
+const SHOWN_GROUPS: usize = 40;
+
+/// A table of the groups of all objects; empty where the file keeps none.
+fn groups_table(file: &File) -> Result<String, Failure> {
+    let mut table = Table::default();
+    table.row(["object", "group", "name", "material", "triangles"]);
+    let mut rows = 0;
+    for object in 0..file.object_count() {
+        let view = file.object(object)?;
+        let name = file.object_name(object);
+        let shown = if name.is_empty() { object.to_string() } else { name.escape_debug().to_string() };
+        let counts = view.triangles_of_groups();
+        for group in 0..view.groups.len().min(SHOWN_GROUPS) {
+            let row = group as u32;
+            let material = view.material_of(row).map_or("", |material| view.material_name(material));
+            let (name, material) = (view.group_name(row).escape_debug(), material.escape_debug());
+            let cells = [shown.clone(), row.to_string(), name.to_string(), material.to_string()];
+            let [object, group, name, material] = cells.each_ref().map(String::as_str);
+            table.row([object, group, name, material, &count(counts[row as usize])]);
+            rows += 1;
+        }
+        if view.groups.len() > SHOWN_GROUPS {
+            let rest = format!("{} more, see --json", view.groups.len() - SHOWN_GROUPS);
+            table.row([shown.as_str(), "", &rest, "", ""]);
+        }
+    }
+    Ok(if rows == 0 { String::new() } else { format!("{}\n", table.render()) })
 }
 
 /// The scene; null without scene sections.
@@ -109,6 +154,13 @@ fn summary(file: &File) -> Result<String, Failure> {
         if view.has_packed_nodes() {
             facts.row(["boxes of nodes", "8 bits"]);
         }
+        if let Some(Holes { triangles, shares: [opaque, transparent, unknown] }) = holes(&view) {
+            facts.row(["triangles with holes", &count(triangles)]);
+            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+            facts.row(["  of their area opaque", &percent(opaque)]);
+            facts.row(["  transparent", &percent(transparent)]);
+            facts.row(["  unknown", &percent(unknown)]);
+        }
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
         facts.row(["tetrahedra", &count(view.records.len() as u64)]);
@@ -133,7 +185,7 @@ fn summary(file: &File) -> Result<String, Failure> {
         sections.row([kind_name(e.kind), &count(e.count), &bytes(e.length)]);
     }
     let made = file.provenance().map_or(String::new(), |text| format!("\n{text}\n"));
-    Ok(format!("{}\n{}{made}", facts.render(), sections.render()))
+    Ok(format!("{}\n{}{}{made}", facts.render(), groups_table(file)?, sections.render()))
 }
 
 /// The processor's features that kernels may use.

@@ -9,6 +9,7 @@ mod depfile;
 mod diff;
 mod dry_run;
 mod explain;
+mod holes;
 mod import;
 mod info;
 mod job;

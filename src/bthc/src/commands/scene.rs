@@ -10,6 +10,7 @@ use bth_compile::Monitor;
 use bth_compile::cached::{Cache, DryRun};
 use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
 use bth_compile::source;
+use bth_import::AlphaMode;
 use bth_import::gltf::scene::{ImportReport, import};
 use bth_scene::Manifest;
 use serde_json::json;
@@ -71,7 +72,8 @@ pub(super) fn compile(
         target: job.target.path(),
     };
     let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
-    let mut report = deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model))?;
+    let mut report =
+        deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model, context.options.alpha))?;
     report.json["scene"] = outcome.report;
     report.json["import"] = json!(import);
     if let Some(built) = &outcome.built {
@@ -108,14 +110,14 @@ pub(super) fn dry_run(
 }
 
 /// All files that a scene is made from.
-pub(super) fn inputs(model: &Path) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn inputs(model: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>, Failure> {
     if is_gltf(model) {
-        return Ok(source::files(model)?);
+        return Ok(source::files(model, alpha)?);
     }
-    Ok(files(&bth_scene::read(model)?, model)?)
+    Ok(files(&bth_scene::read(model)?, model, alpha)?)
 }
 
-fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>> {
+fn files(manifest: &Manifest, model: &Path, alpha: AlphaMode) -> bth_compile::Result<Vec<PathBuf>> {
     let mut files = vec![model.to_owned()];
     let mut paths: Vec<&str> = manifest.objects.iter().map(|o| o.source.path()).collect();
     paths.sort_unstable();
@@ -125,7 +127,7 @@ fn files(manifest: &Manifest, model: &Path) -> bth_compile::Result<Vec<PathBuf>>
         let path = model.parent().unwrap_or(Path::new("")).join(path);
         // The file of an object without visible instances may be missing.
         if path != *model && path.exists() {
-            files.extend(source::files(&path)?);
+            files.extend(source::files(&path, alpha)?);
         }
     }
     Ok(files)

@@ -20,6 +20,12 @@ pub(super) fn summary(report: &CompileReport) -> String {
     row_unless_zero(&mut facts, "elements skipped", mesh.skipped);
     row_unless_zero(&mut facts, "boundary edges", mesh.boundary_edges);
     row_unless_zero(&mut facts, "non-manifold edges", mesh.non_manifold_edges);
+    if let Some(opacity) = &mesh.opacity {
+        facts.row(["triangles of cut-out materials", &count(opacity.triangles)]);
+        let [opaque, transparent, unknown] = [opacity.opaque, opacity.transparent, opacity.unknown]
+            .map(|share| format!("{:.1} %", 100.0 * share));
+        facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
+    }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);
         facts.row(["vertices moved by at most", &found.displacement.to_string()]);

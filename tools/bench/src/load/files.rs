@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(read_rays(&path).unwrap(), [ray, Ray { tmin: 0.0, ..ray }]);
 
         let (positions, triangles) = (vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
-        let mesh = Mesh { positions: positions.clone(), triangles: triangles.clone(), attributes: None };
+        let mesh = Mesh { positions: positions.clone(), triangles: triangles.clone(), ..Mesh::default() };
         let path = scratch.write("mesh", &mesh_bytes(&mesh)).unwrap();
         assert_eq!(read_mesh(&path).unwrap(), (positions, triangles));
         assert!(read_rays(&path).is_err());

@@ -132,7 +132,7 @@ mod tests {
             let a = k / n * (n + 1) + k % n;
             [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
         };
-        Mesh { positions, triangles: (0..n * n).flat_map(square).collect(), attributes: None }
+        Mesh { positions, triangles: (0..n * n).flat_map(square).collect(), ..Mesh::default() }
     }
 
     #[test]

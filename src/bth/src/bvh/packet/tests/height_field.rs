@@ -150,6 +150,12 @@ impl HeightField {
             corners: &[],
             normals: &[],
             uvs: &[],
+            groups: &[],
+            group_runs: &[],
+            materials: &[],
+            labels: &[],
+            opacity: &[],
+            opacity_micro: &[],
         }
     }
 }

@@ -1,0 +1,240 @@
+/* C++17 interface of bth: what bth.h declares, with scenes that close themselves and errors that are thrown. Header only; link
+ * with libbth.
+ *
+ *     bth::scene scene = bth::scene::open("dragon.bth");
+ *     bth_hit hit = scene.nearest(bth_ray{{0, 0, 5}, 0, {0, 0, -1}, INFINITY});
+ *
+ * Constant member functions may run on one scene at the same time, as those of bth.h; the others must run alone.
+ */
+#ifndef BTH_HPP
+#define BTH_HPP
+
+#include "bth.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace bth {
+
+/* What bth.h reports as a negative code and a text. */
+class error : public std::runtime_error {
+public:
+    error(std::int32_t code, const char *text) : std::runtime_error(text), code_(code) {}
+    /* BTH_ERROR_... */
+    std::int32_t code() const noexcept { return code_; }
+
+private:
+    std::int32_t code_;
+};
+
+/* Throws unless the code is BTH_OK. */
+inline void check(std::int32_t code) {
+    if (code != BTH_OK) throw error(code, bth_last_error());
+}
+
+/* Whether a hit is none. */
+inline bool is_miss(const bth_hit &hit) noexcept { return hit.surface.triangle == BTH_NONE; }
+
+/* Frames of a scene. */
+struct frame_range {
+    std::int32_t first;
+    std::int32_t last;
+    double rate; /* frames per second */
+};
+
+/* An open scene. It can be moved but not copied; one that was moved from can only be destroyed or assigned to. */
+class scene {
+public:
+    /* Reads a file in full and checks it. The path is in UTF-8. */
+    static scene open(const std::string &path) { return open(path, BTH_READ); }
+
+    /* Maps a file, whose contents are not checked; see BTH_MAP. */
+    static scene map(const std::string &path) { return open(path, BTH_MAP); }
+
+    /* Copies and checks the contents of a file. */
+    static scene from_bytes(const void *bytes, std::size_t length) {
+        bth_scene *opened = nullptr;
+        check(bth_open_memory(static_cast<const std::uint8_t *>(bytes), length, BTH_READ, &opened));
+        return scene(opened);
+    }
+
+    /* The nearest hit of a ray, or a miss. `from` is the triangle on which the ray starts, a hint, or null. */
+    bth_hit nearest(const bth_ray &ray, const bth_surface *from = nullptr) const {
+        bth_hit hit;
+        bth_nearest(get(), &ray, from, &hit, 1);
+        return hit;
+    }
+
+    /* Whether a ray hits anything. */
+    bool any(const bth_ray &ray, const bth_surface *from = nullptr) const {
+        std::uint8_t hit = 0;
+        bth_any(get(), &ray, from, &hit, 1);
+        return hit != 0;
+    }
+
+    /* As bth_nearest. */
+    void nearest(const bth_ray *rays, bth_hit *hits, std::size_t count, const bth_surface *from = nullptr) const {
+        bth_nearest(get(), rays, from, hits, count);
+    }
+
+    /* As bth_any. */
+    void any(const bth_ray *rays, std::uint8_t *hit, std::size_t count, const bth_surface *from = nullptr) const {
+        bth_any(get(), rays, from, hit, count);
+    }
+
+    /* For any range of rays that are adjacent in memory: std::vector, std::array, std::span. */
+    template <typename Rays>
+    std::vector<bth_hit> nearest_of(const Rays &rays) const {
+        std::vector<bth_hit> hits(std::size(rays));
+        nearest(std::data(rays), hits.data(), hits.size());
+        return hits;
+    }
+
+    template <typename Rays>
+    std::vector<std::uint8_t> any_of(const Rays &rays) const {
+        std::vector<std::uint8_t> hit(std::size(rays));
+        any(std::data(rays), hit.data(), hit.size());
+        return hit;
+    }
+
+    /* Moves the scene to a time in seconds, or to that of a frame; on an error the scene is unchanged. */
+    void set_seconds(double seconds) { check(bth_set_seconds(get(), seconds)); }
+    void set_frame(std::int32_t frame) { check(bth_set_frame(get(), frame)); }
+
+    double seconds() const noexcept { return bth_seconds(get()); }
+
+    frame_range frames() const noexcept {
+        frame_range found{};
+        bth_frames(get(), &found.first, &found.last, &found.rate);
+        return found;
+    }
+
+    std::uint32_t instance_count() const noexcept { return bth_instance_count(get()); }
+
+    bth_instance instance(std::uint32_t row) const {
+        bth_instance found;
+        check(bth_get_instance(get(), row, &found));
+        return found;
+    }
+
+    /* Hits with conditions and several hits of a ray: by ascending t, then instance, then triangle. */
+    bth_hit nearest_accepted(const bth_ray &ray, const bth_accept &accept) const {
+        bth_hit hit;
+        check(bth_nearest_accepted(get(), &ray, &accept, &hit, 1));
+        return hit;
+    }
+
+    bool any_accepted(const bth_ray &ray, const bth_accept &accept) const {
+        std::uint8_t found = 0;
+        check(bth_any_accepted(get(), &ray, &accept, &found, 1));
+        return found != 0;
+    }
+
+    std::uint64_t count_hits(const bth_ray &ray, const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        std::uint64_t count = 0;
+        check(bth_count_hits(get(), &ray, &accept, &count, 1));
+        return count;
+    }
+
+    /* The `most` nearest hits, all by default. */
+    std::vector<bth_hit> all_hits(const bth_ray &ray, std::uint64_t most = BTH_ALL_HITS,
+                                  const bth_accept &accept = BTH_ACCEPT_EVERYTHING) const {
+        std::vector<bth_hit> hits(8);
+        for (;;) {
+            std::uint64_t offsets[2];
+            bth_hit_list list{offsets, hits.data(), hits.size(), 0};
+            check(bth_all_hits(get(), &ray, &accept, most, &list, 1));
+            const bool complete = list.needed <= hits.size();
+            hits.resize(static_cast<std::size_t>(list.needed));
+            if (complete) return hits;
+        }
+    }
+
+    void set_instance_mask(std::uint32_t instance, std::uint32_t mask) {
+        check(bth_set_instance_mask(get(), instance, mask));
+    }
+    void set_group_mask(std::uint32_t object, std::uint32_t group, std::uint32_t mask) {
+        check(bth_set_group_mask(get(), object, group, mask));
+    }
+
+    /* Whether closed surfaces enclose a point, x, y and z in world space, and how often. */
+    bool contains(const float (&point)[3]) const {
+        std::uint8_t inside = 0;
+        check(bth_contains(get(), point, &inside, 1));
+        return inside != 0;
+    }
+
+    std::int32_t winding(const float (&point)[3]) const {
+        std::int32_t found = 0;
+        check(bth_winding(get(), point, &found, 1));
+        return found;
+    }
+
+    /* The closest point of the triangles within a radius; its surface is BTH_NONE if there is none. */
+    bth_closest closest(const float (&point)[3], float radius) const {
+        bth_closest found;
+        check(bth_closest_points(get(), point, radius, &found, 1));
+        return found;
+    }
+
+    /* The distance to the closest triangle, negative inside of closed meshes. */
+    float signed_distance(const float (&point)[3]) const {
+        float distance = 0;
+        check(bth_signed_distances(get(), point, &distance, 1));
+        return distance;
+    }
+
+    /* The surface at a hit. */
+    bth_surface_point surface(const bth_hit &hit) const {
+        bth_surface_point point;
+        check(bth_surface_at(get(), &hit, &point));
+        return point;
+    }
+
+    std::string object_name(std::uint32_t object) const {
+        return name([&](char *to, std::size_t size) { return bth_object_name(get(), object, to, size); });
+    }
+    std::string group_name(std::uint32_t object, std::uint32_t group) const {
+        return name([&](char *to, std::size_t size) { return bth_group_name(get(), object, group, to, size); });
+    }
+    std::string material_name(std::uint32_t object, std::uint32_t material) const {
+        return name([&](char *to, std::size_t size) { return bth_material_name(get(), object, material, to, size); });
+    }
+
+    std::uint64_t resident_bytes() const noexcept { return bth_resident_bytes(get()); }
+
+    /* The scene for functions of bth.h; it stays open. */
+    bth_scene *get() const noexcept { return handle_.get(); }
+
+private:
+    struct close {
+        void operator()(bth_scene *scene) const noexcept { bth_close(scene); }
+    };
+
+    explicit scene(bth_scene *opened) noexcept : handle_(opened) {}
+
+    /* The text that a function copies to a buffer of some size. */
+    template <typename Copy>
+    static std::string name(Copy copy) {
+        std::string text(copy(nullptr, 0) + 1, '\0');
+        text.resize(copy(&text[0], text.size()));
+        return text;
+    }
+
+    static scene open(const std::string &path, std::uint32_t flags) {
+        bth_scene *opened = nullptr;
+        check(bth_open(path.c_str(), flags, &opened));
+        return scene(opened);
+    }
+
+    std::unique_ptr<bth_scene, close> handle_;
+};
+
+} // namespace bth
+
+#endif

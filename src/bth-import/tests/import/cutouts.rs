@@ -1,0 +1,174 @@
+//! Cut-out materials of glTF models: which triangles have them, from which images, and what is refused.
+
+use super::gltf::glb;
+use super::*;
+use bth_import::{AlphaMode, Cutouts, Wrap, import_cutouts, source_files};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// An image of 2 by 1 texels, of which the left is transparent.
+fn image() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.write_header().unwrap().write_image_data(&[1, 2, 3, 0, 1, 2, 3, 255]).unwrap();
+    bytes
+}
+
+fn base64(bytes: &[u8]) -> String {
+    let digits = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |g: &[u8]| {
+        let bits = g.iter().fold(0u32, |bits, b| bits << 8 | u32::from(*b)) << (8 * (3 - g.len()));
+        (0..=g.len()).map(move |k| digits[(bits >> (18 - 6 * k)) as usize & 63] as char)
+    };
+    bytes.chunks(3).flat_map(group).collect()
+}
+
+/// A triangle of an opaque material, then one of the given material, the second in a mirrored node too. The binary chunk ends
+/// with the image.
+fn document(material: Value) -> (Value, Vec<u8>) {
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    bytes.extend(floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
+    bytes.extend([255, 255, 255, 0, 255, 255, 255, 51, 255, 255, 255, 255]);
+    let image = image();
+    let start = bytes.len();
+    bytes.extend(&image);
+    let primitive = |material: u32, color: bool| {
+        let mut attributes = json!({"POSITION": 0, "TEXCOORD_0": 1});
+        if color {
+            attributes["COLOR_0"] = json!(2);
+        }
+        json!({"attributes": attributes, "material": material})
+    };
+    let document = json!({
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}],
+        "meshes": [{"primitives": [primitive(0, false), primitive(1, false)]}, {"primitives": [primitive(1, true)]}],
+        "materials": [{}, material],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}],
+        "images": [{"bufferView": 3, "mimeType": "image/png"}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5121, "normalized": true, "count": 3, "type": "VEC4"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24},
+            {"buffer": 0, "byteOffset": 60, "byteLength": 12},
+            {"buffer": 0, "byteOffset": start, "byteLength": image.len()}],
+        "buffers": [{"byteLength": bytes.len()}]
+    });
+    (document, bytes)
+}
+
+fn masked() -> Value {
+    json!({"alphaMode": "MASK", "alphaCutoff": 0.25, "pbrMetallicRoughness":
+        {"baseColorFactor": [1, 1, 1, 0.5], "baseColorTexture": {"index": 0}}})
+}
+
+/// Writes the document and reads its cut-outs.
+fn read(folder: &Path, (document, bytes): &(Value, Vec<u8>), mode: AlphaMode) -> Result<Cutouts> {
+    let path = folder.join("a.glb");
+    std::fs::write(&path, glb(document, bytes)).unwrap();
+    let mesh = import(&path, Keep::None, &Silent)?.0;
+    let cutouts = import_cutouts(&path, mode, &Silent)?;
+    if mode != AlphaMode::None {
+        assert_eq!(cutouts.mesh_triangles, mesh.triangles.len());
+    }
+    Ok(cutouts)
+}
+
+fn cutouts(model: &(Value, Vec<u8>), mode: AlphaMode) -> Result<Cutouts> {
+    read(tempfile::tempdir().unwrap().path(), model, mode)
+}
+
+#[test]
+fn materials_of_the_mode_are_read_with_their_corners() {
+    let found = cutouts(&document(masked()), AlphaMode::Mask).unwrap();
+    let material = &found.materials[0];
+    assert_eq!((material.factor, material.cutoff, material.nearest), (0.5, 0.25, true));
+    assert_eq!(material.wrap, [Wrap::Clamp, Wrap::Mirror]);
+    assert_eq!(found.images[material.image.unwrap()].alpha, [0, 255]);
+    assert_eq!(found.triangles.iter().map(|t| t.triangle).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!(found.triangles[0].corners.map(|c| c.uv), [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+    assert_eq!(found.triangles[0].corners.map(|c| c.alpha), [1.0; 3]);
+    // The import exchanges the last two corners of mirrored meshes. Alpha of vertex colours counts.
+    assert_eq!(found.triangles[1].corners.map(|c| c.uv), [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]);
+    assert_eq!(found.triangles[1].corners.map(|c| c.alpha), [0.0, 1.0, 0.2]);
+    assert_eq!(cutouts(&document(masked()), AlphaMode::None).unwrap(), Cutouts::default());
+}
+
+#[test]
+fn blended_materials_count_where_they_are_asked_for() {
+    let blend = json!({"alphaMode": "BLEND", "alphaCutoff": 0.1, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    assert!(cutouts(&document(blend.clone()), AlphaMode::Mask).unwrap().triangles.is_empty());
+    let found = cutouts(&document(blend), AlphaMode::Blend).unwrap();
+    assert_eq!((found.triangles.len(), found.materials[0].cutoff), (2, 0.5));
+    let opaque = json!({"alphaMode": "OPAQUE", "pbrMetallicRoughness": {"baseColorTexture": {"index": 9}}});
+    assert!(cutouts(&document(opaque), AlphaMode::Blend).unwrap().triangles.is_empty());
+}
+
+#[test]
+fn texture_coordinates_are_transformed_and_may_be_missing() {
+    let mut material = masked();
+    material["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
+        json!({"KHR_texture_transform": {"offset": [2, 3], "scale": [10, 100]}});
+    let found = cutouts(&document(material.clone()), AlphaMode::Mask).unwrap();
+    assert_eq!(found.triangles[0].corners.map(|c| c.uv), [[2.0, 3.0], [12.0, 3.0], [2.0, 103.0]]);
+    // A set that the primitives do not have: they are opaque.
+    material["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = json!(3);
+    assert!(cutouts(&document(material), AlphaMode::Mask).unwrap().triangles.is_empty());
+    // Without a texture the factor alone decides.
+    let plain = json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25]}});
+    let found = cutouts(&document(plain), AlphaMode::Mask).unwrap();
+    assert_eq!((found.materials[0].image, found.materials[0].factor, found.triangles.len()), (None, 0.25, 2));
+}
+
+#[test]
+fn images_come_from_files_and_data_uris_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut model = document(masked());
+    model.0["images"][0] = json!({"uri": format!("data:image/png;base64,{}", base64(&image()))});
+    let expected = cutouts(&document(masked()), AlphaMode::Mask).unwrap();
+    assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
+    model.0["images"][0] = json!({"uri": "a%20leaf.png"});
+    let missing = read(folder.path(), &model, AlphaMode::Mask).unwrap_err();
+    assert!(matches!(missing, Error::File { code: "BTH-O001", .. }), "{missing}");
+    std::fs::write(folder.path().join("a leaf.png"), image()).unwrap();
+    assert_eq!(read(folder.path(), &model, AlphaMode::Mask).unwrap(), expected);
+    let path = folder.path().join("a.glb");
+    assert_eq!(source_files(&path, AlphaMode::None).unwrap(), [path.as_path()]);
+    assert_eq!(source_files(&path, AlphaMode::Mask).unwrap(), [path, folder.path().join("a leaf.png")]);
+}
+
+#[test]
+fn what_cannot_be_read_is_an_error_with_a_code_only_where_it_is_asked_for() {
+    type Change = (&'static str, fn(&mut Value));
+    let changes: [Change; 11] = [
+        ("BTH-I016", |d| d["images"][0] = json!({"bufferView": 0})),
+        ("BTH-I016", |d| d["images"][0] = json!({})),
+        ("BTH-I016", |d| d["images"][0] = json!({"uri": "data:image/png;base64,!"})),
+        ("BTH-I016", |d| d["images"][0] = json!({"uri": "https://example.org/a.png"})),
+        ("BTH-I016", |d| d["textures"][0] = json!({"extensions": {"KHR_texture_basisu": {"source": 0}}})),
+        ("BTH-I014", |d| d["images"][0]["bufferView"] = json!(77)),
+        ("BTH-I002", |d| d["textures"] = json!([])),
+        ("BTH-I002", |d| d["samplers"][0]["wrapS"] = json!(1)),
+        ("BTH-I002", |d| d["textures"][0]["sampler"] = json!(5)),
+        ("BTH-I002", |d| d["materials"][1]["alphaCutoff"] = json!(-1)),
+        ("BTH-I002", |d| d["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1, 1, 1, 7])),
+    ];
+    for (code, change) in changes {
+        let mut model = document(masked());
+        change(&mut model.0);
+        let error = cutouts(&model, AlphaMode::Mask).expect_err(code);
+        assert!(matches!(&error, Error::Input { code: found, .. } if *found == code), "{code}: {error}");
+        cutouts(&model, AlphaMode::None).unwrap();
+    }
+}
+
+#[test]
+fn jpeg_images_have_no_alpha() {
+    let mut model = document(masked());
+    model.0["images"][0] = json!({"uri": format!("data:image/jpeg;base64,{}", base64(b"\xff\xd8\xff\xe0"))});
+    let found = cutouts(&model, AlphaMode::Mask).unwrap();
+    assert_eq!((found.materials[0].image, found.images.len()), (None, 0));
+}

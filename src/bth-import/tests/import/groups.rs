@@ -1,0 +1,117 @@
+//! Groups of triangles: what each format yields.
+
+use super::gltf::glb;
+use super::*;
+use bth_import::{Groups, Wanted};
+use serde_json::json;
+
+const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+fn groups(name: &str, bytes: &[u8]) -> (Mesh, Groups) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    let read = |groups| import(&path, Wanted { attributes: Keep::None, groups }, &Silent).unwrap().0;
+    let (mut mesh, plain) = (read(true), read(false));
+    let groups = mesh.groups.take().expect("wanted groups");
+    assert_eq!(mesh, plain, "groups change nothing else");
+    (mesh, groups)
+}
+
+/// The groups as text: name, material and runs.
+fn shown(groups: &Groups) -> Vec<String> {
+    let runs = |row: usize| {
+        let of_row = groups.runs.iter().filter(|run| run[1] as usize == row);
+        of_row.map(|run| run[0].to_string()).collect::<Vec<_>>().join(",")
+    };
+    let material = |row: Option<u32>| row.map_or("-", |row| groups.materials[row as usize].as_str());
+    let one = |(row, group): (usize, &bth_import::Group)| {
+        format!("{}|{}|{}", group.name, material(group.material), runs(row))
+    };
+    groups.groups.iter().enumerate().map(one).collect()
+}
+
+#[test]
+fn obj_groups_are_names_with_materials() {
+    let text = format!(
+        "{CORNERS}f 1 2 3\nusemtl red paint # metallic\nf 1 2 3 4\no car\ng\nf 1 2 3\ng body  left\nf 1 2 3\n\
+         usemtl\nf 1 2 3\nusemtl unused\nusemtl blue\nl 1 2\nf 1 2\nusemtl red paint\nf 4 3 2 1\ng unused\n"
+    );
+    let (mesh, groups) = groups("a.obj", text.as_bytes());
+    assert_eq!(mesh.triangles.len(), 8);
+    let expected = ["|-|0", "|red paint|1", "body left|red paint|4,6", "body left|-|5"];
+    assert_eq!(shown(&groups), expected);
+    assert_eq!(groups.materials, ["red paint"]);
+}
+
+#[test]
+fn obj_groups_that_come_again_are_the_same_and_many_are_quick() {
+    let mut text = CORNERS.to_owned();
+    for i in 0..20_000 {
+        text += &format!("g part {}\nusemtl m{}\nf 1 2 3\n", i % 5000, i % 5000);
+    }
+    let (_, groups) = groups("a.obj", text.as_bytes());
+    assert_eq!((groups.groups.len(), groups.materials.len(), groups.runs.len()), (5000, 5000, 20_000));
+    assert_eq!(groups.groups[4999].name, "part 4999");
+    assert_eq!(groups.runs[12_345], [12_345, 2345]);
+}
+
+#[test]
+fn names_that_are_not_utf8_are_replaced() {
+    let (_, groups) = groups("a.obj", &[CORNERS.as_bytes(), b"usemtl a\xff\nf 1 2 3\n"].concat());
+    assert_eq!(groups.materials, ["a\u{fffd}"]);
+}
+
+#[test]
+fn solids_of_stl_are_groups() {
+    let facet = "facet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    let text = format!(
+        "solid left  wheel\n{facet}{facet}endsolid\nsolid\nendsolid\nsolid right\n{facet}endsolid right\n"
+    );
+    assert_eq!(shown(&groups("a.stl", text.as_bytes()).1), ["left wheel|-|0", "right|-|2"]);
+}
+
+#[test]
+fn a_format_without_groups_has_none() {
+    let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    assert_eq!(groups("a.off", off).1, Groups::default());
+    assert_eq!(groups("a.obj", format!("{CORNERS}f 1 2 3\n").as_bytes()).1, Groups::default());
+    assert_eq!(groups("a.obj", b"g a\nusemtl b\n").1, Groups::default());
+}
+
+#[test]
+fn primitives_of_gltf_are_groups() {
+    let positions: Vec<u8> = SQUARE.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
+    let primitive = |material: Option<u32>| match material {
+        Some(m) => json!({"attributes": {"POSITION": 0}, "mode": 5, "material": m}),
+        None => json!({"attributes": {"POSITION": 0}, "mode": 5}),
+    };
+    let lines = json!({"attributes": {"POSITION": 0}, "mode": 1});
+    let document = json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0, 1, 2]}],
+        "nodes": [{"mesh": 1}, {"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 1, "scale": [-1, 1, 1]}],
+        "materials": [{"name": "unused"}, {}, {"name": "glass"}],
+        "meshes": [
+            {"primitives": [primitive(Some(1))]},
+            {"name": "door", "primitives": [primitive(Some(2)), lines, primitive(None)]}
+        ],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}],
+        "buffers": [{"byteLength": 48}]
+    });
+    let bytes = glb(&document, &positions);
+    let (_, groups) = groups("a.glb", &bytes);
+    assert_eq!(shown(&groups), ["door/0|glass|0,6", "door/2|-|2,8", "mesh 0|material 1|4"]);
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, &bytes).unwrap();
+    let wanted = Wanted { attributes: Keep::None, groups: true };
+    let meshes = bth_import::import_gltf_meshes(&path, &[0, 1], wanted, &Silent).unwrap();
+    let of = |row: usize| shown(meshes[row].0.groups.as_ref().unwrap());
+    assert_eq!(
+        (of(0), of(1)),
+        (vec!["mesh 0|material 1|0".into()], vec!["door/0|glass|0".into(), "door/2|-|2".into()])
+    );
+}

@@ -1,0 +1,68 @@
+//! Triangles that let rays pass: queries go on behind hits on transparent parts.
+//!
+//! The nearest hit is found as in scenes where every triangle is opaque. Where it lies on a transparent part, the ray is searched
+//! again by the walk of [`mod@crate::hits`], which passes over such hits. Nothing else changes: a hit that is not transparent is the
+//! nearest of those that are not, and a ray without any hit has none of them. So scenes without opacity pay for one test in each
+//! call, and rays that meet no holes pay for looking up the opacity of their hit.
+
+use crate::hits::Accept;
+use crate::query::Steps;
+use crate::rays::{Hit, PrimitiveRef, Ray};
+use crate::scene::Scene;
+use bth_format::layout::Opacity;
+
+impl Scene {
+    /// The opacity of the triangle where a hit lies: [`Opacity::Opaque`] for triangles about which the file says nothing. A hit of
+    /// a query is never transparent; where it is unknown, a filter ([`Accept::filter`]) may decide, and without one it counts.
+    ///
+    /// # Panics
+    /// If the hit is none of this scene.
+    pub fn opacity(&self, hit: &Hit) -> Opacity {
+        self.view(self.object_of(hit.primitive.instance)).opacity_at(hit.primitive.triangle, hit.u, hit.v)
+    }
+
+    /// As `nearest_hits_of`, for a scene with triangles that let rays pass.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn nearest_not_transparent(
+        &self,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        hits: &mut [Hit],
+    ) {
+        self.nearest_of_all(rays, from, hits);
+        for (ray, hit) in rays.iter().zip(hits) {
+            self.go_on(ray, hit);
+        }
+    }
+
+    /// As `any_hits_of`, for a scene with triangles that let rays pass.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn any_not_transparent(
+        &self,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        found: &mut [bool],
+    ) {
+        self.any_of_all(rays, from, found);
+        for (ray, found) in rays.iter().zip(found) {
+            *found = *found && self.search_any(ray, &Accept::default());
+        }
+    }
+
+    /// As `nearest_counted`, for a scene with triangles that let rays pass. The steps of the search behind holes are not counted.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn counted_not_transparent(&self, ray: &Ray, (mut hit, steps): (Hit, Steps)) -> (Hit, Steps) {
+        self.go_on(ray, &mut hit);
+        (hit, steps)
+    }
+
+    /// Replaces a ray's nearest hit by its nearest one that is not transparent.
+    fn go_on(&self, ray: &Ray, hit: &mut Hit) {
+        if hit.is_hit() && self.opacity(hit) == Opacity::Transparent {
+            *hit = self.search_nearest(ray, &Accept::default()).unwrap_or(Hit::MISS);
+        }
+    }
+}

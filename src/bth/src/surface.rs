@@ -1,0 +1,249 @@
+//! The surface at a hit: positions, normals, texture coordinates, group, material and names, from the sections of the source that
+//! a file keeps. And bounds.
+//!
+//! What a file keeps is decided when it is compiled: positions of triangles by default (not with `--no-geometry`), normals and
+//! texture coordinates with `--attributes`, groups, materials and names with `--names`.
+
+use crate::intersect::point_exact::exact_normal;
+use crate::rays::{Hit, PrimitiveRef};
+use crate::scene::Scene;
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
+
+/// The surface at a point of a triangle, as [`Scene::surface`] finds it. Positions and normals are in world space unless their name
+/// says otherwise, normals have length 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// The point: the triangle's vertices weighted by the hit's barycentric coordinates, in f64. It lies on the triangle but for
+    /// the rounding of these coordinates to f32, which the ray's `origin + t * direction` does not.
+    pub position: [f64; 3],
+    /// The point in the space of the object.
+    pub object_position: [f64; 3],
+    /// The normal of the triangle's plane, on the side from which the object's vertices are seen counterclockwise. A mirrored
+    /// instance shows the same sides of its object as others do.
+    pub geometric_normal: [f64; 3],
+    /// As [`Self::geometric_normal`], in the space of the object.
+    pub object_geometric_normal: [f64; 3],
+    /// The normals of the source at the vertices, interpolated, on whatever side the source has them. The geometric normal where
+    /// the file keeps none, where those of the vertices cancel out, and in place of a vertex's normal of zeros.
+    pub normal: [f64; 3],
+    /// As [`Self::normal`], in the space of the object.
+    pub object_normal: [f64; 3],
+    /// Texture coordinates, interpolated; `None` if the file keeps none.
+    pub uv: Option<[f32; 2]>,
+    /// Index of the object.
+    pub object: u32,
+    /// Index of the group of the object's triangles; 0 if the file keeps no groups. Its name is [`Scene::group_name`].
+    pub group: u32,
+    /// Index of the object's material; `None` if the group has none or the file keeps none. Its name is
+    /// [`Scene::material_name`].
+    pub material: Option<u32>,
+}
+
+/// Lower and upper end of a box.
+pub type Bounds = ([f32; 3], [f32; 3]);
+
+impl Scene {
+    /// The vertices of a triangle in the space of its object, as rays are tested against them: on the grid, if the file has one.
+    /// `None` if the file does not keep them (it was compiled with `--no-geometry`), or if there is no such instance or triangle.
+    pub fn triangle(&self, primitive: PrimitiveRef) -> Option<[[f32; 3]; 3]> {
+        triangle(&self.object(self.object_at(primitive)?), primitive.triangle)
+    }
+
+    /// The vertices of a triangle in world space, at the scene's time. In a mirrored instance they are seen clockwise from the
+    /// front. `None` as for [`Self::triangle`].
+    pub fn triangle_in_world(&self, primitive: PrimitiveRef) -> Option<[[f64; 3]; 3]> {
+        let corners = self.triangle(primitive)?;
+        let to_world = self.instance(primitive.instance).to_world;
+        Some(corners.map(|corner| transformed(&to_world, corner.map(f64::from))))
+    }
+
+    /// The surface at a hit of this scene, at the scene's time. `None` for a miss, if the file does not keep the vertices of
+    /// triangles (it was compiled with `--no-geometry`), if there is no such instance or triangle, or if the instance is hidden
+    /// by now.
+    ///
+    /// ```no_run
+    /// use bth::rays::Ray;
+    ///
+    /// let scene = bth::open("house.bth")?;
+    /// let hit = scene.nearest(&Ray::new([0.0, 1.0, 9.0], [0.0, 0.0, -1.0]));
+    /// if let Some(surface) = hit.and_then(|hit| scene.surface(&hit)) {
+    ///     let group = scene.group_name(surface.object, surface.group);
+    ///     println!("{group} at {:?} with normal {:?}", surface.position, surface.normal);
+    /// }
+    /// # Ok::<(), bth::Error>(())
+    /// ```
+    pub fn surface(&self, hit: &Hit) -> Option<SurfacePoint> {
+        let PrimitiveRef { instance, triangle: id } = hit.primitive;
+        let object = self.object_at(hit.primitive)?;
+        if self.world().is_some_and(|world| world.placements[instance as usize].is_none()) {
+            return None;
+        }
+        let view = self.object(object);
+        let corners = triangle(&view, id)?;
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let weights = [1.0 - u - v, u, v];
+        let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
+        let object_geometric_normal = plane_normal(corners)?;
+        let object_normal = interpolated_normal(&view, id, weights, object_geometric_normal);
+        let to_world = |normal: [f64; 3]| match self.world() {
+            None => normal,
+            Some(_) => unit(self.normal_to_world(instance, normal)).unwrap_or(normal),
+        };
+        let group = view.group_of(id);
+        Some(SurfacePoint {
+            position: transformed(&self.instance(instance).to_world, object_position),
+            object_position,
+            geometric_normal: to_world(object_geometric_normal),
+            object_geometric_normal,
+            normal: to_world(object_normal),
+            object_normal,
+            uv: interpolated_uv(&view, id, weights),
+            object,
+            group,
+            material: view.material_of(group),
+        })
+    }
+
+    /// The group of a triangle of an object: 0 if the file keeps no groups. Costs O(log runs), where a run is a sequence of
+    /// triangles of one group in the source.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_of(&self, object: u32, triangle: u32) -> u32 {
+        self.object(object).group_of(triangle)
+    }
+
+    /// The name of a group of an object's triangles; empty if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_name(&self, object: u32, group: u32) -> &str {
+        self.object(object).group_name(group)
+    }
+
+    /// The material of a group; `None` if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn group_material(&self, object: u32, group: u32) -> Option<u32> {
+        self.object(object).material_of(group)
+    }
+
+    /// Number of materials of an object; 0 if the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn material_count(&self, object: u32) -> u32 {
+        self.object(object).materials.len() as u32
+    }
+
+    /// The name of an object's material; empty if it has none or the file keeps none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn material_name(&self, object: u32, material: u32) -> &str {
+        self.object(object).material_name(material)
+    }
+
+    /// The name of an object, that of the scene manifest or of the glTF mesh; empty if the file keeps none.
+    pub fn object_name(&self, object: u32) -> &str {
+        self.file().object_name(object)
+    }
+
+    /// Box of the triangles of an object that can be hit, in the space of the object; `None` if there are none.
+    ///
+    /// # Panics
+    /// If there is no such object.
+    pub fn object_bounds(&self, object: u32) -> Option<Bounds> {
+        let header = self.object(object).header;
+        (header.root != NONE).then_some((header.lower, header.upper))
+    }
+
+    /// Box in world space that contains all visible instances at the scene's time, slightly enlarged to cover roundings of
+    /// transforms; `None` if nothing is visible. It is the union of all [`Self::instance_bounds`].
+    pub fn bounds(&self) -> Option<Bounds> {
+        let boxes = (0..self.instance_count()).filter_map(|instance| self.instance_bounds(instance));
+        boxes.reduce(|(lower, upper), (l, u)| {
+            (
+                std::array::from_fn(|k| f32::min(lower[k], l[k])),
+                std::array::from_fn(|k| f32::max(upper[k], u[k])),
+            )
+        })
+    }
+
+    /// The object of a triangle; `None` if there is no such instance.
+    fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
+        (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance))
+    }
+}
+
+/// The vertices of a triangle as they are traced; `None` if the file does not keep them or there is no such triangle.
+fn triangle(view: &ObjectView<'_>, id: u32) -> Option<[[f32; 3]; 3]> {
+    let rows = view.triangles.get(id as usize)?;
+    let [a, b, c] = rows.map(|row| view.positions.get(row as usize).copied());
+    let corners = [a?, b?, c?];
+    Some(view.grid.map_or(corners, |grid| corners.map(|corner| grid.nearest(corner))))
+}
+
+/// Normals are computed exactly if the error bound of f64 exceeds this share of their greatest component.
+const NORMAL_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// The normal of a triangle's plane; `None` for a triangle of zero area, which is never hit.
+fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
+    let [a, b, c] = corners.map(|corner| corner.map(f64::from));
+    let edge = |to: [f64; 3]| [0, 1, 2].map(|k| to[k] - a[k]);
+    let (e, f) = (edge(b), edge(c));
+    let products = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| (e[i] * f[j], e[j] * f[i]));
+    let normal = products.map(|(p, q)| p - q);
+    // The products of differences of f32 neither overflow nor underflow in f64. Each component has at most 7 roundings.
+    let error =
+        products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
+    let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
+}
+
+/// The interpolated normal at barycentric weights, in the space of the object.
+fn interpolated_normal(view: &ObjectView<'_>, id: u32, weights: [f64; 3], geometric: [f64; 3]) -> [f64; 3] {
+    let Some(corners) = attribute(view, view.normals, id) else { return geometric };
+    let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
+    if corners.iter().all(zero) {
+        return geometric;
+    }
+    let corners = corners.map(|normal| if zero(&normal) { geometric } else { normal.map(f64::from) });
+    unit(weighted(weights, corners)).unwrap_or(geometric)
+}
+
+/// The interpolated texture coordinates at barycentric weights.
+fn interpolated_uv(view: &ObjectView<'_>, id: u32, weights: [f64; 3]) -> Option<[f32; 2]> {
+    let corners = attribute(view, view.uvs, id)?;
+    Some(weighted(weights, corners.map(|uv| uv.map(f64::from))).map(|x| x as f32))
+}
+
+/// The attributes of a triangle's corners, if the file keeps them.
+fn attribute<const N: usize>(view: &ObjectView<'_>, rows: &[[f32; N]], id: u32) -> Option<[[f32; N]; 3]> {
+    let [a, b, c] = view.corners.get(id as usize)?.map(|row| rows.get(row as usize).copied());
+    Some([a?, b?, c?])
+}
+
+/// The sum of weighted vectors.
+fn weighted<const N: usize>(weights: [f64; 3], [a, b, c]: [[f64; N]; 3]) -> [f64; N] {
+    std::array::from_fn(|k| weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k])
+}
+
+/// A point after a transform with rows of four.
+fn transformed(rows: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
+    rows.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
+}
+
+/// A vector divided by its length; `None` for zero and for what is not finite. It is divided by its greatest component first, since
+/// the squares of components may overflow or underflow.
+fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let greatest = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let v = v.map(|x| x / greatest);
+    if !(greatest > 0.0 && v.iter().all(|x| x.is_finite())) {
+        return None;
+    }
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    Some(v.map(|x| x / length))
+}

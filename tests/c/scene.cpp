@@ -1,0 +1,75 @@
+// Compiles a mesh and traces it through bth.hpp. Exits with the line of the first check that fails.
+#include "bth.hpp"
+#include "bth_compile.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <type_traits>
+
+static_assert(std::is_nothrow_move_constructible_v<bth::scene> && std::is_nothrow_move_assignable_v<bth::scene>);
+static_assert(!std::is_copy_constructible_v<bth::scene> && !std::is_copy_assignable_v<bth::scene>);
+
+#define CHECK(condition)                                                                                                 \
+    do {                                                                                                                 \
+        if (!(condition)) {                                                                                              \
+            std::fprintf(stderr, "%d: %s\n", __LINE__, #condition);                                                      \
+            return __LINE__;                                                                                             \
+        }                                                                                                                \
+    } while (0)
+
+int main(int argc, char **argv) {
+    const std::array<float, 12> positions = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
+    const std::array<std::uint32_t, 6> triangles = {0, 1, 2, 1, 3, 2};
+    const bth_mesh mesh = {positions.data(), 4, triangles.data(), 2};
+    bth_bytes bytes{};
+    CHECK(bth_compile_mesh(&mesh, nullptr, &bytes) == BTH_COMPILE_OK);
+    bth::scene first = bth::scene::from_bytes(bytes.data, bytes.length);
+    bth_free_bytes(&bytes);
+
+    bth::scene scene = std::move(first);
+    CHECK(first.get() == nullptr && scene.get() != nullptr);
+    const bth_ray down = {{0.25F, 0.25F, 2}, 0, {0, 0, -1}, INFINITY};
+    const bth_ray beside = {{3, 3, 2}, 0, {0, 0, -1}, INFINITY};
+    const bth_hit hit = scene.nearest(down);
+    CHECK(hit.t == 2 && hit.surface.triangle == 0 && !bth::is_miss(hit) && bth::is_miss(scene.nearest(beside)));
+    CHECK(scene.any(down, &hit.surface) && !scene.any(beside));
+    const std::vector<bth_ray> rays = {beside, down};
+    const std::vector<bth_hit> hits = scene.nearest_of(rays);
+    CHECK(bth::is_miss(hits[0]) && std::memcmp(&hits[1], &hit, sizeof hit) == 0);
+    CHECK((scene.any_of(rays) == std::vector<std::uint8_t>{0, 1}));
+    CHECK(scene.instance_count() == 1 && scene.instance(0).visible == 1 && scene.frames().rate == 1);
+    CHECK(scene.resident_bytes() > 0 && scene.seconds() == 0);
+
+    const bth_accept no_back = {~0U, BTH_CULL_BACK, nullptr, nullptr};
+    const bth_ray up = {{0.25F, 0.25F, -2}, 0, {0, 0, 1}, INFINITY};
+    CHECK(scene.any(up) && !scene.any_accepted(up, no_back) && bth::is_miss(scene.nearest_accepted(up, no_back)));
+    const bth_ray diagonal = {{0.5F, 0.5F, 2}, 0, {0, 0, -1}, INFINITY};
+    CHECK(scene.count_hits(diagonal) == 2 && scene.all_hits(diagonal).size() == 2 && scene.all_hits(diagonal, 1).size() == 1);
+    CHECK(scene.all_hits(beside).empty() && scene.surface(hit).geometric_normal[2] == 1);
+    CHECK(!scene.contains({0.25F, 0.25F, -1}) && scene.closest({0.25F, 0.25F, -3}, 9).distance == 3);
+    CHECK(std::abs(scene.signed_distance({0.25F, 0.25F, 3})) == 3 && scene.object_name(0).empty());
+    scene.set_instance_mask(0, 2);
+    CHECK(bth::is_miss(scene.nearest_accepted(down, {1, BTH_CULL_NONE, nullptr, nullptr})));
+    CHECK(scene.winding({9, 9, 9}) == 0);
+
+    int caught = 0;
+    try {
+        scene.instance(1);
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT && std::strlen(e.what()) > 0;
+    }
+    try {
+        scene = bth::scene::open(argc > 1 ? argv[1] : "");
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_FILE && std::strstr(e.what(), "BTH-O001") != nullptr;
+    }
+    try {
+        first.nearest(down);
+    } catch (const bth::error &e) {
+        caught += e.code() == BTH_ERROR_ARGUMENT;
+    }
+    CHECK(caught == 3 && scene.any(down));
+    return 0;
+}

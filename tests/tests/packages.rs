@@ -1,0 +1,86 @@
+//! Programs in C and C++ that find the installed libraries by CMake and by pkg-config (`tools/package/install`).
+#![cfg(unix)]
+#![allow(clippy::print_stdout)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the repository")
+}
+
+/// Whether a program can be run; prints a line if not.
+fn have(program: &str) -> bool {
+    let found = Command::new(program).arg("--version").output().is_ok();
+    if !found {
+        println!("SKIPPED: no {program}");
+    }
+    found
+}
+
+/// Runs a command that must succeed, and returns its output.
+fn output_of(command: &mut Command) -> String {
+    let output = command.output().expect("the command runs");
+    assert!(output.status.success(), "{command:?}: {output:?}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// A folder with the libraries installed and then moved, as by a package manager.
+fn installed(folder: &Path) -> PathBuf {
+    let built = bth_tests::built(&["bth-capi", "bth-compile-capi"]);
+    let prefix = folder.join("moved");
+    let mut install = Command::new(root().join("tools/package/install"));
+    output_of(install.arg("/usr").env("DESTDIR", folder).env("BTH_INSTALL_FROM", built));
+    std::fs::rename(folder.join("usr"), &prefix).expect("a folder that can be moved");
+    prefix
+}
+
+/// Runs the programs of `tests/c`, which check themselves.
+fn run_both(folder: &Path) {
+    output_of(Command::new(folder.join("scene")).arg(folder.join("absent.bth")));
+    output_of(
+        Command::new(folder.join("compile")).args(["mesh.bth", "scene.bth"].map(|name| folder.join(name))),
+    );
+}
+
+#[test]
+fn a_cmake_project_finds_the_libraries() {
+    if !["cmake", "c++", "cc"].into_iter().all(have) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let prefix = installed(folder.path());
+    let build = folder.path().join("build");
+    let configure = |extra: &str| {
+        let mut cmake = Command::new("cmake");
+        cmake.arg("-S").arg(root().join("tests/packages/cmake")).arg("-B").arg(&build);
+        cmake.arg(format!("-DCMAKE_PREFIX_PATH={}", prefix.display()));
+        cmake.arg(format!("-DPROGRAMS={}", root().join("tests/c").display())).arg(extra);
+        cmake
+    };
+    output_of(&mut configure("-DCMAKE_BUILD_TYPE=Release"));
+    output_of(Command::new("cmake").arg("--build").arg(&build));
+    run_both(&build);
+}
+
+#[test]
+fn programs_find_the_libraries_by_pkg_config() {
+    if !["pkg-config", "c++", "cc"].into_iter().all(have) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let prefix = installed(folder.path());
+    let ask = |arguments: &[&str]| {
+        let mut ask = Command::new("pkg-config");
+        output_of(ask.args(arguments).env("PKG_CONFIG_PATH", prefix.join("lib/pkgconfig"))).trim().to_owned()
+    };
+    assert_eq!(ask(&["--modversion", "bth"]), env!("CARGO_PKG_VERSION"));
+    let flags = ask(&["--cflags", "--libs", "bth", "bth_compile"]);
+    for (compiler, source) in [("c++", "scene.cpp"), ("cc", "compile.c")] {
+        let mut compile = Command::new(compiler);
+        compile.arg(root().join("tests/c").join(source)).args(flags.split(' '));
+        compile.arg(format!("-Wl,-rpath,{}", prefix.join("lib").display()));
+        output_of(compile.arg("-o").arg(folder.path().join(source).with_extension("")));
+    }
+    run_both(folder.path());
+}

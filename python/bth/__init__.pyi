@@ -22,7 +22,7 @@ def compile(
     max_error: float | str | None = None, boxes: Literal["f32", "8", 8] | None = None,
     attributes: Literal["none", "normals", "all"] | None = None,
     tets: Literal["link32", "tet32", "tet20", "tet16"] | None = None, subtrees: Literal["keep", "prune"] | None = None,
-    compact: bool | None = None, geometry: bool | None = None,
+    compact: bool | None = None, geometry: bool | None = None, names: bool | None = None,
     estimator: Literal["face-count", "average-depth"] | None = None, select: Literal["best", "paper"] | None = None,
     optimize_for: Literal["camera", "secondary", "balanced"] | None = None, profile: str | PathLike[str] | None = None,
     max_bytes_per_triangle: float | None = None, budget: float | None = None, probe: Literal["steps", "off"] | None = None,

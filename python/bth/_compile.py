@@ -8,7 +8,7 @@ from ._scene import Scene
 
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, attributes=None,
-    tets=None, subtrees=None, compact=None, geometry=None, estimator=None, select=None, optimize_for=None, profile=None,
+    tets=None, subtrees=None, compact=None, geometry=None, names=None, estimator=None, select=None, optimize_for=None, profile=None,
     max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
     tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, strict=None,
     cache=None, threads=None, progress=None,

@@ -86,6 +86,7 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         coordinates: coordinates(keywords)?,
         keep_subtrees: subtrees.unwrap_or(structure == Structure::Bth && !compact),
         geometry: keywords.value("geometry")?.unwrap_or(true),
+        names: keywords.value("names")?.unwrap_or(false),
         ..CompileOptions::default()
     };
     selection(keywords, &mut options)?;

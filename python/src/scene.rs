@@ -51,9 +51,11 @@ impl NativeScene {
     }
 }
 
-fn no_instance(instance: u32, count: u32) -> PyErr {
-    PyIndexError::new_err(format!("instance {instance} of {count}"))
-}
+/// Transforms, objects and visibility of instances.
+type Placements<'py> = (Bound<'py, PyArray3<f64>>, Vec<u32>, Vec<bool>);
+
+/// Positions and triangles.
+type Geometry<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
 
 #[pymethods]
 impl NativeScene {
@@ -109,7 +111,7 @@ impl NativeScene {
         self.with(py, bth::Scene::seconds)
     }
 
-    /// Sets the time; returns the numbers of instances that moved.
+    /// Sets the time.
     fn set_seconds(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let updated = self.get()?.change(py, |scene| scene.set_seconds(seconds))?;
         updated.map(drop).map_err(|e| format_error(&e))
@@ -120,24 +122,8 @@ impl NativeScene {
         updated.map(drop).map_err(|e| format_error(&e))
     }
 
-    /// Object, node, whether visible, and box of an instance.
-    fn instance(
-        &self,
-        py: Python<'_>,
-        instance: u32,
-    ) -> PyResult<(u32, u32, bool, Option<([f32; 3], [f32; 3])>, Vec<Vec<f64>>)> {
-        self.with(py, |scene| {
-            if instance >= scene.instance_count() {
-                return Err(no_instance(instance, scene.instance_count()));
-            }
-            let view = scene.instance(instance);
-            let rows = view.to_world.iter().map(|row| row.to_vec()).collect();
-            Ok((view.object, view.node, view.visible, scene.instance_bounds(instance), rows))
-        })?
-    }
-
-    /// For each instance the 3×4 matrix that transforms its object's space to world space, and the indices of objects.
-    fn placements<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray3<f64>>, Vec<u32>, Vec<bool>)> {
+    /// For each instance the 3×4 matrix that transforms its object's space to world space, its object, and whether it is visible.
+    fn placements<'py>(&self, py: Python<'py>) -> PyResult<Placements<'py>> {
         let (matrices, objects, visible) = self.with(py, |scene| {
             let count = scene.instance_count();
             let mut matrices = Array3::zeros((count as usize, 3, 4));
@@ -169,11 +155,7 @@ impl NativeScene {
     }
 
     /// Positions and triangles of an object, if the file has them.
-    fn geometry<'py>(
-        &self,
-        py: Python<'py>,
-        object: u32,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>)> {
+    fn geometry<'py>(&self, py: Python<'py>, object: u32) -> PyResult<Geometry<'py>> {
         let (positions, triangles) = self.with(py, |scene| {
             if object >= scene.object_count() {
                 return Err(PyIndexError::new_err(format!("object {object} of {}", scene.object_count())));

@@ -252,7 +252,7 @@ fn conditions_of_a_batch_are_those_of_its_rays() {
     let scene = compiled(&model, Structure::Bvh, RecordKind::Link32, false);
     let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
     let rays = assorted(&corners, 6_000, 7);
-    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle % 2 == 0;
+    let even = |_: &Ray, hit: &Hit| hit.primitive.triangle.is_multiple_of(2);
     let accept = Accept { filter: Some(&even), ..Accept::default() };
     let (mut alone, mut together) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
     scene.batch(&rays).accept(&accept).nearest(&mut alone);

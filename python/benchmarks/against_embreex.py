@@ -1,6 +1,6 @@
 """Rays per second of bth and of embreex through their numpy interfaces: the same rays, one thread, in turns.
 
-    python python/benchmarks/embreex.py MODEL.ply …        models that bth and trimesh read
+    python python/benchmarks/against_embreex.py MODEL.ply …        models that bth and trimesh read
 
 Rays come from points around the model to points of its box, 1e6 a batch.
 """

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
-use std::io::Read;
 
 use serde::Deserialize;
 
@@ -10,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::gltf::extensions::{MESHOPT, unsupported_extension};
 use crate::gltf::meshopt;
 use crate::gltf::schema::{Buffer, BufferView, GltfDocument, MeshoptCompression};
-use crate::gltf::uri::{beside, decode_base64};
+use crate::gltf::uri::{beside, decode_base64, read_at_most};
 use crate::source::{Source, TRUNCATED, TRUNCATED_HINT};
 
 const BUFFER: &str = "BTH-I014";
@@ -153,18 +152,7 @@ impl<'a> Buffers<'a> {
             let hint = "put the buffer beside the model and refer to it by its name";
             return Err(self.source.error_in_part(BUFFER, part, message, hint));
         };
-        let file_error = |e: std::io::Error| Error::File {
-            code: "BTH-O001",
-            path: path.clone(),
-            message: format!("cannot read: {e}"),
-        };
-        let file = std::fs::File::open(&path).map_err(file_error)?;
-        if !file.metadata().map_err(file_error)?.is_file() {
-            return Err(file_error(std::io::Error::other("not a regular file")));
-        }
-        let mut bytes = Vec::new();
-        file.take(length).read_to_end(&mut bytes).map_err(file_error)?;
-        Ok(bytes)
+        read_at_most(&path, length)
     }
 
     fn error(&self, part: impl Into<String>, message: impl Into<String>) -> Error {

@@ -1,6 +1,9 @@
 //! URIs of glTF buffers: files beside the document and data: URIs (glTF 2.0 specification, §2.8).
 
+use std::io::Read;
 use std::path::{self, Path, PathBuf};
+
+use crate::error::{Error, Result};
 
 /// The file that a relative URI names; `None` for others.
 pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
@@ -9,6 +12,25 @@ pub(crate) fn beside(document: &Path, uri: &str) -> Option<PathBuf> {
     let is_relative = !uri.contains(':')
         && !relative.components().any(|c| matches!(c, path::Component::RootDir | path::Component::Prefix(_)));
     is_relative.then(|| document.parent().unwrap_or(Path::new("")).join(relative))
+}
+
+/// The first bytes of a file beside the document, at most `most`.
+///
+/// # Errors
+/// `BTH-O001` when it cannot be read or is no regular file.
+pub(crate) fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let file_error = |e: std::io::Error| Error::File {
+        code: "BTH-O001",
+        path: path.to_owned(),
+        message: format!("cannot read: {e}"),
+    };
+    let file = std::fs::File::open(path).map_err(file_error)?;
+    if !file.metadata().map_err(file_error)?.is_file() {
+        return Err(file_error(std::io::Error::other("not a regular file")));
+    }
+    let mut bytes = Vec::new();
+    file.take(most).read_to_end(&mut bytes).map_err(file_error)?;
+    Ok(bytes)
 }
 
 /// Decodes percent escapes (RFC 3986, §2.1); `None` if that is malformed or the result is not UTF-8.

@@ -10,7 +10,6 @@
 mod accept;
 mod batch;
 mod collect;
-mod groups;
 mod search;
 
 pub use accept::{Accept, Cull, Filter};
@@ -105,7 +104,7 @@ impl Scene {
     /// # Panics
     /// If there is no such object.
     pub fn group_count(&self, object: u32) -> u32 {
-        groups::group_count(&self.object(object))
+        self.object(object).group_count()
     }
 
     /// Whether every hit is accepted.

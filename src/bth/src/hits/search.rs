@@ -3,7 +3,6 @@
 
 use super::accept::Accept;
 use super::collect::{Collector, Found};
-use super::groups::group_of;
 use crate::bvh::candidate::intersect_exactly;
 use crate::bvh::enumerate::{Receiver, enumerate};
 use crate::enumerate::EnteredInstance;
@@ -97,7 +96,7 @@ impl InstanceHits<'_> {
     /// Whether the mask of a triangle's group has a bit in common with that of the ray.
     fn meets_group(&self, triangle: TriangleRef<'_>) -> bool {
         self.groups.is_none_or(|groups| {
-            let group = group_of(self.object, triangle.read());
+            let group = self.object.group_of(triangle.read());
             self.accept.mask & Masks::of_group(groups, group) != 0
         })
     }

@@ -4,7 +4,6 @@
 //! These parts are read for cut-outs only, so that a document whose materials are malformed is imported without them.
 
 use std::collections::HashMap;
-use std::io::Read;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -15,7 +14,7 @@ use crate::cutout::{AlphaImage, AlphaMode, CutoutMaterial, Wrap};
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::schema::Extensions;
-use crate::gltf::uri::{beside, decode_base64};
+use crate::gltf::uri::{beside, decode_base64, read_at_most};
 use crate::source::MALFORMED;
 
 /// A code for a texture or image that cannot be read.
@@ -240,18 +239,7 @@ impl<'m, 'a> Materials<'m, 'a> {
             let message = format!("expected a relative file name or a data: URI, found \"{uri}\"");
             return Err(self.unreadable(part, message));
         };
-        let file_error = |e: std::io::Error| Error::File {
-            code: "BTH-O001",
-            path: path.clone(),
-            message: format!("cannot read: {e}"),
-        };
-        let file = std::fs::File::open(&path).map_err(file_error)?;
-        if !file.metadata().map_err(file_error)?.is_file() {
-            return Err(file_error(std::io::Error::other("not a regular file")));
-        }
-        let mut bytes = Vec::new();
-        file.take(MAX_FILE).read_to_end(&mut bytes).map_err(file_error)?;
-        Ok(bytes)
+        read_at_most(&path, MAX_FILE)
     }
 
     /// A row of a list of the document, parsed.

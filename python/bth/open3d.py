@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from . import _meshes
-from ._compile import compile
+from ._assembly import Assembly
 
 _INVALID = 0xFFFFFFFF
 
@@ -15,24 +14,11 @@ class RaycastingScene:
 
     def __init__(self, nthreads=0):
         self._threads = nthreads or None
-        self._parts = []
-        self._compiled = None
+        self._assembly = Assembly()
 
     def add_triangles(self, vertices, triangles=None):
         """Adds vertices (n, 3) and triangles (m, 3), or a mesh; returns its geometry's index."""
-        self._parts.append(_meshes.triangles_of(vertices if triangles is None else (vertices, triangles)))
-        self._compiled = None
-        return len(self._parts) - 1
-
-    def _scene(self):
-        if self._compiled is None:
-            first_vertex = np.cumsum([0] + [len(v) for v, _ in self._parts])
-            first_face = np.cumsum([0] + [len(f) for _, f in self._parts])
-            vertices = np.concatenate([np.zeros((0, 3), np.float32)] + [v for v, _ in self._parts])
-            faces = [f + np.uint32(first) for (_, f), first in zip(self._parts, first_vertex)]
-            faces = np.concatenate([np.zeros((0, 3), np.uint32)] + faces)
-            self._compiled = compile((vertices, faces), quality="fast"), first_face
-        return self._compiled
+        return self._assembly.add(vertices if triangles is None else (vertices, triangles))
 
     def _rays(self, rays, nthreads):
         rays = np.asarray(rays)
@@ -42,7 +28,7 @@ class RaycastingScene:
 
     def _ids(self, triangles):
         """Geometries, and triangles in them, of triangles of the scene; INVALID_ID for none."""
-        first = self._scene()[1]
+        first = self._assembly.scene()[1]
         geometry = np.searchsorted(first, triangles, side="right") - 1
         none = triangles == _INVALID
         local = triangles - first[np.where(none, 0, geometry)]
@@ -51,7 +37,7 @@ class RaycastingScene:
     def cast_rays(self, rays, nthreads=0):
         """Nearest hits: t_hit, geometry_ids, primitive_ids, primitive_uvs, primitive_normals."""
         origins, directions, threads = self._rays(rays, nthreads)
-        hits = self._scene()[0].nearest(origins, directions, threads=threads)
+        hits = self._assembly.scene()[0].nearest(origins, directions, threads=threads)
         geometry, primitive = self._ids(hits.triangle)
         return {
             "t_hit": hits.t, "geometry_ids": geometry, "primitive_ids": primitive,
@@ -61,17 +47,17 @@ class RaycastingScene:
     def test_occlusions(self, rays, tnear=0.0, tfar=float("inf"), nthreads=0):
         """Whether rays hit anything between tnear and tfar."""
         origins, directions, threads = self._rays(rays, nthreads)
-        return self._scene()[0].any(origins, directions, tmin=tnear, tmax=tfar, threads=threads)
+        return self._assembly.scene()[0].any(origins, directions, tmin=tnear, tmax=tfar, threads=threads)
 
     def count_intersections(self, rays, nthreads=0):
         """Number of triangles that rays hit."""
         origins, directions, threads = self._rays(rays, nthreads)
-        return self._scene()[0].count(origins, directions, threads=threads).astype(np.int32)
+        return self._assembly.scene()[0].count(origins, directions, threads=threads).astype(np.int32)
 
     def list_intersections(self, rays, nthreads=0):
         """All hits: ray_splits (offsets), ray_ids, t_hit, geometry_ids, primitive_ids, primitive_uvs."""
         origins, directions, threads = self._rays(rays, nthreads)
-        found = self._scene()[0].all_hits(origins, directions, threads=threads)
+        found = self._assembly.scene()[0].all_hits(origins, directions, threads=threads)
         geometry, primitive = self._ids(found.triangle)
         return {
             "ray_splits": found.offsets, "ray_ids": found.ray, "t_hit": found.t, "geometry_ids": geometry,
@@ -80,7 +66,7 @@ class RaycastingScene:
 
     def compute_closest_points(self, query_points, nthreads=0):
         """Closest points: points, geometry_ids, primitive_ids, primitive_uvs, primitive_normals."""
-        scene = self._scene()[0]
+        scene = self._assembly.scene()[0]
         closest = scene.closest(query_points, threads=nthreads or self._threads)
         geometry, primitive = self._ids(closest.triangle)
         return {
@@ -90,17 +76,17 @@ class RaycastingScene:
         }
 
     def compute_distance(self, query_points, nthreads=0):
-        return self._scene()[0].closest(query_points, threads=nthreads or self._threads).distance
+        return self._assembly.scene()[0].closest(query_points, threads=nthreads or self._threads).distance
 
     def compute_signed_distance(self, query_points, nthreads=0, nsamples=1):
         """nsamples: one ray decides exactly; more would not change the answer."""
         _odd(nsamples)
-        return self._scene()[0].signed_distance(query_points, threads=nthreads or self._threads)
+        return self._assembly.scene()[0].signed_distance(query_points, threads=nthreads or self._threads)
 
     def compute_occupancy(self, query_points, nthreads=0, nsamples=1):
         """1 for points inside, else 0."""
         _odd(nsamples)
-        return self._scene()[0].contains(query_points, threads=nthreads or self._threads).astype(np.float32)
+        return self._assembly.scene()[0].contains(query_points, threads=nthreads or self._threads).astype(np.float32)
 
     @staticmethod
     def create_rays_pinhole(intrinsic_matrix=None, extrinsic_matrix=None, width_px=None, height_px=None, *, fov_deg=None,

@@ -19,7 +19,7 @@ class TriangleMesh:
             if vertices.ndim != 3 or vertices.shape[1:] != (3, 3):
                 raise ValueError(f"vertices: expected the shape (m, 3, 3) without indices, got {vertices.shape}")
             vertices, indices = vertices.reshape(-1, 3), np.arange(3 * len(vertices)).reshape(-1, 3)
-        self.mesh = scene._add(vertices, np.asarray(indices))
+        self.mesh = scene._assembly.add((vertices, np.asarray(indices)))
 
 
 class ElementMesh(TriangleMesh):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from .. import _meshes
-from .._compile import compile
+from .._assembly import Assembly
 
 # What embreex takes for no limit.
 _FAR = np.float32(1e37)
@@ -13,24 +12,7 @@ class EmbreeScene:
     def __init__(self, device=None, robust=True):
         """robust: every query is."""
         self.device = device
-        self._parts = []
-        self._compiled = None
-
-    def _add(self, vertices, faces):
-        self._parts.append(_meshes.triangles_of((vertices, faces)))
-        self._compiled = None
-        return len(self._parts) - 1
-
-    def _scene(self):
-        """The scene, the first triangle of each mesh, and the end of the last's."""
-        if self._compiled is None:
-            first_vertex = np.cumsum([0] + [len(v) for v, _ in self._parts])
-            first_face = np.cumsum([0] + [len(f) for _, f in self._parts])
-            vertices = np.concatenate([np.zeros((0, 3), np.float32)] + [v for v, _ in self._parts])
-            faces = [f + np.uint32(first) for (_, f), first in zip(self._parts, first_vertex)]
-            faces = np.concatenate([np.zeros((0, 3), np.uint32)] + faces)
-            self._compiled = compile((vertices, faces), quality="fast"), first_face
-        return self._compiled
+        self._assembly = Assembly()
 
     def run(self, vec_origins, vec_directions, dists=None, query="INTERSECT", output=None):
         """As in embreex: indices of triangles or -1, distances, or with `output` a dictionary of arrays."""
@@ -41,7 +23,7 @@ class EmbreeScene:
             if array.ndim != 2 or array.shape[1] != 3:
                 raise ValueError(f"{name}: expected the shape (n, 3), got {array.shape}")
         far = np.broadcast_to(np.asarray(_FAR if dists is None else dists, np.float32), (len(origins),))
-        scene, first_face = self._scene()
+        scene, first_face = self._assembly.scene()
         if query == "OCCLUDED" and not output:
             return np.where(scene.any(origins, directions, tmax=far), 0, -1).astype(np.int32)
         hits = scene.nearest(origins, directions, tmax=far)
@@ -58,7 +40,7 @@ class EmbreeScene:
 
     def _normals(self, hits):
         """Cross products of the edges, not normalized, as those of Embree; zeros for a miss."""
-        scene, _ = self._scene()
+        scene, _ = self._assembly.scene()
         normals = np.zeros((len(hits), 3), np.float32)
         vertices, faces = scene.vertices(), scene.triangles()
         if hits.hit.any():

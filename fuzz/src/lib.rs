@@ -3,7 +3,7 @@
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
-use bth_import::{AlphaMode, Keep, import_bytes, import_cutouts_bytes};
+use bth_import::{AlphaMode, Keep, Wanted, import_bytes, import_cutouts_bytes};
 use bth_random::Rng;
 use std::path::Path;
 
@@ -43,6 +43,16 @@ fn trace(scene: &Scene, rng: &mut Rng) {
     scene.batch(&rays).from(&from[..]).nearest(&mut hits);
     scene.batch(&rays).from(&from[..]).any(&mut found);
     scene.batch(&rays).any(&mut found);
+    for hit in &hits {
+        if let Some(surface) = scene.surface(hit) {
+            assert!(surface.group < scene.group_count(surface.object));
+            scene.group_name(surface.object, surface.group);
+            surface.material.map(|material| scene.material_name(surface.object, material));
+            scene.object_name(surface.object);
+        }
+        scene.triangle_in_world(hit.primitive);
+    }
+    scene.bounds();
     for (ray, from) in rays.iter().zip(&from).take(8) {
         scene.nearest_from(ray, *from);
         scene.any(ray);
@@ -78,7 +88,8 @@ fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
 /// Imports a model of this format; a mesh that comes out keeps the promises of its type.
 pub fn import(format: &str, bytes: &[u8]) {
     let name = Path::new("/nonexistent/fuzz/model").with_extension(format);
-    let Ok((mesh, report)) = import_bytes(&name, bytes, Keep::All, &Silent) else { return };
+    let wanted = Wanted { attributes: Keep::All, groups: true };
+    let Ok((mesh, report)) = import_bytes(&name, bytes, wanted, &Silent) else { return };
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
     assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
     assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
@@ -88,6 +99,14 @@ pub fn import(format: &str, bytes: &[u8]) {
         };
         assert!(cutouts.triangles.iter().all(fits));
     }
+    let groups = mesh.groups.as_ref().expect("groups, which are wanted");
+    assert!(groups.runs.first().is_none_or(|run| run[0] == 0));
+    assert!(groups.runs.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] != pair[1][1]));
+    assert!(groups.runs.iter().all(|run| (run[0] as usize) < mesh.triangles.len()));
+    assert!(groups.runs.iter().all(|run| (run[1] as usize) < groups.groups.len()));
+    let material =
+        |group: &bth_import::Group| group.material.is_none_or(|m| (m as usize) < groups.materials.len());
+    assert!(groups.groups.iter().all(material));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));

@@ -77,7 +77,7 @@ def test_embreex(mesh, rays):
 def test_embreex_elements_are_closed(corners, element):
     scene = EmbreeScene()
     ElementMesh(scene, np.array(corners, np.float32), np.array([element]))
-    compiled, _ = scene._scene()
+    compiled, _ = scene._assembly.scene()
     assert compiled.contains([[0.1, 0.1, 0.1], [-0.1, 0.1, 0.1], [0.1, 0.1, 1.5]]).tolist() == [True, False, False]
     assert scene.run(np.array([[-0.1, 0.1, 0.2]]), np.array([[1.0, 0, 0]]), query="DISTANCE") == pytest.approx(0.1)
 

@@ -114,11 +114,15 @@ impl Scene {
     }
 
     fn all_in(&self, region: &dyn Region, triangles: &mut Vec<PrimitiveRef>) {
-        let _ = self.visit_in(region, &mut |triangle| {
-            triangles.push(triangle);
+        let mut found = Vec::new();
+        let _ = self.visit_in(region, &mut |PrimitiveRef { instance, triangle }| {
+            found.push(u64::from(instance) << 32 | u64::from(triangle));
             ControlFlow::Continue(())
         });
-        triangles.sort_unstable_by_key(|p| (p.instance, p.triangle));
+        found.sort_unstable();
+        triangles.extend(
+            found.iter().map(|&key| PrimitiveRef { instance: (key >> 32) as u32, triangle: key as u32 }),
+        );
     }
 
     /// Visits the triangles that overlap a region, until the visitor breaks.

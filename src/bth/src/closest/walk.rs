@@ -136,12 +136,12 @@ impl ObjectWalk<'_> {
         valid: u32,
         limit: f32,
     ) -> u32 {
-        if block.is_beyond(s, point, limit) {
-            return 0;
-        }
         // Without vectors, bounds in lanes take as long as decisions, and much code.
         if !S::HAS_VECTORS {
-            return valid;
+            return if is_beyond_called(s, point, block, limit) { 0 } else { valid };
+        }
+        if block.is_beyond(s, point, limit) {
+            return 0;
         }
         let bounds = TriangleLanes::new(s, &block.relative(s, point));
         // In object space, the least upper bound says nothing about which triangle is closest in world space.
@@ -202,4 +202,10 @@ impl ObjectWalk<'_> {
         };
         search.offer(corners, || PrimitiveRef { instance: self.instance, triangle: id() });
     }
+}
+
+/// [`CornerLanes::is_beyond`] as a function of its own, because unrolled wherever scalar code needs it it would take much code.
+#[inline(never)]
+fn is_beyond_called<S: Simd>(s: S, point: &PointLanes<S>, block: &impl CornerLanes, limit: f32) -> bool {
+    block.is_beyond(s, point, limit)
 }

@@ -131,7 +131,8 @@ impl Scene {
     fn append_all(&self, ray: &Ray, accept: &Accept<'_>, found: &mut Vec<Found>, hits: &mut Vec<Hit>) {
         found.clear();
         search(self, ray, accept, found);
-        found.sort_unstable();
+        // The heap of `append_nearest` sorts these few hits, too, so that there is no code of another sort for them.
+        *found = BinaryHeap::from(std::mem::take(found)).into_sorted_vec();
         hits.extend(found.iter().map(|found| found.hit));
     }
 

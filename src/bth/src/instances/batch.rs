@@ -189,17 +189,18 @@ impl World {
             if run.len() >= MIN_RAYS_PER_INSTANCE {
                 trace(object, run);
             } else {
-                short_runs.push([object, first as u32, end as u32]);
+                short_runs.push(u64::from(object) << 32 | first as u64);
             }
             first = end;
         }
         short_runs.sort_unstable();
-        for runs in short_runs.chunk_by(|a, b| a[0] == b[0]) {
+        for runs in short_runs.chunk_by(|a, b| a >> 32 == b >> 32) {
             gathered.clear();
-            for &[_, first, end] in runs {
-                gathered.extend_from_slice(&sorted[first as usize..end as usize]);
+            for &run in runs {
+                let visits = &sorted[run as u32 as usize..];
+                gathered.extend(visits.iter().take_while(|visit| visit.instance == visits[0].instance));
             }
-            trace(runs[0][0], gathered);
+            trace((runs[0] >> 32) as u32, gathered);
         }
         visits.all.clear();
     }

@@ -16,6 +16,8 @@ pub(super) struct ObjectRays {
     pub(super) t_scale: Vec<f32>,
     /// For each ray the triangle on which it starts, or `NONE`; empty where hints are of no use.
     from: Vec<u32>,
+    /// For each ray its greatest t in world space.
+    tmax: Vec<f32>,
 }
 
 impl ObjectRays {
@@ -30,11 +32,13 @@ impl ObjectRays {
         self.rays.clear();
         self.t_scale.clear();
         self.from.clear();
+        self.tmax.clear();
+        self.tmax.extend(visits.iter().map(|visit| tmax(visit.ray as usize)));
         // Only objects with tetrahedra use hints.
         if batch.from.is_some() && !object.tet_leaves.is_empty() {
             self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
         }
-        Isa::chosen().run(EnterKernel { object_rays: self, batch, visits, tmax });
+        Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });
     }
 
     /// The triangles on which rays start, if there are any.
@@ -45,19 +49,18 @@ impl ObjectRays {
 
 /// The kernel of [`ObjectRays::fill`]. It transforms up to sixteen rays of the same instance at a time; visits are sorted by
 /// instance.
-struct EnterKernel<'a, T> {
+struct EnterKernel<'a> {
     object_rays: &'a mut ObjectRays,
     batch: &'a SceneBatch<'a>,
     visits: &'a [Visit],
-    tmax: T,
 }
 
-impl<T: Fn(usize) -> f32> Kernel for EnterKernel<'_, T> {
+impl Kernel for EnterKernel<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let EnterKernel { object_rays: ObjectRays { rays, t_scale, .. }, batch, visits, tmax } = self;
+        let EnterKernel { object_rays: ObjectRays { rays, t_scale, tmax, .. }, batch, visits } = self;
         rays.resize(visits.len(), NO_RAY);
         t_scale.resize(visits.len(), 1.0);
         let mut lanes = RayLanes::NONE;
@@ -68,8 +71,7 @@ impl<T: Fn(usize) -> f32> Kernel for EnterKernel<'_, T> {
             let mut count = 0;
             while count < LANES && start + count < visits.len() && visits[start + count].instance == instance
             {
-                let ray = visits[start + count].ray;
-                (index[count], last[count]) = (ray, tmax(ray as usize));
+                (index[count], last[count]) = (visits[start + count].ray, tmax[start + count]);
                 count += 1;
             }
             let used = s.mask(((1u64 << count) - 1) as u32);

@@ -33,6 +33,12 @@ struct ListedInstance {
     rays: u64,
 }
 
+/// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction sets.
+#[inline(never)]
+fn sort_by_depth(items: &mut [ListedInstance]) {
+    items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
+}
+
 /// A packet, and the range of its instances in the list.
 #[derive(Clone, Copy, Debug)]
 struct TopLevelPacket {
@@ -164,7 +170,7 @@ impl TopLevelPackets {
                 }
             }
         }
-        self.items[begin..].sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
+        sort_by_depth(&mut self.items[begin..]);
         Listed::All
     }
 

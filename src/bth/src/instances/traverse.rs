@@ -91,14 +91,17 @@ impl RayTraversals {
         for first in (0..active.len()).step_by(LANES) {
             let count = LANES.min(active.len() - first);
             index[..count].copy_from_slice(&active[first..first + count]);
-            prepared.fill(s, &bounds, rays, &index, count);
+            // Without vectors, preparation in lanes takes as long as one ray after the other, and much code.
+            if S::HAS_VECTORS {
+                prepared.fill(s, &bounds, rays, &index, count);
+            }
             for (lane, &ray_index) in index[..count].iter().enumerate() {
                 let ray_index = ray_index as usize;
                 let ray = &rays[ray_index];
                 let [x, y, z] = ray.origin;
                 let is_near = x.abs() <= top.reach && y.abs() <= top.reach && z.abs() <= top.reach;
                 let state = &mut self.states[ray_index];
-                match prepared.prepared(lane).filter(|_| is_near) {
+                match prepared.prepared(lane).filter(|_| S::HAS_VECTORS && is_near) {
                     Some(prepared) => state.slabs = prepared.slabs,
                     None => match widened_slabs(ray, top) {
                         Some(slabs) => state.slabs = slabs,

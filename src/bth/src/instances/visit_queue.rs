@@ -9,22 +9,26 @@ pub(super) struct VisitQueue {
     pub(super) all: Vec<Visit>,
     /// The same visits in the order of the instances.
     pub(super) sorted: Vec<Visit>,
-    /// Runs of `sorted` through instances that few rays visit: the object, the first visit and the end.
-    pub(super) short_runs: Vec<[u32; 3]>,
+    /// Runs of `sorted` through instances that few rays visit: the object in the upper half, the first visit in the lower.
+    pub(super) short_runs: Vec<u64>,
     /// The visits of several such runs with the same object.
     pub(super) gathered: Vec<Visit>,
     /// For each instance the index in `sorted` of its next visit.
     next: Vec<u32>,
+    /// Instances and rays of few visits, as numbers that are sorted.
+    keys: Vec<u64>,
 }
 
 impl VisitQueue {
     /// Fills `sorted` with all visits, by instance and then by ray: a counting sort, or for few visits a comparison sort.
     pub(super) fn sort(&mut self, instances: usize) {
-        let VisitQueue { all, sorted, next, .. } = self;
+        let VisitQueue { all, sorted, next, keys, .. } = self;
         sorted.clear();
         if instances > 4 * all.len() {
-            sorted.extend_from_slice(all);
-            sorted.sort_unstable_by_key(|v| (v.instance, v.ray));
+            keys.clear();
+            keys.extend(all.iter().map(|v| u64::from(v.instance) << 32 | u64::from(v.ray)));
+            keys.sort_unstable();
+            sorted.extend(keys.iter().map(|&key| Visit { ray: key as u32, instance: (key >> 32) as u32 }));
             return;
         }
         next.clear();

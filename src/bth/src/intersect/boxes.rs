@@ -151,6 +151,21 @@ impl<S: Simd> RaySlabLanes<S> {
     /// at which it enters them. Empty slots may be among them where coordinates are too great for f32.
     #[inline(always)]
     pub(crate) fn children<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        if S::HAS_VECTORS {
+            self.children_inlined(s, node, limit)
+        } else {
+            self.children_called(s, node, limit)
+        }
+    }
+
+    /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it would take much code.
+    #[inline(never)]
+    fn children_called<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        self.children_inlined(s, node, limit)
+    }
+
+    #[inline(always)]
+    fn children_inlined<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
         let (mut enter, mut leave) = (self.first, s.splat(limit));
         for k in 0..3 {
             let (near, far) = (node.planes(s, k, self.near[k]), node.planes(s, k, self.near[k] ^ FAR));

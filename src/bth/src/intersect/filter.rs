@@ -242,6 +242,33 @@ impl TriangleFilter {
         first: f32,
         limit: f32,
     ) -> Candidates<S> {
+        if S::HAS_VECTORS {
+            self.candidates_inlined(s, block, first, limit)
+        } else {
+            self.candidates_called(s, block, first, limit)
+        }
+    }
+
+    /// [`Self::candidates`] as a function of its own: unrolled in every scalar kernel it would be half of their code.
+    #[inline(never)]
+    fn candidates_called<S: Simd, B: TriangleBlock>(
+        &self,
+        s: S,
+        block: &B,
+        first: f32,
+        limit: f32,
+    ) -> Candidates<S> {
+        self.candidates_inlined(s, block, first, limit)
+    }
+
+    #[inline(always)]
+    fn candidates_inlined<S: Simd, B: TriangleBlock>(
+        &self,
+        s: S,
+        block: &B,
+        first: f32,
+        limit: f32,
+    ) -> Candidates<S> {
         let corners = block.project(s, self);
         let greatest = greatest_coordinate(s, &corners);
         let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));

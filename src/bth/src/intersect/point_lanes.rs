@@ -82,6 +82,21 @@ impl<S: Simd> PointLanes<S> {
     /// bounds of the scaled squared distances. Empty slots may be among them.
     #[inline(always)]
     pub(crate) fn children<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        if S::HAS_VECTORS {
+            self.children_inlined(s, node, limit)
+        } else {
+            self.children_called(s, node, limit)
+        }
+    }
+
+    /// [`Self::children`] as a function of its own, because unrolled in scalar kernels it would take much code.
+    #[inline(never)]
+    fn children_called<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        self.children_inlined(s, node, limit)
+    }
+
+    #[inline(always)]
+    fn children_inlined<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
         let mut squared = s.splat(0.0);
         for k in 0..3 {
             let below = s.fma(node.planes(s, k, 0), self.scale, s.splat(-self.origin[k]));

@@ -69,6 +69,9 @@ impl Kernel for MissKernel<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
+        if !S::HAS_VECTORS {
+            return self.0.fill(Hit::MISS);
+        }
         let (blocks, rest) = self.0.as_chunks_mut();
         let none = AnswerLanes { lanes: 0, intersections: &Intersections::NONE, instance: NONE };
         for block in blocks {

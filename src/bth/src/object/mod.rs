@@ -17,15 +17,16 @@ use bth_format::object::ObjectView;
 
 /// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a
 /// hit.
-#[inline(never)]
+#[inline(always)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
     nearest_to(object, ray, from, instance, &mut hit);
     hit
 }
 
-/// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
-#[inline(always)]
+/// As [`nearest`], but stores the hit in `hit`, which avoids a copy. Not inlined: every crate that traces single rays would hold
+/// kernels of its own.
+#[inline(never)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
     trace::<Nearest, ()>(object, ray, from, instance, &mut (), hit);
 }
@@ -37,8 +38,8 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
     (hit, steps)
 }
 
-/// Whether a ray in object space hits anything; `from` as for [`nearest`].
-#[inline(always)]
+/// Whether a ray in object space hits anything; `from` as for [`nearest`]. Not inlined, as [`nearest_to`].
+#[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;
     trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);

@@ -31,6 +31,13 @@ pub(crate) trait Kernel {
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
+/// A part of kernels that is compiled once per instruction set, with its arguments ([`Simd::call`]).
+pub(crate) trait Part<S> {
+    type Output;
+    /// Must be `#[inline(always)]`.
+    fn run(self, simd: S) -> Self::Output;
+}
+
 /// Operations on vectors of sixteen lanes. Where masks are given as bits, bit i stands for lane i.
 pub(crate) trait Simd: Copy + 'static {
     /// f32 lanes.
@@ -42,6 +49,10 @@ pub(crate) trait Simd: Copy + 'static {
 
     /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
     const HAS_VECTORS: bool = true;
+
+    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set share: for parts that many
+    /// kernels need and that run long beside a call.
+    fn call<P: Part<Self>>(self, part: P) -> P::Output;
 
     fn splat(self, x: f32) -> Self::F;
     fn load(self, from: &[f32; LANES]) -> Self::F;

@@ -4,7 +4,7 @@
 //! that are faster only with vectors are not compiled for it ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part
 //! of the library.
 
-use super::{LANES, Simd};
+use super::{LANES, Part, Simd};
 use std::array::from_fn;
 
 /// The token of scalar code, which runs on every machine.
@@ -215,6 +215,11 @@ impl Simd for Scalar {
     type U = U;
     type M = M;
     const HAS_VECTORS: bool = false;
+
+    #[inline(never)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        part.run(self)
+    }
 
     methods! {
         add(a: F, b: F) -> F;

@@ -15,7 +15,7 @@ use crate::intersect::boxes::{self, RaySlabs};
 use crate::intersect::filter::{self, TriangleFilter};
 use crate::intersect::line::Line;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{NONE, Object};
 use bth_format::object::ObjectBounds;
 use glam::{Vec3A, Vec4};
@@ -170,6 +170,28 @@ impl PreparedRay {
     }
 }
 
+/// [`Prepared::fill`] with its arguments.
+struct Fill<'a> {
+    prepared: &'a mut Prepared,
+    bounds: &'a ObjectBounds,
+    rays: &'a [Ray],
+    at: &'a [u32; LANES],
+    count: usize,
+}
+
+impl<S: Simd> Part<S> for Fill<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        let Fill { prepared, bounds, rays, at, count } = self;
+        let used = s.mask(((1u64 << count) - 1) as u32);
+        let field = gather_rays(s, used, rays, s.load_u(at));
+        let lanes = prepare_lanes(s, bounds, field, &MixedAxes::of(s, [field[4], field[5], field[6]]));
+        prepared.write(s, &lanes, s.load_u(at), 0..2);
+        prepared.ready &= s.mask_bits(used);
+    }
+}
+
 /// Sixteen prepared rays, aligned to cache lines for the stores of whole vectors.
 #[derive(Debug)]
 #[repr(C, align(64))]
@@ -202,11 +224,7 @@ impl Prepared {
         at: &[u32; LANES],
         count: usize,
     ) {
-        let used = s.mask(((1u64 << count) - 1) as u32);
-        let field = gather_rays(s, used, rays, s.load_u(at));
-        let lanes = prepare_lanes(s, bounds, field, &MixedAxes::of(s, [field[4], field[5], field[6]]));
-        self.write(s, &lanes, s.load_u(at), 0..2);
-        self.ready &= s.mask_bits(used);
+        s.call(Fill { prepared: self, bounds, rays, at, count });
     }
 
     /// Stores rays that are prepared in lanes; `at` holds their indices in the batch. Only the cache lines in `lines`, a part of

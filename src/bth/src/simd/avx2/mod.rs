@@ -9,7 +9,7 @@ mod rows;
 
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
-use super::{Kernel, LANES, Simd, assert_indices, scalar, valid_indices};
+use super::{Kernel, LANES, Part, Simd, assert_indices, scalar, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -70,6 +70,13 @@ fn entry<K: Kernel>(simd: Avx2, kernel: K) -> K::Output {
     kernel.run(simd)
 }
 
+/// As [`entry`], for a part of kernels.
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[inline(never)]
+fn part_entry<P: Part<Avx2>>(simd: Avx2, part: P) -> P::Output {
+    part.run(simd)
+}
+
 /// Methods that apply the same intrinsics to both halves.
 macro_rules! halves {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
@@ -107,6 +114,12 @@ impl Simd for Avx2 {
     type F = F;
     type U = U;
     type M = M;
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        // SAFETY: self proves that the machine has the features that `part_entry` enables.
+        unsafe { part_entry(self, part) }
+    }
 
     halves! {
         add(a: F, b: F) -> F = _mm256_add_ps(a, b);

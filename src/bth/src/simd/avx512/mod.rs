@@ -9,7 +9,7 @@ mod sort;
 
 use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters, transpose4};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
-use super::{Kernel, LANES, Simd, assert_indices, valid_indices};
+use super::{Kernel, LANES, Part, Simd, assert_indices, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -49,6 +49,13 @@ fn entry<K: Kernel>(simd: Avx512, kernel: K) -> K::Output {
     kernel.run(simd)
 }
 
+/// As [`entry`], for a part of kernels.
+#[target_feature(enable = "avx512f,avx512bw,avx512cd,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[inline(never)]
+fn part_entry<P: Part<Avx512>>(simd: Avx512, part: P) -> P::Output {
+    part.run(simd)
+}
+
 /// Methods that are one intrinsic on registers.
 macro_rules! intrinsics {
     ($($name:ident($($arg:ident: $of:ty),*) -> $out:ty = $do:expr;)*) => { $(
@@ -64,6 +71,12 @@ impl Simd for Avx512 {
     type F = __m512;
     type U = __m512i;
     type M = __mmask16;
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        // SAFETY: self proves that the machine has the features that `part_entry` enables.
+        unsafe { part_entry(self, part) }
+    }
 
     intrinsics! {
         splat(x: f32) -> __m512 = _mm512_set1_ps(x);

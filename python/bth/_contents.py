@@ -4,18 +4,9 @@ import operator
 
 import numpy as np
 
-from . import _native, _threads
+from . import _arrays, _native, _threads
 from ._hits import FIELDS, SurfacePoints
 from ._ray_queries import mask_bits
-
-
-def _indices(array, name):
-    array = np.asarray(array)
-    if array.dtype.kind not in "iu" and array.size:
-        raise TypeError(f"{name}: expected integers, got an array of {array.dtype}")
-    if array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):
-        raise IndexError(f"{name}: expected indices from 0, got {array.min() if array.min() < 0 else array.max()}")
-    return array.astype(np.uint32, copy=False)
 
 
 def _weights(array, name):
@@ -33,7 +24,7 @@ class Contents:
     # At points of triangles.
 
     def _points(self, u, v, instance, triangle):
-        points = _weights(u, "u"), _weights(v, "v"), _indices(instance, "instance"), _indices(triangle, "triangle")
+        points = _weights(u, "u"), _weights(v, "v"), _arrays.indices(instance, "instance"), _arrays.indices(triangle, "triangle")
         try:
             points = np.broadcast_arrays(*points)
         except ValueError:

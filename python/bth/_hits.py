@@ -94,8 +94,8 @@ class _OnTriangles:
 
 def _named(names, index):
     """The names at indices; empty at NONE."""
-    table = np.array([*names, ""], object)
-    return table[np.where(np.asarray(index) == NONE, len(names), index)]
+    table, index = np.array([*names, ""], object), np.asarray(index)
+    return table[np.where(index == NONE, len(names), index).reshape(-1)].reshape(index.shape)
 
 
 class Hits(_OnTriangles):

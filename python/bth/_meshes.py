@@ -40,7 +40,7 @@ def _parts(mesh):
     if hasattr(mesh, "points") and hasattr(mesh, "cells_dict"):  # meshio
         return mesh.points, _meshio_faces(mesh.cells_dict)
     if hasattr(mesh, "points") and hasattr(mesh, "regular_faces") or hasattr(mesh, "extract_surface"):  # pyvista
-        surface = mesh if hasattr(mesh, "is_all_triangles") else mesh.extract_surface()
+        surface = mesh if hasattr(mesh, "is_all_triangles") else _pyvista_surface(mesh)
         return surface.points, _pyvista_faces(surface)
     if hasattr(mesh, "vertices") and hasattr(mesh, "triangles"):  # Open3D
         return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
@@ -100,6 +100,13 @@ def places_of(instances, transforms, meshes):
         message = f"transforms: expected one or {len(instances)}, one for each instance, got the shape {transforms.shape}"
         raise ValueError(message) from None
     return np.require(instances, np.uint32, "CA"), np.require(transforms, np.float64, "CA")
+
+
+def _pyvista_surface(mesh):
+    try:
+        return mesh.extract_surface(algorithm="dataset_surface")
+    except TypeError:  # Before pyvista 0.47 there was only this.
+        return mesh.extract_surface()
 
 
 def _pyvista_faces(surface):

@@ -27,9 +27,12 @@ def _conditions(mask, cull, filter):
 def _start(start, shape):
     if start is None:
         return None
-    instance, triangle = (start.instance, start.triangle) if hasattr(start, "instance") else start
+    pair = (start.instance, start.triangle) if hasattr(start, "instance") else start
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+        raise TypeError(f"start: expected Hits or a pair (instance, triangle), got {type(start).__name__}")
+    pair = [_arrays.indices(a, "start") for a in pair]
     try:
-        return tuple(np.broadcast_to(np.asarray(a, np.uint32), shape).reshape(-1) for a in (instance, triangle))
+        return tuple(np.broadcast_to(a, shape).reshape(-1) for a in pair)
     except ValueError:
         raise ValueError(f"start: the shapes do not fit {shape}, that of the rays") from None
 

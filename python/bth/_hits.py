@@ -240,8 +240,17 @@ class SurfacePoints:
     __slots__ = tuple(FIELDS)
 
     def __init__(self, fields):
-        for name in FIELDS:
-            setattr(self, name, fields[name])
+        self.position = fields["position"]
+        self.object_position = fields["object_position"]
+        self.geometric_normal = fields["geometric_normal"]
+        self.object_geometric_normal = fields["object_geometric_normal"]
+        self.shading_normal = fields["shading_normal"]
+        self.object_shading_normal = fields["object_shading_normal"]
+        self.texcoord = fields["texcoord"]
+        self.object = fields["object"]
+        self.group = fields["group"]
+        self.material = fields["material"]
+        self.opacity = fields["opacity"]
 
     def __len__(self):
         return len(self.object)

@@ -1,9 +1,10 @@
-"""The first example of docs/python.md runs."""
+"""The examples of docs/python.md and the typed program run."""
 
 import pathlib
 import re
 
 import pytest
+import typed
 
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "python.md"
 
@@ -15,3 +16,7 @@ def test_quick_start(tmp_path, monkeypatch, capsys):
     exec(compile(example, str(PAGE), "exec"), {})
     assert "[ True False]" in capsys.readouterr().out
     assert (tmp_path / "tetrahedron.bth").exists()
+
+
+def test_typed_program(tmp_path):
+    typed.main(tmp_path)

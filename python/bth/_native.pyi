@@ -3,9 +3,6 @@ from typing import Any, Final, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-from . import Candidate as Candidate
-from . import Error as Error
-
 __version__: Final[str]
 
 _Array: TypeAlias = NDArray[Any]
@@ -18,6 +15,26 @@ _Start: TypeAlias = tuple[_Array, ...] | None
 _Points: TypeAlias = tuple[_Array, ...]
 _Box: TypeAlias = tuple[list[float], list[float]] | None
 _Masks: TypeAlias = tuple[list[tuple[int, int]], list[tuple[int, int, int]]]
+
+class Error(ValueError):
+    code: str
+
+@final
+class Candidate:
+    @property
+    def ray(self) -> int: ...
+    @property
+    def t(self) -> float: ...
+    @property
+    def u(self) -> float: ...
+    @property
+    def v(self) -> float: ...
+    @property
+    def instance(self) -> int: ...
+    @property
+    def triangle(self) -> int: ...
+    @property
+    def opacity(self) -> int: ...
 
 @final
 class Scene:

@@ -1,5 +1,6 @@
 """Options of the compiler: all of the program's that have a meaning here, checked, and with the same effect."""
 
+import ast
 import inspect
 import os
 import pathlib
@@ -90,3 +91,11 @@ def test_progress_and_cancelling(path):
     with pytest.raises(RuntimeError, match="no more"):
         for _ in range(50):
             bth.compile((corners, [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(30000)]), quality="best", progress=cancel)
+
+
+def test_stubs_have_the_options():
+    stub = pathlib.Path(bth.__file__).parent / "_compile.pyi"
+    functions = {f.name: {a.arg for a in f.args.kwonlyargs} for f in ast.parse(stub.read_text()).body if isinstance(f, ast.FunctionDef)}
+    parameters = set(inspect.signature(bth.compile).parameters) - {"model"}
+    assert functions["compile"] == parameters
+    assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "strict"}

@@ -61,6 +61,9 @@ def compile_scene(meshes, instances=None, transforms=None, **options):
     options = {name: value for name, value in options.items() if value is not None}
     if hasattr(meshes, "vertices") or hasattr(meshes, "points"):
         raise TypeError(f"meshes: expected a list of meshes, got a {type(meshes).__name__}")
+    meshes = list(meshes)
+    if any(isinstance(mesh, (str, os.PathLike)) for mesh in meshes):
+        raise TypeError("meshes: expected meshes in memory, got a path: scenes of files are manifests (format-spec/scene-manifest.md)")
     parts = [_meshes.triangles_of(mesh) for mesh in meshes]
     instances, transforms = _meshes.places_of(instances, transforms, len(parts))
     return Scene(_native.compile_scene(parts, instances, transforms, _checked(options)))

@@ -5,7 +5,7 @@ import operator
 import numpy as np
 
 from . import _arrays, _native, _threads
-from ._hits import FIELDS, SurfacePoints
+from ._hits import FIELDS, NONE, SurfacePoints
 from ._ray_queries import mask_bits
 
 
@@ -14,6 +14,14 @@ def _weights(array, name):
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name}: expected numbers, got an array of {array.dtype}")
     return array.astype(np.float32, copy=False)
+
+
+def _index(index, name):
+    """One index as the native module takes it, which knows how many there are."""
+    number = operator.index(index)
+    if not 0 <= number <= NONE:
+        raise IndexError(f"{name}: expected an index from 0, got {number}")
+    return number
 
 
 class Contents:
@@ -62,11 +70,11 @@ class Contents:
 
     def vertices(self, obj=0):
         """Distinct positions of an object, (n, 3) float32, in the space of the object."""
-        return self._native.geometry(obj)[0]
+        return self._native.geometry(_index(obj, "obj"))[0]
 
     def triangles(self, obj=0):
         """For each triangle of an object its rows of `vertices`, (m, 3) uint32."""
-        return self._native.geometry(obj)[1]
+        return self._native.geometry(_index(obj, "obj"))[1]
 
     @property
     def triangle_counts(self):
@@ -82,11 +90,11 @@ class Contents:
 
     def instance_bounds(self, instance):
         """Lower and upper end of a box in world space around an instance, (2, 3) float32; None if it is hidden."""
-        return _box(self._native.instance_bounds(instance))
+        return _box(self._native.instance_bounds(_index(instance, "instance")))
 
     def object_bounds(self, obj=0):
         """Lower and upper end of a box around an object, in the space of the object, (2, 3) float32; None if nothing of it can be hit."""
-        return _box(self._native.object_bounds(obj))
+        return _box(self._native.object_bounds(_index(obj, "obj")))
 
     # Instances.
 
@@ -123,15 +131,15 @@ class Contents:
 
     def group_names(self, obj=0):
         """For each group of an object's triangles its name; one group without a name if the file keeps none (see the option `names`)."""
-        return _native.groups(self._native, obj)[0]
+        return _native.groups(self._native, _index(obj, "obj"))[0]
 
     def material_names(self, obj=0):
         """For each material of an object its name; none if the file keeps none (see the option `names`)."""
-        return _native.groups(self._native, obj)[2]
+        return _native.groups(self._native, _index(obj, "obj"))[2]
 
     def group_materials(self, obj=0):
         """For each group of an object's triangles the index of its material, or None."""
-        return _native.groups(self._native, obj)[1]
+        return _native.groups(self._native, _index(obj, "obj"))[1]
 
     # Masks.
 
@@ -142,11 +150,11 @@ class Contents:
 
     def group_masks(self, obj=0):
         """For each group of an object's triangles its mask, uint32: all bits are set unless `set_group_mask` was called."""
-        return np.array(_native.group_masks(self._native, obj), np.uint32)
+        return np.array(_native.group_masks(self._native, _index(obj, "obj")), np.uint32)
 
     def set_instance_mask(self, instance, mask):
         """Sets the mask of an instance, 32 bits: rays whose `mask` has no bit in common with it pass. Waits for the queries of other threads."""
-        _native.set_instance_mask(self._native, operator.index(instance), mask_bits(mask))
+        _native.set_instance_mask(self._native, _index(instance, "instance"), mask_bits(mask))
 
     def set_group_mask(self, group, mask, obj=0):
         """Sets the mask of a group of an object's triangles, in all its instances, by index, or of all groups of a name. A ray must have a bit in common with the instance and one with the group."""
@@ -155,8 +163,8 @@ class Contents:
             if not groups:
                 raise LookupError(f"group: object {obj} has none that is called {group!r}")
         else:
-            groups = [operator.index(group)]
-        _native.set_group_masks(self._native, obj, groups, mask_bits(mask))
+            groups = [_index(group, "group")]
+        _native.set_group_masks(self._native, _index(obj, "obj"), groups, mask_bits(mask))
 
 
 def _box(bounds):

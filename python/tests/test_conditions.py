@@ -101,10 +101,11 @@ def test_hints_change_nothing_under_masks(grouped, aimed):
 
 
 @pytest.mark.parametrize("call, error", [
-    (lambda s: s.set_instance_mask(1, 1), IndexError), (lambda s: s.set_instance_mask(-1, 1), OverflowError),
+    (lambda s: s.set_instance_mask(1, 1), IndexError), (lambda s: s.set_instance_mask(-1, 1), IndexError),
     (lambda s: s.set_instance_mask(0, 1 << 32), ValueError), (lambda s: s.set_instance_mask(0, -1), ValueError),
     (lambda s: s.set_instance_mask("a", 1), TypeError), (lambda s: s.set_instance_mask(0.5, 1), TypeError),
-    (lambda s: s.set_group_mask(99, 1), IndexError), (lambda s: s.set_group_mask(0, 1, 5), IndexError),
+    (lambda s: s.set_group_mask(99, 1), IndexError), (lambda s: s.set_group_mask(-1, 1), IndexError), (lambda s: s.set_group_mask(0, 1, -1), IndexError),
+    (lambda s: s.set_group_mask(0, 1, 5), IndexError),
     (lambda s: s.set_group_mask("part 7", 1), LookupError), (lambda s: s.set_group_mask(None, 1), TypeError),
     (lambda s: s.any([0, 0, 0], [0, 0, 1], mask=-1), ValueError), (lambda s: s.any([0, 0, 0], [0, 0, 1], cull="left"), ValueError),
     (lambda s: s.any([0, 0, 0], [0, 0, 1], cull=1), TypeError), (lambda s: s.any([0, 0, 0], [0, 0, 1], filter=3), TypeError),

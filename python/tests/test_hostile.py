@@ -173,6 +173,32 @@ def test_masks_change_while_others_trace(scene):
     assert not failures and results == {0, 30000} and changes >= 40
 
 
+def test_masks_change_while_others_filter(scene, rays):
+    other, failures, counts, stop = bth.load(scene.to_bytes()), [], [], threading.Event()
+    expected = int((scene.all_hits(*rays).u > 0.5).sum())
+
+    def trace():
+        try:
+            while not stop.is_set():
+                # The filter queries the scene that another thread waits to change.
+                found = other.count(*rays, mask=1, filter=lambda c: c.u > 0.5 and len(other.nearest(rays[0][:1], rays[1][:1])) == 1)
+                counts.append(int(found.sum()))
+        except Exception as error:
+            failures.append(error)
+
+    tracing = [threading.Thread(target=trace, daemon=True) for _ in range(3)]
+    for thread in tracing:
+        thread.start()
+    for change in range(20):
+        other.set_instance_mask(0, (2, 1)[change % 2])
+        time.sleep(0.002)
+        other.to_bytes()
+    stop.set()
+    for thread in tracing:
+        thread.join(60)
+    assert not failures and not any(thread.is_alive() for thread in tracing) and counts and set(counts) <= {0, expected}
+
+
 def test_the_time_changes_while_others_trace(mesh, tmp_path):
     lines = [f"v {x} {y} {z}" for x, y, z in mesh[0].tolist()] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh[1].tolist()]
     (tmp_path / "ball.obj").write_text("\n".join(lines))

@@ -40,7 +40,7 @@ def path(tmp_path):
 @pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
 @pytest.mark.parametrize("options", [
     {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16, "boxes": 8},
-    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"max_bytes_per_triangle": 60.0, "memory": 100},
+    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
 ])
 def test_bytes_of_the_program(path, options):
     command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache", "--quiet"]

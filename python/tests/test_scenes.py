@@ -103,7 +103,7 @@ def test_scenes_are_written_and_cached(mesh, tmp_path):
     (([0], [0], np.eye(3)), ValueError), (([0], [0], np.zeros((2, 4, 4))), ValueError), (([0], [0, 0], np.zeros((3, 3, 4))), ValueError),
     (([0], [0], np.ones((4, 4))), ValueError), (([0], [0], np.eye(4) * np.nan), ValueError), (([0], [0], "moved"), TypeError),
     (([0], [0], np.zeros((1, 3, 4))), None), (([0], [0], np.array([np.diag([1.0, 1, 0, 1])])), bth.Error),
-    ((3,), TypeError), (([3],), TypeError), (([0], [0], np.full((3, 4), np.inf)), bth.Error),
+    ((3,), TypeError), (([3],), TypeError), ((["ball.obj"],), TypeError), (([0], [0], np.full((3, 4), np.inf)), bth.Error),
 ])
 def test_wrong_instances(mesh, arguments, error):
     arguments = ([mesh if m == 0 else m for m in arguments[0]] if arguments[0] != 3 else 3, *arguments[1:])

@@ -118,6 +118,11 @@ def test_names(kept, bare):
     for wrong in (kept.group_names, kept.material_names, kept.group_materials, kept.group_masks, kept.object_bounds, kept.instance_bounds):
         with pytest.raises(IndexError, match="of 1"):
             wrong(1)
+        for index in (-1, 1 << 32):
+            with pytest.raises(IndexError, match="from 0"):
+                wrong(index)
+        with pytest.raises(TypeError):
+            wrong("first")
 
 
 def test_without_geometry(path, aimed):

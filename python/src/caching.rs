@@ -3,8 +3,9 @@
 use crate::options::Keywords;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
 /// Where results are kept.
@@ -51,17 +52,34 @@ pub(crate) fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Opti
         Err(_) if !asked => return Ok(None),
         Err(e) => return Err(PyOSError::new_err(format!("{} cannot be the cache: {e}", folder.display()))),
     };
-    match shared.or_else(|| set("BTH_SHARED_CACHE").map(PathBuf::from)) {
-        Some(place) if place.to_string_lossy().contains("://") => {
+    let is_address = |place: &Path| place.to_string_lossy().contains("://");
+    let shared = match (shared, set("BTH_SHARED_CACHE").map(PathBuf::from)) {
+        (Some(place), _) if is_address(&place) => {
+            let message =
+                format!("shared_cache: expected a folder, got {}, which only bthc knows", place.display());
+            return Err(PyValueError::new_err(message));
+        }
+        (None, Some(place)) if is_address(&place) => {
             let message = format!(
-                "shared_cache: expected a folder, got {}: only bthc knows other places",
+                "going on without BTH_SHARED_CACHE: {} is no folder, and only bthc knows it",
                 place.display()
             );
-            Err(PyValueError::new_err(message))
+            warn(keywords.0.py(), &message)?;
+            None
         }
-        Some(folder) => Ok(Some(store.with_remote(Box::new(bth_cache::Folder(folder))))),
-        None => Ok(Some(store)),
-    }
+        (Some(place), _) | (None, Some(place)) => Some(place),
+        (None, None) => None,
+    };
+    Ok(Some(match shared {
+        Some(folder) => store.with_remote(Box::new(bth_cache::Folder(folder))),
+        None => store,
+    }))
+}
+
+/// Warns the caller, which fails where warnings are errors.
+pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
+    let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
 /// The cache of a model, named by its path in messages about misses.

@@ -82,8 +82,7 @@ pub(crate) fn monitored<T: Send>(
     let threads = keywords.within("threads", 0..=4096)?.unwrap_or(0) as usize;
     let warn = |py: Python<'_>| -> PyResult<()> {
         for message in std::mem::take(&mut *work::lock(&monitor.warnings)) {
-            let text = std::ffi::CString::new(message.replace('\0', " ")).unwrap_or_default();
-            PyErr::warn(py, &py.get_type::<pyo3::exceptions::PyUserWarning>(), &text, 1)?;
+            crate::caching::warn(py, &message)?;
         }
         Ok(())
     };

@@ -78,6 +78,16 @@ def test_shared_caches(path, tmp_path):
     assert kept and bth.compile(path, cache=tmp_path / "two", shared_cache=str(shared), cache_size=1 << 26).to_bytes() == first.to_bytes()
 
 
+def test_shared_caches_of_the_environment(path, tmp_path, monkeypatch):
+    (tmp_path / "shared").mkdir()
+    monkeypatch.setenv("BTH_SHARED_CACHE", str(tmp_path / "shared"))
+    first = bth.compile(path, cache=tmp_path / "one")
+    assert any(files for _, _, files in os.walk(tmp_path / "shared"))
+    monkeypatch.setenv("BTH_SHARED_CACHE", "s3://bucket/prefix")
+    with pytest.warns(UserWarning, match="BTH_SHARED_CACHE"):
+        assert bth.compile(path, cache=tmp_path / "two").to_bytes() == first.to_bytes()
+
+
 def test_progress_and_cancelling(path):
     stages = []
     big = models.parts(count=30000)

@@ -79,7 +79,8 @@ pub(crate) fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Opti
 /// Warns the caller, which fails where warnings are errors.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
     let text = CString::new(message.replace('\0', " ")).unwrap_or_default();
-    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
+    // The frame of the package is 1, that of its caller 2.
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
 }
 
 /// The cache of a model, named by its path in messages about misses.

@@ -84,8 +84,9 @@ def test_shared_caches_of_the_environment(path, tmp_path, monkeypatch):
     first = bth.compile(path, cache=tmp_path / "one")
     assert any(files for _, _, files in os.walk(tmp_path / "shared"))
     monkeypatch.setenv("BTH_SHARED_CACHE", "s3://bucket/prefix")
-    with pytest.warns(UserWarning, match="BTH_SHARED_CACHE"):
+    with pytest.warns(UserWarning, match="BTH_SHARED_CACHE") as warned:
         assert bth.compile(path, cache=tmp_path / "two").to_bytes() == first.to_bytes()
+    assert warned[0].filename == __file__
 
 
 def test_progress_and_cancelling(path):

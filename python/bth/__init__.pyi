@@ -1,124 +1,13 @@
-from collections.abc import Callable
-from os import PathLike
-from typing import Any, Literal
+from ._compile import compile as compile, compile_scene as compile_scene
+from ._hits import (
+    NONE as NONE, AllHits as AllHits, Closest as Closest, Hits as Hits, Opacity as Opacity, Overlaps as Overlaps,
+    SurfacePoints as SurfacePoints,
+)
+from ._native import Candidate as Candidate, Error as Error, __version__ as __version__, isa as isa
+from ._scene import Scene as Scene, load as load, open as open
+from ._threads import set_threads as set_threads
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-NONE: int
-__version__: str
-
-class Error(ValueError):
-    code: str
-
-def isa() -> str: ...
-def set_threads(threads: int | None) -> None: ...
-def open(path: str | PathLike[str], mmap: bool = False) -> Scene: ...
-def load(data: Any) -> Scene: ...
-def compile(
-    model: Any, *,
-    output: str | PathLike[str] | None = None, quality: Literal["fast", "balanced", "best"] | None = None,
-    structure: Literal["bth", "bvh", "tets"] | None = None, coordinates: Literal["f32", "21", "16", 21, 16] | None = None,
-    max_error: float | str | None = None, boxes: Literal["f32", "8", 8] | None = None,
-    attributes: Literal["none", "normals", "all"] | None = None,
-    tets: Literal["link32", "tet32", "tet20", "tet16"] | None = None, subtrees: Literal["keep", "prune"] | None = None,
-    compact: bool | None = None, geometry: bool | None = None, names: bool | None = None,
-    estimator: Literal["face-count", "average-depth"] | None = None, select: Literal["best", "paper"] | None = None,
-    optimize_for: Literal["camera", "secondary", "balanced"] | None = None, profile: str | PathLike[str] | None = None,
-    max_bytes_per_triangle: float | None = None, budget: float | None = None, probe: Literal["steps", "off"] | None = None,
-    min_tet_triangles: int | None = None, c_tet: float | None = None, for_scene: bool | None = None,
-    tet_deadline: int | None = None, tet_memory: int | None = None, flatten: bool | None = None,
-    scene: str | None = None, animation: str | None = None, rate: float | None = None, strict: bool | None = None,
-    cache: bool | str | PathLike[str] | None = None, threads: int | None = None,
-    progress: Callable[[str, int, int | None], object] | None = None,
-) -> Scene: ...
-
-class Hits:
-    t: NDArray[np.float32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    instance: NDArray[np.uint32]
-    triangle: NDArray[np.uint32]
-    @property
-    def hit(self) -> NDArray[np.bool_]: ...
-    @property
-    def position(self) -> NDArray[np.float64]: ...
-    @property
-    def normal(self) -> NDArray[np.float64]: ...
-    def __len__(self) -> int: ...
-
-class AllHits:
-    offsets: NDArray[np.int64]
-    t: NDArray[np.float32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    instance: NDArray[np.uint32]
-    triangle: NDArray[np.uint32]
-    @property
-    def ray(self) -> NDArray[np.int64]: ...
-    def __len__(self) -> int: ...
-
-class Closest:
-    distance: NDArray[np.float32]
-    point: NDArray[np.float32]
-    u: NDArray[np.float32]
-    v: NDArray[np.float32]
-    instance: NDArray[np.uint32]
-    triangle: NDArray[np.uint32]
-    @property
-    def found(self) -> NDArray[np.bool_]: ...
-    def __len__(self) -> int: ...
-
-_Cull = Literal["back", "front"] | None
-
-class Scene:
-    seconds: float
-    def nearest(
-        self, origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike = 0.0, tmax: ArrayLike = ..., start: Any = None, *,
-        mask: int = ..., cull: _Cull = None, threads: int | None = None,
-    ) -> Hits: ...
-    def any(
-        self, origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike = 0.0, tmax: ArrayLike = ..., start: Any = None, *,
-        threads: int | None = None,
-    ) -> NDArray[np.bool_]: ...
-    def all_hits(
-        self, origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike = 0.0, tmax: ArrayLike = ..., *,
-        most: int | None = None, mask: int = ..., cull: _Cull = None, threads: int | None = None,
-    ) -> AllHits: ...
-    def count(
-        self, origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike = 0.0, tmax: ArrayLike = ..., *,
-        mask: int = ..., cull: _Cull = None, threads: int | None = None,
-    ) -> NDArray[np.int64]: ...
-    def crossings(
-        self, origins: ArrayLike, directions: ArrayLike, tmin: ArrayLike = 0.0, tmax: ArrayLike = ..., *,
-        threads: int | None = None,
-    ) -> tuple[NDArray[np.uint32], NDArray[np.int32]]: ...
-    def contains(self, points: ArrayLike, *, threads: int | None = None) -> NDArray[np.bool_]: ...
-    def winding(self, points: ArrayLike, *, threads: int | None = None) -> NDArray[np.int32]: ...
-    def signed_distance(self, points: ArrayLike, *, threads: int | None = None) -> NDArray[np.float32]: ...
-    def closest(self, points: ArrayLike, radius: float = ..., *, threads: int | None = None) -> Closest: ...
-    def normals(self, instance: ArrayLike, triangle: ArrayLike) -> NDArray[np.float64]: ...
-    def vertices(self, obj: int = 0) -> NDArray[np.float32]: ...
-    def triangles(self, obj: int = 0) -> NDArray[np.uint32]: ...
-    @property
-    def bounds(self) -> NDArray[np.float32] | None: ...
-    @property
-    def transforms(self) -> NDArray[np.float64]: ...
-    @property
-    def objects_of_instances(self) -> NDArray[np.uint32]: ...
-    @property
-    def visible(self) -> NDArray[np.bool_]: ...
-    @property
-    def triangle_counts(self) -> NDArray[np.int64]: ...
-    @property
-    def frames(self) -> tuple[int, int, float] | None: ...
-    @property
-    def nbytes(self) -> int: ...
-    @property
-    def closed(self) -> bool: ...
-    def set_frame(self, frame: int) -> None: ...
-    def to_bytes(self) -> bytes: ...
-    def save(self, path: str | PathLike[str]) -> None: ...
-    def close(self) -> None: ...
-    def __enter__(self) -> Scene: ...
-    def __exit__(self, *_: object) -> None: ...
+__all__ = [
+    "AllHits", "Candidate", "Closest", "Error", "Hits", "NONE", "Opacity", "Overlaps", "Scene", "SurfacePoints", "__version__", "compile",
+    "compile_scene", "isa", "load", "open", "set_threads",
+]

@@ -36,6 +36,16 @@ def numbers(array, name, shape):
         raise ValueError(f"{name}: the shape {array.shape} does not fit {shape}, that of the rays") from None
 
 
+def indices(array, name):
+    """An array of uint32; a copy only where it must be."""
+    array = np.asarray(array)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name}: expected integers, got an array of {array.dtype}")
+    if array.dtype not in (np.uint32, np.uint16, np.uint8) and array.size and (array.min() < 0 or array.max() > 0xFFFFFFFF):
+        raise IndexError(f"{name}: expected indices from 0, got {array.min() if array.min() < 0 else array.max()}")
+    return array.astype(np.uint32, copy=False)
+
+
 def together(first, first_name, second, second_name):
     """Two arrays of vectors, broadcast to one shape and with their leading axes made one; and these leading axes."""
     first, second = vectors(first, first_name), vectors(second, second_name)

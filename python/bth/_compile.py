@@ -1,36 +1,83 @@
 """Compilation of models."""
 
+import inspect
 import os
 
 from . import _meshes, _native
 from ._scene import Scene
 
+#: Options that only files of glTF have a use for.
+_GLTF = ("flatten", "scene", "animation", "rate", "strict")
+
 
 def compile(
-    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, attributes=None,
+    model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, attributes=None, alpha=None,
     tets=None, subtrees=None, compact=None, geometry=None, names=None, estimator=None, select=None, optimize_for=None, profile=None,
     max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
     tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, strict=None,
-    cache=None, threads=None, progress=None,
+    cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
     """Compiles a model and returns its scene.
 
-    model: a path (OBJ, PLY, STL, OFF, glTF, GLB, scene manifest), a pair (vertices, faces), or a mesh of trimesh, meshio, pyvista or Open3D.
+    model: a path (OBJ, PLY, STL, OFF, glTF, GLB, scene manifest), a pair (vertices, faces), a mesh of trimesh, meshio, pyvista or Open3D,
+    or a scene of trimesh.
     output: also writes the compiled file to this path.
-    cache: True, False or a folder; by default files go through the cache as those of the program, and arrays do not.
+    cache: True, False or a folder; by default files go through the cache as those of the program, and arrays do not. cache_size and
+    shared_cache are as those of the program; the latter is a folder.
     progress: is called with the name of the stage, the units done and the units in all or None; an exception from it cancels.
     threads: by default one for each processor; the result does not depend on it.
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
+    attributes ('normals', 'all'), alpha ('mask', 'blend') and names (True) keep what models in files have of these.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
-    if output is not None:
-        options["output"] = os.fspath(output)
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress: expected a function, got {type(progress).__name__}")
     if isinstance(model, (str, os.PathLike)):
         path = os.fspath(model)
         os.stat(path)
-        return Scene(_native.compile_path(path, options))
+        return Scene(_native.compile_path(path, _checked(options)))
+    for name in _GLTF:
+        if name in options:
+            raise ValueError(f"{name}: an option for files, got a {type(model).__name__}")
+    if _meshes.is_scene(model):
+        return compile_scene(*_meshes.parts_of_scene(model), **options)
     vertices, faces = _meshes.triangles_of(model)
-    return Scene(_native.compile_mesh(vertices, faces, options))
+    return Scene(_native.compile_mesh(vertices, faces, _checked(options)))
+
+
+def compile_scene(meshes, instances=None, transforms=None, **options):
+    """Compiles a scene of instances of meshes and returns it.
+
+    meshes: a list of pairs (vertices, faces) or of meshes, each as for `compile`.
+    instances: for each instance the row of its mesh, (n,) integers; by default each mesh has one.
+    transforms: for each instance the matrix from its mesh's space to world space, which is applied to columns: (n, 4, 4), (n, 3, 4), or one for all.
+    options: those of `compile` that are not about glTF files.
+
+    Instance i of the scene is row i of instances. Meshes without instance are left out and equal ones are stored once, so objects may be fewer than meshes:
+    see `Scene.objects_of_instances`.
+    """
+    for name in options:
+        if name not in _OPTIONS:
+            raise TypeError(f"compile_scene() got an unexpected keyword argument '{name}'")
+    options = {name: value for name, value in options.items() if value is not None}
+    if hasattr(meshes, "vertices") or hasattr(meshes, "points"):
+        raise TypeError(f"meshes: expected a list of meshes, got a {type(meshes).__name__}")
+    meshes = list(meshes)
+    if any(isinstance(mesh, (str, os.PathLike)) for mesh in meshes):
+        raise TypeError("meshes: expected meshes in memory, got a path: scenes of files are manifests (format-spec/scene-manifest.md)")
+    parts = [_meshes.triangles_of(mesh) for mesh in meshes]
+    instances, transforms = _meshes.places_of(instances, transforms, len(parts))
+    return Scene(_native.compile_scene(parts, instances, transforms, _checked(options)))
+
+
+_OPTIONS = frozenset(inspect.signature(compile).parameters) - {"model", *_GLTF}
+
+
+def _checked(options):
+    """Options as the native module takes them."""
+    progress = options.get("progress")
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress: expected a function, got {type(progress).__name__}")
+    for name in ("output", "profile", "shared_cache"):
+        if name in options:
+            options[name] = os.fspath(options[name])
+    return options

@@ -40,7 +40,7 @@ def _parts(mesh):
     if hasattr(mesh, "points") and hasattr(mesh, "cells_dict"):  # meshio
         return mesh.points, _meshio_faces(mesh.cells_dict)
     if hasattr(mesh, "points") and hasattr(mesh, "regular_faces") or hasattr(mesh, "extract_surface"):  # pyvista
-        surface = mesh if hasattr(mesh, "is_all_triangles") else mesh.extract_surface()
+        surface = mesh if hasattr(mesh, "is_all_triangles") else _pyvista_surface(mesh)
         return surface.points, _pyvista_faces(surface)
     if hasattr(mesh, "vertices") and hasattr(mesh, "triangles"):  # Open3D
         return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
@@ -50,9 +50,63 @@ def _parts(mesh):
 
 
 def _meshio_faces(cells):
-    parts = [np.asarray(cells[kind]) for kind in ("triangle",) if kind in cells]
+    """Triangles, then quadrilaterals as two triangles each. Lines, points and the insides of solids are no surface."""
+    curved = [kind for kind in cells if kind.startswith(("triangle", "quad", "polygon")) and kind not in ("triangle", "quad")]
+    parts = [np.asarray(cells["triangle"])] if "triangle" in cells else []
     parts += [np.asarray(cells["quad"])[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)] if "quad" in cells else []
+    if curved or not parts and any(kind not in ("line", "vertex") for kind in cells):
+        found = ", ".join(cells)
+        raise ValueError(f"cells: expected triangles and quadrilaterals, got {found}: take the surface of solids, and straight faces")
     return np.concatenate(parts) if parts else np.zeros((0, 3), np.uint32)
+
+
+def is_scene(model):
+    """Whether this is a scene of trimesh."""
+    return hasattr(model, "geometry") and hasattr(getattr(model, "graph", None), "nodes_geometry")
+
+
+def parts_of_scene(scene):
+    """Meshes, and for each instance its mesh and its transform, of a scene of trimesh."""
+    meshes = list(scene.geometry.values())
+    row = {name: row for row, name in enumerate(scene.geometry)}
+    placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
+    instances = np.array([row[name] for _, name in placed], np.int64)
+    transforms = np.array([matrix for matrix, _ in placed], np.float64).reshape(-1, 4, 4)
+    return meshes, instances, transforms
+
+
+def places_of(instances, transforms, meshes):
+    """Rows of meshes (n,) uint32 and matrices (n, 3, 4) float64, contiguous, of instances of so many meshes."""
+    instances = np.arange(meshes) if instances is None else np.asarray(instances)
+    if instances.size == 0 and instances.ndim <= 1:
+        instances = np.zeros(0, np.uint32)
+    if instances.dtype.kind not in "iu":
+        raise TypeError(f"instances: expected integers, got an array of {instances.dtype}")
+    if instances.ndim != 1:
+        raise ValueError(f"instances: expected the shape (n,), got {instances.shape}")
+    if instances.size and (instances.min() < 0 or instances.max() >= meshes):
+        worst = instances.min() if instances.min() < 0 else instances.max()
+        raise ValueError(f"instances: expected rows from 0 to {meshes - 1}, got {worst}")
+    transforms = np.asarray(np.eye(4) if transforms is None else transforms)
+    if transforms.dtype.kind not in "fiu":
+        raise TypeError(f"transforms: expected numbers, got an array of {transforms.dtype}")
+    if transforms.shape[-2:] not in ((3, 4), (4, 4)):
+        raise ValueError(f"transforms: expected the shape (n, 4, 4) or (n, 3, 4), got {transforms.shape}")
+    if transforms.shape[-2] == 4 and not (transforms[..., 3, :] == [0, 0, 0, 1]).all():
+        raise ValueError("transforms: expected 0, 0, 0, 1 in the last rows: the matrices are applied to columns")
+    try:
+        transforms = np.broadcast_to(transforms[..., :3, :], (len(instances), 3, 4))
+    except ValueError:
+        message = f"transforms: expected one or {len(instances)}, one for each instance, got the shape {transforms.shape}"
+        raise ValueError(message) from None
+    return np.require(instances, np.uint32, "CA"), np.require(transforms, np.float64, "CA")
+
+
+def _pyvista_surface(mesh):
+    try:
+        return mesh.extract_surface(algorithm="dataset_surface")
+    except TypeError:  # Before pyvista 0.47 there was only this.
+        return mesh.extract_surface()
 
 
 def _pyvista_faces(surface):

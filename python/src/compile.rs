@@ -1,19 +1,20 @@
 //! The compiler: files and arrays to scenes.
 
+use crate::caching::{cache, store};
 use crate::errors::{compile_error, format_error};
 use crate::options::{Keywords, options};
 use crate::scene::NativeScene;
 use crate::work;
 use bth_cache::Store;
 use bth_compile::cached::Cache;
-use bth_compile::memory::{self, TriangleMesh};
+use bth_compile::memory::{self, Instance, TriangleMesh};
 use bth_compile::pipeline::CompileOptions;
 use bth_compile::scene::{CachePolicy, SceneSource};
 use bth_compile::{Monitor, write};
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::ImportOptions;
-use numpy::PyReadonlyArray2;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
@@ -48,42 +49,6 @@ impl Monitor for Progress {
     }
 }
 
-/// Where results are kept.
-#[derive(FromPyObject)]
-enum CacheKeyword {
-    Switch(bool),
-    Folder(PathBuf),
-}
-
-/// The store that the keywords name; `default` is whether there is one if they name none.
-fn store(keywords: &Keywords<'_, '_>, default: bool) -> PyResult<Option<Store>> {
-    let set = |name: &str| std::env::var(name).ok().filter(|value| !value.is_empty());
-    let (folder, asked) = match keywords.value::<CacheKeyword>("cache")? {
-        Some(CacheKeyword::Switch(false)) => return Ok(None),
-        None if !default || set("BTH_NO_CACHE").is_some() => return Ok(None),
-        Some(CacheKeyword::Folder(folder)) => (Some(folder), true),
-        Some(CacheKeyword::Switch(true)) | None => (bth_cache::folder(), false),
-    };
-    let Some(folder) = folder else { return Ok(None) };
-    let size = match set("BTH_CACHE_SIZE") {
-        Some(text) => bth_cache::parse_bytes(&text)
-            .map_err(|e| PyValueError::new_err(format!("BTH_CACHE_SIZE: {e}")))?,
-        None => bth_cache::DEFAULT_CAP,
-    };
-    match Store::open(&folder, size) {
-        Ok(store) => Ok(Some(store)),
-        // The default folder may be one that cannot be written to.
-        Err(_) if !asked => Ok(None),
-        Err(e) => Err(PyOSError::new_err(format!("{} cannot be the cache: {e}", folder.display()))),
-    }
-}
-
-/// The cache of a model, named by its path in messages about misses.
-fn cache<'a>(store: Option<&'a Store>, model: &Path) -> Cache<'a> {
-    let subject = std::path::absolute(model).unwrap_or_else(|_| model.to_owned());
-    store.map_or_else(Cache::none, |store| Cache::new(store, subject.to_string_lossy()))
-}
-
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|e| extensions.iter().any(|wanted| e.eq_ignore_ascii_case(wanted)))
 }
@@ -114,11 +79,10 @@ pub(crate) fn monitored<T: Send>(
 ) -> PyResult<T> {
     let monitor = Progress::default();
     let progress: Option<Py<PyAny>> = keywords.get("progress")?.map(Bound::unbind);
-    let threads: usize = keywords.value("threads")?.unwrap_or(0);
+    let threads = keywords.within("threads", 0..=4096)?.unwrap_or(0) as usize;
     let warn = |py: Python<'_>| -> PyResult<()> {
         for message in std::mem::take(&mut *work::lock(&monitor.warnings)) {
-            let text = std::ffi::CString::new(message.replace('\0', " ")).unwrap_or_default();
-            PyErr::warn(py, &py.get_type::<pyo3::exceptions::PyUserWarning>(), &text, 1)?;
+            crate::caching::warn(py, &message)?;
         }
         Ok(())
     };
@@ -198,10 +162,7 @@ pub(crate) fn compile_mesh(
     let options = options(&keywords)?;
     let store = store(&keywords, false)?;
     let output: Option<PathBuf> = keywords.value("output")?;
-    let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
-    let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
-    let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
-    let mesh = TriangleMesh { positions, triangles };
+    let mesh = triangle_mesh(&positions, &triangles)?;
     let opened = monitored(py, &keywords, |monitor| {
         if store.is_none() && output.is_none() {
             return memory::open(mesh, &options, monitor).map(Ok);
@@ -230,6 +191,49 @@ fn deliver(content: &write::Content, output: Option<&Path>) -> bth_compile::Resu
         write::write_content(output, content)?;
     }
     Ok(bytes)
+}
+
+/// Compiles a scene: pairs of positions and triangles, and for each instance its mesh and the 3×4 matrix that places it.
+#[pyfunction]
+pub(crate) fn compile_scene(
+    py: Python<'_>,
+    meshes: Vec<(PyReadonlyArray2<'_, f32>, PyReadonlyArray2<'_, u32>)>,
+    instances: PyReadonlyArray1<'_, u32>,
+    transforms: PyReadonlyArray3<'_, f64>,
+    keywords: &Bound<'_, PyDict>,
+) -> PyResult<NativeScene> {
+    let keywords = Keywords(keywords);
+    let options = options(&keywords)?;
+    let store = store(&keywords, false)?;
+    let output: Option<PathBuf> = keywords.value("output")?;
+    let meshes = meshes.iter().map(|(p, t)| triangle_mesh(p, t)).collect::<PyResult<Vec<_>>>()?;
+    let transforms = transforms.as_array();
+    if transforms.shape() != [instances.len(), 3, 4] {
+        return Err(PyValueError::new_err("expected a 3×4 matrix for each instance"));
+    }
+    let placed = |(row, &mesh): (usize, &u32)| Instance {
+        mesh,
+        to_world: std::array::from_fn(|i| std::array::from_fn(|k| transforms[[row, i, k]])),
+    };
+    let instances: Vec<Instance> = instances.as_array().iter().enumerate().map(placed).collect();
+    let bytes = monitored(py, &keywords, |monitor| {
+        let cache = store.as_ref().map_or_else(Cache::none, |store| Cache::new(store, "scene"));
+        let compiled = memory::compile_scene(&meshes, &instances, &options, &cache, monitor)?;
+        deliver(&compiled.content.ok_or_else(no_content)?, output.as_deref())
+    })?;
+    let scene = py.detach(|| bth::from_bytes(&bytes));
+    scene.map(NativeScene::new).map_err(|e| format_error(&e))
+}
+
+/// A mesh in arrays, three numbers a row.
+fn triangle_mesh<'a>(
+    positions: &'a PyReadonlyArray2<'_, f32>,
+    triangles: &'a PyReadonlyArray2<'_, u32>,
+) -> PyResult<TriangleMesh<'a>> {
+    let contiguous = |_| PyValueError::new_err("expected contiguous arrays of positions and triangles");
+    let (positions, _) = positions.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    let (triangles, _) = triangles.as_slice().map_err(contiguous)?.as_chunks::<3>();
+    Ok(TriangleMesh { positions, triangles })
 }
 
 /// Compiles a file as the program does: glTF files and manifests are scenes.

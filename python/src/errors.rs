@@ -6,14 +6,14 @@ use pyo3::prelude::*;
 
 create_exception!(
     bth,
-    BthError,
+    Error,
     PyValueError,
     "A model or a compiled file cannot be used. Its attribute `code` is stable, such as 'BTH-F001'."
 );
 
 /// An exception with a code.
 fn coded(code: &str, message: String) -> PyErr {
-    let error = BthError::new_err(message);
+    let error = Error::new_err(message);
     Python::attach(|py| {
         // Without the attribute the message still has the code.
         let _ = error.value(py).setattr("code", code);
@@ -30,12 +30,12 @@ pub(crate) fn format_error(error: &bth_format::Error) -> PyErr {
 
 /// The exception for an error of the compiler.
 pub(crate) fn compile_error(error: bth_compile::Error) -> PyErr {
-    use bth_compile::Error;
+    use bth_compile::Error as Failure;
     let text = error.to_string();
     match error {
-        Error::Input { code, .. } | Error::Limit { code, .. } => coded(code, text),
-        Error::File { .. } => PyOSError::new_err(text),
-        Error::Internal { .. } => PyRuntimeError::new_err(text),
-        Error::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
+        Failure::Input { code, .. } | Failure::Limit { code, .. } => coded(code, text),
+        Failure::File { .. } => PyOSError::new_err(text),
+        Failure::Internal { .. } => PyRuntimeError::new_err(text),
+        Failure::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
     }
 }

@@ -5,24 +5,31 @@
 //! |---|---|
 //! | `work` | runs a call's chunks on threads without the interpreter's lock, and lets signals through |
 //! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
-//! | `scene`, `shared` | a scene that threads share
-//! | `queries`, `many`, `points` | its queries |
-//! | `options`, `compile` | the compiler |
+//! | `scene`, `shared` | a scene that threads share |
+//! | `queries`, `many`, `points`, `overlaps` | its queries |
+//! | `conditions` | what rays may hit, filters in Python included |
+//! | `surface`, `parts` | what hits lead to: normals and the like, names and masks |
+//! | `options`, `compile`, `caching` | the compiler |
 //! | `errors` | exceptions |
 
 // Functions take what Python passes, and return tuples of arrays.
 #![allow(clippy::too_many_arguments, clippy::type_complexity)]
 
+mod caching;
 mod compile;
+mod conditions;
 mod errors;
 mod many;
 mod options;
 mod output;
+mod overlaps;
+mod parts;
 mod points;
 mod queries;
 mod rays;
 mod scene;
 mod shared;
+mod surface;
 mod work;
 
 use pyo3::prelude::*;
@@ -32,8 +39,11 @@ use pyo3::prelude::*;
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    module.add("Error", py.get_type::<errors::BthError>())?;
+    let error = py.get_type::<errors::Error>();
+    error.setattr("code", "")?;
+    module.add("Error", error)?;
     module.add_class::<scene::NativeScene>()?;
+    module.add_class::<conditions::Candidate>()?;
     module.add_function(wrap_pyfunction!(scene::open, module)?)?;
     module.add_function(wrap_pyfunction!(scene::load, module)?)?;
     module.add_function(wrap_pyfunction!(queries::nearest, module)?)?;
@@ -47,6 +57,20 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(points::signed_distance, module)?)?;
     module.add_function(wrap_pyfunction!(points::closest, module)?)?;
     module.add_function(wrap_pyfunction!(compile::compile_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(compile::compile_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(overlaps::overlaps, module)?)?;
+    module.add_function(wrap_pyfunction!(overlaps::triangles_in, module)?)?;
+    module.add_function(wrap_pyfunction!(surface::surface, module)?)?;
+    module.add_function(wrap_pyfunction!(surface::triangle_positions, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::object_names, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::instance_names, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::groups, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::instance_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::group_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::set_instance_mask, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::set_group_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::masks, module)?)?;
+    module.add_function(wrap_pyfunction!(parts::set_masks, module)?)?;
     module.add_function(wrap_pyfunction!(work::processors, module)?)?;
     module.add_function(wrap_pyfunction!(isa, module)?)?;
     Ok(())

@@ -1,28 +1,14 @@
 //! Queries that return several hits of a ray, or a number of them.
 
+use crate::conditions::Conditions;
 use crate::output::{chunks, chunks_of, numbers};
 use crate::rays::RayArrays;
 use crate::scene::NativeScene;
-use crate::work;
+use bth::Crossings;
 use bth::rays::Hit;
-use bth::{Accept, Crossings, Cull};
 use numpy::{IntoPyArray, PyArray1, PyReadwriteArray1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-
-/// What rays may hit: a mask, and the side of triangles that they pass.
-pub(crate) fn accept(mask: u32, cull: &str) -> PyResult<Accept<'static>> {
-    let cull = match cull {
-        "none" => Cull::None,
-        "back" => Cull::Back,
-        "front" => Cull::Front,
-        other => {
-            let message = format!("cull: expected None, 'back' or 'front', got '{other}'");
-            return Err(PyValueError::new_err(message));
-        }
-    };
-    Ok(Accept { mask, cull, filter: None })
-}
+use std::ops::Range;
 
 /// Arrays of t, u, v, instance and triangle.
 type Columns<'py> = (
@@ -40,12 +26,11 @@ pub(crate) fn all_hits<'py>(
     scene: &NativeScene,
     rays: RayArrays<'_>,
     most: Option<usize>,
-    mask: u32,
-    cull: &str,
+    conditions: Conditions,
     threads: usize,
     mut counts: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<Columns<'py>> {
-    let (scene, rays, accept) = (scene.get()?, rays.rays()?, accept(mask, cull)?);
+    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
     let counts = numbers(&mut counts, rays.len())?;
     let mut parts: Vec<Vec<Hit>> = Vec::new();
     parts.resize_with(rays.len().div_ceil(crate::rays::CHUNK), Vec::new);
@@ -55,19 +40,20 @@ pub(crate) fn all_hits<'py>(
         let counts = rows.split_off_mut(..count).expect("a count for each ray");
         (counts, rest.next().expect("a part for each chunk"))
     });
-    work::run(py, threads, jobs, |(range, (counts, hits))| {
+    let each = |scene: &bth::Scene, (range, (counts, hits)): (Range<usize>, (&mut [u64], &mut Vec<Hit>))| {
         let (mut read, mut of_ray) = (Vec::new(), Vec::new());
-        rays.read(range, &mut read);
-        let scene = scene.read();
-        for (ray, count) in read.iter().zip(counts) {
+        rays.read(range.clone(), &mut read);
+        conditions.each(scene, range.start, &read, |i, ray, accept| {
             match most {
-                None => scene.all_hits(ray, &accept, &mut of_ray),
-                Some(most) => scene.nearest_hits(ray, most, &accept, &mut of_ray),
+                None => scene.all_hits(ray, accept, &mut of_ray),
+                Some(most) => scene.nearest_hits(ray, most, accept, &mut of_ray),
             }
-            *count = of_ray.len() as u64;
+            counts[i] = of_ray.len() as u64;
             hits.extend_from_slice(&of_ray);
-        }
-    })?;
+        });
+    };
+    scene.run(py, conditions.threads(threads), jobs, each)?;
+    conditions.finish()?;
     let hits = || parts.iter().flatten();
     Ok((
         hits().map(|h| h.t).collect::<Vec<_>>().into_pyarray(py),
@@ -84,21 +70,20 @@ pub(crate) fn count(
     py: Python<'_>,
     scene: &NativeScene,
     rays: RayArrays<'_>,
-    mask: u32,
-    cull: &str,
+    conditions: Conditions,
     threads: usize,
     mut out: PyReadwriteArray1<'_, u64>,
 ) -> PyResult<()> {
-    let (scene, rays, accept) = (scene.get()?, rays.rays()?, accept(mask, cull)?);
+    let (scene, rays, conditions) = (scene.get()?, rays.rays()?, conditions.checked()?);
     let jobs = chunks_of(numbers(&mut out, rays.len())?);
-    work::run(py, threads, jobs, |(range, counts)| {
+    scene.run(py, conditions.threads(threads), jobs, |scene, (range, counts)| {
         let mut read = Vec::new();
-        rays.read(range, &mut read);
-        let scene = scene.read();
-        for (ray, count) in read.iter().zip(counts) {
-            *count = scene.count_hits(ray, &accept) as u64;
-        }
-    })
+        rays.read(range.clone(), &mut read);
+        conditions.each(scene, range.start, &read, |i, ray, accept| {
+            counts[i] = scene.count_hits(ray, accept) as u64;
+        });
+    })?;
+    conditions.finish()
 }
 
 /// Crossings of surfaces by rays: their numbers, and outward ones minus inward ones.
@@ -117,11 +102,11 @@ pub(crate) fn crossings(
         let part = "a result for each ray";
         (count.split_off_mut(..rows).expect(part), winding.split_off_mut(..rows).expect(part))
     });
-    work::run(py, threads, jobs, |(range, (count, winding))| {
+    scene.run(py, threads, jobs, |scene, (range, (count, winding))| {
         let mut read = Vec::new();
         rays.read(range, &mut read);
         let mut found = vec![Crossings::default(); read.len()];
-        scene.read().crossings_batch(&read, &mut found);
+        scene.crossings_batch(&read, &mut found);
         for (i, found) in found.iter().enumerate() {
             (count[i], winding[i]) = (found.count, found.winding);
         }

@@ -3,10 +3,11 @@
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::{bvh, coordinates, costs};
 use bth_format::layout::{GridBits, RecordKind};
-use bth_import::Keep;
+use bth_import::{AlphaMode, Keep};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// The keywords of a call; those that are missing or `None` have their defaults.
@@ -39,6 +40,17 @@ impl<'py> Keywords<'_, 'py> {
             }
             x => Ok(x),
         }
+    }
+
+    /// A whole number in a range.
+    pub(crate) fn within(&self, name: &str, range: RangeInclusive<u64>) -> PyResult<Option<u64>> {
+        let number = self.value::<i128>(name)?;
+        let wanted = |n: i128| u64::try_from(n).ok().filter(|n| range.contains(n));
+        let outside = |n| {
+            let (least, most) = (range.start(), range.end());
+            PyValueError::new_err(format!("{name}: expected a number from {least} to {most}, got {n}"))
+        };
+        number.map(|n| wanted(n).ok_or_else(|| outside(n))).transpose()
     }
 
     /// The choice that a keyword names.
@@ -85,17 +97,26 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
         coordinates: coordinates(keywords)?,
         keep_subtrees: subtrees.unwrap_or(structure == Structure::Bth && !compact),
+        alpha: keywords
+            .choice(
+                "alpha",
+                &[("none", AlphaMode::None), ("mask", AlphaMode::Mask), ("blend", AlphaMode::Blend)],
+            )?
+            .unwrap_or_default(),
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: keywords.value("names")?.unwrap_or(false),
         ..CompileOptions::default()
     };
     selection(keywords, &mut options)?;
-    if let Some(seconds) = keywords.value::<u64>("tet_deadline")? {
+    if let Some(seconds) = keywords.within("tet_deadline", 1..=86_400)? {
         options.tets.deadline = std::time::Duration::from_secs(seconds);
         options.tets.deadline_per_triangle = std::time::Duration::ZERO;
     }
-    if let Some(mib) = keywords.value::<u32>("tet_memory")? {
-        options.tets.memory = u64::from(mib) << 20;
+    if let Some(mib) = keywords.within("tet_memory", 16..=1 << 20)? {
+        options.tets.memory = mib << 20;
+    }
+    if let Some(mib) = keywords.within("memory", 1..=u64::MAX >> 20)? {
+        options.objects_memory = mib << 20;
     }
     Ok(options)
 }
@@ -159,8 +180,8 @@ fn selection(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyRes
     {
         costs.probe = probe;
     }
-    if let Some(triangles) = keywords.value("min_tet_triangles")? {
-        costs.minimum_triangles = triangles;
+    if let Some(triangles) = keywords.within("min_tet_triangles", 1..=u64::from(u32::MAX))? {
+        costs.minimum_triangles = triangles as u32;
     }
     costs.for_scene = keywords.value("for_scene")?.unwrap_or(false);
     costs.max_bytes_per_triangle = keywords.positive("max_bytes_per_triangle")?;

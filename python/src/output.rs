@@ -80,7 +80,8 @@ impl<'a> HitColumns<'a> {
     }
 }
 
-fn split_off<'a, T>(rows: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+/// Splits off the first rows.
+pub(crate) fn split_off<'a, T>(rows: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     rows.split_off_mut(..count).expect("as many rows as the caller has counted")
 }
 

@@ -1,9 +1,8 @@
 //! Queries by points: containment, winding numbers, closest points and distances.
 
-use crate::output::{HitArrays, chunks, chunks_of, numbers};
+use crate::output::{HitArrays, chunks, chunks_of, numbers, split_off};
 use crate::rays::Vectors;
 use crate::scene::NativeScene;
-use crate::work;
 use bth::rays::{Hit, PrimitiveRef};
 use numpy::PyReadwriteArray1;
 use pyo3::prelude::*;
@@ -27,8 +26,8 @@ pub(crate) fn contains(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    work::run(py, threads, jobs, |(range, inside)| {
-        scene.read().contains_batch(&read(points, range), inside);
+    scene.run(py, threads, jobs, |scene, (range, inside)| {
+        scene.contains_batch(&read(points, range), inside);
     })
 }
 
@@ -43,8 +42,8 @@ pub(crate) fn winding(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    work::run(py, threads, jobs, |(range, winding)| {
-        scene.read().winding_batch(&read(points, range), winding);
+    scene.run(py, threads, jobs, |scene, (range, winding)| {
+        scene.winding_batch(&read(points, range), winding);
     })
 }
 
@@ -59,12 +58,13 @@ pub(crate) fn signed_distance(
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let jobs = chunks_of(numbers(&mut out, points.len())?);
-    work::run(py, threads, jobs, |(range, distances)| {
-        scene.read().signed_distance_batch(&read(points, range), distances);
+    scene.run(py, threads, jobs, |scene, (range, distances)| {
+        scene.signed_distance_batch(&read(points, range), distances);
     })
 }
 
-/// Closest points within a radius: in the place of t their distances; and their positions, three numbers a point.
+/// Closest points within a radius: in the place of t their distances; their positions, three numbers a point; and on what of the
+/// triangle they lie, as [`bth::Feature::code`] numbers it.
 #[pyfunction]
 pub(crate) fn closest(
     py: Python<'_>,
@@ -74,25 +74,28 @@ pub(crate) fn closest(
     threads: usize,
     mut out: HitArrays<'_>,
     mut positions: PyReadwriteArray1<'_, f32>,
+    mut features: PyReadwriteArray1<'_, u8>,
 ) -> PyResult<()> {
     let (scene, points) = (scene.get()?, points.rows()?);
     let mut columns = out.columns(points.len())?;
     let mut positions = numbers(&mut positions, points.len() * 3)?;
+    let mut features = numbers(&mut features, points.len())?;
     let jobs = chunks(points.len(), |rows| {
-        (columns.split_off(rows), positions.split_off_mut(..rows * 3).expect("three numbers a point"))
+        (columns.split_off(rows), split_off(&mut positions, rows * 3), split_off(&mut features, rows))
     });
-    work::run(py, threads, jobs, |(range, (mut columns, positions))| {
+    scene.run(py, threads, jobs, |scene, (range, (mut columns, positions, features))| {
         let points = read(points, range);
         let mut found = vec![None; points.len()];
-        scene.read().closest_batch(&points, radius, &mut found);
+        scene.closest_batch(&points, radius, &mut found);
         let hit = |c: &Option<bth::Closest>| match c {
             Some(c) => Hit { t: c.distance, u: c.u, v: c.v, primitive: c.primitive },
             None => Hit { t: f32::INFINITY, u: 0.0, v: 0.0, primitive: PrimitiveRef::NONE },
         };
         columns.store(&found.iter().map(hit).collect::<Vec<_>>());
         let (rows, _) = positions.as_chunks_mut::<3>();
-        for (row, found) in rows.iter_mut().zip(&found) {
-            *row = found.map_or([f32::NAN; 3], |c| c.point);
+        for (i, found) in found.iter().enumerate() {
+            rows[i] = found.map_or([f32::NAN; 3], |c| c.point);
+            features[i] = found.map_or(0, |c| c.feature.code() as u8);
         }
     })
 }

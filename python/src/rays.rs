@@ -35,7 +35,7 @@ pub(crate) enum Rows<'a> {
 
 /// A view of numbers that may be shared between threads.
 #[derive(Clone, Copy)]
-enum Numbers<'a> {
+pub(crate) enum Numbers<'a> {
     Single(ArrayView1<'a, f32>),
     Double(ArrayView1<'a, f64>),
     Same(f32),
@@ -94,7 +94,8 @@ fn each_row<T: Copy>(
 }
 
 impl Bound1<'_> {
-    fn numbers(&self) -> Numbers<'_> {
+    /// The numbers.
+    pub(crate) fn numbers(&self) -> Numbers<'_> {
         match self {
             Self::Single(a) => Numbers::Single(a.as_array()),
             Self::Double(a) => Numbers::Double(a.as_array()),
@@ -104,7 +105,8 @@ impl Bound1<'_> {
 }
 
 impl Numbers<'_> {
-    fn len(&self) -> Option<usize> {
+    /// How many there are; `None` for one number for all.
+    pub(crate) fn len(&self) -> Option<usize> {
         match self {
             Self::Single(a) => Some(a.len()),
             Self::Double(a) => Some(a.len()),
@@ -112,8 +114,9 @@ impl Numbers<'_> {
         }
     }
 
+    /// Calls `put` with the row within the range and the number of each row of it, rounded to f32.
     #[inline(always)]
-    fn each(&self, range: Range<usize>, mut put: impl FnMut(usize, f32)) {
+    pub(crate) fn each(&self, range: Range<usize>, mut put: impl FnMut(usize, f32)) {
         match self {
             Self::Single(a) => range.enumerate().for_each(|(i, row)| put(i, a[row])),
             Self::Double(a) => range.enumerate().for_each(|(i, row)| put(i, a[row] as f32)),

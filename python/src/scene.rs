@@ -3,8 +3,7 @@
 use crate::errors::format_error;
 use crate::shared::{Handle, OpenScene};
 use numpy::ndarray::{Array2, Array3};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1};
-use pyo3::exceptions::{PyIndexError, PyKeyError};
+use numpy::{IntoPyArray, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -41,7 +40,11 @@ impl NativeScene {
     }
 
     /// Calls `read` with the scene and without the interpreter's lock.
-    fn with<T: Send>(&self, py: Python<'_>, read: impl FnOnce(&bth::Scene) -> T + Send) -> PyResult<T> {
+    pub(crate) fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        read: impl FnOnce(&bth::Scene) -> T + Send,
+    ) -> PyResult<T> {
         let scene = self.0.get()?;
         Ok(py.detach(|| read(&scene.read())))
     }
@@ -144,25 +147,33 @@ impl NativeScene {
     }
 
     /// Lower and upper end of a box that contains all visible instances.
-    fn bounds(&self, py: Python<'_>) -> PyResult<Option<([f32; 3], [f32; 3])>> {
+    fn bounds(&self, py: Python<'_>) -> PyResult<Option<bth::Bounds>> {
+        self.with(py, bth::Scene::bounds)
+    }
+
+    /// Lower and upper end of a box in world space that contains an instance, if it is visible.
+    fn instance_bounds(&self, py: Python<'_>, instance: u32) -> PyResult<Option<bth::Bounds>> {
         self.with(py, |scene| {
-            (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)).reduce(|a, b| {
-                let lower = std::array::from_fn(|k| a.0[k].min(b.0[k]));
-                let upper = std::array::from_fn(|k| a.1[k].max(b.1[k]));
-                (lower, upper)
-            })
-        })
+            crate::parts::check_index("instance", instance, scene.instance_count())?;
+            Ok(scene.instance_bounds(instance))
+        })?
+    }
+
+    /// Lower and upper end of a box of an object in its own space, if anything of it can be hit.
+    fn object_bounds(&self, py: Python<'_>, object: u32) -> PyResult<Option<bth::Bounds>> {
+        self.with(py, |scene| {
+            crate::parts::check_index("object", object, scene.object_count())?;
+            Ok(scene.object_bounds(object))
+        })?
     }
 
     /// Positions and triangles of an object, if the file has them.
     fn geometry<'py>(&self, py: Python<'py>, object: u32) -> PyResult<Geometry<'py>> {
         let (positions, triangles) = self.with(py, |scene| {
-            if object >= scene.object_count() {
-                return Err(PyIndexError::new_err(format!("object {object} of {}", scene.object_count())));
-            }
+            crate::parts::check_index("object", object, scene.object_count())?;
             let view = scene.object(object);
             if view.triangles.is_empty() && view.header.triangles > 0 {
-                return Err(PyKeyError::new_err("the file has been compiled without its geometry"));
+                return Err(crate::surface::no_geometry());
             }
             let rows = |rows: usize| (rows, 3);
             let positions =
@@ -172,17 +183,5 @@ impl NativeScene {
             Ok((positions.expect("three a row"), triangles.expect("three a row")))
         })??;
         Ok((positions.into_pyarray(py), triangles.into_pyarray(py)))
-    }
-
-    /// Geometric normals in world space of triangles of instances, not normalized; zeros for no triangle.
-    fn normals<'py>(
-        &self,
-        py: Python<'py>,
-        instances: PyReadonlyArray1<'_, u32>,
-        triangles: PyReadonlyArray1<'_, u32>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (instances, triangles) = (instances.as_array(), triangles.as_array());
-        let normals = self.with(py, |scene| crate::queries::normals(scene, instances, triangles))??;
-        Ok(normals.into_pyarray(py))
     }
 }

@@ -14,6 +14,9 @@ pub(crate) struct OpenScene {
     changing: AtomicU32,
 }
 
+/// How long a thread waits before it looks again whether it may read or change the scene.
+const PAUSE: Duration = Duration::from_micros(100);
+
 impl OpenScene {
     pub(crate) fn new(scene: bth::Scene) -> Arc<OpenScene> {
         Arc::new(OpenScene { scene: RwLock::new(scene), changing: AtomicU32::new(0) })
@@ -21,23 +24,52 @@ impl OpenScene {
 
     /// The scene for queries. Not for threads that hold the interpreter's lock: whoever changes the scene needs it.
     pub(crate) fn read(&self) -> RwLockReadGuard<'_, bth::Scene> {
-        // The handler of a signal is inside of a call, perhaps of this scene: it must not wait for whom that call keeps waiting.
+        // A filter or the handler of a signal is inside of a call, perhaps of this scene: it must not wait for whom that call
+        // keeps waiting.
         while self.changing.load(Ordering::Relaxed) > 0 && !work::is_inside_call() {
-            std::thread::sleep(Duration::from_micros(100));
+            std::thread::sleep(PAUSE);
         }
-        self.scene.read().unwrap_or_else(std::sync::PoisonError::into_inner)
+        loop {
+            // Not `read`, which may panic or wait for ever on a thread that has the lock already, as that of a filter.
+            if let Some(scene) = self.try_read() {
+                return scene;
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    fn try_read(&self) -> Option<RwLockReadGuard<'_, bth::Scene>> {
+        match self.scene.try_read() {
+            Ok(scene) => Some(scene),
+            Err(TryLockError::Poisoned(scene)) => Some(scene.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
     }
 
     /// As [`Self::read`], for a thread that holds the interpreter's lock.
     pub(crate) fn read_attached(&self, py: Python<'_>) -> RwLockReadGuard<'_, bth::Scene> {
         loop {
-            match self.scene.try_read() {
-                Ok(scene) => return scene,
-                Err(TryLockError::Poisoned(scene)) => return scene.into_inner(),
-                Err(TryLockError::WouldBlock) => {}
+            if let Some(scene) = self.try_read() {
+                return scene;
             }
             py.detach(|| drop(self.read()));
         }
+    }
+
+    /// Calls `work` with the scene and each of the jobs, on up to so many threads, as [`work::run`] does. The scene does not change
+    /// before all are done.
+    pub(crate) fn run<J: Send>(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        jobs: Vec<J>,
+        work: impl Fn(&bth::Scene, J) + Sync + Send,
+    ) -> PyResult<()> {
+        py.detach(|| {
+            let guard = self.read();
+            let scene: &bth::Scene = &guard;
+            work::run(threads, jobs, |job| work(scene, job))
+        })
     }
 
     /// Changes the scene when no query uses it any more.
@@ -47,8 +79,7 @@ impl OpenScene {
         change: impl FnOnce(&mut bth::Scene) -> T + Send,
     ) -> PyResult<T> {
         if work::is_inside_call() {
-            let message =
-                "a scene cannot be changed in the handler of a signal that interrupts a call of this package";
+            let message = "a scene cannot be changed by a filter, nor by the handler of a signal that interrupts a call of this package";
             return Err(PyRuntimeError::new_err(message));
         }
         self.changing.fetch_add(1, Ordering::Relaxed);
@@ -60,7 +91,7 @@ impl OpenScene {
                     Err(TryLockError::Poisoned(scene)) => return Ok(change(&mut scene.into_inner())),
                     Err(TryLockError::WouldBlock) => work::check_signals()?,
                 }
-                std::thread::sleep(Duration::from_micros(200));
+                std::thread::sleep(PAUSE);
             }
         });
         self.changing.fetch_sub(1, Ordering::Relaxed);

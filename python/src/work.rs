@@ -11,11 +11,11 @@ use std::time::{Duration, Instant};
 const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 
 thread_local! {
-    /// How many calls this thread is in: more than one where the handler of a signal uses a scene.
+    /// How many calls this thread is in: more than one where a filter or the handler of a signal uses a scene.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Whether this thread is inside of a call, as the handler of a signal that interrupts one.
+/// Whether this thread is inside of a call, as a filter, or the handler of a signal that interrupts one.
 pub(crate) fn is_inside_call() -> bool {
     DEPTH.get() > 0
 }
@@ -69,19 +69,15 @@ pub(crate) fn check_signals() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }
 
-/// Calls `work` with each of the jobs, on up to so many threads, without the interpreter's lock. One thread is the caller's own. Ends
-/// early with the exception that the handler of a signal raises; then some of the jobs have not been done.
-pub(crate) fn run<J: Send>(
-    py: Python<'_>,
-    threads: usize,
-    jobs: Vec<J>,
-    work: impl Fn(J) + Sync + Send,
-) -> PyResult<()> {
+/// Calls `work` with each of the jobs, on up to so many threads, none of which has the interpreter's lock. One thread is the caller's
+/// own, which must not have the lock either. Ends early with the exception that the handler of a signal raises; then some of the
+/// jobs have not been done.
+pub(crate) fn run<J: Send>(threads: usize, jobs: Vec<J>, work: impl Fn(J) + Sync + Send) -> PyResult<()> {
     let threads = threads.min(jobs.len());
     let queue = Mutex::new(jobs.into_iter());
     let next = || lock(&queue).next();
     let _inside = Inside::new();
-    py.detach(|| if threads <= 1 { alone(&next, &work) } else { together(threads, &next, &work) })
+    if threads <= 1 { alone(&next, &work) } else { together(threads, &next, &work) }
 }
 
 /// Does all jobs on the caller's thread.

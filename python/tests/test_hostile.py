@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -141,6 +142,136 @@ def test_closed_while_others_trace(scene):
         assert not failures
 
 
+def test_masks_change_while_others_trace(scene):
+    origins, directions = [0, 0, 0], np.random.default_rng(2).normal(size=(30000, 3))
+    other, failures, results, stop = bth.load(scene.to_bytes()), [], set(), threading.Event()
+
+    def trace(threads):
+        try:
+            while not stop.is_set():
+                hit = int(other.nearest(origins, directions, mask=1, threads=threads).hit.sum())
+                results.add(hit)
+                # The whole call sees the masks of one time.
+                if hit not in (0, 30000):
+                    failures.append(hit)
+        except Exception as error:
+            failures.append(error)
+
+    tracing = [threading.Thread(target=trace, args=(threads,)) for threads in (1, 2, 2)]
+    for thread in tracing:
+        thread.start()
+    deadline = time.monotonic() + 60
+    changes = 0
+    while (changes < 40 or len(results) < 2) and time.monotonic() < deadline and not failures:
+        other.set_instance_mask(0, (1, 2)[changes % 2])
+        other.set_group_mask(0, (1, 3)[changes // 2 % 2])
+        time.sleep(0.002)
+        changes += 1
+    stop.set()
+    for thread in tracing:
+        thread.join()
+    assert not failures and results == {0, 30000} and changes >= 40
+
+
+def test_masks_change_while_others_filter(scene, rays):
+    other, failures, counts, stop = bth.load(scene.to_bytes()), [], [], threading.Event()
+    expected = int((scene.all_hits(*rays).u > 0.5).sum())
+
+    def trace():
+        try:
+            while not stop.is_set():
+                # The filter queries the scene that another thread waits to change.
+                found = other.count(*rays, mask=1, filter=lambda c: c.u > 0.5 and len(other.nearest(rays[0][:1], rays[1][:1])) == 1)
+                counts.append(int(found.sum()))
+        except Exception as error:
+            failures.append(error)
+
+    tracing = [threading.Thread(target=trace, daemon=True) for _ in range(3)]
+    for thread in tracing:
+        thread.start()
+    for change in range(20):
+        other.set_instance_mask(0, (2, 1)[change % 2])
+        time.sleep(0.002)
+        other.to_bytes()
+    stop.set()
+    for thread in tracing:
+        thread.join(60)
+    assert not failures and not any(thread.is_alive() for thread in tracing) and counts and set(counts) <= {0, expected}
+
+
+def test_the_time_changes_while_others_trace(mesh, tmp_path):
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh[0].tolist()] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh[1].tolist()]
+    (tmp_path / "ball.obj").write_text("\n".join(lines))
+    (tmp_path / "scene.manifest").write_text("""
+        version = 1
+        frames = { last = 9, rate = 1 }
+        objects = [{ name = "ball", model = "ball.obj" }]
+        nodes = [{ name = "ball", object = "ball" }]
+        tracks = [{ node = "ball", property = "translation", times = [0, 9], values = [[0, 0, 0], [90, 0, 0]] }]
+    """)
+    other = bth.compile(tmp_path / "scene.manifest")
+    x = np.repeat(np.arange(10) * 10.0, 3000)
+    origins = np.stack([x, np.full_like(x, 0.01), np.full_like(x, 5)], 1)
+    results, stop = [], threading.Event()
+
+    def trace():
+        while not stop.is_set():
+            results.append(x[other.any(origins, [0, 0, -1])])
+
+    threads = [threading.Thread(target=trace) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for frame in [*range(10)] * 5:
+        other.set_frame(frame)
+        time.sleep(0.001)
+    stop.set()
+    for thread in threads:
+        thread.join()
+    # Each call sees the ball at one place.
+    assert all(len(found) == 3000 and len(set(found)) == 1 for found in results) and len(results) > 3
+
+
+def test_wrong_dtypes(scene):
+    good = [0.0, 0, 0], [0, 0, 1.0]
+    for wrong in (np.zeros(3, complex), np.zeros(3, "U3"), np.zeros(3, object), np.zeros(3, "M8[s]"), np.zeros(3, [("x", "f4")]), b"abc", {"x": 1}):
+        calls = [lambda: scene.overlaps_box(wrong, good[1]), lambda: scene.overlaps_sphere(wrong, 1), lambda: scene.contains(wrong),
+                 lambda: scene.surface(wrong, 0), lambda: scene.normals(0, wrong), lambda: scene.surface(0, 0, wrong), lambda: scene.closest(wrong),
+                 lambda: scene.nearest(*good, tmin=wrong), lambda: scene.nearest(*good, start=(wrong, wrong))]
+        for call in calls:
+            with pytest.raises((TypeError, ValueError)):
+                call()
+    for kind in (np.float16, np.int8, np.uint64, bool, ">f8", "<f4"):
+        assert scene.any(np.zeros(3, kind), np.ones(3, kind)) and scene.contains(np.zeros((2, 3), kind)).all()
+    for start, error in (((-1, 0), IndexError), ((0, 1 << 32), IndexError), ((0.5, 0), TypeError), (7, TypeError), ((1, 2, 3), TypeError),
+                         (([0, 0], [0, 0]), ValueError)):
+        with pytest.raises(error, match="start"):
+            scene.nearest(*good, start=start)
+
+
+def test_strides(scene, rays):
+    hits = scene.nearest(*rays)
+    # Backwards along both axes, every other one, and a stride of zero.
+    for view in (np.s_[::-1], np.s_[::2], np.s_[-1::-3]):
+        origins, directions = (np.concatenate([a[:, ::-1], a], 1)[view][:, 2::-1] for a in rays)
+        assert (scene.nearest(origins, directions).t == hits.t[view]).all()
+        assert (scene.surface(hits.instance[view], hits.triangle[view], hits.u[view], hits.v[view]).group == hits.group[view]).all()
+        assert (scene.overlaps_sphere(origins, 0.5) == scene.overlaps_sphere(rays[0], 0.5)[view]).all()
+        assert (scene.overlaps_box(origins, origins + 1) == scene.overlaps_box(rays[0], rays[0] + np.float32(1))[view]).all()
+        assert (scene.closest(origins).feature == scene.closest(rays[0]).feature[view]).all()
+        assert (scene.any(origins, directions, tmax=np.broadcast_to(np.float32(1), len(origins))) == (hits.t[view] <= 1)).all()
+
+
+def test_huge_shapes(scene):
+    huge = np.broadcast_to(np.float32(0), (1 << 45, 3))
+    for call in (lambda: scene.contains(huge), lambda: scene.closest(huge), lambda: scene.overlaps_box(huge, huge), lambda: scene.overlaps_sphere(huge, 1),
+                 lambda: scene.any(huge, huge), lambda: scene.all_hits(huge, huge), lambda: scene.surface(np.broadcast_to(np.uint32(0), 1 << 45), 0),
+                 lambda: scene.overlaps_sphere(np.zeros((1 << 22, 1, 3)), np.zeros(1 << 23))):
+        with pytest.raises(MemoryError):
+            call()
+    deep = np.zeros((1,) * 30 + (3,))
+    assert scene.contains(deep).shape == (1,) * 30
+
+
 def _resident():
     with open("/proc/self/statm") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -155,10 +286,35 @@ def test_copies_and_pickles_do_not_grow():
             other = pickle.loads(pickle.dumps(copy.deepcopy(copy.copy(scene))))
             assert other.any([0.2, 0.2, 1], [0, 0, -1])
 
+    scene.set_instance_mask(0, 3)
     work(500)
     gc.collect()
     before = _resident()
-    work(3000)
+    work(10_000)
+    gc.collect()
+    assert _resident() - before < 4 << 20
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc")
+def test_queries_do_not_grow(scene, rays):
+    def fails(candidate):
+        raise RuntimeError("enough")
+
+    def work(times):
+        for i in range(times):
+            hits = scene.nearest(*rays)
+            hits.surface(), hits.group_name, scene.all_hits(*rays).normal, scene.closest(rays[0]).texcoord
+            scene.triangles_in_sphere(rays[0], 0.5), scene.any(*rays, filter=lambda candidate: candidate.u > 0.5)
+            scene.set_group_mask(0, i), scene.set_instance_mask(0, bth.NONE), scene.set_group_mask(0, bth.NONE)
+            with pytest.raises(RuntimeError):
+                scene.count(*rays, filter=fails)
+            with pytest.raises(IndexError):
+                scene.surface(0, 10**6)
+
+    work(30)
+    gc.collect()
+    before = _resident()
+    work(300)
     gc.collect()
     assert _resident() - before < 4 << 20
 

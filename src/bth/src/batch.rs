@@ -62,8 +62,8 @@ impl<'a> RayBatch<'a> {
         RayBatch { from: triangles.into(), ..self }
     }
 
-    /// Sets what the rays are allowed to hit; by default everything. With conditions, rays are traced one at a time and hints are not
-    /// used, as by [`Scene::nearest_accepted`].
+    /// Sets what the rays are allowed to hit; by default everything, whatever the masks of the scene. Where something is excluded, rays
+    /// are traced one at a time and hints are not used, as by [`Scene::nearest_accepted`].
     #[inline]
     pub fn accept(self, accept: &'a Accept<'a>) -> Self {
         RayBatch { accept: Some(accept), ..self }
@@ -87,7 +87,7 @@ impl<'a> RayBatch<'a> {
         if self.parallel {
             return self.in_tasks(hits, |part, hits| part.nearest(hits));
         }
-        match self.accept {
+        match self.conditions() {
             None => self.scene.nearest_hits_of(self.rays, self.from, hits),
             Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
         }
@@ -104,10 +104,16 @@ impl<'a> RayBatch<'a> {
         if self.parallel {
             return self.in_tasks(found, |part, found| part.any(found));
         }
-        match self.accept {
+        match self.conditions() {
             None => self.scene.any_hits_of(self.rays, self.from, found),
             Some(accept) => self.scene.any_accepted_batch(self.rays, accept, found),
         }
+    }
+
+    /// What the rays are allowed to hit; `None` if that is everything.
+    #[inline]
+    fn conditions(&self) -> Option<&'a Accept<'a>> {
+        self.accept.filter(|accept| !self.scene.accepts_everything(accept))
     }
 
     #[inline]

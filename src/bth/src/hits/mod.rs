@@ -16,6 +16,7 @@ pub use accept::{Accept, Cull, Filter};
 
 use self::collect::{Any, Count, First, FirstOf, Found};
 use self::search::search;
+use crate::masks::Masks;
 use crate::rays::{Hit, Ray};
 use crate::scene::Scene;
 use std::collections::BinaryHeap;
@@ -99,6 +100,26 @@ impl Scene {
         self.masks_mut().set_group(object, group, mask);
     }
 
+    /// The mask of an instance; all bits are set unless [`Self::set_instance_mask`] was called.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn instance_mask(&self, instance: u32) -> u32 {
+        let count = self.instance_count();
+        assert!(instance < count, "expected an instance below {count}, found {instance}");
+        self.masks().of_instance(instance)
+    }
+
+    /// The mask of a group of triangles of an object; all bits are set unless [`Self::set_group_mask`] was called.
+    ///
+    /// # Panics
+    /// If there is no such object, or if it has no such group.
+    pub fn group_mask(&self, object: u32, group: u32) -> u32 {
+        let count = self.group_count(object);
+        assert!(group < count, "expected a group below {count}, found {group}");
+        self.masks().groups(object).map_or(u32::MAX, |groups| Masks::of_group(groups, group))
+    }
+
     /// Number of groups of an object's triangles, at least 1.
     ///
     /// # Panics
@@ -108,7 +129,7 @@ impl Scene {
     }
 
     /// Whether every hit is accepted.
-    fn accepts_everything(&self, accept: &Accept<'_>) -> bool {
+    pub(crate) fn accepts_everything(&self, accept: &Accept<'_>) -> bool {
         let Accept { mask, cull, filter } = accept;
         self.masks().is_empty() && *mask != 0 && *cull == Cull::None && filter.is_none()
     }

@@ -1,0 +1,141 @@
+//! Overlaps of triangles with boxes and balls.
+
+use crate::output::{chunks, chunks_of, numbers};
+use crate::rays::{Bound1, Numbers, Rows, Vectors};
+use crate::scene::NativeScene;
+use bth::rays::PrimitiveRef;
+use numpy::{IntoPyArray, PyArray1, PyReadwriteArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::ops::Range;
+
+/// The arrays of a call: lower and upper ends of boxes, or centres and radii of balls.
+#[derive(FromPyObject)]
+pub(crate) enum RegionArrays<'py> {
+    Boxes {
+        #[pyo3(item(0))]
+        lower: Vectors<'py>,
+        #[pyo3(item(1))]
+        upper: Vectors<'py>,
+    },
+    Balls {
+        #[pyo3(item(0))]
+        center: Vectors<'py>,
+        #[pyo3(item(1))]
+        radius: Bound1<'py>,
+    },
+}
+
+/// Regions that may be shared between threads.
+#[derive(Clone, Copy)]
+enum Regions<'a> {
+    Boxes(Rows<'a>, Rows<'a>),
+    Balls(Rows<'a>, Numbers<'a>),
+}
+
+/// A region.
+#[derive(Clone, Copy, Default)]
+struct Region {
+    /// The lower end, or the centre.
+    first: [f32; 3],
+    upper: [f32; 3],
+    /// `None` for a box.
+    radius: Option<f32>,
+}
+
+impl RegionArrays<'_> {
+    fn regions(&self) -> PyResult<Regions<'_>> {
+        let (regions, one_length) = match self {
+            Self::Boxes { lower, upper } => {
+                let (lower, upper) = (lower.rows()?, upper.rows()?);
+                (Regions::Boxes(lower, upper), lower.len() == upper.len())
+            }
+            Self::Balls { center, radius } => {
+                let (center, radius) = (center.rows()?, radius.numbers());
+                (Regions::Balls(center, radius), radius.len().is_none_or(|n| n == center.len()))
+            }
+        };
+        if one_length { Ok(regions) } else { Err(PyValueError::new_err("the arrays differ in length")) }
+    }
+}
+
+impl Regions<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Boxes(first, _) | Self::Balls(first, _) => first.len(),
+        }
+    }
+
+    /// The regions of a range.
+    fn read(&self, range: Range<usize>) -> Vec<Region> {
+        let mut read = vec![Region::default(); range.len()];
+        match self {
+            Self::Boxes(lower, upper) => {
+                lower.each(range.clone(), |i, lower| read[i].first = lower);
+                upper.each(range, |i, upper| read[i].upper = upper);
+            }
+            Self::Balls(center, radius) => {
+                center.each(range.clone(), |i, center| read[i].first = center);
+                radius.each(range, |i, radius| read[i].radius = Some(radius));
+            }
+        }
+        read
+    }
+}
+
+/// Whether triangles overlap regions, into an array.
+#[pyfunction]
+pub(crate) fn overlaps(
+    py: Python<'_>,
+    scene: &NativeScene,
+    regions: RegionArrays<'_>,
+    threads: usize,
+    mut out: PyReadwriteArray1<'_, bool>,
+) -> PyResult<()> {
+    let (scene, regions) = (scene.get()?, regions.regions()?);
+    let jobs = chunks_of(numbers(&mut out, regions.len())?);
+    scene.run(py, threads, jobs, |scene, (range, found)| {
+        for (region, found) in regions.read(range).iter().zip(found) {
+            *found = match region.radius {
+                None => scene.overlaps_box(region.first, region.upper),
+                Some(radius) => scene.overlaps_sphere(region.first, radius),
+            };
+        }
+    })
+}
+
+/// The triangles that overlap regions: the number of each region's, and instances and triangles of all one after the other.
+#[pyfunction]
+pub(crate) fn triangles_in<'py>(
+    py: Python<'py>,
+    scene: &NativeScene,
+    regions: RegionArrays<'_>,
+    threads: usize,
+    mut counts: PyReadwriteArray1<'_, u64>,
+) -> PyResult<(Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u32>>)> {
+    let (scene, regions) = (scene.get()?, regions.regions()?);
+    let mut rows = numbers(&mut counts, regions.len())?;
+    let mut parts: Vec<Vec<PrimitiveRef>> = Vec::new();
+    parts.resize_with(regions.len().div_ceil(crate::rays::CHUNK), Vec::new);
+    let mut rest = parts.iter_mut();
+    let jobs = chunks(regions.len(), |count| {
+        let counts = rows.split_off_mut(..count).expect("a count for each region");
+        (counts, rest.next().expect("a part for each chunk"))
+    });
+    scene.run(py, threads, jobs, |scene, (range, (counts, all))| {
+        let mut triangles = Vec::new();
+        for (region, count) in regions.read(range).iter().zip(counts) {
+            match region.radius {
+                None => scene.triangles_in_box(region.first, region.upper, &mut triangles),
+                Some(radius) => scene.triangles_in_sphere(region.first, radius, &mut triangles),
+            }
+            *count = triangles.len() as u64;
+            all.extend_from_slice(&triangles);
+        }
+    })?;
+    let all = || parts.iter().flatten();
+    Ok((
+        all().map(|p| p.instance).collect::<Vec<_>>().into_pyarray(py),
+        all().map(|p| p.triangle).collect::<Vec<_>>().into_pyarray(py),
+    ))
+}

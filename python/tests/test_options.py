@@ -1,0 +1,112 @@
+"""Options of the compiler: all of the program's that have a meaning here, checked, and with the same effect."""
+
+import ast
+import inspect
+import os
+import pathlib
+import re
+import subprocess
+
+import models
+import pytest
+from test_bits import BTHC
+
+import bth
+
+PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "reference.md"
+#: Options of `bthc compile` that a function has no use for, and those that have another name.
+OTHERS = {
+    "jobs", "dry-run", "depfile", "format", "watch", "shard", "json", "quiet", "in-cache", "no-cache", "cache-dir", "no-geometry",
+    "help", "version", "isa",
+}
+OURS = {"cache", "geometry", "progress"}
+
+
+@pytest.mark.skipif(not PAGE.exists(), reason="not in the repository")
+def test_all_options_of_the_program():
+    section = re.search(r"^## bthc compile\n(.*?)^## ", PAGE.read_text(), re.S | re.M)[1]
+    rows = [re.split(r"(?<!\\)\|", line)[1] for line in section.splitlines() if line.startswith("| `")]
+    options = {name for row in rows for name in re.findall(r"--([a-z][a-z-]*)", row)}
+    parameters = {name.replace("_", "-") for name in inspect.signature(bth.compile).parameters} - {"model"} - OURS
+    assert options - OTHERS == parameters
+
+
+@pytest.fixture
+def path(tmp_path):
+    models.write_obj(tmp_path / "parts.obj", *models.parts())
+    return tmp_path / "parts.obj"
+
+
+@pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
+@pytest.mark.parametrize("options", [
+    {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16, "boxes": 8},
+    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
+])
+def test_bytes_of_the_program(path, options):
+    command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache", "--quiet"]
+    for name, value in options.items():
+        name = "--" + name.replace("_", "-")
+        command += ["--no-geometry"] if name == "--geometry" else [name] if value is True else [name, str(value)]
+    subprocess.run(command, check=True)
+    assert bth.compile(path, cache=False, **options).to_bytes() == path.with_suffix(".bth").read_bytes()
+
+
+@pytest.mark.parametrize("options, error", [
+    ({"alpha": "holes"}, ValueError), ({"attributes": "colours"}, ValueError), ({"names": "yes"}, TypeError), ({"threads": -1}, ValueError),
+    ({"threads": 5000}, ValueError), ({"threads": 1.5}, TypeError), ({"tet_deadline": 0}, ValueError), ({"tet_memory": 1}, ValueError),
+    ({"memory": 0}, ValueError), ({"min_tet_triangles": 0}, ValueError), ({"budget": -1}, ValueError), ({"c_tet": float("nan")}, ValueError),
+    ({"max_error": "much"}, ValueError), ({"cache_size": "large", "cache": True}, ValueError), ({"cache": 3.5}, TypeError),
+    ({"compact": True, "tets": "tet20"}, ValueError), ({"progress": 3}, TypeError), ({"rate": 0}, ValueError),
+    ({"cache": False, "shared_cache": "x"}, ValueError), ({"profile": "no such profile"}, OSError), ({"output": 7}, TypeError),
+    ({"shared_cache": "s3://bucket/prefix"}, ValueError),
+])
+def test_wrong_options(path, tmp_path, options, error):
+    if options.get("cache") is True or "shared_cache" in options and "cache" not in options:
+        options = {**options, "cache": tmp_path / "cache"}
+    with pytest.raises(error) as raised:
+        bth.compile(path, **options)
+    if error is not OSError and "compact" not in options:
+        names = [name for name in options if name != "cache"] or ["cache"]
+        assert any(name in str(raised.value) for name in names) or error is TypeError
+
+
+def test_shared_caches(path, tmp_path):
+    shared, size = tmp_path / "shared", "64MiB"
+    shared.mkdir()
+    first = bth.compile(path, cache=tmp_path / "one", shared_cache=shared, cache_size=size)
+    kept = {file for _, _, files in os.walk(shared) for file in files}
+    assert kept and bth.compile(path, cache=tmp_path / "two", shared_cache=str(shared), cache_size=1 << 26).to_bytes() == first.to_bytes()
+
+
+def test_shared_caches_of_the_environment(path, tmp_path, monkeypatch):
+    (tmp_path / "shared").mkdir()
+    monkeypatch.setenv("BTH_SHARED_CACHE", str(tmp_path / "shared"))
+    first = bth.compile(path, cache=tmp_path / "one")
+    assert any(files for _, _, files in os.walk(tmp_path / "shared"))
+    monkeypatch.setenv("BTH_SHARED_CACHE", "s3://bucket/prefix")
+    with pytest.warns(UserWarning, match="BTH_SHARED_CACHE") as warned:
+        assert bth.compile(path, cache=tmp_path / "two").to_bytes() == first.to_bytes()
+    assert warned[0].filename == __file__
+
+
+def test_progress_and_cancelling(path):
+    stages = []
+    big = models.parts(count=30000)
+    corners = big[0].reshape(-1, 3)
+    bth.compile((corners, [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(30000)]), quality="best", progress=lambda *a: stages.append(a))
+    assert all(isinstance(stage, str) and done >= 0 and (total is None or total >= 0) for stage, done, total in stages)
+
+    def cancel(*_):
+        raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        for _ in range(50):
+            bth.compile((corners, [[3 * i, 3 * i + 1, 3 * i + 2] for i in range(30000)]), quality="best", progress=cancel)
+
+
+def test_stubs_have_the_options():
+    stub = pathlib.Path(bth.__file__).parent / "_compile.pyi"
+    functions = {f.name: {a.arg for a in f.args.kwonlyargs} for f in ast.parse(stub.read_text()).body if isinstance(f, ast.FunctionDef)}
+    parameters = set(inspect.signature(bth.compile).parameters) - {"model"}
+    assert functions["compile"] == parameters
+    assert functions["compile_scene"] == parameters - {"flatten", "scene", "animation", "rate", "strict"}

@@ -1,0 +1,78 @@
+"""A program with types, which mypy checks (python/test), and test_docs.py runs."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import bth
+
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def nearest(scene: bth.Scene, rays: NDArray[np.float32]) -> NDArray[np.float64]:
+    hits: bth.Hits = scene.nearest(rays[..., :3], rays[..., 3:], tmax=9, mask=3, cull="back", filter=keep)
+    t: NDArray[np.float32] = hits.t
+    triangle: NDArray[np.uint32] = hits.triangle
+    found: NDArray[np.bool_] = scene.any(hits.position, [0, 0, 1], start=hits)
+    group: str = hits.group_name.item(0)
+    surface: bth.SurfacePoints = hits.surface()
+    assert t.shape == triangle.shape == found.shape == surface.texcoord.shape[:-1] and group == ""
+    return hits.shading_normal
+
+
+def keep(candidate: bth.Candidate) -> bool:
+    return candidate.u + candidate.v < 0.9 and candidate.opacity != bth.Opacity.UNKNOWN
+
+
+def masks(scene: bth.Scene) -> list[int]:
+    scene.set_instance_mask(0, 1)
+    scene.set_group_mask("", 3)
+    scene.set_group_mask(0, 3, obj=0)
+    masks: NDArray[np.uint32] = scene.group_masks()
+    return [int(mask) for mask in masks]
+
+
+def many(scene: bth.Scene, points: NDArray[np.float64]) -> None:
+    every: bth.AllHits = scene.all_hits(points, [0, 0, 1], most=3)
+    offsets: NDArray[np.int64] = every.offsets
+    count: NDArray[np.int64] = scene.count(points, [0, 0, 1])
+    passages, winding = scene.crossings(points, [0, 0, 1])
+    closest: bth.Closest = scene.closest(points, radius=5)
+    inside: NDArray[np.bool_] = scene.contains(points) & scene.overlaps_sphere(points, closest.distance)
+    overlaps: bth.Overlaps = scene.triangles_in_box(points - 1, points + 1)
+    box: NDArray[np.float32] | None = scene.bounds
+    assert box is not None and len(offsets) == count.size + 1 == inside.size + 1 and len(overlaps) <= 4 * count.size
+    assert passages.shape == winding.shape == closest.feature.shape
+
+
+def compiled(path: Path) -> bth.Scene:
+    with bth.compile((VERTICES, FACES), quality="fast", names=True, output=path) as first:
+        data: bytes = first.to_bytes()
+    scenes = [bth.open(path, mmap=True), bth.load(data), bth.compile_scene([(VERTICES, FACES)], [0, 0], np.eye(4), threads=1)]
+    frames: tuple[int, int, float] | None = scenes[2].frames
+    assert frames is not None and frames[0] == 0
+    return scenes[0]
+
+
+def wrong(scene: bth.Scene) -> None:
+    """What mypy must refuse; never called."""
+    scene.nearest([0, 0, 0], [0, 0, 1], cull="left")  # type: ignore[arg-type]
+    scene.any([0, 0, 0], [0, 0, 1], filter=3)  # type: ignore[arg-type]
+    bth.compile("model.obj", alpha="holes")  # type: ignore[arg-type]
+    bth.compile_scene([], flatten=True)  # type: ignore[call-arg]
+    scene.nearst([0, 0, 0], [0, 0, 1])  # type: ignore[attr-defined]
+    scene.bounds = None  # type: ignore[misc]
+
+
+def main(folder: Path) -> None:
+    scene = compiled(folder / "tetrahedron.bth")
+    try:
+        bth.load(b"nothing")
+    except bth.Error as error:
+        code: str = error.code
+        assert code.startswith("BTH-F")
+    many(scene, np.full((2, 3), 0.1))
+    assert nearest(scene, np.array([[0.2, 0.2, -1, 0, 0, 1]], np.float32)).tolist() == [[0, 0, -1]]
+    assert masks(scene) == [3]

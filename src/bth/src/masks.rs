@@ -38,6 +38,13 @@ impl Masks {
         store(&mut self.instances, instance, mask);
     }
 
+    /// Sets all bits of the mask of an instance that was removed.
+    pub(crate) fn reset_instance(&mut self, instance: u32) {
+        if let Some(mask) = self.instances.get_mut(instance as usize) {
+            *mask = u32::MAX;
+        }
+    }
+
     /// The masks of an object's groups, for [`Self::of_group`]; `None` if none was set.
     pub(crate) fn groups(&self, object: u32) -> Option<&[u32]> {
         self.groups.get(object as usize).map(Vec::as_slice).filter(|masks| !masks.is_empty())

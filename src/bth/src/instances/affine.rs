@@ -57,6 +57,12 @@ impl Affine {
         Affine { linear: [row(0), row(1), row(2)], translation: [t[3], t[7], t[11]] }
     }
 
+    /// The transform with the rows of four of `m`, one after the other.
+    pub(crate) fn from_f32(m: &[f32; 12]) -> Affine {
+        let row = |i: usize| [m[4 * i], m[4 * i + 1], m[4 * i + 2]].map(f64::from);
+        Affine { linear: [row(0), row(1), row(2)], translation: [m[3], m[7], m[11]].map(f64::from) }
+    }
+
     /// The product: `inner` is applied first, then `self`.
     pub(crate) fn times(&self, inner: &Affine) -> Affine {
         let column = |k: usize| [0, 1, 2].map(|row| inner.linear[row][k]);

@@ -1,15 +1,12 @@
 //! Tests of batches through instances. The oracle is a loop over all instances.
 
 use super::super::affine::Affine;
+use super::super::exact_loop;
 use super::super::placement::PartBoxes;
 use super::*;
-use crate::bvh::candidate::{Candidate, ReadCorners};
 use crate::hits::Accept;
-use crate::intersect::exact::reported;
-use crate::intersect::line::Line;
 use crate::scene::Scene;
 use bth_format::File;
-use bth_format::layout::Child;
 use bth_random::Rng;
 
 const FILES: [&[u8]; 2] = [
@@ -256,51 +253,15 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
     assert!(hit_count > ray_count / 4, "{hit_count} of {ray_count} hit");
 }
 
-/// The triangles of an object with their ids, without any test of boxes.
-fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
-    let (mut found, mut stack) = (vec![], vec![object.header.root]);
-    while let Some(code) = stack.pop() {
-        let Some(child) = Child::from_code(code) else { continue };
-        let count = match child {
-            Child::Indexed(at) => object.indexed(at, &mut None).triangles,
-            Child::Raw(at) => object.raw(at, &mut None).triangles,
-            Child::Node(_) | Child::Packed(_) => {
-                stack.extend(object.unpacked_node(child).expect("a node").child);
-                continue;
-            }
-            Child::Tets(_) => panic!("a file without tetrahedra"),
-        };
-        for triangle in 0..count {
-            let candidate = Candidate { leaf: code, triangle };
-            let (index, corners) = candidate.read(object, ReadCorners).expect("a leaf");
-            found.push((object.triangle_ids[index as usize], corners));
-        }
-    }
-    found
-}
-
 /// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the documented order.
 fn hits_by_loop(world: &World, file: &File, ray: &Ray) -> Vec<Hit> {
     let mut found = vec![];
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
-        let object_ray = placement.inverse.ray(ray);
-        let Some(line) = Line::new(&object_ray.ray) else { continue };
-        for (triangle, corners) in triangles(&file.object(placement.object()).unwrap()) {
-            let Some(at) = line.intersection(corners) else { continue };
-            let in_object = reported(at.t);
-            let t = if object_ray.t_scale == 1.0 { in_object } else { in_object * object_ray.t_scale };
-            let Ray { tmin, tmax, .. } = object_ray.ray;
-            if tmin <= in_object && in_object <= tmax && ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY {
-                let [u, v] = at.uv();
-                let primitive = PrimitiveRef { instance: instance as u32, triangle };
-                found.push((at.t, Hit { t, u, v, primitive }));
-            }
-        }
+        let object = file.object(placement.object()).unwrap();
+        exact_loop::add_hits(&object, &placement.inverse, instance as u32, ray, &mut found);
     }
-    let order = |(exact, hit): &(f64, Hit)| (hit.t, hit.primitive.instance, *exact, hit.primitive.triangle);
-    found.sort_by(|a, b| order(a).partial_cmp(&order(b)).expect("no NaN"));
-    found.into_iter().map(|(_, hit)| hit).collect()
+    exact_loop::in_order(found)
 }
 
 #[test]

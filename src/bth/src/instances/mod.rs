@@ -13,6 +13,8 @@ mod batch;
 mod caller;
 mod enter_object;
 mod enumerate;
+#[cfg(test)]
+pub(crate) mod exact_loop;
 mod file_scene;
 mod hierarchy;
 mod packets;
@@ -28,7 +30,11 @@ mod world;
 pub(crate) use affine::{Affine, ObjectRay};
 pub(crate) use caller::NewInstance;
 pub(crate) use hierarchy::NodeHierarchy;
+#[cfg(test)]
+pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
 pub(crate) use top_level::INSTANCE;
+#[cfg(test)]
+pub(crate) use top_level::TopLevel;
 pub use world::Update;
 pub(crate) use world::{InstanceRow, Placed, World};

@@ -57,7 +57,7 @@ fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
 
 impl TopLevel {
     /// Computes all boxes again after instances have moved. The visible instances are those for which the BVH was built.
-    pub(super) fn refit(&mut self, placements: &[Option<Placement>]) {
+    pub(crate) fn refit(&mut self, placements: &[Option<Placement>]) {
         self.measure(placements);
         let mut lines = std::mem::take(&mut self.lines);
         self.refit_instances(&mut lines, placements);

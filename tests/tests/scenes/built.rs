@@ -5,6 +5,7 @@ use crate::support::{compiled, manifest, models, options, varied};
 use bth::rays::{Hit, Ray};
 use bth::{Accept, Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
+use bth_compile::pipeline::CompileOptions;
 use bth_random::Rng;
 use std::fmt::Write;
 use std::path::Path;
@@ -177,7 +178,11 @@ fn names_and_groups_lead_back_to_the_file_of_each_object() {
     let text = r#"objects = [{ name = "trunk", model = "knot.ply" }, { name = "leaf", model = "quad.obj" }]
 nodes = [{ name = "a", object = "trunk" }, { name = "b", object = "leaf", translation = [9, 0, 0] }]
 "#;
-    let (tree, _) = compiled(&manifest(text), folder.path());
+    let named = CompileOptions { names: true, ..options() };
+    let path = Path::new("tree.manifest");
+    let (tree, _) =
+        bth_compile::scene::compile(&manifest(text), folder.path(), path, &named, &Silent).unwrap();
+    let tree = bth::from_bytes(&tree.bytes).unwrap();
     let (compiled, _) =
         bth_compile::pipeline::compile(Path::new(&folder.path().join("quad.obj")), &options(), &Silent)
             .unwrap();

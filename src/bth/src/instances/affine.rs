@@ -26,7 +26,12 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Maximum norm of a matrix: the greatest sum of the absolute values of a row.
 fn norm(rows: &[[f64; 3]; 3]) -> f64 {
-    rows.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0, f64::max)
+    rows.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0, |m, x| if x > m { x } else { m })
+}
+
+/// Whether all elements are finite, without branches.
+fn all_finite(rows: &[[f64; 3]; 3]) -> bool {
+    rows.iter().flatten().fold(true, |finite, x| finite & x.is_finite())
 }
 
 impl Affine {
@@ -77,7 +82,7 @@ impl Affine {
     }
 
     pub(crate) fn is_finite(&self) -> bool {
-        self.linear.iter().flatten().chain(&self.translation).all(|x| x.is_finite())
+        all_finite(&self.linear) & self.translation.iter().fold(true, |finite, x| finite & x.is_finite())
     }
 
     /// Whether the linear part is zero.
@@ -99,7 +104,8 @@ impl Affine {
             return None;
         }
         // Scaling by a power of two brings the greatest element near 1, so that no product overflows or underflows.
-        let greatest = self.linear.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
+        let greatest: f64 =
+            self.linear.iter().flatten().fold(0.0, |m, x| if x.abs() > m { x.abs() } else { m });
         let exponent = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
         let scale = 1.0 / exponent;
         if !(exponent > 0.0 && scale.is_finite() && scale > 0.0) {
@@ -109,7 +115,7 @@ impl Affine {
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let determinant = dot(a, cofactors[0]);
         let linear = [0, 1, 2].map(|k| [0, 1, 2].map(|j| cofactors[j][k] / determinant));
-        if !linear.iter().flatten().all(|x| x.is_finite()) {
+        if !all_finite(&linear) {
             return None;
         }
         let condition = norm(&[a, b, c]) * norm(&linear);

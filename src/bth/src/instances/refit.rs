@@ -52,7 +52,7 @@ fn used(node: &WideNode) -> usize {
 fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
     let end = |end: usize| [0, 1, 2].map(|k| node.bounds[k][end][slot]);
     let ([a, b, c], [d, e, f]) = (end(0), end(1));
-    Bounds([-a, -b, -c, d, e, f])
+    Bounds { lower: [-a, -b, -c, 0.0], upper: [d, e, f, 0.0] }
 }
 
 impl TopLevel {

@@ -41,32 +41,51 @@ const MIN_PARALLEL: usize = 4096;
 /// A visible instance, while the BVH is built.
 #[derive(Clone, Copy, Debug)]
 struct BuildItem {
-    /// Its world box, widened for rays from within the reach.
+    /// Its world box, widened for rays from within the reach. In the unused number of the lower end are the bits of its index.
     bounds: Bounds,
-    /// Index of the instance.
-    instance: u32,
 }
 
-/// A box: the three lower ends, negated so that a union is a maximum of all six values, and the three upper ends.
+impl BuildItem {
+    fn new(mut bounds: Bounds, instance: u32) -> BuildItem {
+        bounds.lower[3] = f32::from_bits(instance);
+        BuildItem { bounds }
+    }
+    fn instance(&self) -> u32 {
+        self.bounds.lower[3].to_bits()
+    }
+}
+
+/// Three numbers, for each axis one, and one that has no meaning, so that they fill a vector register.
+type Axes = [f32; 4];
+
+#[inline(always)]
+fn greater(a: Axes, b: Axes) -> Axes {
+    std::array::from_fn(|i| if b[i] > a[i] { b[i] } else { a[i] })
+}
+
+/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounds(pub(super) [f32; 6]);
+#[repr(align(32))]
+pub(super) struct Bounds {
+    pub(super) lower: Axes,
+    pub(super) upper: Axes,
+}
 
 impl Bounds {
-    pub(super) const EMPTY: Bounds = Bounds([f32::NEG_INFINITY; 6]);
+    pub(super) const EMPTY: Bounds = Bounds { lower: [f32::NEG_INFINITY; 4], upper: [f32::NEG_INFINITY; 4] };
 
     /// Enlarges the box to contain another.
+    #[inline(always)]
     pub(super) fn grow(&mut self, other: &Bounds) {
-        for i in 0..6 {
-            self.0[i] = if other.0[i] > self.0[i] { other.0[i] } else { self.0[i] };
-        }
+        (self.lower, self.upper) = (greater(self.lower, other.lower), greater(self.upper, other.upper));
     }
     /// Twice the centre along an axis.
     fn center(&self, axis: usize) -> f32 {
-        self.0[3 + axis] - self.0[axis]
+        self.upper[axis] - self.lower[axis]
     }
     /// Half the surface area, in f64 because f32 could overflow.
     pub(super) fn area(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.0[3 + k]) + f64::from(self.0[k]));
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.upper[k]) + f64::from(self.lower[k]));
         x * y + y * z + z * x
     }
 }
@@ -77,17 +96,17 @@ struct ItemRange {
     first: u32,
     end: u32,
     bounds: Bounds,
-    /// For each axis twice the least coordinate of the items' centres.
-    least: [f32; 3],
+    /// For each axis twice the least coordinate of the items' centres, negated.
+    least: Axes,
     /// For each axis twice the greatest coordinate of the items' centres.
-    greatest: [f32; 3],
+    greatest: Axes,
 }
 
 impl ItemRange {
     /// A range without items that begins at `first`.
     fn empty(first: u32) -> ItemRange {
-        let (least, greatest) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        ItemRange { first, end: first, bounds: Bounds::EMPTY, least, greatest }
+        let none = [f32::NEG_INFINITY; 4];
+        ItemRange { first, end: first, bounds: Bounds::EMPTY, least: none, greatest: none }
     }
 
     fn of(first: u32, items: &[BuildItem]) -> ItemRange {
@@ -100,11 +119,9 @@ impl ItemRange {
     fn add(&mut self, bounds: &Bounds) {
         self.end += 1;
         self.bounds.grow(bounds);
-        for k in 0..3 {
-            let c = bounds.center(k);
-            self.least[k] = if c < self.least[k] { c } else { self.least[k] };
-            self.greatest[k] = if c > self.greatest[k] { c } else { self.greatest[k] };
-        }
+        let center: Axes = std::array::from_fn(|k| bounds.upper[k] - bounds.lower[k]);
+        self.greatest = greater(self.greatest, center);
+        self.least = greater(self.least, center.map(|x| -x));
     }
 
     fn len(&self) -> u32 {
@@ -131,7 +148,7 @@ impl TopLevel {
         self.measure(placements);
         let visible = placements.iter().enumerate();
         let item = |(instance, placement): (usize, &Option<Placement>)| {
-            Some(BuildItem { bounds: self.bounds_of(placement.as_ref()?), instance: instance as u32 })
+            Some(BuildItem::new(self.bounds_of(placement.as_ref()?), instance as u32))
         };
         let mut items = Vec::with_capacity(placements.len());
         items.extend(visible.filter_map(item));
@@ -155,8 +172,8 @@ impl TopLevel {
         let pad = (placement.origin_slack * self.reach).next_up();
         let mut bounds = Bounds::EMPTY;
         for k in 0..3 {
-            bounds.0[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
-            bounds.0[3 + k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
+            bounds.lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
+            bounds.upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
         }
         bounds
     }
@@ -241,7 +258,7 @@ fn build_subtree(lines: &mut Vec<CacheLine>, items: &mut [BuildItem], range: Ite
         depth = depth.max(level);
         if range.len() <= WIDTH as u32 {
             for (slot, item) in items[range.first as usize..range.end as usize].iter().enumerate() {
-                put(lines, node, slot, INSTANCE | item.instance, &item.bounds);
+                put(lines, node, slot, INSTANCE | item.instance(), &item.bounds);
             }
             continue;
         }
@@ -279,8 +296,8 @@ fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Boun
 /// Stores the box of a child in a slot of a node.
 pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &Bounds) {
     for k in 0..3 {
-        node.bounds[k][0][slot] = -bounds.0[k];
-        node.bounds[k][1][slot] = bounds.0[3 + k];
+        node.bounds[k][0][slot] = -bounds.lower[k];
+        node.bounds[k][1][slot] = bounds.upper[k];
     }
 }
 
@@ -310,9 +327,9 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize
 fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];
     // Differences may overflow to infinity, which is then the greatest extent.
-    let spread = [0, 1, 2].map(|k| range.greatest[k] - range.least[k]);
+    let spread = [0, 1, 2].map(|k| range.greatest[k] + range.least[k]);
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
-    let middle = range.least[axis] / 2.0 + range.greatest[axis] / 2.0;
+    let middle = range.greatest[axis] / 2.0 - range.least[axis] / 2.0;
     let (mut left, mut right) = (ItemRange::empty(range.first), ItemRange::empty(0));
     let (mut i, mut end) = (0, items.len());
     while i < end {

@@ -3,6 +3,7 @@
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::world::{InstanceRow, TransformSource, Update, World};
 use crate::objects::Objects;
+use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -155,12 +156,11 @@ impl World {
         new: &impl Fn(u32) -> NewInstance,
         placed: &mut [Result<Option<Placement>, PlacementError>],
     ) {
-        for (&instance, placed) in changed.iter().zip(placed) {
-            *placed = self.place(objects, &new(instance));
-        }
+        Isa::chosen().run(PlaceKernel { world: self, objects, changed, new, placed });
     }
 
     /// The placement of an instance; `None` if it is not visible.
+    #[inline(always)]
     fn place(&self, objects: &Objects, new: &NewInstance) -> Result<Option<Placement>, PlacementError> {
         let InstanceRow { object, to_world, .. } = &new.row;
         if !new.visible || *object == NONE {
@@ -181,5 +181,26 @@ impl World {
             None => &PartBoxes::whole(view.header),
         };
         Placement::new(to_world, *object, view.header, parts).map(Some)
+    }
+}
+
+/// Kernel that computes the placements of changed instances.
+struct PlaceKernel<'a, N> {
+    world: &'a World,
+    objects: &'a Objects,
+    changed: &'a [u32],
+    new: &'a N,
+    placed: &'a mut [Result<Option<Placement>, PlacementError>],
+}
+
+impl<N: Fn(u32) -> NewInstance> Kernel for PlaceKernel<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        // The loops of a placement are vectorized with the registers of the instruction set.
+        for (&instance, placed) in self.changed.iter().zip(self.placed) {
+            *placed = self.world.place(self.objects, &(self.new)(instance));
+        }
     }
 }

@@ -68,10 +68,11 @@ impl PartBoxes {
     #[inline(always)]
     fn extent_along(&self, row: [f64; 3]) -> [f64; 2] {
         // The signs of the row's elements determine at which corners of a box the product is least and greatest.
-        let ends = [0, 1, 2].map(|k| {
+        let mut ends = [[&self.bounds[0][0]; 2]; 3];
+        for k in 0..3 {
             let [low, high] = &self.bounds[k];
-            if row[k] < 0.0 { [high, low] } else { [low, high] }
-        });
+            ends[k] = if row[k] < 0.0 { [high, low] } else { [low, high] };
+        }
         let (mut least, mut greatest) = ([f64::INFINITY; BLOCK], [f64::NEG_INFINITY; BLOCK]);
         for block in 0..self.blocks {
             let product = |end: usize, i: usize| {
@@ -110,6 +111,7 @@ impl Placement {
     /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|, in the maximum norm.
     ///
     /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter world box.
+    #[inline(always)]
     pub(crate) fn new(
         world: &Affine,
         index: u32,
@@ -120,9 +122,14 @@ impl Placement {
             return Err(PlacementError::NotFinite);
         }
         let (inverse, condition) = world.inverse().ok_or(PlacementError::Singular)?;
-        let coordinate = |v: &[f64; 3]| v.iter().fold(0.0, |m, x| if x.abs() > m { x.abs() } else { m });
-        let greatest = coordinate(&object.lower.map(f64::from)).max(coordinate(&object.upper.map(f64::from)));
-        let pad = ROUNDING * (condition * coordinate(&world.translation) + world.norm() * greatest);
+        let (mut greatest, mut far) = (0.0, 0.0);
+        for k in 0..3 {
+            let ends = f64::from(object.lower[k].abs().max(object.upper[k].abs()));
+            greatest = if ends > greatest { ends } else { greatest };
+            let translation = world.translation[k].abs();
+            far = if translation > far { translation } else { far };
+        }
+        let pad = ROUNDING * (condition * far + world.norm() * greatest);
         let mut placement = Placement {
             inverse,
             lower: [0.0; 3],
@@ -135,8 +142,10 @@ impl Placement {
             placement.lower[k] = ((world.translation[k] + lower - pad) as f32).next_down();
             placement.upper[k] = ((world.translation[k] + upper + pad) as f32).next_up();
         }
-        let ends = placement.lower.iter().chain(&placement.upper);
-        let finite = ends.fold(true, |finite, x| finite & x.is_finite());
+        let mut finite = true;
+        for k in 0..3 {
+            finite &= placement.lower[k].is_finite() & placement.upper[k].is_finite();
+        }
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
     }
 

@@ -4,6 +4,7 @@
 use super::placement::Placement;
 use super::top_level::{Bounds, INSTANCE, TopLevel, node_mut, put_bounds};
 use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use glam::Vec4;
 
 /// From this number of nodes on, the boxes of instances are stored by several threads.
 #[cfg(feature = "rayon")]
@@ -52,7 +53,7 @@ fn used(node: &WideNode) -> usize {
 fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
     let end = |end: usize| [0, 1, 2].map(|k| node.bounds[k][end][slot]);
     let ([a, b, c], [d, e, f]) = (end(0), end(1));
-    Bounds { lower: [-a, -b, -c, 0.0], upper: [d, e, f, 0.0] }
+    Bounds { lower: Vec4::new(-a, -b, -c, 0.0), upper: Vec4::new(d, e, f, 0.0) }
 }
 
 impl TopLevel {
@@ -114,9 +115,15 @@ impl TopLevel {
 
 /// The box of all children of a node. Empty slots hold boxes that change no union.
 fn union(node: &WideNode) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for slot in 0..WIDTH {
-        bounds.grow(&slot_bounds(node, slot));
+    let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
+    for k in 0..3 {
+        let (mut least, mut greatest) = (f32::INFINITY, f32::NEG_INFINITY);
+        for slot in 0..WIDTH {
+            let (low, high) = (node.bounds[k][0][slot], node.bounds[k][1][slot]);
+            least = if low < least { low } else { least };
+            greatest = if high > greatest { high } else { greatest };
+        }
+        (lower[k], upper[k]) = (-least, greatest);
     }
-    bounds
+    Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
 }

@@ -7,6 +7,7 @@
 use super::placement::Placement;
 use super::refit::CostRatio;
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
+use glam::Vec4;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
@@ -45,47 +46,35 @@ struct BuildItem {
     bounds: Bounds,
 }
 
+/// Bits of the least normal number. Indices of instances are below 2^30, so their sum is far below the bits of infinity.
+const LEAST_NORMAL: u32 = f32::MIN_POSITIVE.to_bits();
+
 impl BuildItem {
     fn new(mut bounds: Bounds, instance: u32) -> BuildItem {
-        bounds.lower[3] = f32::from_bits(instance);
+        // Neither a denormal number, with which arithmetic may be slow, nor a NaN, whose bits might not survive a copy.
+        bounds.lower.w = f32::from_bits(instance + LEAST_NORMAL);
         BuildItem { bounds }
     }
     fn instance(&self) -> u32 {
-        self.bounds.lower[3].to_bits()
+        self.bounds.lower.w.to_bits() - LEAST_NORMAL
     }
 }
 
-/// Three numbers, for each axis one, and one that has no meaning, so that they fill a vector register.
-type Axes = [f32; 4];
-
-#[inline(always)]
-fn greater(a: Axes, b: Axes) -> Axes {
-    std::array::from_fn(|i| if b[i] > a[i] { b[i] } else { a[i] })
-}
-
-/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends.
+/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends. The fourth numbers have
+/// no meaning; they fill vector registers.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
 pub(super) struct Bounds {
-    pub(super) lower: Axes,
-    pub(super) upper: Axes,
+    pub(super) lower: Vec4,
+    pub(super) upper: Vec4,
 }
 
 impl Bounds {
-    pub(super) const EMPTY: Bounds = Bounds { lower: [f32::NEG_INFINITY; 4], upper: [f32::NEG_INFINITY; 4] };
+    pub(super) const EMPTY: Bounds = Bounds { lower: Vec4::NEG_INFINITY, upper: Vec4::NEG_INFINITY };
 
-    /// Enlarges the box to contain another.
-    #[inline(always)]
-    pub(super) fn grow(&mut self, other: &Bounds) {
-        (self.lower, self.upper) = (greater(self.lower, other.lower), greater(self.upper, other.upper));
-    }
-    /// Twice the centre along an axis.
-    fn center(&self, axis: usize) -> f32 {
-        self.upper[axis] - self.lower[axis]
-    }
     /// Half the surface area, in f64 because f32 could overflow.
     pub(super) fn area(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.upper[k]) + f64::from(self.lower[k]));
+        let (lower, upper) = (self.lower.to_array(), self.upper.to_array());
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(upper[k]) + f64::from(lower[k]));
         x * y + y * z + z * x
     }
 }
@@ -97,31 +86,33 @@ struct ItemRange {
     end: u32,
     bounds: Bounds,
     /// For each axis twice the least coordinate of the items' centres, negated.
-    least: Axes,
+    least: Vec4,
     /// For each axis twice the greatest coordinate of the items' centres.
-    greatest: Axes,
+    greatest: Vec4,
 }
 
 impl ItemRange {
     /// A range without items that begins at `first`.
     fn empty(first: u32) -> ItemRange {
-        let none = [f32::NEG_INFINITY; 4];
+        let none = Vec4::NEG_INFINITY;
         ItemRange { first, end: first, bounds: Bounds::EMPTY, least: none, greatest: none }
     }
 
     fn of(first: u32, items: &[BuildItem]) -> ItemRange {
         let mut range = ItemRange::empty(first);
-        items.iter().for_each(|item| range.add(&item.bounds));
+        range.end += items.len() as u32;
+        items.iter().for_each(|item| range.enclose(&item.bounds, Vec4::INFINITY));
         range
     }
 
+    /// Enlarges the boxes for an item if `limit` is infinite, and leaves them as they are if it is negative infinity.
     #[inline(always)]
-    fn add(&mut self, bounds: &Bounds) {
-        self.end += 1;
-        self.bounds.grow(bounds);
-        let center: Axes = std::array::from_fn(|k| bounds.upper[k] - bounds.lower[k]);
-        self.greatest = greater(self.greatest, center);
-        self.least = greater(self.least, center.map(|x| -x));
+    fn enclose(&mut self, bounds: &Bounds, limit: Vec4) {
+        let center = bounds.upper - bounds.lower;
+        self.bounds.lower = self.bounds.lower.max(bounds.lower.min(limit));
+        self.bounds.upper = self.bounds.upper.max(bounds.upper.min(limit));
+        self.greatest = self.greatest.max(center.min(limit));
+        self.least = self.least.max((-center).min(limit));
     }
 
     fn len(&self) -> u32 {
@@ -161,8 +152,10 @@ impl TopLevel {
         (self.extent, self.origin_slack) = (0.0, 0.0);
         for placement in placements.iter().flatten() {
             self.origin_slack = self.origin_slack.max(placement.origin_slack);
-            let ends = placement.lower.iter().chain(&placement.upper);
-            self.extent = ends.fold(self.extent, |m, x| m.max(x.abs()));
+            for k in 0..3 {
+                let greater = placement.upper[k].abs().max(placement.lower[k].abs());
+                self.extent = self.extent.max(greater);
+            }
         }
         self.reach = REACH * self.extent;
     }
@@ -170,12 +163,12 @@ impl TopLevel {
     /// The world box of an instance, widened for rays from within the reach.
     pub(super) fn bounds_of(&self, placement: &Placement) -> Bounds {
         let pad = (placement.origin_slack * self.reach).next_up();
-        let mut bounds = Bounds::EMPTY;
+        let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
         for k in 0..3 {
-            bounds.lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
-            bounds.upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
+            lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
+            upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
         }
-        bounds
+        Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
     }
 
     fn build_from(&mut self, items: &mut [BuildItem]) {
@@ -295,9 +288,10 @@ fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Boun
 
 /// Stores the box of a child in a slot of a node.
 pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &Bounds) {
+    let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
     for k in 0..3 {
-        node.bounds[k][0][slot] = -bounds.lower[k];
-        node.bounds[k][1][slot] = bounds.upper[k];
+        node.bounds[k][0][slot] = -lower[k];
+        node.bounds[k][1][slot] = upper[k];
     }
 }
 
@@ -327,29 +321,34 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize
 fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];
     // Differences may overflow to infinity, which is then the greatest extent.
-    let spread = [0, 1, 2].map(|k| range.greatest[k] + range.least[k]);
+    let spread = (range.greatest + range.least).to_array();
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
-    let middle = range.greatest[axis] / 2.0 - range.least[axis] / 2.0;
+    let middle = (range.greatest / 2.0 - range.least / 2.0).to_array()[axis];
+    // Lanes other than the axis are compared with a number that is greater than none.
+    let mut limits = [f32::NEG_INFINITY; 4];
+    limits[axis] = middle;
+    let limits = Vec4::from_array(limits);
     let (mut left, mut right) = (ItemRange::empty(range.first), ItemRange::empty(0));
-    let (mut i, mut end) = (0, items.len());
-    while i < end {
-        let bounds = items[i].bounds;
-        if bounds.center(axis) < middle {
-            left.add(&bounds);
-            i += 1;
-        } else {
-            right.add(&bounds);
-            end -= 1;
-            items.swap(i, end);
-        }
+    let mut count = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        let is_left = (item.bounds.upper - item.bounds.lower).cmplt(limits).any();
+        // There are no branches, because on which side an item lies is not predictable.
+        items[i] = items[count];
+        items[count] = item;
+        count += usize::from(is_left);
+        let limit = Vec4::splat(if is_left { f32::INFINITY } else { f32::NEG_INFINITY });
+        left.enclose(&item.bounds, limit);
+        right.enclose(&item.bounds, -limit);
     }
-    if i == 0 || i == items.len() {
+    if count == 0 || count == items.len() {
         let half = items.len() / 2;
         return (
             ItemRange::of(range.first, &items[..half]),
             ItemRange::of(range.first + half as u32, &items[half..]),
         );
     }
+    left.end = range.first + count as u32;
     (right.first, right.end) = (left.end, range.end);
     (left, right)
 }

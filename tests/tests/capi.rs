@@ -285,6 +285,86 @@ fn a_c_program_moves_a_scene_and_sees_what_rust_sees() {
 }
 
 #[test]
+fn a_c_program_builds_a_scene_of_two_files_as_rust_does() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "builder") else { return };
+    let quad = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
+    let model = folder.path().join("quad.obj");
+    std::fs::write(&model, quad).expect("a model");
+    let manifest = bth_scene::parse(SCENE, Path::new("wheel.manifest")).expect("a manifest");
+    let options = CompileOptions::default();
+    let (moving, _) =
+        bth_compile::scene::compile(&manifest, folder.path(), Path::new("wheel"), &options, &Silent)
+            .expect("the wheel compiles");
+    let (still, _) = compile(&model, &options, &Silent).expect("the quad compiles");
+    let files = [("still", &still.bytes), ("moving", &moving.bytes)].map(|(name, bytes)| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, bytes).expect("a file");
+        file.to_str().expect("UTF-8").to_owned()
+    });
+    let points: Vec<[f32; 2]> =
+        (0..60).map(|i| [0.8 * i as f32 - 20.0, 0.3 * (i % 5) as f32 - 0.7]).collect();
+    let input: String = points.iter().map(|[x, z]| format!("{x} {z}\n")).collect();
+    let output = run(&program, &files.each_ref().map(String::as_str), &input);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).expect("text");
+
+    let mut expected = String::new();
+    let mut builder = bth::SceneBuilder::new();
+    let [quad, wheel] =
+        [&still.bytes, &moving.bytes].map(|b| builder.add(&bth::from_bytes(b).expect("a file")));
+    let at = |x: f32, y: f32, z: f32, s: f32| [s, 0.0, 0.0, x, 0.0, s, 0.0, y, 0.0, 0.0, s, z];
+    let line = |i: u32, step: f32, z: f32| at(2.5 * i as f32 - 20.0, step * i as f32, z, 1.0);
+    let ids: Vec<u32> =
+        (0..20).map(|i| builder.instance(quad, &line(i, 0.1, 0.0)).expect("an object")).collect();
+    let subscene = builder.subscene(wheel, &at(0.0, 3.0, 0.0, 0.5)).expect("a scene");
+    let rays: Vec<Ray> = points.iter().map(|[x, z]| Ray::new([*x, 9.0, *z], [0.0, -1.0, 0.0])).collect();
+    let mut commit = |builder: &mut bth::SceneBuilder| {
+        expected += &match builder.commit() {
+            Ok(u) => format!(
+                "update {} {} {} {} {}\n",
+                u.nodes,
+                u.placed,
+                u.visible,
+                u32::from(u.rebuilt),
+                u.cost_ratio
+            ),
+            Err(error) => format!("error -6 bth_builder_commit: {error}\n"),
+        };
+        let mut hits = vec![Hit::MISS; rays.len()];
+        builder.scene().batch(&rays).nearest(&mut hits);
+        for hit in &hits {
+            expected += &format!("hit {} {} {}\n", hit.t, hit.primitive.instance, hit.primitive.triangle);
+        }
+        hits.iter().filter(|hit| hit.is_hit()).count()
+    };
+    assert!(commit(&mut builder) > 30);
+    let many: Vec<_> = (0..20).map(|i| line(i, 0.2, 0.5)).collect();
+    builder.set_transforms(&ids, &many).expect("instances");
+    builder.set_subscene_seconds(subscene, 0.8).expect("a subscene");
+    commit(&mut builder);
+    builder.set_visible(ids[8], false).expect("an instance");
+    builder.remove(ids[9]).expect("an instance");
+    commit(&mut builder);
+    builder.set_transform(ids[3], &at(0.0, 0.0, 0.0, 0.0)).expect("an instance");
+    commit(&mut builder);
+    builder.set_transform(ids[3], &at(-1.0, 1.0, 0.25, -2.0)).expect("an instance");
+    commit(&mut builder);
+    builder.set_subscene_transform(subscene, &at(4.0, 3.0, 0.0, 1.0)).expect("a subscene");
+    commit(&mut builder);
+    builder.set_subscene_visible(subscene, false).expect("a subscene");
+    commit(&mut builder);
+    builder.remove_subscene(subscene).expect("a subscene");
+    commit(&mut builder);
+    // C prints numbers in another way.
+    let fields = |text: &str| -> Vec<Vec<String>> {
+        let number = |field: &str| field.parse::<f32>().map_or(field.to_owned(), |x| x.to_string());
+        text.lines().map(|line| line.split(' ').map(number).collect()).collect()
+    };
+    assert_eq!(fields(&text), fields(&expected));
+}
+
+#[test]
 fn a_c_program_counts_crossings_and_finds_points_inside() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = c_program(folder.path(), "inside") else { return };

@@ -58,14 +58,14 @@ typedef struct {
 
 /* Results of functions. */
 #define BTH_OK 0
-#define BTH_ERROR_ARGUMENT (-1)    /* a null pointer, an unknown flag, a path that is not UTF-8, an instance that does not
-                                      exist, or a time that is not finite */
+#define BTH_ERROR_ARGUMENT (-1)    /* a null pointer, an unknown flag, a path that is not UTF-8, an object or instance that
+                                      does not exist, or a time that is not finite */
 #define BTH_ERROR_FILE (-2)        /* the file could not be read */
 #define BTH_ERROR_FORMAT (-3)      /* not a BTH file, or one that violates the specification */
 #define BTH_ERROR_VERSION (-4)     /* a version or feature that this library does not support */
 #define BTH_ERROR_INTERNAL (-5)    /* a defect of this library */
-#define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed at the given time: its transform cannot be inverted or
-                                      is not finite; the text of the error gives the node */
+#define BTH_ERROR_SCENE (-6)       /* an instance cannot be placed: its transform, at the given time, cannot be inverted or
+                                      is not finite; the text of the error gives the node or the instance */
 #define BTH_ERROR_MISSING (-7)     /* the file does not keep what is asked for, or there is none; the text of the error says
                                       which option of the compiler keeps it */
 
@@ -111,8 +111,9 @@ int32_t bth_set_frame(bth_scene *scene, int32_t frame);
 /* An instance at the scene's time. 112 bytes. */
 typedef struct {
     double to_world[3][4]; /* transform from object space to world space: rows, applied to columns (x, y, z, 1) */
-    uint32_t object;       /* index of its object */
-    uint32_t node;         /* index of the node to which it is attached; BTH_NONE in a file without scene sections */
+    uint32_t object;       /* index of its object; BTH_NONE if a builder has removed the instance */
+    uint32_t node;         /* index of the node to which it is attached, in the file of its object; BTH_NONE in a file without
+                              scene sections, and for instances that the caller of a builder has placed */
     uint32_t visible;      /* 1 if rays can hit it, else 0 */
     uint32_t reserved;     /* 0 */
 } bth_instance;
@@ -292,6 +293,82 @@ int32_t bth_surface_at(const bth_scene *scene, const bth_hit *hit, bth_surface_p
 size_t bth_object_name(const bth_scene *scene, uint32_t object, char *name, size_t capacity);
 size_t bth_group_name(const bth_scene *scene, uint32_t object, uint32_t group, char *name, size_t capacity);
 size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t material, char *name, size_t capacity);
+
+/* Scenes of the objects of several files, whose instances the caller places and moves at run time. A builder holds a scene, which
+ * answers all queries above. Calls note what is to be, and bth_builder_commit makes all of it visible. Functions that take a
+ * bth_builder without const must not run at the same time as any other function on the builder or its scene. Functions that return a
+ * code return BTH_ERROR_ARGUMENT for objects, instances and subscenes that do not exist, and have no effect then.
+ *
+ * Transforms map object space to world space: the rows of a 3x4 matrix, one after the other, that is applied to columns (x, y, z, 1).
+ * They may scale, shear and mirror. Instances have ids, which stay the same until they are removed, and which are the instances of
+ * hits. A commit frees the ids of removed instances; the least free id is used first. */
+typedef struct bth_builder bth_builder;
+
+/* A builder whose scene has no objects and no instances. */
+bth_builder *bth_builder_new(void);
+
+/* Frees a builder and its scene; null is allowed. */
+void bth_builder_free(bth_builder *builder);
+
+/* The scene of a builder as it was last committed, with all objects that were added; null if the builder is. The pointer is valid until
+ * bth_builder_free, must not be given to bth_close, and its scene has no time: bth_set_seconds has no effect on it. */
+const bth_scene *bth_builder_scene(const bth_builder *builder);
+
+/* Adds the objects of another scene, without instances of them, and stores the index of the first in *first_object: the object with
+ * index i there has index *first_object + i here. The memory of the file is shared, and lasts until the last of the scenes is closed;
+ * a mapped file must not change until then. Masks and the time of the other scene have no effect here. */
+int32_t bth_builder_add(bth_builder *builder, const bth_scene *scene, uint32_t *first_object);
+
+/* Adds an instance of an object and stores its id in *instance. bth_builder_commit decides whether the transform can be used. */
+int32_t bth_builder_instance(bth_builder *builder, uint32_t object, const float transform[12], uint32_t *instance);
+
+/* Sets the transforms of `count` instances: the twelve numbers from transforms[12 * i] on are that of instances[i]. If an instance is
+ * given several times, its last transform counts. If one does not exist or belongs to a subscene, none is set. */
+int32_t bth_builder_set_transforms(bth_builder *builder, const uint32_t *instances, const float *transforms, size_t count);
+
+/* Hides an instance from all queries if `visible` is 0, else shows it. An instance of a subscene is visible if the subscene and its
+ * nodes are, too. */
+int32_t bth_builder_set_visible(bth_builder *builder, uint32_t instance, uint32_t visible);
+
+/* Removes an instance that belongs to no subscene. */
+int32_t bth_builder_remove(bth_builder *builder, uint32_t instance);
+
+/* Adds an instance of each instance of a file, placed by the nodes and tracks of the file and then by the transform, as at the first
+ * frame of the file, and stores the id of the whole in *subscene. A file without scene sections has one instance of each object.
+ * `first_object` is what bth_builder_add stored. A file may have several subscenes, each at a time of its own. */
+int32_t bth_builder_subscene(bth_builder *builder, uint32_t first_object, const float transform[12], uint32_t *subscene);
+
+/* Stores the number of a subscene's instances in *count, and the ids of the first `capacity` of them, in the order of the file, in
+ * `instances`, which may be null if `capacity` is 0. */
+int32_t bth_builder_subscene_instances(bth_builder *builder, uint32_t subscene, uint32_t *instances, size_t capacity,
+                                       size_t *count);
+
+/* Set the transform of a subscene, its time in seconds, and whether it is visible, and remove it with its instances. */
+int32_t bth_builder_set_subscene_transform(bth_builder *builder, uint32_t subscene, const float transform[12]);
+int32_t bth_builder_set_subscene_seconds(bth_builder *builder, uint32_t subscene, double seconds);
+int32_t bth_builder_set_subscene_visible(bth_builder *builder, uint32_t subscene, uint32_t visible);
+int32_t bth_builder_remove_subscene(bth_builder *builder, uint32_t subscene);
+
+/* As bth_set_instance_mask and bth_set_group_mask, for the scene of a builder. They have an effect at once, without a commit. The mask
+ * of an instance that is removed is dropped. */
+int32_t bth_builder_set_instance_mask(bth_builder *builder, uint32_t instance, uint32_t mask);
+int32_t bth_builder_set_group_mask(bth_builder *builder, uint32_t object, uint32_t group, uint32_t mask);
+
+/* What a commit has done. 48 bytes. */
+typedef struct {
+    uint64_t nodes;           /* nodes of subscenes that moved, were hidden or became visible */
+    uint64_t placed;          /* instances that were placed again */
+    uint64_t visible;         /* visible instances of the whole scene */
+    double cost_ratio;        /* expected cost of rays through the top level relative to when it was last built */
+    double top_level_seconds; /* time to rebuild or refit the top level */
+    uint32_t rebuilt;         /* 1 if the top level was built anew, 0 if its boxes were computed again or nothing changed */
+    uint32_t reserved;        /* 0 */
+} bth_update;
+
+/* Makes all changes since the last commit visible. `update` may be null. If a visible instance cannot be placed, returns
+ * BTH_ERROR_SCENE, and the text of the error gives the instance. The scene is then unchanged, and the changes still wait: correct the
+ * transform, or hide or remove the instance, and commit again. */
+int32_t bth_builder_commit(bth_builder *builder, bth_update *update);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,7 @@
 //! C interface of bth. Its documentation is the header `include/bth.h`, which must be kept consistent with this crate.
 #![allow(unsafe_code)] // Most functions take pointers from C.
 
+pub mod builder;
 pub mod closest;
 pub mod hits;
 pub mod inside;
@@ -47,6 +48,9 @@ fn code_of(error: &Error) -> i32 {
         Code::Read => ERROR_FILE,
         Code::Host | Code::Version | Code::Features | Code::UnknownKind => ERROR_VERSION,
         Code::Singular | Code::NotFinite => ERROR_SCENE,
+        Code::NoSuchObject | Code::NoSuchInstance | Code::PlacedByFile | Code::TooManyInstances => {
+            ERROR_ARGUMENT
+        }
         _ => ERROR_FORMAT,
     }
 }

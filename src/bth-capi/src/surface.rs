@@ -61,7 +61,11 @@ fn no_triangle(scene: &Scene, primitive: PrimitiveRef) -> (i32, String) {
     if instance >= scene.instance_count() {
         return (ERROR_ARGUMENT, format!("there is no instance {instance}"));
     }
-    let view = scene.object(scene.object_of(instance));
+    let object = scene.object_of(instance);
+    if object >= scene.object_count() {
+        return (ERROR_ARGUMENT, format!("instance {instance} was removed"));
+    }
+    let view = scene.object(object);
     if triangle >= view.header.triangles {
         return (ERROR_ARGUMENT, format!("there is no triangle {triangle} of instance {instance}"));
     }

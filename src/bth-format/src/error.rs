@@ -120,6 +120,9 @@ codes! {
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
     NotFinite "S002" "The transform and the world box of an instance that is seen are finite."
+    NoSuchInstance "S003" "The instance or subscene that the caller named exists."
+    PlacedByFile "S004" "An instance of a subscene is moved and removed only with the subscene."
+    TooManyInstances "S005" "A scene has at most 2^30 instances."
 }
 
 impl Code {
@@ -137,9 +140,16 @@ impl Code {
                 "the file was damaged; copy or compile it again"
             }
             Code::Singular => {
-                "scale by 0 to hide; else keep the scales of one node within 2^24 of each other"
+                "hide the instance, or scale its node by 0; else keep the scales of one transform within 2^24 of each other"
             }
             Code::NotFinite => "keep translations and scales within the range of 32-bit numbers",
+            Code::NoSuchInstance => "use ids that the scene builder returned and that were not removed since",
+            Code::PlacedByFile => {
+                "move, hide or remove the subscene, or add the object as an instance of its own"
+            }
+            Code::TooManyInstances => {
+                "remove instances that are not seen, or join objects that move together"
+            }
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }
@@ -200,6 +210,10 @@ impl Error {
         found: impl Into<String>,
     ) -> Self {
         Self::within(code, kind, offset, expected, found).in_object(NONE)
+    }
+    /// An error of a call, which is about no file.
+    pub fn of_call(code: Code, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { offset: None, ..Self::at(code, 0, expected, found) }
     }
     /// An error of the operating system.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {

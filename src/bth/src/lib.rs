@@ -15,6 +15,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod batch;
+mod builder;
 mod bvh;
 mod closest;
 mod crossing;
@@ -25,6 +26,7 @@ mod intersect;
 mod masks;
 mod motion;
 mod object;
+mod objects;
 mod opacity;
 mod query;
 pub mod rays;
@@ -37,6 +39,7 @@ mod tets;
 pub use batch::RayBatch;
 pub use bth_format::layout::Opacity;
 pub use bth_format::{Code, Error};
+pub use builder::SceneBuilder;
 pub use closest::{Closest, Feature};
 pub use crossing::Crossings;
 pub use hits::{Accept, Cull, Filter};

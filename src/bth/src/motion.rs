@@ -7,9 +7,10 @@ use bth_format::{Error, File, SceneView};
 /// An instance at the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstanceView {
-    /// Index of its object.
+    /// Index of its object; `u32::MAX` if a scene builder has removed the instance.
     pub object: u32,
-    /// Index of the node to which it is attached; `u32::MAX` in a file without scene sections.
+    /// Index of the node to which it is attached, in the file of its object; `u32::MAX` in a file without scene sections and for
+    /// instances that the caller of a scene builder has placed.
     pub node: u32,
     /// Transform from object space to world space: the rows of a 3×4 matrix that is applied to columns (x, y, z, 1).
     pub to_world: [[f64; 4]; 3],
@@ -28,9 +29,9 @@ pub fn check_first_frame(file: &File) -> Result<(), Error> {
 }
 
 impl Scene {
-    /// The scene sections; `None` if the file has none.
+    /// The scene sections; `None` if the file has none or a scene builder made the scene.
     pub fn description(&self) -> Option<SceneView<'_>> {
-        self.world().and_then(|_| self.file().scene())
+        self.world().and_then(|_| self.objects().sole_file()?.scene())
     }
 
     /// Time of the scene in seconds: after opening, that of its first frame; 0 without scene sections.
@@ -39,15 +40,15 @@ impl Scene {
     }
 
     /// Sets the time of the scene in seconds: evaluates the animation, places the instances that moved and rebuilds the top-level
-    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections this
-    /// has no effect.
+    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections, and in
+    /// scenes of a scene builder, this has no effect.
     ///
     /// # Errors
     /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
     /// finite in `f32`. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
-        let (file, world) = self.file_and_world_mut();
-        world.as_mut().map_or(Ok(Update::default()), |world| world.update(file, seconds))
+        let (objects, world) = self.objects_and_world_mut();
+        world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }
 
     /// Sets the time of the scene to that of a frame, which may lie outside of the range of frames.
@@ -59,17 +60,18 @@ impl Scene {
         self.set_seconds(f64::from(frame) / rate)
     }
 
-    /// Number of instances in the scene, visible or not.
+    /// Number of instances in the scene, visible or not; in a scene of a scene builder, one more than the greatest id that was ever
+    /// committed.
     pub fn instance_count(&self) -> u32 {
         self.world().map_or(self.object_count(), |world| world.placements.len() as u32)
     }
 
-    /// Index of an instance's object.
+    /// Index of an instance's object; `u32::MAX` if a scene builder has removed the instance.
     ///
     /// # Panics
     /// If there is no such instance.
     pub fn object_of(&self, instance: u32) -> u32 {
-        if self.world().is_some() { self.file().instances()[instance as usize].object } else { instance }
+        self.world().map_or(instance, |world| world.object_of(self.objects(), instance))
     }
 
     /// An instance at the scene's time.
@@ -89,18 +91,17 @@ impl Scene {
             };
         };
         let visible = world.placements[instance as usize].is_some();
-        let row = self.file().instances()[instance as usize];
-        let (to_world, _) = self.node(row.node);
-        InstanceView { object: row.object, node: row.node, to_world, visible }
+        let row = world.row(self.objects(), instance);
+        InstanceView { object: row.object, node: row.node, to_world: row.to_world.rows(), visible }
     }
 
     /// The transform from a node's space to world space at the scene's time, as in [`InstanceView::to_world`], and whether the
     /// node is visible.
     ///
     /// # Panics
-    /// If there is no such node, as in a file without scene sections.
+    /// If there is no such node, as in a file without scene sections or a scene of a scene builder.
     pub fn node(&self, node: u32) -> ([[f64; 4]; 3], bool) {
-        self.world().expect("a file with nodes").node(self.file(), node)
+        self.world().expect("a file with nodes").node(self.objects(), node)
     }
 
     /// Transforms a normal from an instance's object space to world space, by the transpose of the inverse. The result is not
@@ -124,7 +125,7 @@ impl Scene {
             let object = self.object(instance).header;
             return (object.root != bth_format::layout::NONE).then_some((object.lower, object.upper));
         };
-        world.bounds(self.file(), instance)
+        world.bounds(self.objects(), instance)
     }
 
     /// Number of objects in which rays have been traced since the scene was opened; without scene sections, of all objects.
@@ -132,8 +133,8 @@ impl Scene {
         self.world().map_or(self.object_count() as usize, |world| world.traced_objects())
     }
 
-    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy. Both are 0 without scene
-    /// sections.
+    /// Bytes on the heap: of the placed instances with the top-level BVH, and of the node hierarchy or the transforms that a scene
+    /// builder was given. Both are 0 for a file without scene sections.
     pub fn heap_bytes(&self) -> (usize, usize) {
         self.world().map_or((0, 0), |world| world.bytes())
     }

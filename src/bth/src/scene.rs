@@ -3,6 +3,7 @@
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::object;
+use crate::objects::{ObjectTable, Objects};
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::error::Error;
@@ -13,7 +14,8 @@ use std::path::Path;
 
 /// An open file that can be traced. The instances of a file with scene sections are placed as at a given time (see
 /// [`Scene::set_frame`]). In a file without scene sections, each object has one instance with the same index, and object space is
-/// world space.
+/// world space. A scene of several files, whose instances the caller places, comes from a
+/// [`SceneBuilder`](crate::SceneBuilder).
 ///
 /// Queries take `&self` and may run on any number of threads at once. A ray hits nothing if its origin or direction is not
 /// finite, its direction is zero, `tmin` or `tmax` is NaN, or `tmin` exceeds `tmax`.
@@ -30,8 +32,8 @@ use std::path::Path;
 /// closest points are about the surface itself and look at no opacity.
 #[derive(Debug)]
 pub struct Scene {
-    file: File,
-    /// The instances at the scene's time; `None` if the file has no scene sections.
+    objects: Objects,
+    /// The instances at the scene's time; `None` if the scene is a file without scene sections.
     world: Option<World>,
     /// Whether some triangle of some object may let rays pass.
     has_opacity: bool,
@@ -72,7 +74,7 @@ pub fn from_file(file: File) -> Result<Scene, Error> {
 /// the size of its objects.
 ///
 /// # Safety
-/// Until the scene is dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be such that
+/// Until the scene, and every scene that [`SceneBuilder`](crate::SceneBuilder) makes of it, is dropped, the file must not be written to or truncated (see [`File::map`]). Its contents must be such that
 /// [`open`] accepts them, as those of unchanged files that `bthc` has written. With other contents tracing may panic or not
 /// terminate, but it does not read out of bounds.
 ///
@@ -99,7 +101,26 @@ impl Scene {
     fn with_world(file: File) -> Result<Scene, Error> {
         let world = World::new(&file)?;
         let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
-        Ok(Scene { file, world, has_opacity, masks: Masks::default() })
+        Ok(Scene { objects: Objects::File(file), world, has_opacity, masks: Masks::default() })
+    }
+
+    /// A scene of the objects of several files, without objects and instances yet.
+    pub(crate) fn of_several_files() -> Scene {
+        let (objects, world) = (Objects::Several(ObjectTable::default()), Some(World::empty()));
+        Scene { objects, world, has_opacity: false, masks: Masks::default() }
+    }
+
+    /// Adds the objects of another scene to a scene of several files; returns the index of the first.
+    pub(crate) fn add_objects(&mut self, other: &Scene) -> u32 {
+        let first = self.object_count();
+        if let Objects::Several(table) = &mut self.objects {
+            table.add(&other.objects);
+        }
+        if let Some(world) = &mut self.world {
+            world.add_objects(self.objects.count());
+        }
+        self.has_opacity |= other.has_opacity;
+        first
     }
 
     /// The instances; `None` if the file has no scene sections.
@@ -117,19 +138,36 @@ impl Scene {
         &mut self.masks
     }
 
-    /// The file, and mutable access to the instances.
-    pub(crate) fn file_and_world_mut(&mut self) -> (&File, &mut Option<World>) {
-        (&self.file, &mut self.world)
+    /// The objects, and mutable access to the instances.
+    pub(crate) fn objects_and_world_mut(&mut self) -> (&Objects, &mut Option<World>) {
+        (&self.objects, &mut self.world)
+    }
+
+    /// The objects.
+    pub(crate) fn objects(&self) -> &Objects {
+        &self.objects
     }
 
     /// The file of the scene.
+    ///
+    /// # Panics
+    /// If the scene was made by a [`SceneBuilder`](crate::SceneBuilder): its objects come from any number of files, see
+    /// [`Self::file_of`].
     pub fn file(&self) -> &File {
-        &self.file
+        self.objects.sole_file().expect("a scene that is a file; `file_of` is for scenes of several files")
     }
 
-    /// Number of objects in the file.
+    /// The file of an object, and the object's index there, which in a scene that is a file is the same.
+    ///
+    /// # Panics
+    /// If `object` is not less than [`Self::object_count`].
+    pub fn file_of(&self, object: u32) -> (&File, u32) {
+        self.objects.locate(object).expect("an object below object_count")
+    }
+
+    /// Number of objects.
     pub fn object_count(&self) -> u32 {
-        self.file.object_count()
+        self.objects.count()
     }
 
     /// The sections of an object, given its index.
@@ -137,19 +175,24 @@ impl Scene {
     /// # Panics
     /// If `object` is not less than [`Self::object_count`].
     pub fn object(&self, object: u32) -> ObjectView<'_> {
-        self.file.object(object).expect("an object below object_count, checked when opened")
+        *self.view(object)
     }
 
     /// The sections of an object below [`Self::object_count`].
     #[inline]
     pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
-        self.file.view(object).expect("an object below object_count, checked when opened")
+        self.objects.view(object)
     }
 
     /// A scene with given instances.
     #[cfg(test)]
     pub(crate) fn with_instances(file: File, world: World) -> Scene {
-        Scene { file, world: Some(world), has_opacity: false, masks: Masks::default() }
+        Scene {
+            objects: Objects::File(file),
+            world: Some(world),
+            has_opacity: false,
+            masks: Masks::default(),
+        }
     }
 
     /// The object and the index of the only visible instance, if there is exactly one and its object space is world space. Rays
@@ -166,7 +209,7 @@ impl Scene {
 
     /// Size in bytes of the sections that traversal reads.
     pub fn resident_bytes(&self) -> u64 {
-        self.file.resident_bytes()
+        self.objects.resident_bytes()
     }
 
     /// Nearest hit of a ray in world space.
@@ -206,7 +249,7 @@ impl Scene {
             return object::nearest_counted(object, ray, hint(from, instance), instance);
         }
         if let Some(world) = &self.world {
-            return world.nearest_counted(&self.file, ray, from);
+            return world.nearest_counted(&self.objects, ray, from);
         }
         let (mut best, mut steps, mut ray) = (Hit::MISS, Steps::default(), *ray);
         for instance in 0..self.object_count() {
@@ -263,7 +306,7 @@ impl Scene {
             });
         }
         if let Some(world) = &self.world {
-            return world.nearest(&self.file, rays, from, hits);
+            return world.nearest(&self.objects, rays, from, hits);
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);
@@ -322,7 +365,7 @@ impl Scene {
             });
         }
         if let Some(world) = &self.world {
-            return world.any(&self.file, rays, from, found);
+            return world.any(&self.objects, rays, from, found);
         }
         for instance in 0..self.object_count() {
             let object = self.view(instance);

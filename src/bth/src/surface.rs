@@ -148,7 +148,7 @@ impl Scene {
 
     /// The name of an object, that of the scene manifest or of the glTF mesh; empty if the file keeps none.
     pub fn object_name(&self, object: u32) -> &str {
-        self.file().object_name(object)
+        self.objects().locate(object).map_or("", |(file, row)| file.object_name(row))
     }
 
     /// Box of the triangles of an object that can be hit, in the space of the object; `None` if there are none.
@@ -174,7 +174,8 @@ impl Scene {
 
     /// The object of a triangle; `None` if there is no such instance.
     fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
-        (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance))
+        let object = (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance));
+        object.filter(|object| *object != NONE)
     }
 }
 

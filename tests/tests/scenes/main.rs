@@ -1,6 +1,7 @@
 //! Scenes from end to end: import, compilation, animation and rays.
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
+mod built;
 mod flattened;
 mod import;
 mod motion;

@@ -16,18 +16,19 @@ use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
 use buffer::Buffer;
 use std::path::Path;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-/// An open file whose header and section table have been checked: `BTH-F001` to `BTH-F019` and `BTH-F022` hold.
-#[derive(Debug)]
+/// An open file whose header and section table have been checked: `BTH-F001` to `BTH-F019` and `BTH-F022` hold. Clones share
+/// the memory or the mapping, which lasts as long as the last of them.
+#[derive(Clone, Debug)]
 pub struct File {
-    buffer: Buffer,
+    buffer: Arc<Buffer>,
     /// Per object and kind the row of the section table, or `NONE`.
-    rows: Vec<[u32; OBJECT_KINDS]>,
+    rows: Arc<[[u32; OBJECT_KINDS]]>,
     /// Per object its view, once it has been made. Views borrow from `buffer`; `'static` stands in for a lifetime that
     /// cannot be named: see [`File::first_view`].
-    views: Vec<OnceLock<ObjectView<'static>>>,
+    views: Arc<[OnceLock<ObjectView<'static>>]>,
 }
 
 /// Kinds that belong to objects are below this.
@@ -64,7 +65,7 @@ impl File {
     /// Maps a file and checks the header and the section table. Pages are read when they are used.
     ///
     /// # Safety
-    /// Until the `File` is dropped nobody, in this process or another, may write to the file, truncate it or punch holes
+    /// Until the `File` and its clones are dropped nobody, in this process or another, may write to the file, truncate it or punch holes
     /// into it. Renaming another file over it or removing its name is allowed: the mapping keeps the old content.
     ///
     /// # Errors
@@ -83,16 +84,15 @@ impl File {
         }
         let objects = table::check(buffer.bytes())?;
         let views = (0..objects).map(|_| OnceLock::new()).collect();
-        let mut file = Self { buffer, rows: vec![[NONE; OBJECT_KINDS]; objects as usize], views };
-        let mut rows = std::mem::take(&mut file.rows);
-        for (row, entry) in file.table().iter().enumerate() {
+        let mut rows = vec![[NONE; OBJECT_KINDS]; objects as usize];
+        let (header, _) = Header::ref_from_prefix(buffer.bytes()).expect("checked above");
+        for (row, entry) in table::entries(buffer.bytes(), header).iter().enumerate() {
             let object = rows.get_mut(entry.object as usize);
             if let Some(slot) = object.and_then(|kinds| kinds.get_mut(entry.kind as usize)) {
                 *slot = row as u32;
             }
         }
-        file.rows = rows;
-        Ok(file)
+        Ok(Self { buffer: Arc::new(buffer), rows: rows.into(), views })
     }
 
     /// All bytes of the file.
@@ -166,7 +166,7 @@ impl File {
 
     /// Whether the file is mapped, so that reading bytes may wait for the disk.
     pub fn is_mapped(&self) -> bool {
-        matches!(self.buffer, Buffer::Mapped(_))
+        matches!(*self.buffer, Buffer::Mapped(_))
     }
 
     /// As [`Self::object`], made once and kept.
@@ -188,9 +188,10 @@ impl File {
     fn first_view(&self, object: u32) -> Result<&ObjectView<'_>> {
         let view = self.make_view(object)?;
         // SAFETY: only the lifetime changes. The view borrows from the bytes of `buffer`, which are on the heap or mapped:
-        // they do not move when `self` does, are never written to or replaced, and live until `self` is dropped. `views` is
-        // private, and what leaves this type is shortened to a borrow of `self`, so no view outlives `self`. A view has no
-        // destructor, so the order in which the fields of `self` are dropped does not matter.
+        // they do not move when `self` does, are never written to or replaced, and live until `self` and all its clones are
+        // dropped. `views` is private and shared only with clones, which share `buffer`, too; what leaves this type is shortened
+        // to a borrow of `self`, so no view is used after `buffer` is gone. A view has no destructor, so the order in which
+        // the fields of `self` are dropped does not matter.
         let view = unsafe { std::mem::transmute::<ObjectView<'_>, ObjectView<'static>>(view) };
         Ok(self.views[object as usize].get_or_init(|| view))
     }

@@ -148,7 +148,7 @@ impl Scene {
                 stack.extend(
                     (0..WIDTH).filter(|&i| node.child[i] != NONE && overlaps(i)).map(|i| node.child[i]),
                 );
-            } else if let Some(placed) = world.placed(self.file(), code & !INSTANCE) {
+            } else if let Some(placed) = world.placed(self.objects(), code & !INSTANCE) {
                 let object = self.view(placed.object);
                 let placed = PlacedObject::new(placed, object);
                 let instance = code & !INSTANCE;

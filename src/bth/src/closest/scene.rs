@@ -148,7 +148,7 @@ impl<'a> Searcher<'a> {
         let placed = match self.placed.entry(instance) {
             Entry::Occupied(entry) => entry.into_mut(),
             Entry::Vacant(entry) => {
-                let Some(placed) = world.placed(scene.file(), instance) else { return };
+                let Some(placed) = world.placed(scene.objects(), instance) else { return };
                 let object = scene.view(placed.object);
                 entry.insert(PlacedObject::new(placed, object))
             }

@@ -16,17 +16,47 @@ pub(crate) struct Affine {
     pub(crate) translation: [f64; 3],
 }
 
+#[inline(always)]
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline(always)]
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Maximum norm of a matrix: the greatest sum of the absolute values of a row.
+#[inline(always)]
 fn norm(rows: &[[f64; 3]; 3]) -> f64 {
-    rows.iter().map(|r| r[0].abs() + r[1].abs() + r[2].abs()).fold(0.0, f64::max)
+    let mut greatest = 0.0;
+    for row in rows {
+        let sum = row[0].abs() + row[1].abs() + row[2].abs();
+        greatest = if sum > greatest { sum } else { greatest };
+    }
+    greatest
+}
+
+/// Whether all elements are finite, without branches.
+#[inline(always)]
+fn all_finite(rows: &[[f64; 3]; 3]) -> bool {
+    let mut finite = true;
+    for row in rows {
+        finite &= row[0].is_finite() & row[1].is_finite() & row[2].is_finite();
+    }
+    finite
+}
+
+/// The rows, each element multiplied by a factor.
+#[inline(always)]
+fn scaled(rows: &[[f64; 3]; 3], factor: f64) -> [[f64; 3]; 3] {
+    let mut product = *rows;
+    for row in &mut product {
+        for x in row {
+            *x *= factor;
+        }
+    }
+    product
 }
 
 impl Affine {
@@ -57,6 +87,19 @@ impl Affine {
         Affine { linear: [row(0), row(1), row(2)], translation: [t[3], t[7], t[11]] }
     }
 
+    /// The transform with the rows of four of `m`, one after the other.
+    #[inline(always)]
+    pub(crate) fn from_f32(m: &[f32; 12]) -> Affine {
+        let mut affine = Affine::IDENTITY;
+        for i in 0..3 {
+            for j in 0..3 {
+                affine.linear[i][j] = f64::from(m[4 * i + j]);
+            }
+            affine.translation[i] = f64::from(m[4 * i + 3]);
+        }
+        affine
+    }
+
     /// The product: `inner` is applied first, then `self`.
     pub(crate) fn times(&self, inner: &Affine) -> Affine {
         let column = |k: usize| [0, 1, 2].map(|row| inner.linear[row][k]);
@@ -70,8 +113,10 @@ impl Affine {
         [0, 1, 2].map(|k| dot(self.linear[k], p) + self.translation[k])
     }
 
+    #[inline(always)]
     pub(crate) fn is_finite(&self) -> bool {
-        self.linear.iter().flatten().chain(&self.translation).all(|x| x.is_finite())
+        let [x, y, z] = self.translation;
+        all_finite(&self.linear) & x.is_finite() & y.is_finite() & z.is_finite()
     }
 
     /// Whether the linear part is zero.
@@ -88,31 +133,43 @@ impl Affine {
     }
 
     /// The inverse, and the condition number of the linear part. `None` if the transform is not finite or treated as singular.
+    #[inline(always)]
     pub(crate) fn inverse(&self) -> Option<(Inverse, f64)> {
         if !self.is_finite() {
             return None;
         }
         // Scaling by a power of two brings the greatest element near 1, so that no product overflows or underflows.
-        let greatest = self.linear.iter().flatten().fold(0.0f64, |m, x| m.max(x.abs()));
+        let mut greatest = 0.0f64;
+        for row in &self.linear {
+            for x in row {
+                greatest = if x.abs() > greatest { x.abs() } else { greatest };
+            }
+        }
         let exponent = f64::from_bits(greatest.to_bits() & (0x7ff << 52));
         let scale = 1.0 / exponent;
         if !(exponent > 0.0 && scale.is_finite() && scale > 0.0) {
             return None;
         }
-        let [a, b, c] = self.linear.map(|row| row.map(|x| x * scale));
+        let [a, b, c] = scaled(&self.linear, scale);
         let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
         let determinant = dot(a, cofactors[0]);
-        let linear = [0, 1, 2].map(|k| [0, 1, 2].map(|j| cofactors[j][k] / determinant));
-        if !linear.iter().flatten().all(|x| x.is_finite()) {
+        let mut linear = [[0.0; 3]; 3];
+        for k in 0..3 {
+            for j in 0..3 {
+                linear[k][j] = cofactors[j][k] / determinant;
+            }
+        }
+        if !all_finite(&linear) {
             return None;
         }
         let condition = norm(&[a, b, c]) * norm(&linear);
-        let linear = linear.map(|row| row.map(|x| x * scale));
+        let linear = scaled(&linear, scale);
         let inverse = Inverse { linear, origin: self.translation };
         (condition <= GREATEST_CONDITION && norm(&linear).is_finite()).then_some((inverse, condition))
     }
 
     /// Maximum norm of the linear part.
+    #[inline(always)]
     pub(crate) fn norm(&self) -> f64 {
         norm(&self.linear)
     }

@@ -9,11 +9,11 @@ use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::object::{self, Scratch};
+use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{self, Query, Steps, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
-use bth_format::file::File;
 use bth_format::object::ObjectView;
 use std::cell::RefCell;
 
@@ -118,32 +118,50 @@ impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
 
 impl World {
     /// Computes the nearest hits; among hits of equal t that in the instance of least index.
-    pub(crate) fn nearest(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
+    pub(crate) fn nearest(
+        &self,
+        objects: &Objects,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        hits: &mut [Hit],
+    ) {
         hits.fill(Hit::MISS);
         object::with_scratch(|scratch| {
             let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
-            self.run(file, rays, from, &mut query);
+            self.run(objects, rays, from, &mut query);
         });
     }
 
     /// Computes whether rays hit anything.
-    pub(crate) fn any(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
+    pub(crate) fn any(
+        &self,
+        objects: &Objects,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        found: &mut [bool],
+    ) {
         found.fill(false);
         object::with_scratch(|scratch| {
             let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
-            self.run(file, rays, from, &mut query);
+            self.run(objects, rays, from, &mut query);
         });
     }
 
     /// As [`Self::nearest`] for one ray, with the statistics of the traversal of objects.
-    pub(crate) fn nearest_counted(&self, file: &File, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
+    pub(crate) fn nearest_counted(&self, objects: &Objects, ray: &Ray, from: PrimitiveRef) -> (Hit, Steps) {
         let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
-        self.run(file, std::slice::from_ref(ray), Some(&[from]), &mut query);
+        self.run(objects, std::slice::from_ref(ray), Some(&[from]), &mut query);
         (query.best, query.steps)
     }
 
-    fn run(&self, file: &File, rays: &[Ray], from: Option<&[PrimitiveRef]>, query: &mut impl SceneQuery) {
-        let batch = SceneBatch { world: self, file, rays, from };
+    fn run(
+        &self,
+        objects: &Objects,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        query: &mut impl SceneQuery,
+    ) {
+        let batch = SceneBatch { world: self, objects, rays, from };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
         let mut active_rays = ACTIVE_RAYS.take();
         let isa = Isa::chosen();
@@ -178,7 +196,7 @@ impl World {
         visits.sort(self.placements.len());
         let mut trace = |object: u32, visits: &[Visit]| {
             self.mark_traced(object);
-            let object = batch.file.view(object).expect("checked when opened");
+            let object = batch.objects.view(object);
             query.trace(batch, object, visits);
         };
         let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;

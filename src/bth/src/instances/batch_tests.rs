@@ -1,14 +1,12 @@
 //! Tests of batches through instances. The oracle is a loop over all instances.
 
 use super::super::affine::Affine;
+use super::super::exact_loop;
 use super::super::placement::PartBoxes;
 use super::*;
-use crate::bvh::candidate::{Candidate, ReadCorners};
 use crate::hits::Accept;
-use crate::intersect::exact::reported;
-use crate::intersect::line::Line;
 use crate::scene::Scene;
-use bth_format::layout::Child;
+use bth_format::File;
 use bth_random::Rng;
 
 const FILES: [&[u8]; 2] = [
@@ -101,6 +99,7 @@ fn top_level_and_hints_do_not_change_results() {
     let (mut hit_count, mut far_hits, mut ray_count) = (0, 0, 0);
     for case in 0..600 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let objects = Objects::File(file.clone());
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = rays(&mut rng, &transforms, 40);
@@ -114,14 +113,14 @@ fn top_level_and_hints_do_not_change_results() {
         for from in [None, Some(from.as_slice())] {
             let mut hits = vec![Hit::MISS; rays.len()];
             let mut found = vec![false; rays.len()];
-            world.nearest(&file, &rays, from, &mut hits);
-            world.any(&file, &rays, from, &mut found);
+            world.nearest(&objects, &rays, from, &mut hits);
+            world.any(&objects, &rays, from, &mut found);
             for (i, ray) in rays.iter().enumerate() {
                 let expected = nearest_by_loop(&world, &file, ray);
                 assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
                 assert_eq!(found[i], expected.is_hit(), "case {case}, ray {i}: {ray:?}");
                 if i % 8 == 0 {
-                    assert_eq!(world.nearest_counted(&file, ray, PrimitiveRef::NONE).0, expected);
+                    assert_eq!(world.nearest_counted(&objects, ray, PrimitiveRef::NONE).0, expected);
                 }
                 let start = ray.origin.iter().fold(0.0f32, |m, x| m.max(x.abs()));
                 far_hits += u32::from(expected.is_hit() && start > world.top.reach);
@@ -139,6 +138,7 @@ fn top_level_and_hints_do_not_change_results() {
 #[test]
 fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
     let file = File::from_bytes(FILES[0]).unwrap();
+    let objects = Objects::File(file.clone());
     let world = world(&file, &mut Rng::new(3), 50).0;
     let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
     for ray in [
@@ -150,8 +150,8 @@ fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
         Ray { tmin: f32::NAN, ..good },
     ] {
         let (mut hit, mut found) = ([Hit::MISS], [true]);
-        world.nearest(&file, &[ray], None, &mut hit);
-        world.any(&file, &[ray], None, &mut found);
+        world.nearest(&objects, &[ray], None, &mut hit);
+        world.any(&objects, &[ray], None, &mut found);
         assert_eq!((hit[0], found[0]), (Hit::MISS, false), "{ray:?}");
     }
 }
@@ -183,12 +183,13 @@ fn packets_through_the_top_level_do_not_change_results() {
     let (mut in_packets, mut ray_count, mut hit_count, mut refused) = (0, 0, 0, 0);
     for case in 0..200 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let objects = Objects::File(file.clone());
         let count = [1, 7, 17, 40, 150][case % 5];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = bundle(&mut rng, &transforms, [33, 64, 100][case % 3]);
         let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
-        world.nearest(&file, &rays, None, &mut hits);
-        world.any(&file, &rays, None, &mut found);
+        world.nearest(&objects, &rays, None, &mut hits);
+        world.any(&objects, &rays, None, &mut found);
         for (i, ray) in rays.iter().enumerate() {
             let expected = nearest_by_loop(&world, &file, ray);
             assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
@@ -196,7 +197,7 @@ fn packets_through_the_top_level_do_not_change_results() {
             hit_count += usize::from(expected.is_hit());
         }
         let mut active_rays = ActiveRays::default();
-        let batch = SceneBatch { world: &world, file: &file, rays: &rays, from: None };
+        let batch = SceneBatch { world: &world, objects: &objects, rays: &rays, from: None };
         Isa::chosen().run(StartKernel {
             batch: &batch,
             first: 0,
@@ -217,6 +218,7 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
     let (mut hit_count, mut ray_count) = (0, 0);
     for case in 0..60 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
+        let objects = Objects::File(file.clone());
         let identity = Affine::IDENTITY;
         let object = rng.below(u64::from(file.object_count())) as u32;
         let parts = PartBoxes::whole(file.object_header(object));
@@ -236,8 +238,8 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
             .map(|_| PrimitiveRef { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
             .collect();
         let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
-        world.nearest(&file, &rays, Some(&from), &mut hits);
-        world.any(&file, &rays, Some(&from), &mut found);
+        world.nearest(&objects, &rays, Some(&from), &mut hits);
+        world.any(&objects, &rays, Some(&from), &mut found);
         let scene = Scene::with_instances(file, world);
         let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
         scene.batch(&rays).from(&from[..]).nearest(&mut sole_hits);
@@ -251,51 +253,15 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
     assert!(hit_count > ray_count / 4, "{hit_count} of {ray_count} hit");
 }
 
-/// The triangles of an object with their ids, without any test of boxes.
-fn triangles(object: &ObjectView<'_>) -> Vec<(u32, [[f32; 3]; 3])> {
-    let (mut found, mut stack) = (vec![], vec![object.header.root]);
-    while let Some(code) = stack.pop() {
-        let Some(child) = Child::from_code(code) else { continue };
-        let count = match child {
-            Child::Indexed(at) => object.indexed(at, &mut None).triangles,
-            Child::Raw(at) => object.raw(at, &mut None).triangles,
-            Child::Node(_) | Child::Packed(_) => {
-                stack.extend(object.unpacked_node(child).expect("a node").child);
-                continue;
-            }
-            Child::Tets(_) => panic!("a file without tetrahedra"),
-        };
-        for triangle in 0..count {
-            let candidate = Candidate { leaf: code, triangle };
-            let (index, corners) = candidate.read(object, ReadCorners).expect("a leaf");
-            found.push((object.triangle_ids[index as usize], corners));
-        }
-    }
-    found
-}
-
 /// Oracle: the hits of a ray in all instances and triangles, each decided exactly, in the documented order.
 fn hits_by_loop(world: &World, file: &File, ray: &Ray) -> Vec<Hit> {
     let mut found = vec![];
     for (instance, placement) in world.placements.iter().enumerate() {
         let Some(placement) = placement else { continue };
-        let object_ray = placement.inverse.ray(ray);
-        let Some(line) = Line::new(&object_ray.ray) else { continue };
-        for (triangle, corners) in triangles(&file.object(placement.object()).unwrap()) {
-            let Some(at) = line.intersection(corners) else { continue };
-            let in_object = reported(at.t);
-            let t = if object_ray.t_scale == 1.0 { in_object } else { in_object * object_ray.t_scale };
-            let Ray { tmin, tmax, .. } = object_ray.ray;
-            if tmin <= in_object && in_object <= tmax && ray.tmin <= t && t <= ray.tmax && t < f32::INFINITY {
-                let [u, v] = at.uv();
-                let primitive = PrimitiveRef { instance: instance as u32, triangle };
-                found.push((at.t, Hit { t, u, v, primitive }));
-            }
-        }
+        let object = file.object(placement.object()).unwrap();
+        exact_loop::add_hits(&object, &placement.inverse, instance as u32, ray, &mut found);
     }
-    let order = |(exact, hit): &(f64, Hit)| (hit.t, hit.primitive.instance, *exact, hit.primitive.triangle);
-    found.sort_by(|a, b| order(a).partial_cmp(&order(b)).expect("no NaN"));
-    found.into_iter().map(|(_, hit)| hit).collect()
+    exact_loop::in_order(found)
 }
 
 #[test]

@@ -1,19 +1,25 @@
 //! Instances of a scene at a time, and rays through them.
 //!
-//! An update of the time ([`world`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`hierarchy`]), computes the
-//! inverse transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the
-//! boxes ([`top_level`]). A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others
+//! An update of the time ([`file_scene`]) evaluates the tracks ([`tracks`]) and the hierarchy of nodes ([`hierarchy`]), computes
+//! the inverse transform and the world box of each instance that moved ([`placement`], [`affine`]), and rebuilds the BVH over the
+//! boxes ([`top_level`]). In a scene that the caller builds, a commit ([`caller`]) does the same for the instances that the caller
+//! has changed, and may refit the BVH instead. Rays meet the result ([`world`]) in the same way. A batch of rays ([`batch`]) traverses that BVH, coherent rays as packets ([`packets`]) and the others
 //! one by one ([`traverse`]). Each visit of an instance by a ray is queued ([`visit_queue`]); the rays of an object's visits are
 //! transformed into its space ([`enter_object`]) and traced there together, with t unchanged. A ray whose query reports several
 //! hits goes through the top level alone ([`enumerate`]).
 
 mod affine;
 mod batch;
+mod caller;
 mod enter_object;
 mod enumerate;
+#[cfg(test)]
+pub(crate) mod exact_loop;
+mod file_scene;
 mod hierarchy;
 mod packets;
 mod placement;
+mod refit;
 mod scene_batch;
 mod top_level;
 mod tracks;
@@ -21,8 +27,14 @@ mod traverse;
 mod visit_queue;
 mod world;
 
-pub(crate) use affine::ObjectRay;
+pub(crate) use affine::{Affine, ObjectRay};
+pub(crate) use caller::NewInstance;
+pub(crate) use hierarchy::NodeHierarchy;
+#[cfg(test)]
+pub(crate) use placement::PartBoxes;
 pub(crate) use placement::Placement;
 pub(crate) use top_level::INSTANCE;
+#[cfg(test)]
+pub(crate) use top_level::TopLevel;
 pub use world::Update;
-pub(crate) use world::{Placed, World};
+pub(crate) use world::{InstanceRow, Placed, World};

@@ -26,49 +26,69 @@ pub(crate) struct Placement {
     pub(crate) origin_slack: f32,
 }
 
+/// Number of boxes that are computed together.
+const BLOCK: usize = 4;
+
 /// Boxes that contain all triangles of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PartBoxes {
-    count: usize,
-    /// For each axis the lower and the upper ends of the boxes. Elements from `count` on are not used.
-    bounds: [[[f32; WIDTH]; 2]; 3],
+    /// Number of blocks in use.
+    blocks: usize,
+    /// For each axis the lower and the upper ends of the boxes, in blocks. Blocks are filled up with copies of the first box.
+    bounds: [[[[f64; BLOCK]; WIDTH / BLOCK]; 2]; 3],
 }
 
 impl PartBoxes {
+    /// The first `count` of some boxes, given as those of a node, at least one.
+    fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3]) -> PartBoxes {
+        let bounds = boxes.map(|ends| {
+            ends.map(|end| {
+                let value = |i: usize| f64::from(if i < count { end[i] } else { end[0] });
+                std::array::from_fn(|block| std::array::from_fn(|i| value(block * BLOCK + i)))
+            })
+        });
+        PartBoxes { blocks: count.div_ceil(BLOCK), bounds }
+    }
+
     /// The box of the whole object.
     pub(crate) fn whole(object: &Object) -> PartBoxes {
-        let bounds = [0, 1, 2].map(|k| [[object.lower[k]; WIDTH], [object.upper[k]; WIDTH]]);
-        PartBoxes { count: 1, bounds }
+        PartBoxes::new(1, &[0, 1, 2].map(|k| [[object.lower[k]; WIDTH], [object.upper[k]; WIDTH]]))
     }
 
     /// The boxes of the root's children if the object has a root node, else its box.
     pub(crate) fn of_root_children(object: &ObjectView<'_>) -> PartBoxes {
-        let mut parts = PartBoxes::whole(object.header);
-        let Some(node) = object.root() else { return parts };
-        let used = node.child.iter().take_while(|code| **code != NONE).count();
-        if used > 0 {
-            parts.count = used;
-            parts.bounds = node.bounds;
+        let Some(node) = object.root() else { return PartBoxes::whole(object.header) };
+        match node.child.iter().take_while(|code| **code != NONE).count() {
+            0 => PartBoxes::whole(object.header),
+            used => PartBoxes::new(used, &node.bounds),
         }
-        parts
     }
 
     /// The least and the greatest scalar product of `row` with any point of the boxes.
+    #[inline(always)]
     fn extent_along(&self, row: [f64; 3]) -> [f64; 2] {
-        let mut extent = [f64::INFINITY, f64::NEG_INFINITY];
         // The signs of the row's elements determine at which corners of a box the product is least and greatest.
-        let ends = [0, 1, 2].map(|k| {
+        let mut ends = [[&self.bounds[0][0]; 2]; 3];
+        for k in 0..3 {
             let [low, high] = &self.bounds[k];
-            if row[k] < 0.0 { [high, low] } else { [low, high] }
-        });
-        let product =
-            |end: usize, i: usize| -> f64 { (0..3).map(|k| row[k] * f64::from(ends[k][end][i])).sum() };
-        for i in 0..self.count {
-            let (least, greatest) = (product(0, i), product(1, i));
-            extent[0] = if least < extent[0] { least } else { extent[0] };
-            extent[1] = if greatest > extent[1] { greatest } else { extent[1] };
+            ends[k] = if row[k] < 0.0 { [high, low] } else { [low, high] };
         }
-        extent
+        let (mut least, mut greatest) = ([f64::INFINITY; BLOCK], [f64::NEG_INFINITY; BLOCK]);
+        for block in 0..self.blocks {
+            let product = |end: usize, i: usize| {
+                let [x, y, z] = ends.map(|ends| ends[end][block][i]);
+                row[0] * x + row[1] * y + row[2] * z
+            };
+            for i in 0..BLOCK {
+                let (low, high) = (product(0, i), product(1, i));
+                least[i] = if low < least[i] { low } else { least[i] };
+                greatest[i] = if high > greatest[i] { high } else { greatest[i] };
+            }
+        }
+        [
+            least.into_iter().fold(f64::INFINITY, f64::min),
+            greatest.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        ]
     }
 }
 
@@ -91,6 +111,7 @@ impl Placement {
     /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|, in the maximum norm.
     ///
     /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter world box.
+    #[inline(always)]
     pub(crate) fn new(
         world: &Affine,
         index: u32,
@@ -101,9 +122,14 @@ impl Placement {
             return Err(PlacementError::NotFinite);
         }
         let (inverse, condition) = world.inverse().ok_or(PlacementError::Singular)?;
-        let coordinate = |v: &[f64; 3]| v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let greatest = coordinate(&object.lower.map(f64::from)).max(coordinate(&object.upper.map(f64::from)));
-        let pad = ROUNDING * (condition * coordinate(&world.translation) + world.norm() * greatest);
+        let (mut greatest, mut far) = (0.0, 0.0);
+        for k in 0..3 {
+            let ends = f64::from(object.lower[k].abs().max(object.upper[k].abs()));
+            greatest = if ends > greatest { ends } else { greatest };
+            let translation = world.translation[k].abs();
+            far = if translation > far { translation } else { far };
+        }
+        let pad = ROUNDING * (condition * far + world.norm() * greatest);
         let mut placement = Placement {
             inverse,
             lower: [0.0; 3],
@@ -116,7 +142,10 @@ impl Placement {
             placement.lower[k] = ((world.translation[k] + lower - pad) as f32).next_down();
             placement.upper[k] = ((world.translation[k] + upper + pad) as f32).next_up();
         }
-        let finite = placement.lower.iter().chain(&placement.upper).all(|x| x.is_finite());
+        let mut finite = true;
+        for k in 0..3 {
+            finite &= placement.lower[k].is_finite() & placement.upper[k].is_finite();
+        }
         if finite { Ok(placement) } else { Err(PlacementError::NotFinite) }
     }
 
@@ -142,22 +171,23 @@ mod tests {
             let mut unit = || rng.below(1 << 30) as f64 / (1u64 << 29) as f64 - 1.0;
             let mut object = Object::new_zeroed();
             (object.lower, object.upper) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-            let mut parts = PartBoxes { count: 1 + case % WIDTH, bounds: [[[f32::NAN; WIDTH]; 2]; 3] };
-            for i in 0..parts.count {
+            let (count, mut boxes) = (1 + case % WIDTH, [[[f32::NAN; WIDTH]; 2]; 3]);
+            for i in 0..count {
                 for k in 0..3 {
                     let (a, b) = (unit() as f32, unit() as f32 * 0.2);
-                    parts.bounds[k][0][i] = a.min(a + b);
-                    parts.bounds[k][1][i] = a.max(a + b);
-                    object.lower[k] = object.lower[k].min(parts.bounds[k][0][i]);
-                    object.upper[k] = object.upper[k].max(parts.bounds[k][1][i]);
+                    boxes[k][0][i] = a.min(a + b);
+                    boxes[k][1][i] = a.max(a + b);
+                    object.lower[k] = object.lower[k].min(boxes[k][0][i]);
+                    object.upper[k] = object.upper[k].max(boxes[k][1][i]);
                 }
             }
+            let parts = PartBoxes::new(count, &boxes);
             let mut numbers = [0.0; 10];
             numbers.iter_mut().for_each(|x| *x = unit());
             let world = Affine::from_parts(&numbers);
             let Ok(placement) = Placement::new(&world, 0, &object, &parts) else { continue };
-            for (i, corner) in (0..parts.count).flat_map(|i| (0..8).map(move |corner| (i, corner))) {
-                let end = |k: usize| f64::from(parts.bounds[k][corner >> k & 1][i]);
+            for (i, corner) in (0..count).flat_map(|i| (0..8).map(move |corner| (i, corner))) {
+                let end = |k: usize| f64::from(boxes[k][corner >> k & 1][i]);
                 let point = world.apply([end(0), end(1), end(2)]);
                 let holds = |k: usize| {
                     f64::from(placement.lower[k]) <= point[k] && point[k] <= f64::from(placement.upper[k])

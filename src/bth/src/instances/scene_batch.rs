@@ -2,15 +2,15 @@
 
 use super::World;
 use super::affine::ObjectRay;
+use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{PrimitiveRef, Ray};
-use bth_format::File;
 use bth_format::layout::NONE;
 
 /// A batch of rays in world space, and the scene that they go through.
 pub(super) struct SceneBatch<'a> {
     pub(super) world: &'a World,
-    pub(super) file: &'a File,
+    pub(super) objects: &'a Objects,
     pub(super) rays: &'a [Ray],
     /// For each ray the triangle on which it starts; see [`RayBatch::from`](crate::RayBatch::from).
     pub(super) from: Option<&'a [PrimitiveRef]>,

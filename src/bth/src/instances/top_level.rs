@@ -1,10 +1,13 @@
-//! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits whenever instances move.
+//! The top-level BVH over the instances of a scene: 16 children per node, built by midpoint splits. Where instances only move, its
+//! boxes can be computed again in the same nodes ([`super::refit`]).
 //!
 //! Sixteen instances or fewer become the children of one node. Splitting them further would give nodes with two or three
 //! children, whose empty slots cost memory and time.
 
 use super::placement::Placement;
+use super::refit::CostRatio;
 use bth_format::layout::{CacheLine, Child, NODE_LINES, NONE, WIDTH, WideNode};
+use glam::Vec4;
 use zerocopy::{FromBytes, IntoBytes};
 
 /// The boxes are built for rays whose origin has at most this factor times the greatest |coordinate| of the instances' boxes. For
@@ -17,9 +20,9 @@ pub(crate) const INSTANCE: u32 = Child::LEAF_BIT;
 /// The top-level BVH.
 #[derive(Debug, Default)]
 pub(crate) struct TopLevel {
-    /// The nodes, the root first, aligned to cache lines like those of objects. The child code of a node is the index of its
-    /// first line, that of an instance is [`INSTANCE`] and its index.
-    lines: Vec<CacheLine>,
+    /// The nodes, the root first and parents before their children, aligned to cache lines like those of objects. The child code of
+    /// a node is the index of its first line, that of an instance is [`INSTANCE`] and its index.
+    pub(super) lines: Vec<CacheLine>,
     /// Greatest |coordinate| of the instances' boxes.
     pub(crate) extent: f32,
     /// For rays whose origin has a |coordinate| greater than this, the boxes are widened by `origin_slack` times that
@@ -29,37 +32,49 @@ pub(crate) struct TopLevel {
     pub(crate) origin_slack: f32,
     /// Number of levels of nodes.
     pub(crate) depth: u32,
+    pub(super) cost: CostRatio,
 }
+
+/// From this number of visible instances on, the subtrees of the root are built by several threads.
+#[cfg(feature = "rayon")]
+const MIN_PARALLEL: usize = 4096;
 
 /// A visible instance, while the BVH is built.
 #[derive(Clone, Copy, Debug)]
 struct BuildItem {
-    /// Its world box, widened for rays from within the reach.
+    /// Its world box, widened for rays from within the reach. In the unused number of the lower end are the bits of its index.
     bounds: Bounds,
-    /// Index of the instance.
-    instance: u32,
 }
 
-/// A box: the three lower ends, negated so that a union is a maximum of all six values, and the three upper ends.
+/// Bits of the least normal number. Indices of instances are below 2^30, so their sum is far below the bits of infinity.
+const LEAST_NORMAL: u32 = f32::MIN_POSITIVE.to_bits();
+
+impl BuildItem {
+    fn new(mut bounds: Bounds, instance: u32) -> BuildItem {
+        // Neither a denormal number, with which arithmetic may be slow, nor a NaN, whose bits might not survive a copy.
+        bounds.lower.w = f32::from_bits(instance + LEAST_NORMAL);
+        BuildItem { bounds }
+    }
+    fn instance(&self) -> u32 {
+        self.bounds.lower.w.to_bits() - LEAST_NORMAL
+    }
+}
+
+/// A box: the three lower ends, negated so that a union is a maximum of all values, and the three upper ends. The fourth numbers have
+/// no meaning; they fill vector registers.
 #[derive(Clone, Copy, Debug)]
-struct Bounds([f32; 6]);
+pub(super) struct Bounds {
+    pub(super) lower: Vec4,
+    pub(super) upper: Vec4,
+}
 
 impl Bounds {
-    const EMPTY: Bounds = Bounds([f32::NEG_INFINITY; 6]);
+    pub(super) const EMPTY: Bounds = Bounds { lower: Vec4::NEG_INFINITY, upper: Vec4::NEG_INFINITY };
 
-    /// Enlarges the box to contain another.
-    fn grow(&mut self, other: &Bounds) {
-        for i in 0..6 {
-            self.0[i] = if other.0[i] > self.0[i] { other.0[i] } else { self.0[i] };
-        }
-    }
-    /// Twice the centre along an axis.
-    fn center(&self, axis: usize) -> f32 {
-        self.0[3 + axis] - self.0[axis]
-    }
     /// Half the surface area, in f64 because f32 could overflow.
-    fn area(&self) -> f64 {
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(self.0[3 + k]) + f64::from(self.0[k]));
+    pub(super) fn area(&self) -> f64 {
+        let (lower, upper) = (self.lower.to_array(), self.upper.to_array());
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(upper[k]) + f64::from(lower[k]));
         x * y + y * z + z * x
     }
 }
@@ -70,34 +85,34 @@ struct ItemRange {
     first: u32,
     end: u32,
     bounds: Bounds,
-    /// For each axis twice the least coordinate of the items' centres.
-    least: [f32; 3],
+    /// For each axis twice the least coordinate of the items' centres, negated.
+    least: Vec4,
     /// For each axis twice the greatest coordinate of the items' centres.
-    greatest: [f32; 3],
+    greatest: Vec4,
 }
 
 impl ItemRange {
     /// A range without items that begins at `first`.
     fn empty(first: u32) -> ItemRange {
-        let (least, greatest) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        ItemRange { first, end: first, bounds: Bounds::EMPTY, least, greatest }
+        let none = Vec4::NEG_INFINITY;
+        ItemRange { first, end: first, bounds: Bounds::EMPTY, least: none, greatest: none }
     }
 
     fn of(first: u32, items: &[BuildItem]) -> ItemRange {
         let mut range = ItemRange::empty(first);
-        items.iter().for_each(|item| range.add(&item.bounds));
+        range.end += items.len() as u32;
+        items.iter().for_each(|item| range.enclose(&item.bounds, Vec4::INFINITY));
         range
     }
 
+    /// Enlarges the boxes for an item if `limit` is infinite, and leaves them as they are if it is negative infinity.
     #[inline(always)]
-    fn add(&mut self, bounds: &Bounds) {
-        self.end += 1;
-        self.bounds.grow(bounds);
-        for k in 0..3 {
-            let c = bounds.center(k);
-            self.least[k] = if c < self.least[k] { c } else { self.least[k] };
-            self.greatest[k] = if c > self.greatest[k] { c } else { self.greatest[k] };
-        }
+    fn enclose(&mut self, bounds: &Bounds, limit: Vec4) {
+        let center = bounds.upper - bounds.lower;
+        self.bounds.lower = self.bounds.lower.max(bounds.lower.min(limit));
+        self.bounds.upper = self.bounds.upper.max(bounds.upper.min(limit));
+        self.greatest = self.greatest.max(center.min(limit));
+        self.least = self.least.max((-center).min(limit));
     }
 
     fn len(&self) -> u32 {
@@ -120,53 +135,89 @@ impl TopLevel {
         // There is rarely more than one node for every seven instances.
         self.lines.clear();
         self.lines.reserve_exact((placements.len() / 7 + 1) * NODE_LINES);
-        (self.extent, self.origin_slack, self.depth) = (0.0, 0.0, 0);
+        self.depth = 0;
+        self.measure(placements);
+        let visible = placements.iter().enumerate();
+        let item = |(instance, placement): (usize, &Option<Placement>)| {
+            Some(BuildItem::new(self.bounds_of(placement.as_ref()?), instance as u32))
+        };
+        let mut items = Vec::with_capacity(placements.len());
+        items.extend(visible.filter_map(item));
+        self.build_from(&mut items);
+        self.cost = CostRatio::of_new(self);
+    }
+
+    /// Sets what rays need to know about all boxes.
+    pub(super) fn measure(&mut self, placements: &[Option<Placement>]) {
+        (self.extent, self.origin_slack) = (0.0, 0.0);
         for placement in placements.iter().flatten() {
             self.origin_slack = self.origin_slack.max(placement.origin_slack);
-            let ends = placement.lower.iter().chain(&placement.upper);
-            self.extent = ends.fold(self.extent, |m, x| m.max(x.abs()));
+            for k in 0..3 {
+                let greater = placement.upper[k].abs().max(placement.lower[k].abs());
+                self.extent = self.extent.max(greater);
+            }
         }
         self.reach = REACH * self.extent;
-        let mut items = Vec::with_capacity(placements.len());
-        for (instance, placement) in placements.iter().enumerate() {
-            let Some(placement) = placement else { continue };
-            let pad = (placement.origin_slack * self.reach).next_up();
-            let mut bounds = Bounds::EMPTY;
-            for k in 0..3 {
-                bounds.0[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
-                bounds.0[3 + k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
-            }
-            items.push(BuildItem { bounds, instance: instance as u32 });
+    }
+
+    /// The world box of an instance, widened for rays from within the reach.
+    pub(super) fn bounds_of(&self, placement: &Placement) -> Bounds {
+        let pad = (placement.origin_slack * self.reach).next_up();
+        let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
+        for k in 0..3 {
+            lower[k] = -((placement.lower[k] - pad).next_down().max(f32::MIN));
+            upper[k] = (placement.upper[k] + pad).next_up().min(f32::MAX);
         }
+        Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
+    }
+
+    fn build_from(&mut self, items: &mut [BuildItem]) {
         if items.is_empty() {
             return;
         }
-        let mut tasks = vec![Task { node: self.add_node(), level: 1, range: ItemRange::of(0, &items) }];
-        while let Some(Task { node, level, range }) = tasks.pop() {
-            self.depth = self.depth.max(level);
-            let items = &mut items[..];
-            if range.len() <= WIDTH as u32 {
-                for (slot, item) in items[range.first as usize..range.end as usize].iter().enumerate() {
-                    self.put(node, slot, INSTANCE | item.instance, &item.bounds);
-                }
-                continue;
-            }
-            let mut ranges = [range; WIDTH];
-            let count = split_into(items, &mut ranges);
-            for (slot, range) in ranges[..count].iter().enumerate() {
-                let child = self.add_node();
-                self.put(node, slot, child, &range.bounds);
-                tasks.push(Task { node: child, level: level + 1, range: *range });
-            }
+        let range = ItemRange::of(0, items);
+        #[cfg(feature = "rayon")]
+        if items.len() >= MIN_PARALLEL {
+            return self.build_in_parallel(items, range);
         }
+        self.depth = build_subtree(&mut self.lines, items, range, 1);
     }
 
-    /// Adds a node without children; returns its code.
-    fn add_node(&mut self) -> u32 {
-        const LINES: [CacheLine; NODE_LINES] = zerocopy::transmute!(EMPTY);
-        let code = self.lines.len();
-        self.lines.extend_from_slice(&LINES);
-        code as u32
+    /// Builds the root, and the subtrees of its children in parallel.
+    #[cfg(feature = "rayon")]
+    fn build_in_parallel(&mut self, items: &mut [BuildItem], range: ItemRange) {
+        use rayon::iter::{IntoParallelIterator, ParallelIterator};
+        let mut ranges = [range; WIDTH];
+        let count = split_into(items, &mut ranges);
+        // The ranges follow each other, once sorted.
+        let mut order: Vec<usize> = (0..count).collect();
+        order.sort_unstable_by_key(|&slot| ranges[slot].first);
+        let (mut rest, mut tasks) = (items, Vec::new());
+        for &slot in &order {
+            let (items, others) = rest.split_at_mut(ranges[slot].len() as usize);
+            rest = others;
+            tasks.push((slot, items, ItemRange { first: 0, end: ranges[slot].len(), ..ranges[slot] }));
+        }
+        let subtrees: Vec<_> = tasks
+            .into_par_iter()
+            .map(|(slot, items, range)| {
+                let mut lines = Vec::with_capacity((items.len() / 7 + 1) * NODE_LINES);
+                let depth = build_subtree(&mut lines, items, range, 2);
+                (slot, lines, depth)
+            })
+            .collect();
+        let root = add_node(&mut self.lines);
+        for (slot, lines, depth) in subtrees {
+            let first = self.lines.len() as u32;
+            put(&mut self.lines, root, slot, first, &ranges[slot].bounds);
+            self.depth = self.depth.max(depth);
+            self.lines.extend_from_slice(&lines);
+            for lines in self.lines[first as usize..].chunks_exact_mut(NODE_LINES) {
+                for code in node_mut(lines).child.iter_mut().filter(|code| **code & INSTANCE == 0) {
+                    *code += first;
+                }
+            }
+        }
     }
 
     /// The node with a child code.
@@ -181,17 +232,6 @@ impl TopLevel {
         self.lines.is_empty()
     }
 
-    /// Stores a child in a slot of a node.
-    fn put(&mut self, node: u32, slot: usize, code: u32, bounds: &Bounds) {
-        let lines = &mut self.lines[node as usize..][..NODE_LINES];
-        let node = WideNode::mut_from_bytes(lines.as_mut_bytes()).expect("a node is as long as its lines");
-        node.child[slot] = code;
-        for k in 0..3 {
-            node.bounds[k][0][slot] = -bounds.0[k];
-            node.bounds[k][1][slot] = bounds.0[3 + k];
-        }
-    }
-
     /// Greatest |coordinate| of the boxes in the nodes.
     pub(crate) fn greatest_coordinate(&self) -> f32 {
         (self.extent + self.origin_slack * self.reach).next_up().next_up()
@@ -200,6 +240,58 @@ impl TopLevel {
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
         self.lines.capacity() * size_of::<CacheLine>()
+    }
+}
+
+/// Adds the nodes over a range of the items to `lines`, the root first, which is on a given level; returns the greatest level.
+fn build_subtree(lines: &mut Vec<CacheLine>, items: &mut [BuildItem], range: ItemRange, level: u32) -> u32 {
+    let mut depth = level;
+    let mut tasks = vec![Task { node: add_node(lines), level, range }];
+    while let Some(Task { node, level, range }) = tasks.pop() {
+        depth = depth.max(level);
+        if range.len() <= WIDTH as u32 {
+            for (slot, item) in items[range.first as usize..range.end as usize].iter().enumerate() {
+                put(lines, node, slot, INSTANCE | item.instance(), &item.bounds);
+            }
+            continue;
+        }
+        let mut ranges = [range; WIDTH];
+        let count = split_into(items, &mut ranges);
+        for (slot, range) in ranges[..count].iter().enumerate() {
+            let child = add_node(lines);
+            put(lines, node, slot, child, &range.bounds);
+            tasks.push(Task { node: child, level: level + 1, range: *range });
+        }
+    }
+    depth
+}
+
+/// Adds a node without children; returns its code.
+fn add_node(lines: &mut Vec<CacheLine>) -> u32 {
+    const LINES: [CacheLine; NODE_LINES] = zerocopy::transmute!(EMPTY);
+    let code = lines.len();
+    lines.extend_from_slice(&LINES);
+    code as u32
+}
+
+/// The node in the lines of one.
+pub(super) fn node_mut(lines: &mut [CacheLine]) -> &mut WideNode {
+    WideNode::mut_from_bytes(lines.as_mut_bytes()).expect("a node is as long as its lines")
+}
+
+/// Stores a child in a slot of a node.
+fn put(lines: &mut [CacheLine], node: u32, slot: usize, code: u32, bounds: &Bounds) {
+    let node = node_mut(&mut lines[node as usize..][..NODE_LINES]);
+    node.child[slot] = code;
+    put_bounds(node, slot, bounds);
+}
+
+/// Stores the box of a child in a slot of a node.
+pub(super) fn put_bounds(node: &mut WideNode, slot: usize, bounds: &Bounds) {
+    let (lower, upper) = (bounds.lower.to_array(), bounds.upper.to_array());
+    for k in 0..3 {
+        node.bounds[k][0][slot] = -lower[k];
+        node.bounds[k][1][slot] = upper[k];
     }
 }
 
@@ -229,29 +321,34 @@ fn split_into(items: &mut [BuildItem], ranges: &mut [ItemRange; WIDTH]) -> usize
 fn split(items: &mut [BuildItem], range: ItemRange) -> (ItemRange, ItemRange) {
     let items = &mut items[range.first as usize..range.end as usize];
     // Differences may overflow to infinity, which is then the greatest extent.
-    let spread = [0, 1, 2].map(|k| range.greatest[k] - range.least[k]);
+    let spread = (range.greatest + range.least).to_array();
     let axis = (0..3).fold(0, |best, k| if spread[k] > spread[best] { k } else { best });
-    let middle = range.least[axis] / 2.0 + range.greatest[axis] / 2.0;
+    let middle = (range.greatest / 2.0 - range.least / 2.0).to_array()[axis];
+    // Lanes other than the axis are compared with a number that is greater than none.
+    let mut limits = [f32::NEG_INFINITY; 4];
+    limits[axis] = middle;
+    let limits = Vec4::from_array(limits);
     let (mut left, mut right) = (ItemRange::empty(range.first), ItemRange::empty(0));
-    let (mut i, mut end) = (0, items.len());
-    while i < end {
-        let bounds = items[i].bounds;
-        if bounds.center(axis) < middle {
-            left.add(&bounds);
-            i += 1;
-        } else {
-            right.add(&bounds);
-            end -= 1;
-            items.swap(i, end);
-        }
+    let mut count = 0;
+    for i in 0..items.len() {
+        let item = items[i];
+        let is_left = (item.bounds.upper - item.bounds.lower).cmplt(limits).any();
+        // There are no branches, because on which side an item lies is not predictable.
+        items[i] = items[count];
+        items[count] = item;
+        count += usize::from(is_left);
+        let limit = Vec4::splat(if is_left { f32::INFINITY } else { f32::NEG_INFINITY });
+        left.enclose(&item.bounds, limit);
+        right.enclose(&item.bounds, -limit);
     }
-    if i == 0 || i == items.len() {
+    if count == 0 || count == items.len() {
         let half = items.len() / 2;
         return (
             ItemRange::of(range.first, &items[..half]),
             ItemRange::of(range.first + half as u32, &items[half..]),
         );
     }
+    left.end = range.first + count as u32;
     (right.first, right.end) = (left.end, range.end);
     (left, right)
 }

@@ -1,28 +1,40 @@
-//! The instances of a scene at a time.
+//! The instances of a scene, as rays meet them. They come from a file with scene sections ([`super::file_scene`]) or from the caller
+//! of a scene builder ([`super::caller`]).
 
-use super::affine::Inverse;
+use super::affine::{Affine, Inverse};
+use super::caller::CallerInstances;
 use super::hierarchy::NodeHierarchy;
-use super::placement::{PartBoxes, Placement, PlacementError};
+use super::placement::{PartBoxes, Placement};
 use super::top_level::TopLevel;
-#[cfg(test)]
-use bth_format::SceneView;
-use bth_format::error::{Code, Error, Result};
-use bth_format::file::File;
-use bth_format::layout::*;
+use crate::objects::Objects;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Statistics of an update of a scene's time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Statistics of an update: of a scene's time, or of a [`commit`](crate::SceneBuilder::commit).
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
-    /// Nodes that moved, were hidden or became visible, including all their descendants.
+    /// Nodes of files that moved, were hidden or became visible, including all their descendants.
     pub nodes: usize,
-    /// Instances of these nodes, which were placed again.
+    /// Instances that were placed again.
     pub placed: usize,
     /// Visible instances of the whole scene.
     pub visible: usize,
-    /// Time to rebuild the top level.
+    /// Whether the top level was built anew. If instances only moved, a commit refits it, that is, keeps its nodes and computes
+    /// their boxes again, as long as [`Self::cost_ratio`] permits.
+    pub rebuilt: bool,
+    /// Expected cost of rays through the top level relative to when it was last built: 1 after it was, greater where instances
+    /// that share a node have moved apart since. It is the surface area of the boxes of all nodes, relative to that of the boxes
+    /// of all instances. A commit builds the top level anew where this would exceed 1.5.
+    pub cost_ratio: f64,
+    /// Time to rebuild or refit the top level.
     pub top_level: Duration,
+}
+
+impl Default for Update {
+    /// An update in which nothing changed.
+    fn default() -> Update {
+        Update { nodes: 0, placed: 0, visible: 0, rebuilt: false, cost_ratio: 1.0, top_level: Duration::ZERO }
+    }
 }
 
 /// The transforms of a visible instance.
@@ -40,12 +52,31 @@ pub(crate) struct Placed {
     pub(crate) upper: [f32; 3],
 }
 
-/// The instances of a file with scene sections at a time. The sections have been checked.
+/// An instance: its object, its node, and its transform to world space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InstanceRow {
+    /// Index of the object; `NONE` if the instance was removed.
+    pub(crate) object: u32,
+    /// Index of the node in the file of the object, or `NONE`.
+    pub(crate) node: u32,
+    pub(crate) to_world: Affine,
+}
+
+/// Where the transforms of instances come from.
+#[derive(Debug)]
+pub(super) enum TransformSource {
+    /// The node hierarchy of the file.
+    File(NodeHierarchy),
+    /// The caller.
+    Caller(CallerInstances),
+}
+
+/// The instances of a scene at a time.
 #[derive(Debug)]
 pub(crate) struct World {
-    /// Time of the scene.
+    /// Time of the scene; 0 if the caller places the instances.
     pub(crate) seconds: f64,
-    hierarchy: NodeHierarchy,
+    pub(super) source: TransformSource,
     /// For each instance its placement; `None` if it is not visible.
     pub(crate) placements: Vec<Option<Placement>>,
     pub(crate) top: TopLevel,
@@ -56,143 +87,95 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// The instances of a file at the first frame of its scene; `None` if the file has no scene sections.
-    ///
-    /// # Errors
-    /// Those of [`File::check_scene`] and of [`Self::update`].
-    pub(crate) fn new(file: &File) -> Result<Option<World>> {
-        let Some(view) = file.check_scene()? else { return Ok(None) };
-        let scene = &view.scene[0];
-        let mut world = World {
-            seconds: f64::from(scene.first_frame) / scene.rate,
-            hierarchy: NodeHierarchy::new(&view),
-            placements: vec![None; view.instances.len()],
-            top: TopLevel::default(),
-            only_visible: None,
-            traced: (0..file.object_count()).map(|_| AtomicBool::new(false)).collect(),
-        };
-        world.place_instances(file, world.seconds, true)?;
-        Ok(Some(world))
+    /// Instances that are not placed yet, of `objects` objects.
+    pub(super) fn unplaced(source: TransformSource, seconds: f64, instances: usize, objects: u32) -> World {
+        let (placements, top, only_visible) = (vec![None; instances], TopLevel::default(), None);
+        let mut world = World { seconds, source, placements, top, only_visible, traced: Vec::new() };
+        world.add_objects(objects);
+        world
     }
 
-    /// Instances with given placements, without a hierarchy.
+    /// No instances yet; the caller will place them.
+    pub(crate) fn empty() -> World {
+        World::unplaced(TransformSource::Caller(CallerInstances::default()), 0.0, 0, 0)
+    }
+
+    /// Instances with given placements, without transforms.
     #[cfg(test)]
     pub(crate) fn with_placements(placements: Vec<Option<Placement>>, objects: u32) -> World {
-        let empty = SceneView {
-            scene: &[],
-            nodes: &[],
-            instances: &[],
-            tracks: &[],
-            times: &[],
-            values: &[],
-            cameras: &[],
-            lights: &[],
-            names: &[],
-        };
-        let mut top = TopLevel::default();
-        top.build(&placements);
-        let traced = (0..objects).map(|_| AtomicBool::new(false)).collect();
-        let only_visible = only_visible(&placements);
-        World { seconds: 0.0, hierarchy: NodeHierarchy::new(&empty), placements, top, only_visible, traced }
+        let mut world = World::empty();
+        world.add_objects(objects);
+        world.placements = placements;
+        world.build_top();
+        world
     }
 
-    /// Sets the time. After an error the instances are unchanged.
-    ///
-    /// # Errors
-    /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it or the world box is not finite. The error
-    /// gives the node.
-    pub(crate) fn update(&mut self, file: &File, seconds: f64) -> Result<Update> {
-        let result = self.place_instances(file, seconds, false);
-        match &result {
-            Ok(_) => self.seconds = seconds,
-            // The instances of the former time have been placed before, so placing them again succeeds.
-            Err(_) => drop(self.place_instances(file, self.seconds, true)),
+    /// Makes the number of objects `count`.
+    pub(crate) fn add_objects(&mut self, count: u32) {
+        self.traced.resize_with(count as usize, || AtomicBool::new(false));
+        if let TransformSource::Caller(caller) = &mut self.source {
+            caller.add_objects(count);
         }
-        result
     }
 
-    /// Places the instances that moved, or with `all` every instance, and rebuilds the top level.
-    fn place_instances(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
-        let view = file.scene().expect("checked when the scene was opened");
-        let mut update = Update { nodes: self.hierarchy.update(&view, seconds, all), ..Update::default() };
-        for (row, instance) in view.instances.iter().enumerate() {
-            if !self.hierarchy.moved(instance.node) {
-                continue;
+    /// Builds the top level.
+    pub(super) fn build_top(&mut self) {
+        self.top.build(&self.placements);
+        let mut visible = self.placements.iter().enumerate().filter(|(_, placement)| placement.is_some());
+        let first = visible.next().map(|(row, _)| row as u32);
+        self.only_visible = first.filter(|_| visible.next().is_none());
+    }
+
+    /// Whether rays have been traced in an object.
+    pub(super) fn is_traced(&self, object: u32) -> bool {
+        self.traced[object as usize].load(Ordering::Relaxed)
+    }
+
+    /// An instance.
+    pub(crate) fn row(&self, objects: &Objects, instance: u32) -> InstanceRow {
+        match &self.source {
+            TransformSource::File(hierarchy) => {
+                let view = super::file_scene::scene_of(objects);
+                let row = view.instances[instance as usize];
+                let to_world = hierarchy.to_world(&view, row.node);
+                InstanceRow { object: row.object, node: row.node, to_world }
             }
-            self.placements[row] = None;
-            update.placed += 1;
-            if self.hierarchy.hidden(instance.node) {
-                continue;
-            }
-            let object = file.object_header(instance.object);
-            if object.root == NONE {
-                continue;
-            }
-            let world = self.hierarchy.to_world(&view, instance.node);
-            // The boxes of the root's children give a tighter world box. They are used only if they are in memory already:
-            // reading the root of every mapped object would take longer than the tighter boxes save.
-            let traced = self.traced[instance.object as usize].load(Ordering::Relaxed);
-            let parts = match file.view(instance.object) {
-                Ok(view) if traced || !file.is_mapped() => PartBoxes::of_root_children(view),
-                _ => PartBoxes::whole(object),
-            };
-            let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
-                let (code, expected, found) = match error {
-                    PlacementError::Singular => {
-                        (Code::Singular, "a transform that can be inverted", "one that cannot")
-                    }
-                    PlacementError::NotFinite => {
-                        (Code::NotFinite, "a finite transform and world box", "one that is not")
-                    }
-                };
-                let name = view.node_name(instance.node).escape_debug();
-                let found = format!("{found}: node \"{name}\" at {seconds} s");
-                let offset = u64::from(instance.node) * size_of::<Node>() as u64;
-                file.locate(Error::within_file(code, kind::NODES, offset, expected, found), NONE)
-            })?;
-            self.placements[row] = Some(placement);
+            TransformSource::Caller(caller) => caller.rows[instance as usize],
         }
-        if update.placed > 0 {
-            let start = Instant::now();
-            self.top.build(&self.placements);
-            self.only_visible = only_visible(&self.placements);
-            update.top_level = start.elapsed();
+    }
+
+    /// Index of an instance's object; `NONE` if the instance was removed.
+    pub(crate) fn object_of(&self, objects: &Objects, instance: u32) -> u32 {
+        match &self.source {
+            TransformSource::File(_) => {
+                super::file_scene::scene_of(objects).instances[instance as usize].object
+            }
+            TransformSource::Caller(caller) => caller.rows[instance as usize].object,
         }
-        update.visible = self.placements.iter().flatten().count();
-        Ok(update)
     }
 
     /// World box of an instance, computed from the object's box, so it does not depend on which objects have been traced. `None`
     /// if the instance is not visible.
-    pub(crate) fn bounds(&self, file: &File, instance: u32) -> Option<([f32; 3], [f32; 3])> {
+    pub(crate) fn bounds(&self, objects: &Objects, instance: u32) -> Option<([f32; 3], [f32; 3])> {
         self.placements[instance as usize].as_ref()?;
-        let view = file.scene().expect("checked when the scene was opened");
-        let instance = view.instances[instance as usize];
-        let (world, object) =
-            (self.hierarchy.to_world(&view, instance.node), file.object_header(instance.object));
-        let placement = Placement::new(&world, instance.object, object, &PartBoxes::whole(object)).ok()?;
+        let InstanceRow { object, to_world, .. } = self.row(objects, instance);
+        let header = objects.header(object);
+        let placement = Placement::new(&to_world, object, header, &PartBoxes::whole(header)).ok()?;
         Some((placement.lower, placement.upper))
     }
 
     /// The transforms and the world box of an instance; `None` if it is not visible.
-    pub(crate) fn placed(&self, file: &File, instance: u32) -> Option<Placed> {
+    pub(crate) fn placed(&self, objects: &Objects, instance: u32) -> Option<Placed> {
         let placement = self.placements[instance as usize].as_ref()?;
-        let node = file.scene().expect("checked when the scene was opened").instances[instance as usize].node;
         let Inverse { linear, origin } = placement.inverse;
         Some(Placed {
             object: placement.object(),
-            to_world: self.node(file, node).0,
+            to_world: self.row(objects, instance).to_world.rows(),
             inverse: linear,
             origin,
             lower: placement.lower,
             upper: placement.upper,
         })
-    }
-
-    /// The transform from a node's space to world space, as rows of four, and whether the node is visible.
-    pub(crate) fn node(&self, file: &File, node: u32) -> ([[f64; 4]; 3], bool) {
-        let view = file.scene().expect("checked when the scene was opened");
-        (self.hierarchy.to_world(&view, node).rows(), !self.hierarchy.hidden(node))
     }
 
     /// The only visible instance and its object, if there is exactly one and the object's space is world space. Most such scenes
@@ -221,15 +204,12 @@ impl World {
         self.traced.iter().filter(|t| t.load(Ordering::Relaxed)).count()
     }
 
-    /// Bytes on the heap: of the instances and the top level, and of the hierarchy.
+    /// Bytes on the heap: of the instances and the top level, and of the hierarchy or the caller's transforms.
     pub(crate) fn bytes(&self) -> (usize, usize) {
-        (size_of_val(self.placements.as_slice()) + self.top.bytes(), self.hierarchy.bytes())
+        let source = match &self.source {
+            TransformSource::File(hierarchy) => hierarchy.bytes(),
+            TransformSource::Caller(caller) => caller.bytes(),
+        };
+        (size_of_val(self.placements.as_slice()) + self.top.bytes(), source)
     }
-}
-
-/// The only visible instance, if there is exactly one.
-fn only_visible(placements: &[Option<Placement>]) -> Option<u32> {
-    let mut visible = placements.iter().enumerate().filter(|(_, placement)| placement.is_some());
-    let (row, _) = visible.next()?;
-    visible.next().is_none().then_some(row as u32)
 }

@@ -4,6 +4,7 @@ mod accuracy;
 mod compare;
 mod costs;
 mod inside;
+mod instances;
 mod load;
 mod models;
 mod output;
@@ -20,6 +21,7 @@ pub use accuracy::Accuracy;
 pub use compare::Compare;
 pub use costs::Costs;
 pub use inside::Inside;
+pub use instances::Instances;
 pub use load::{Load, LoadScenes, Probe, Start, Starts};
 pub use models::{Models, SeenFrom};
 pub use output::Output;
@@ -71,6 +73,8 @@ pub enum Command {
     Quality(Quality),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),
+    /// Instances that the caller moves: setting their transforms and committing, ours and Embree's.
+    Instances(Instances),
     /// One start in a process of its own; `load` calls this.
     #[command(hide = true)]
     Probe(Probe),

@@ -23,8 +23,10 @@ pub struct Variant {
     packets: bool,
 }
 
+const QUALITY_LOW: c_int = 0;
 const QUALITY_MEDIUM: c_int = 1;
 const QUALITY_HIGH: c_int = 2;
+const FLAG_DYNAMIC: c_int = 1;
 const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
@@ -34,6 +36,8 @@ pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packet
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
+/// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
+pub const DYNAMIC: Variant = Variant { quality: QUALITY_LOW, flags: FLAG_DYNAMIC, packets: false };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
 

@@ -188,6 +188,23 @@ impl EmbreeScene {
         unsafe { (self.api.commit_scene)(self.scene) };
     }
 
+    /// Places some instances by transforms in rows of four, and builds the scene over all of them.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn place_some(&mut self, instances: &[u32], transforms: &[[f32; 12]]) {
+        for (instance, rows) in instances.iter().zip(transforms) {
+            let instance = self.instances[*instance as usize];
+            // SAFETY: the instance is a geometry of the scene; the library copies twelve numbers in rows.
+            unsafe {
+                (self.api.transform)(instance, 0, FORMAT_ROWS, rows.as_ptr());
+                (self.api.commit_geometry)(instance);
+            }
+        }
+        // SAFETY: no other thread traces, as `self` is borrowed mutably.
+        unsafe { (self.api.commit_scene)(self.scene) };
+    }
+
     /// What the library has allocated.
     pub(super) fn bytes(&self) -> Option<u64> {
         u64::try_from(self.allocated.load(Ordering::Relaxed)).ok()

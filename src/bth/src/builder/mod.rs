@@ -1,0 +1,173 @@
+//! Scenes whose instances the caller places: the objects of several files, moved at run time.
+//!
+//! Changes are staged and become visible by a commit, all or none of them. The staged state is here ([`instances`] of single objects,
+//! [`subscenes`] of whole files); the committed one is that of the [`Scene`], so that rays meet instances of callers and of files in
+//! the same way.
+
+mod ids;
+mod instances;
+mod subscene;
+mod subscenes;
+
+use self::ids::FreeIds;
+use self::instances::StagedInstance;
+use self::subscene::Subscene;
+use crate::instances::Update;
+use crate::scene::Scene;
+use bth_format::{Code, Error};
+
+/// Greatest number of instances: their indices are stored beside kinds of nodes in 32 bits.
+const MAX_INSTANCES: usize = 1 << 30;
+
+/// Makes a [`Scene`] of the objects of several files, and moves its instances at run time.
+///
+/// The builder holds the scene: [`Self::scene`] returns it, and it answers all queries. Instances are added, moved, hidden and removed
+/// by calls that only note what is to be; [`Self::commit`] then places what has changed and updates the top level. Nothing is
+/// compiled or built for the objects, whose files are shared with the scenes that they were added from.
+///
+/// Instances are named by an id, which stays the same until the instance is removed, and which is the instance of hits
+/// ([`PrimitiveRef`](crate::rays::PrimitiveRef)). A commit frees the ids of removed instances; the least free id is used first.
+///
+/// ```no_run
+/// let mut builder = bth::SceneBuilder::new();
+/// let tree = builder.add(&bth::open("tree.bth")?);
+/// let stone = builder.add(&bth::open("stone.bth")?);
+/// let at = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+/// let trees: Vec<u32> = (0..100).map(|i| builder.instance(tree, &at(i as f32))).collect::<Result<_, _>>()?;
+/// builder.instance(stone, &at(-3.0))?;
+/// builder.commit()?;
+///
+/// let ray = bth::rays::Ray::new([7.0, 0.5, 9.0], [0.0, 0.0, -1.0]);
+/// if let Some(hit) = builder.scene().nearest(&ray) {
+///     builder.set_transform(hit.primitive.instance, &at(7.5))?;
+///     builder.remove(trees[0])?;
+///     let update = builder.commit()?;
+///     println!("{} instances placed, {} visible", update.placed, update.visible);
+/// }
+/// # Ok::<(), bth::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct SceneBuilder {
+    scene: Scene,
+    /// For each id the instance as it is to be.
+    instances: Vec<StagedInstance>,
+    /// The ids of instances that differ from those of the scene.
+    changed: Vec<u32>,
+    instance_ids: FreeIds,
+    /// For each id the subscene; `None` if it was removed.
+    subscenes: Vec<Option<Subscene>>,
+    subscene_ids: FreeIds,
+}
+
+impl Default for SceneBuilder {
+    fn default() -> SceneBuilder {
+        SceneBuilder::new()
+    }
+}
+
+impl SceneBuilder {
+    /// A scene without objects and instances.
+    pub fn new() -> SceneBuilder {
+        SceneBuilder {
+            scene: Scene::of_several_files(),
+            instances: Vec::new(),
+            changed: Vec::new(),
+            instance_ids: FreeIds::default(),
+            subscenes: Vec::new(),
+            subscene_ids: FreeIds::default(),
+        }
+    }
+
+    /// Adds the objects of another scene, without instances of them. Returns the index of the first: the object with index `i` there
+    /// has index `first + i` here ([`Scene::file_of`] leads back). The files are shared and stay open as long as one of the
+    /// scenes does; masks and the time of the other scene have no effect here.
+    pub fn add(&mut self, scene: &Scene) -> u32 {
+        self.scene.add_objects(scene)
+    }
+
+    /// The scene as it was last committed, with all objects that were added.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene as it was last committed, which then cannot be changed any more.
+    pub fn into_scene(self) -> Scene {
+        self.scene
+    }
+
+    /// As [`Scene::set_instance_mask`]: it has an effect at once, without a commit. The mask of an instance that is removed is
+    /// dropped.
+    ///
+    /// # Errors
+    /// `BTH-S003` if there is no such instance.
+    pub fn set_instance_mask(&mut self, instance: u32, mask: u32) -> Result<(), Error> {
+        self.staged(instance)?;
+        self.scene.masks_mut().set_instance(instance, mask);
+        Ok(())
+    }
+
+    /// As [`Scene::set_group_mask`]: it has an effect at once, without a commit.
+    ///
+    /// # Errors
+    /// `BTH-O003` if there is no such object, or if it has no such group.
+    pub fn set_group_mask(&mut self, object: u32, group: u32, mask: u32) -> Result<(), Error> {
+        self.check_object(object)?;
+        let count = self.scene.group_count(object);
+        if group >= count {
+            let expected = format!("a group of object {object} below {count}");
+            return Err(Error::of_call(Code::NoSuchObject, expected, group.to_string()));
+        }
+        self.scene.masks_mut().set_group(object, group, mask);
+        Ok(())
+    }
+
+    /// Makes all changes since the last commit visible: places the instances that changed, and updates the top level. If instances
+    /// only moved, the boxes of the top level are computed again; if instances came, went, were hidden or became visible, or
+    /// [`Update::cost_ratio`] would exceed its bound, it is built anew. With the feature `rayon`, the threads of the current pool
+    /// share the work of some thousand instances or more. The answers of queries depend on none of this.
+    ///
+    /// # Errors
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
+    /// finite in `f32`. The error gives the instance. The scene is then unchanged, and so are the changes that wait for a commit:
+    /// correct the transform, or hide or remove the instance, and commit again.
+    pub fn commit(&mut self) -> Result<Update, Error> {
+        let mut nodes = 0;
+        for subscene in self.subscenes.iter_mut().flatten() {
+            let (instances, changed) = (&mut self.instances, &mut self.changed);
+            let moved = |id: u32| instances[id as usize].mark(id, changed);
+            nodes += subscene.evaluate(self.scene.objects(), moved);
+        }
+        let (scene, instances, subscenes) = (&mut self.scene, &self.instances, &self.subscenes);
+        let (objects, world) = scene.objects_and_world_mut();
+        let Some(world) = world else { return Ok(Update::default()) };
+        let new = |id: u32| instances[id as usize].placed_in(objects, subscenes);
+        let update = match world.change(objects, instances.len(), &self.changed, &new) {
+            Ok(update) => Update { nodes, ..update },
+            Err(failed) => {
+                let (code, expected, found) = failed.error.words();
+                let found = format!("{found}: {}", self.describe(failed.instance));
+                return Err(Error::of_call(code, expected, found));
+            }
+        };
+        for id in self.changed.drain(..) {
+            self.instances[id as usize].changed = false;
+        }
+        for id in self.instance_ids.commit() {
+            self.scene.masks_mut().set_instance(id, u32::MAX);
+        }
+        self.subscene_ids.commit();
+        Ok(update)
+    }
+
+    fn check_object(&self, object: u32) -> Result<(), Error> {
+        let count = self.scene.object_count();
+        if object < count {
+            return Ok(());
+        }
+        let expected = format!("an object below {count}, the number of those that were added");
+        Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

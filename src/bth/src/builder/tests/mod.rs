@@ -1,0 +1,155 @@
+//! Tests of scene builders. The oracle is a plain list of what the caller wants, each instance traced by a loop over its triangles.
+
+mod expected;
+mod sequences;
+mod top_level;
+
+use super::*;
+use crate::rays::{Hit, Ray};
+use bth_random::Rng;
+
+macro_rules! files {
+    ($($name:literal),* $(,)?) => {
+        [$(include_bytes!(concat!("../../../../../format-spec/conformance/valid/", $name, ".bth")).as_slice()),*]
+    };
+}
+
+/// Files of one and of several objects, with and without scene sections, tracks, opacity and quantized coordinates.
+const FILES: [&[u8]; 8] = files![
+    "two-objects",
+    "two-levels",
+    "scene-still",
+    "scene-moving",
+    "opacity",
+    "grid-16",
+    "nothing-to-hit",
+    "no-objects",
+];
+
+const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+fn at(x: f32, y: f32, z: f32) -> [f32; 12] {
+    [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z]
+}
+
+fn unit(rng: &mut Rng) -> f32 {
+    rng.unit_f32() * 2.0 - 1.0
+}
+
+/// The nearest hits of rays.
+fn nearest(scene: &Scene, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    scene.batch(rays).nearest(&mut hits);
+    hits
+}
+
+#[test]
+fn calls_that_name_nothing_are_errors_and_change_nothing() {
+    let mut builder = SceneBuilder::new();
+    let file = crate::from_bytes(FILES[0]).unwrap();
+    let code = |result: Result<(), Error>| result.unwrap_err().code();
+    assert_eq!(builder.instance(0, &IDENTITY).unwrap_err().code(), Code::NoSuchObject);
+    assert_eq!(builder.subscene(0, &IDENTITY).unwrap_err().code(), Code::NoSuchObject);
+    assert_eq!((builder.add(&file), builder.add(&file)), (0, 2));
+    assert_eq!(builder.subscene(1, &IDENTITY).unwrap_err().code(), Code::NoSuchObject, "not the first");
+    let own = builder.instance(3, &IDENTITY).unwrap();
+    let subscene = builder.subscene(2, &IDENTITY).unwrap();
+    let placed = builder.subscene_instances(subscene).unwrap()[1];
+    assert_eq!((own, placed), (0, 2));
+    for unknown in [3, 7, u32::MAX] {
+        assert_eq!(code(builder.set_transform(unknown, &IDENTITY)), Code::NoSuchInstance);
+        assert_eq!(code(builder.set_visible(unknown, true)), Code::NoSuchInstance);
+        assert_eq!(code(builder.remove(unknown)), Code::NoSuchInstance);
+        assert_eq!(code(builder.set_instance_mask(unknown, 1)), Code::NoSuchInstance);
+        assert_eq!(code(builder.remove_subscene(unknown)), Code::NoSuchInstance);
+        assert_eq!(code(builder.set_subscene_seconds(unknown, 1.0)), Code::NoSuchInstance);
+        assert_eq!(code(builder.set_subscene_visible(unknown, true)), Code::NoSuchInstance);
+        assert_eq!(code(builder.set_subscene_transform(unknown, &IDENTITY)), Code::NoSuchInstance);
+        assert_eq!(builder.subscene_instances(unknown).unwrap_err().code(), Code::NoSuchInstance);
+        // None of several transforms is set if one cannot be.
+        let transforms = [at(9.0, 0.0, 0.0), IDENTITY];
+        assert_eq!(code(builder.set_transforms(&[own, unknown], &transforms)), Code::NoSuchInstance);
+    }
+    assert_eq!(code(builder.set_group_mask(4, 0, 1)), Code::NoSuchObject);
+    assert_eq!(code(builder.set_group_mask(0, 1, 1)), Code::NoSuchObject);
+    let error = builder.set_transform(placed, &IDENTITY).unwrap_err();
+    assert!(error.to_string().contains("instance 2 of subscene 0") && error.code() == Code::PlacedByFile);
+    assert_eq!(code(builder.remove(placed)), Code::PlacedByFile);
+    builder.commit().unwrap();
+    assert_eq!(builder.scene().instance(own).to_world[0], [1.0, 0.0, 0.0, 0.0]);
+    builder.remove(own).unwrap();
+    assert_eq!(code(builder.remove(own)), Code::NoSuchInstance);
+}
+
+#[test]
+fn ids_are_stable_and_used_again_only_after_the_commit_that_frees_them() {
+    let mut builder = SceneBuilder::new();
+    let object = builder.add(&crate::from_bytes(FILES[0]).unwrap());
+    let add = |builder: &mut SceneBuilder, x: f32| builder.instance(object, &at(x, 0.0, 0.0)).unwrap();
+    let ids: Vec<u32> = (0..5).map(|i| add(&mut builder, 3.0 * i as f32)).collect();
+    assert_eq!((&ids[..], builder.scene().instance_count()), (&[0, 1, 2, 3, 4][..], 0));
+    builder.set_instance_mask(3, 2).unwrap();
+    assert_eq!(builder.commit().unwrap().visible, 5);
+    builder.remove(3).unwrap();
+    builder.remove(1).unwrap();
+    assert_eq!(add(&mut builder, 20.0), 5);
+    let update = builder.commit().unwrap();
+    assert_eq!((update.placed, update.visible, builder.scene().instance_count()), (3, 4, 6));
+    let scene = builder.scene();
+    let removed = scene.instance(3);
+    assert!(removed.object == u32::MAX && !removed.visible && scene.object_of(1) == u32::MAX);
+    let stale = crate::rays::PrimitiveRef { instance: 3, triangle: 0 };
+    assert_eq!((scene.triangle(stale), scene.triangle_in_world(stale)), (None, None));
+    assert_eq!(scene.surface(&Hit { t: 1.0, u: 0.0, v: 0.0, primitive: stale }), None);
+    assert_eq!(scene.instance_bounds(3), None);
+    assert_eq!([add(&mut builder, 1.0), add(&mut builder, 2.0), add(&mut builder, 4.0)], [1, 3, 6]);
+    builder.commit().unwrap();
+    let ray = Ray::new([2.25, 0.25, 9.0], [0.0, 0.0, -1.0]);
+    let accept = crate::Accept { mask: 1, ..crate::Accept::default() };
+    let hit = builder.scene().nearest_accepted(&ray, &accept).expect("a mask is dropped with its instance");
+    assert_eq!(hit.primitive.instance, 3);
+}
+
+#[test]
+fn objects_lead_back_to_their_files_and_files_outlive_the_scenes_they_came_from() {
+    let mut builder = SceneBuilder::new();
+    let scenes = FILES.map(|bytes| crate::from_bytes(bytes).unwrap());
+    let firsts: Vec<u32> = scenes.iter().map(|scene| builder.add(scene)).collect();
+    let again = builder.add(&scenes[1]);
+    for (scene, &first) in scenes.iter().zip(&firsts) {
+        for object in 0..scene.object_count() {
+            let (file, row) = builder.scene().file_of(first + object);
+            assert_eq!((file.content_id(), row), (scene.file().content_id(), object));
+            assert_eq!(builder.scene().object_name(first + object), scene.object_name(object));
+        }
+    }
+    let bytes: u64 = scenes.iter().map(Scene::resident_bytes).sum();
+    assert_eq!(builder.scene().resident_bytes(), bytes, "a file that is added twice counts once");
+    drop(scenes);
+    builder.instance(again, &IDENTITY).unwrap();
+    builder.commit().unwrap();
+    let nested = builder.into_scene();
+    let ray = Ray::new([0.25, 0.25, 9.0], [0.0, 0.0, -1.0]);
+    let hit = nested.nearest(&ray);
+    assert!(hit.is_some());
+    let mut outer = SceneBuilder::new();
+    assert_eq!(outer.add(&nested), 0);
+    drop(nested);
+    outer.instance(again, &IDENTITY).unwrap();
+    outer.commit().unwrap();
+    assert_eq!(outer.scene().nearest(&ray), hit);
+    assert_eq!(outer.scene().touched_objects(), 1);
+}
+
+#[test]
+fn scenes_without_instances_answer_all_queries() {
+    let mut builder = SceneBuilder::default();
+    assert_eq!(builder.commit().unwrap(), Update::default());
+    let scene = builder.scene();
+    let ray = Ray::new([0.0; 3], [1.0; 3]);
+    assert!(scene.nearest(&ray).is_none() && !scene.any(&ray) && scene.bounds().is_none());
+    assert!(scene.closest([0.0; 3], f32::INFINITY).is_none() && scene.winding([0.0; 3]) == 0);
+    assert!(!scene.overlaps_sphere([0.0; 3], 1.0) && scene.crossings(&ray).count == 0);
+    assert_eq!((scene.object_count(), scene.instance_count(), scene.seconds()), (0, 0, 0.0));
+    assert!(scene.description().is_none());
+}

@@ -1,0 +1,129 @@
+//! Refitting of the top level: instances have moved, and the boxes of the same nodes are computed again, from the leaves up. A refit
+//! costs a fraction of a build, but nodes grow where instances that share one move apart. [`CostRatio`] tells how much.
+
+use super::placement::Placement;
+use super::top_level::{Bounds, INSTANCE, TopLevel, node_mut, put_bounds};
+use bth_format::layout::{CacheLine, NODE_LINES, NONE, WIDTH, WideNode};
+use glam::Vec4;
+
+/// From this number of nodes on, the boxes of instances are stored by several threads.
+#[cfg(feature = "rayon")]
+const MIN_PARALLEL: usize = 512;
+/// Number of nodes of one task.
+#[cfg(feature = "rayon")]
+const TASK: usize = 64;
+
+/// The expected cost of rays through the top level, now and when it was built.
+///
+/// A line that meets a box meets a box within with the probability of the ratio of their surface areas. So the area of all nodes
+/// relative to that of all instances is the expected number of nodes that a random line visits for each instance that it visits.
+/// Unlike a cost relative to the area of the root, it does not become less when an instance moves far away.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CostRatio {
+    built: f64,
+    now: f64,
+}
+
+impl CostRatio {
+    /// For a top level that has just been built.
+    pub(super) fn of_new(top: &TopLevel) -> CostRatio {
+        let cost = cost(top);
+        CostRatio { built: cost, now: cost }
+    }
+}
+
+/// The area of all nodes but the root relative to that of all instances.
+fn cost(top: &TopLevel) -> f64 {
+    let (mut nodes, mut instances) = (0.0, 0.0);
+    for code in (0..top.lines.len()).step_by(NODE_LINES) {
+        let node = top.node(code as u32);
+        for slot in 0..used(node) {
+            let area = slot_bounds(node, slot).area();
+            *(if node.child[slot] & INSTANCE == 0 { &mut nodes } else { &mut instances }) += area;
+        }
+    }
+    nodes / instances
+}
+
+/// Number of children of a node, which come first.
+fn used(node: &WideNode) -> usize {
+    node.child.iter().position(|code| *code == NONE).unwrap_or(WIDTH)
+}
+
+fn slot_bounds(node: &WideNode, slot: usize) -> Bounds {
+    let end = |end: usize| [0, 1, 2].map(|k| node.bounds[k][end][slot]);
+    let ([a, b, c], [d, e, f]) = (end(0), end(1));
+    Bounds { lower: Vec4::new(-a, -b, -c, 0.0), upper: Vec4::new(d, e, f, 0.0) }
+}
+
+impl TopLevel {
+    /// Computes all boxes again after instances have moved. The visible instances are those for which the BVH was built.
+    pub(crate) fn refit(&mut self, placements: &[Option<Placement>]) {
+        self.measure(placements);
+        let mut lines = std::mem::take(&mut self.lines);
+        self.refit_instances(&mut lines, placements);
+        // Children come behind their parents, so that their boxes are final when the parent is reached.
+        for code in (0..lines.len()).step_by(NODE_LINES).rev() {
+            let (node, behind) = lines[code..].split_at_mut(NODE_LINES);
+            let node = node_mut(node);
+            for slot in 0..used(node) {
+                let child = node.child[slot];
+                if child & INSTANCE == 0 {
+                    let lines = &mut behind[child as usize - code - NODE_LINES..][..NODE_LINES];
+                    let bounds = union(node_mut(lines));
+                    put_bounds(node, slot, &bounds);
+                }
+            }
+        }
+        self.lines = lines;
+        self.cost.now = cost(self);
+    }
+
+    /// Stores the boxes of all instances.
+    fn refit_instances(&self, lines: &mut [CacheLine], placements: &[Option<Placement>]) {
+        #[cfg(feature = "rayon")]
+        if lines.len() >= MIN_PARALLEL * NODE_LINES {
+            use rayon::iter::ParallelIterator;
+            use rayon::slice::ParallelSliceMut;
+            let tasks = lines.par_chunks_mut(TASK * NODE_LINES);
+            return tasks.for_each(|lines| self.refit_some(lines, placements));
+        }
+        self.refit_some(lines, placements);
+    }
+
+    /// Stores the boxes of the instances in some nodes.
+    fn refit_some(&self, lines: &mut [CacheLine], placements: &[Option<Placement>]) {
+        for lines in lines.chunks_exact_mut(NODE_LINES) {
+            let node = node_mut(lines);
+            for slot in 0..used(node) {
+                let code = node.child[slot];
+                if code & INSTANCE != 0
+                    && let Some(placement) = &placements[(code & !INSTANCE) as usize]
+                {
+                    put_bounds(node, slot, &self.bounds_of(placement));
+                }
+            }
+        }
+    }
+
+    /// The expected cost relative to that when the BVH was built. It is 1 where there is only one node, or none.
+    pub(super) fn cost_ratio(&self) -> f64 {
+        let ratio = self.cost.now / self.cost.built;
+        if ratio.is_nan() { 1.0 } else { ratio }
+    }
+}
+
+/// The box of all children of a node. Empty slots hold boxes that change no union.
+fn union(node: &WideNode) -> Bounds {
+    let (mut lower, mut upper) = ([0.0; 4], [0.0; 4]);
+    for k in 0..3 {
+        let (mut least, mut greatest) = (f32::INFINITY, f32::NEG_INFINITY);
+        for slot in 0..WIDTH {
+            let (low, high) = (node.bounds[k][0][slot], node.bounds[k][1][slot]);
+            least = if low < least { low } else { least };
+            greatest = if high > greatest { high } else { greatest };
+        }
+        (lower[k], upper[k]) = (-least, greatest);
+    }
+    Bounds { lower: Vec4::from_array(lower), upper: Vec4::from_array(upper) }
+}

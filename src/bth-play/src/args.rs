@@ -150,6 +150,11 @@ impl Args {
         self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
     }
 
+    /// The same options with another number of samples per pixel.
+    pub(crate) fn with_samples(&self, spp: u32) -> Self {
+        Self { spp, ..self.clone() }
+    }
+
     /// Where pictures go, which clap requires unless they go to a window.
     pub(crate) fn output(&self) -> Result<&Path, Failure> {
         self.output.as_deref().ok_or_else(|| Failure::Usage("an output is needed".to_owned()))

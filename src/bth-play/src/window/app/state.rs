@@ -97,7 +97,7 @@ impl<'a> App<'a> {
         Self {
             content,
             pool,
-            renderer: ProgressiveRenderer::new(&Args { spp: samples, ..args.clone() }),
+            renderer: ProgressiveRenderer::new(&args.with_samples(samples)),
             playback: Playback::new(range, rate),
             view: ViewCamera::Initial,
             mode: args.mode,

@@ -51,7 +51,7 @@ pub fn import_bytes(
     let raw = match format(&source)? {
         Format::Obj => obj::read(&source, wanted)?,
         Format::Gltf => gltf::flatten::read(&source, wanted)?,
-        Format::Ply => ply::read(&source, wanted.attributes)?,
+        Format::Ply => ply::read(&source, wanted)?,
         Format::Stl => stl::read(&source)?,
         Format::Off => off::read(&source)?,
     };

@@ -141,6 +141,12 @@ impl ColorRecorder {
         row
     }
 
+    /// The row of a colour in sRGB.
+    pub(crate) fn srgb_row(&mut self, color: [f32; 3]) -> u32 {
+        let [r, g, b] = color.map(|x| if x.is_nan() { x } else { linear(x.clamp(0.0, 1.0)) });
+        self.row([r, g, b, 1.0])
+    }
+
     /// Adds the rows of the corners of triangles from the triangle `first` on; those before without colours are white.
     pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>) {
         self.fill(first);

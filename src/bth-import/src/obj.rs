@@ -7,7 +7,6 @@ use std::borrow::Cow;
 
 use crate::error::{Error, Result};
 use crate::groups::NamedGroups;
-use crate::materials::linear;
 use crate::mesh::{Keep, Wanted};
 use crate::mtl::{self, Library};
 use crate::number::{Lines, float, integer, shown, words};
@@ -194,8 +193,7 @@ impl Reader<'_, '_> {
     fn color<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) {
         let numbers: Vec<f32> = words.map_while(float).take(3).collect();
         if let [r, g, b] = *numbers.as_slice() {
-            let [r, g, b] = [r, g, b].map(|x| if x.is_nan() { x } else { linear(x.clamp(0.0, 1.0)) });
-            let row = self.raw.materials.colors.row([r, g, b, 1.0]);
+            let row = self.raw.materials.colors.srgb_row([r, g, b]);
             self.colors.resize(self.raw.positions.len(), None);
             self.colors.push(Some(row));
         }

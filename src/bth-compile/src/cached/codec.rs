@@ -299,6 +299,24 @@ impl Codec for TetMesh {
 mod tests {
     use super::*;
 
+    fn parameters(base_color_texture: u32) -> MaterialParameters {
+        MaterialParameters {
+            base_color: [0.5; 4],
+            emissive: [0.0; 3],
+            alpha_cutoff: 0.5,
+            alpha_mode: 0,
+            flags: 0,
+            base_color_texture,
+            emissive_texture: NONE,
+            reserved: [0; 4],
+        }
+    }
+
+    fn texture() -> Texture {
+        let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        Texture { image: [7; 16], wrap: [0, 1], filter: 1, transform, reserved: [0; 3] }
+    }
+
     #[test]
     fn meshes_with_rows_out_of_range_do_not_come_back() {
         let attributes =
@@ -314,9 +332,15 @@ mod tests {
                 materials: vec!["rubber".into()],
                 runs: vec![[0, 0]],
             }),
+            materials: Some(Materials {
+                parameters: vec![parameters(0)],
+                textures: vec![texture()],
+                color_corners: vec![[0, 1, 1]],
+                colors: vec![[65535; 4], [0, 1, 2, 3]],
+            }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, opacity: None, groups: None, ..mesh.clone() };
+        let plain = Mesh { attributes: None, opacity: None, groups: None, materials: None, ..mesh.clone() };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);
@@ -325,6 +349,17 @@ mod tests {
         for change in changes {
             let mut other = mesh.clone();
             change(other.groups.as_mut().unwrap());
+            assert_eq!(decode::<Mesh>(&encode(&other)), None);
+        }
+        let changes: [fn(&mut Materials); 4] = [
+            |m| m.parameters[0] = parameters(1),
+            |m| m.parameters.push(parameters(0)),
+            |m| m.color_corners[0][2] = 2,
+            |m| m.color_corners.push([0; 3]),
+        ];
+        for change in changes {
+            let mut other = mesh.clone();
+            change(other.materials.as_mut().unwrap());
             assert_eq!(decode::<Mesh>(&encode(&other)), None);
         }
         let mut other = mesh;

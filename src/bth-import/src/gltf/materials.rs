@@ -19,7 +19,7 @@ use crate::gltf::texture::{self, KeptSet};
 use crate::gltf::texture_parts::{TextureParts, TextureReader};
 use crate::image_file::{self, MAX_TEXELS, Refused};
 use crate::materials::{ImageFile, MaterialRecorder};
-use crate::source::Source;
+use crate::source::{IMAGE, Source};
 
 /// How to do without what is read here, in errors.
 const WITHOUT: &str = "without --materials";
@@ -250,8 +250,15 @@ impl MaterialReader<'_, '_> {
 
 /// An image of the document, whose format and size are checked.
 fn image_file(textures: &TextureReader<'_, '_>, index: usize) -> Result<ImageFile> {
-    let bytes = textures.image(index)?;
     let part = format!("image {index}");
+    let bytes = textures.image(index).map_err(|e| match e {
+        Error::File { message, path, .. } => {
+            let hint = format!("put the image there, or compile {WITHOUT}");
+            let message = format!("expected the image {}: {message}", path.display());
+            textures.accessors.source.error_in_part(IMAGE, &part, message, &hint)
+        }
+        other => other,
+    })?;
     image_file::check(&bytes).map_err(|refused| match refused {
         Refused::Malformed(message) => textures.unreadable(&part, message),
         Refused::TooLarge(texels) => Error::Limit {

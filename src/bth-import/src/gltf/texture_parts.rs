@@ -137,7 +137,8 @@ impl TextureReader<'_, '_> {
     /// The bytes of an image file.
     ///
     /// # Errors
-    /// `BTH-I002` where it does not exist or is malformed, `BTH-I014` and `BTH-I016` where its bytes cannot be found.
+    /// `BTH-I002` where it does not exist or is malformed, `BTH-I014` and `BTH-I016` where its bytes cannot be found,
+    /// `BTH-O001` where its file cannot be read.
     pub(super) fn image(&self, index: usize) -> Result<Cow<'_, [u8]>> {
         let part = format!("image {index}");
         let image: Image = self.part(&self.parts.images, index, &part)?;
@@ -158,14 +159,7 @@ impl TextureReader<'_, '_> {
             let message = format!("expected a relative file name or a data: URI, found \"{uri}\"");
             return Err(self.unreadable(part, message));
         };
-        read_at_most(&path, MAX_FILE).map_err(|e| match e {
-            Error::File { message, path, .. } => {
-                let hint = format!("put the image there, or compile {}", self.without);
-                let message = format!("expected the image {}: {message}", path.display());
-                self.accessors.source.error_in_part(IMAGE, part, message, &hint)
-            }
-            other => other,
-        })
+        read_at_most(&path, MAX_FILE)
     }
 
     /// A row of a list of the document, parsed.

@@ -87,6 +87,9 @@ fn groups(view: &ObjectView<'_>) -> Vec<Value> {
     .collect()
 }
 
+/// Names of alpha modes, by their codes.
+const ALPHA_MODES: [&str; 3] = ["opaque", "mask", "blend"];
+
 /// How the materials of an object look; empty where the file keeps no more than their names.
 fn materials(file: &File, object: u32) -> Vec<Value> {
     let texture = |row: u32| (row != NONE).then_some(row);
@@ -94,7 +97,7 @@ fn materials(file: &File, object: u32) -> Vec<Value> {
     rows.map(|p| {
         json!({"base_color": p.base_color, "emissive": p.emissive, "double_sided": p.flags & MATERIAL_DOUBLE_SIDED != 0,
             "unlit": p.flags & MATERIAL_UNLIT != 0, "alpha_cutoff": p.alpha_cutoff,
-            "alpha": ["opaque", "mask", "blend"].get(p.alpha_mode as usize),
+            "alpha": ALPHA_MODES.get(p.alpha_mode as usize),
             "base_color_texture": texture(p.base_color_texture), "emissive_texture": texture(p.emissive_texture)})
     })
     .collect()

@@ -147,17 +147,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         );
         source.monitor.warn(&message);
     }
-    let Reader { mut raw, groups, libraries, colors, .. } = reader;
-    raw.groups = groups.recorder;
-    if wanted.materials {
-        mtl::read(source, &libraries, raw.groups.material_names(), &mut raw.materials)?;
-    }
-    if !colors.is_empty() {
-        // A position without a colour is white.
-        let white = raw.materials.colors.row([1.0; 4]);
-        let row = |position: u32| colors.get(position as usize).copied().flatten().unwrap_or(white);
-        raw.materials.colors.add(0, raw.triangles.iter().map(|corners| corners.map(row)));
-    }
+    let mut raw = reader.finish(wanted)?;
     if raw.normals.is_empty() {
         raw.normal_rows.clear();
     }
@@ -165,6 +155,24 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         raw.uv_rows.clear();
     }
     Ok(raw)
+}
+
+impl<'a> Reader<'a, '_> {
+    /// What was read, with its materials.
+    fn finish(self, wanted: Wanted) -> Result<Raw<'a>> {
+        let Reader { source, mut raw, groups, libraries, colors, .. } = self;
+        raw.groups = groups.recorder;
+        if wanted.materials {
+            mtl::read(source, &libraries, raw.groups.material_names(), &mut raw.materials)?;
+        }
+        if !colors.is_empty() {
+            // A position without a colour is white.
+            let white = raw.materials.colors.row([1.0; 4]);
+            let row = |position: u32| colors.get(position as usize).copied().flatten().unwrap_or(white);
+            raw.materials.colors.add(0, raw.triangles.iter().map(|corners| corners.map(row)));
+        }
+        Ok(raw)
+    }
 }
 
 impl Reader<'_, '_> {

@@ -53,80 +53,100 @@ pub(super) fn shade(
     };
     let mut paths: Vec<PathState> = samples.iter().enumerate().map(start).collect();
     let mut hits = hits.to_vec();
-    for bounce in 0..=frame.args.bounces {
-        let mut shadow_rays = OcclusionRays::default();
-        let mut contributions = Vec::new();
-        let mut next = Vec::new();
+    for number in 0..=frame.args.bounces {
+        let mut bounce = Bounce::new(frame, lights, samples, number);
         for (path, hit) in paths.iter().zip(&hits) {
-            if !hit.is_hit() {
-                let share = share(path.density, lights.density(path.direction));
-                colors[path.sample] += path.throughput * lights.sky(path.direction) * share;
-                continue;
-            }
-            let surface = Surface::of(frame, hit);
-            colors[path.sample] += path.throughput * surface.emitted;
-            if surface.albedo == Vec3::ZERO {
-                continue;
-            }
-            let Sample { sampler, index, .. } = samples[path.sample];
-            let sample =
-                |dimension: u64| sampler.point(DIMENSIONS * u64::from(bounce) + 1 + dimension, index);
-            let point = path.origin + path.direction * f64::from(hit.t);
-            let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
-            let shading = frame.geometry.shading_normal(hit, normal);
-            let throughput = path.throughput * surface.albedo;
-            let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
-            let chance = |ray: u64| samples[path.sample].chance(RAYS * u64::from(bounce) + 1 + ray);
-            let last = bounce == frame.args.bounces;
-            let surroundings = lights.surroundings(sample(3)).map(|(light, density)| {
-                // A path that goes on may find the surroundings by itself.
-                let scattered = if last { 0.0 } else { shading.dot(light.direction).max(0.0) / PI };
-                LightSample { light: light.light * share(Some(density), scattered), ..light }
-            });
-            let of_scene = lights.samples(origin.point, sample(0), sample(1));
-            for (ray, light) in of_scene.chain(surroundings).enumerate() {
-                // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
-                let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
-                if cosine > 0.0 {
-                    shadow_rays.push(origin, light.direction, light.distance, chance(1 + ray as u64));
-                    contributions.push((path.sample, throughput * light.light * cosine as f32));
-                }
-            }
-            if !last {
-                let direction = scattered(shading, normal, sample(2));
-                next.push(PathState {
-                    sample: path.sample,
-                    throughput,
-                    origin: origin.point,
-                    direction,
-                    from: hit.primitive,
-                    density: Some(shading.dot(direction).max(0.0) / PI),
-                });
-            }
+            colors[path.sample] += path.throughput * bounce.meet(path, hit);
         }
+        let Bounce { shadow_rays, contributions, next, .. } = bounce;
         counters.any_rays += shadow_rays.len() as u64;
         for (&(sample, light), blocked) in contributions.iter().zip(shadow_rays.trace(frame)) {
             colors[sample] += if blocked { Vec3::ZERO } else { light };
         }
-        let ray = |path: &PathState| Ray {
-            origin: path.origin.as_vec3().to_array(),
-            tmin: 0.0,
-            direction: path.direction.as_vec3().to_array(),
-            tmax: f32::INFINITY,
-        };
-        let rays: Vec<Ray> = next.iter().map(ray).collect();
-        let from: Vec<PrimitiveRef> = next.iter().map(|path| path.from).collect();
-        hits.clear();
-        hits.resize(rays.len(), Hit::MISS);
-        let chance = |row: usize| {
-            let path: &PathState = &next[row];
-            samples[path.sample].chance(RAYS * (u64::from(bounce) + 1))
-        };
-        visibility::nearest(frame, (&rays, Some(&from)), false, chance, &mut hits);
-        counters.nearest_rays += rays.len() as u64;
+        hits = trace(frame, &next, samples, number);
+        counters.nearest_rays += hits.len() as u64;
         paths = next;
     }
     colors.into_iter().map(reinhard).collect()
+}
+
+/// What the paths of a batch meet after the bounce of a number.
+fn trace(frame: &FrameContext<'_>, paths: &[PathState], samples: &[Sample], number: u32) -> Vec<Hit> {
+    let ray = |path: &PathState| Ray {
+        origin: path.origin.as_vec3().to_array(),
+        tmin: 0.0,
+        direction: path.direction.as_vec3().to_array(),
+        tmax: f32::INFINITY,
+    };
+    let rays: Vec<Ray> = paths.iter().map(ray).collect();
+    let from: Vec<PrimitiveRef> = paths.iter().map(|path| path.from).collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let chance = |row: usize| samples[paths[row].sample].chance(RAYS * (u64::from(number) + 1));
+    visibility::nearest(frame, (&rays, Some(&from)), false, chance, &mut hits);
+    hits
+}
+
+/// What the paths of a batch meet at once.
+struct Bounce<'a> {
+    frame: &'a FrameContext<'a>,
+    lights: &'a Lights<'a>,
+    samples: &'a [Sample],
+    number: u32,
+    shadow_rays: OcclusionRays,
+    /// For each shadow ray its sample, and the light that it brings if it is not blocked.
+    contributions: Vec<(usize, Vec3)>,
+    /// Paths that go on.
+    next: Vec<PathState>,
+}
+
+impl<'a> Bounce<'a> {
+    fn new(frame: &'a FrameContext<'a>, lights: &'a Lights<'a>, samples: &'a [Sample], number: u32) -> Self {
+        let (shadow_rays, contributions) = (OcclusionRays::default(), Vec::new());
+        Self { frame, lights, samples, number, shadow_rays, contributions, next: Vec::new() }
+    }
+
+    /// Adds the shadow rays and the next ray of a path that meets a surface. Returns the radiance that it finds there, or in the
+    /// surroundings.
+    fn meet(&mut self, path: &PathState, hit: &Hit) -> Vec3 {
+        let Self { frame, lights, number, .. } = *self;
+        if !hit.is_hit() {
+            return lights.sky(path.direction) * share(path.density, lights.density(path.direction));
+        }
+        let surface = Surface::of(frame, hit);
+        if surface.albedo == Vec3::ZERO {
+            return surface.emitted;
+        }
+        let Sample { sampler, index, .. } = self.samples[path.sample];
+        let sample = |dimension: u64| sampler.point(DIMENSIONS * u64::from(number) + 1 + dimension, index);
+        let point = path.origin + path.direction * f64::from(hit.t);
+        let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
+        let shading = frame.geometry.shading_normal(hit, normal);
+        let throughput = path.throughput * surface.albedo;
+        let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
+        let last = number == frame.args.bounces;
+        let surroundings = lights.surroundings(sample(3)).map(|(light, density)| {
+            // A path that goes on may find the surroundings by itself.
+            let scattered = if last { 0.0 } else { shading.dot(light.direction).max(0.0) / PI };
+            LightSample { light: light.light * share(Some(density), scattered), ..light }
+        });
+        let of_scene = lights.samples(origin.point, sample(0), sample(1));
+        for (ray, light) in of_scene.chain(surroundings).enumerate() {
+            // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
+            let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
+            if cosine > 0.0 {
+                let chance = self.samples[path.sample].chance(RAYS * u64::from(number) + 1 + ray as u64);
+                self.shadow_rays.push(origin, light.direction, light.distance, chance);
+                self.contributions.push((path.sample, throughput * light.light * cosine as f32));
+            }
+        }
+        if !last {
+            let direction = scattered(shading, normal, sample(2));
+            let density = Some(shading.dot(direction).max(0.0) / PI);
+            let (origin, from) = (origin.point, hit.primitive);
+            self.next.push(PathState { sample: path.sample, throughput, origin, direction, from, density });
+        }
+        surface.emitted
+    }
 }
 
 /// A cosine-distributed direction around the shading normal, on the side of the geometric one.

@@ -47,7 +47,15 @@ fn trace(scene: &Scene, rng: &mut Rng) {
         if let Some(surface) = scene.surface(hit) {
             assert!(surface.group < scene.group_count(surface.object));
             scene.group_name(surface.object, surface.group);
-            surface.material.map(|material| scene.material_name(surface.object, material));
+            if let Some(material) = surface.material {
+                scene.material_name(surface.object, material);
+                let look = scene.material(surface.object, material);
+                for texture in look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture]) {
+                    let texture = texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
+                    assert!(texture.is_none_or(|texture| !texture.bytes.is_empty()));
+                }
+            }
+            scene.vertex_color(hit);
             scene.object_name(surface.object);
         }
         scene.triangle_in_world(hit.primitive);
@@ -88,7 +96,7 @@ fn ray(scene: &Scene, rng: &mut Rng) -> Ray {
 /// Imports a model of this format; a mesh that comes out keeps the promises of its type.
 pub fn import(format: &str, bytes: &[u8]) {
     let name = Path::new("/nonexistent/fuzz/model").with_extension(format);
-    let wanted = Wanted { attributes: Keep::All, groups: true };
+    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true };
     let Ok((mesh, report)) = import_bytes(&name, bytes, wanted, &Silent) else { return };
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
     assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
@@ -107,6 +115,10 @@ pub fn import(format: &str, bytes: &[u8]) {
     let material =
         |group: &bth_import::Group| group.material.is_none_or(|m| (m as usize) < groups.materials.len());
     assert!(groups.groups.iter().all(material));
+    let materials = mesh.materials.as_ref().expect("materials, which are wanted");
+    assert!([0, groups.materials.len()].contains(&materials.parameters.len()));
+    assert!(materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len()));
+    assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use corpus_support::{data_and_compiler, listed_triangles, models, run};
+use corpus_support::{data_and_compiler, listed_triangles, models, program, run};
 
 /// Wall-clock limit, generous for busy machines; the documented limits are below.
 const LIMIT: Duration = Duration::from_secs(300);
@@ -77,6 +77,41 @@ fn every_messy_model_compiles_or_is_refused_with_a_reason() {
             assert!(ended.stderr.contains(place), "{name}: {}", ended.stderr);
         }
     }
+}
+
+/// With materials, too: libraries and images that are missing or broken are errors with a code, a place and a hint. The player shows
+/// every model that compiles without them.
+#[test]
+fn materials_of_messy_models_are_read_or_refused_with_a_reason() {
+    let Some((data, bthc)) = data_and_compiler() else { return };
+    let Some(player) = program("bth-play") else { return println!("SKIPPED: bth-play is not built") };
+    let out = tempfile::tempdir().unwrap();
+    let (mut kept, mut refused) = (0, 0);
+    let is_obj = |path: &std::path::PathBuf| path.extension().is_some_and(|e| e == "obj");
+    for model in models(&data.join("messy")).into_iter().filter(is_obj) {
+        let file = out.path().join("x.bth");
+        let mut compile = limited(&bthc);
+        compile.arg("compile").arg(&model).arg("-o").arg(&file).args(["--materials", "--structure", "bvh"]);
+        let ended = run(&mut compile, LIMIT).unwrap();
+        let shown = model.display();
+        match ended.code {
+            Some(0) => {
+                let picture = out.path().join("x.png");
+                let mut play = Command::new(&player);
+                play.arg(&file).arg("-o").arg(&picture).args(["--size", "32x32", "--spp", "1"]);
+                let played = run(&mut play, LIMIT).unwrap();
+                assert_eq!(played.code, Some(0), "{shown}: {}", played.stderr);
+                kept += 1;
+            }
+            Some(3 | 5) => {
+                let said = &ended.stderr;
+                assert!(said.contains("BTH-") && said.contains("hint"), "{shown}: {said}");
+                refused += 1;
+            }
+            code => panic!("{shown}: {code:?} {}", ended.stderr),
+        }
+    }
+    println!("{kept} messy models with materials, {refused} refused");
 }
 
 #[test]

@@ -15,6 +15,7 @@ from bth_container import Container, Invalid, NONE, kind_name  # noqa: E402
 from bth_geometry import check_geometry  # noqa: E402
 from bth_groups import GroupsView, object_names  # noqa: E402
 from bth_indices import check_indices  # noqa: E402
+from bth_materials import MaterialsView, check_images  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
 from bth_scene import SceneView, check_scene  # noqa: E402
 
@@ -38,6 +39,7 @@ def describe(container):
                 "tet_leaves": len(view.tet_leaves),
                 "tets": len(view.tets),
                 "groups": GroupsView(view).describe(),
+                "materials": MaterialsView(view).describe(),
             }
         )
     return {
@@ -86,13 +88,17 @@ def check(data, level):
     if level == "verify":
         container.check_bytes()
     if level != "open":
+        materials = []
         for i in range(container.objects):
             view = ObjectView(container, i)
             GroupsView(view).check()
+            materials.append(MaterialsView(view))
+            materials[-1].check()
             tets = check_indices(view)
             if level == "verify":
                 check_geometry(view, tets)
         object_names(container)
+        check_images(container, materials)
         check_scene(SceneView(container))
     return container
 
@@ -114,6 +120,8 @@ def show(description):
             print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
         if o["groups"]:
             print(f"  {len(o['groups'])} groups of triangles")
+        if o["materials"]["parameters"]:
+            print(f"  {o['materials']['parameters']} materials with {o['materials']['textures']} textures")
     scene = description["scene"]
     if scene:
         counts = ", ".join(f"{len(scene[k])} {k}" for k in ("nodes", "instances", "tracks", "cameras", "lights"))

@@ -29,6 +29,8 @@ pub struct CompileOptions {
     pub alpha: mesh::AlphaMode,
     /// Whether to keep groups of triangles, materials, and the names of these and of objects.
     pub names: bool,
+    /// Whether to keep how materials look, with textures and vertex colours. Includes all attributes and the groups of triangles.
+    pub materials: bool,
     /// Coordinates that triangle leaves store.
     pub coordinates: coordinates::CoordinateOptions,
     /// Builder of the binary BVH.
@@ -57,6 +59,7 @@ impl Default for CompileOptions {
             structure: Structure::default(),
             attributes: mesh::Keep::default(),
             names: false,
+            materials: false,
             alpha: mesh::AlphaMode::default(),
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
@@ -74,7 +77,13 @@ impl Default for CompileOptions {
 impl CompileOptions {
     /// What to read of models.
     pub fn wanted(&self) -> mesh::Wanted {
-        mesh::Wanted { attributes: self.attributes, groups: self.names }
+        let attributes = if self.materials { mesh::Keep::All } else { self.attributes };
+        mesh::Wanted { attributes, groups: self.names || self.materials, materials: self.materials }
+    }
+
+    /// What of the looks of models is read, for which files besides the models are needed.
+    pub fn looks(&self) -> mesh::Looks {
+        mesh::Looks { alpha: self.alpha, materials: self.materials }
     }
 
     /// How tetrahedra will be stored; the size of the object without them is not set.

@@ -2,8 +2,7 @@
 
 use crate::error::{Error, Result};
 use bth_files::Digest;
-use bth_import::AlphaMode;
-use bth_import::gltf::external_files;
+use bth_import::Looks;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use zerocopy::IntoBytes;
@@ -28,8 +27,8 @@ pub struct SourceDigest {
     pub file: Digest,
     /// BLAKE3 of the files that it refers to, in order.
     pub others: Vec<Digest>,
-    /// Which materials make holes: their images are among the files.
-    pub alpha: AlphaMode,
+    /// What of the looks is read: the images are among the files.
+    pub looks: Looks,
 }
 
 /// A model whose files have been hashed.
@@ -44,9 +43,10 @@ impl SourceDigest {
     ///
     /// # Errors
     /// `BTH-O001` when one cannot be read.
-    pub fn of(path: &Path, alpha: AlphaMode) -> Result<Self> {
-        let others = files(path, alpha)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
-        Ok(Self { file: digest(path)?, others, alpha })
+    pub fn of(path: &Path, looks: impl Into<Looks>) -> Result<Self> {
+        let looks = looks.into();
+        let others = files(path, looks)?.iter().skip(1).map(|other| digest(other)).collect::<Result<_>>()?;
+        Ok(Self { file: digest(path)?, others, looks })
     }
 
     /// Hashes a mesh in memory: the numbers of positions and triangles, then their little-endian bytes.
@@ -59,7 +59,7 @@ impl SourceDigest {
         ] {
             hasher.update(&(count as u64).to_le_bytes()).update(bytes);
         }
-        Self { file: hasher.finalize().into(), others: Vec::new(), alpha: AlphaMode::None }
+        Self { file: hasher.finalize().into(), others: Vec::new(), looks: Looks::default() }
     }
 
     /// Returns `read` if the files still have these hashes, which proves that it was read from the hashed content.
@@ -67,14 +67,10 @@ impl SourceDigest {
     /// # Errors
     /// `BTH-O002` when they do not.
     pub(crate) fn unchanged<T>(&self, path: &Path, read: T) -> Result<T> {
-        if Self::of(path, self.alpha)? == *self {
+        if Self::of(path, self.looks)? == *self {
             return Ok(read);
         }
-        Err(Error::File {
-            code: "BTH-O002",
-            path: path.to_owned(),
-            message: "the file changed while it was read; compile again when it is complete".to_owned(),
-        })
+        Err(changed(path))
     }
 
     /// The text of all hashes, as cache keys contain it.
@@ -84,17 +80,21 @@ impl SourceDigest {
     }
 }
 
-/// The files of a model: the model itself, then those to which a glTF document refers.
+/// The files of a model: the model itself, then those to which it refers.
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.
-pub fn files(path: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let mut files = vec![path.to_owned()];
-    if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(external_files(path, &bth_import::read_file(path)?, alpha));
+pub fn files(path: &Path, looks: impl Into<Looks>) -> Result<Vec<PathBuf>> {
+    bth_import::source_files(path, looks)
+}
+
+/// The error for a file that changed between two looks at it.
+pub(crate) fn changed(path: &Path) -> Error {
+    Error::File {
+        code: "BTH-O002",
+        path: path.to_owned(),
+        message: "the file changed while it was read; compile again when it is complete".to_owned(),
     }
-    Ok(files)
 }
 
 fn digest(path: &Path) -> Result<Digest> {

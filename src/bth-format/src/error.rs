@@ -98,6 +98,7 @@ codes! {
     Opacity "F146" "A row of OPACITY is a state, or a level from 1 to 8 and the first of its words, which lie within OPACITY_MICRO."
     MicroOpacity "F147" "States in OPACITY_MICRO are from 0 to 2; bits behind the last state of a triangle of level 1 are zero."
     ObjectName "F148" "OBJECT_NAMES has a row for each object or none; names lie within OBJECT_LABELS, are UTF-8 and have at most 4,096 bytes."
+    MaterialParameters "F149" "MATERIAL_PARAMETERS has as many rows as MATERIALS or none; colors, alpha cutoff, alpha mode and flags are in the ranges of the table of MaterialParameters; textures are NONE or rows of TEXTURES; reserved fields are zero."
     Scene "F150" "Scene sections come with SCENE, which has one row: a finite rate above 0, a first frame not after the last, both within 2^24 of 0, a camera below the number of cameras or NONE, and reserved fields of zero."
     Node "F151" "A node's parent is NONE or a lesser row, its flags are known, and its reserved fields are zero."
     NodeTransform "F152" "A node's transform is finite; one that is no matrix has a quaternion that is not zero and ends with two zeros."
@@ -108,6 +109,9 @@ codes! {
     TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions are not zero, and visibility is 0 or 1."
     Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are finite and in the ranges of the table of Camera; its reserved fields are zero."
     Light "F159" "A light's node and kind exist; its color, intensity, range and angles are finite and in the ranges of the table of Light; its reserved fields are zero."
+    Texture "F160" "Wrap modes and filter of a texture are known, its transform is finite, and its reserved fields are zero."
+    Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
+    Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
@@ -325,6 +329,12 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::PROVENANCE => "PROVENANCE",
         kind::OBJECT_NAMES => "OBJECT_NAMES",
         kind::OBJECT_LABELS => "OBJECT_LABELS",
+        kind::MATERIAL_PARAMETERS => "MATERIAL_PARAMETERS",
+        kind::TEXTURES => "TEXTURES",
+        kind::COLOR_CORNERS => "COLOR_CORNERS",
+        kind::COLORS => "COLORS",
+        kind::IMAGES => "IMAGES",
+        kind::IMAGE_BYTES => "IMAGE_BYTES",
         kind::SCENE => "SCENE",
         kind::NODES => "NODES",
         kind::INSTANCES => "INSTANCES",

@@ -24,6 +24,7 @@ pub mod exact;
 pub mod file;
 pub mod layout;
 pub mod limits;
+mod materials_view;
 mod names;
 pub mod object;
 mod scene_view;
@@ -32,5 +33,6 @@ pub mod verify;
 
 pub use error::{Code, Error};
 pub use file::File;
+pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
 pub use scene_view::SceneView;

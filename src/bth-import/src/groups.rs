@@ -38,6 +38,11 @@ impl GroupRecorder {
         self.materials.len() as u32 - 1
     }
 
+    /// The names of all materials, by their numbers.
+    pub(super) fn material_names(&self) -> &[String] {
+        &self.materials
+    }
+
     /// Adds a group. Returns its number.
     pub(super) fn group(&mut self, name: String, material: Option<u32>) -> u32 {
         self.groups.push(Group { name: shortened(name), material });
@@ -54,14 +59,15 @@ impl GroupRecorder {
     }
 
     /// The groups of a mesh of so many triangles. Those before the first start are of a group without a name; groups and
-    /// materials without triangles are left out. None at all, if there is but one without a name and a material.
-    pub(super) fn finish(mut self, triangles: usize) -> Groups {
+    /// materials without triangles are left out. None at all, if there is but one without a name and a material. The second value
+    /// has the numbers of the materials that stay.
+    pub(super) fn finish(mut self, triangles: usize) -> (Groups, Vec<u32>) {
         self.runs.retain(|run| (run[0] as usize) < triangles);
         if triangles > 0 && self.runs.first().is_none_or(|run| run[0] > 0) {
             let unnamed = self.group(String::new(), None);
             self.runs.insert(0, [0, unnamed]);
         }
-        let mut found = Groups::default();
+        let (mut found, mut kept) = (Groups::default(), Vec::new());
         let (mut group_rows, mut material_rows) = (HashMap::new(), HashMap::new());
         for [first, group] in self.runs {
             let row = *group_rows.entry(group).or_insert_with(|| {
@@ -69,6 +75,7 @@ impl GroupRecorder {
                 let material = material.map(|material| {
                     *material_rows.entry(material).or_insert_with(|| {
                         found.materials.push(self.materials[material as usize].clone());
+                        kept.push(material);
                         found.materials.len() as u32 - 1
                     })
                 });
@@ -79,8 +86,8 @@ impl GroupRecorder {
         }
         // The absence of groups says the same.
         match found.groups.as_slice() {
-            [only] if *only == Group::default() => Groups::default(),
-            _ => found,
+            [only] if *only == Group::default() => (Groups::default(), kept),
+            _ => (found, kept),
         }
     }
 }
@@ -141,7 +148,8 @@ mod tests {
         named.name(9, "a".into());
         named.material(10, "red".into());
         named.name(12, "beyond".into());
-        let groups = named.recorder.finish(12);
+        let (groups, kept) = named.recorder.finish(12);
+        assert_eq!(kept, [0, 1]);
         let group = |name: &str, material| Group { name: name.into(), material };
         assert_eq!(
             groups.groups,
@@ -153,11 +161,11 @@ mod tests {
 
     #[test]
     fn one_group_without_a_name_is_none() {
-        assert_eq!(GroupRecorder::default().finish(0), Groups::default());
-        assert_eq!(GroupRecorder::default().finish(3), Groups::default());
+        assert_eq!(GroupRecorder::default().finish(0).0, Groups::default());
+        assert_eq!(GroupRecorder::default().finish(3).0, Groups::default());
         let mut named = NamedGroups::default();
         named.material(0, "red".into());
-        assert_eq!(named.recorder.finish(3).runs, [[0, 0]]);
+        assert_eq!(named.recorder.finish(3).0.runs, [[0, 0]]);
     }
 
     #[test]

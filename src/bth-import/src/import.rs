@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use crate::cutout::{AlphaMode, Cutouts};
 use crate::error::{Error, Result};
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
+use crate::groups::Groups;
+use crate::materials::{ImageFile, Looks};
 use crate::mesh::{Attributes, Mesh, Report, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{Raw, RowKind, check_rows, check_triangles};
 use crate::source::{NON_FINITE, Source, input_error, read_file};
-use crate::{attributes, gltf, obj, off, ply, stl, topology, weld};
+use crate::{attributes, gltf, mtl, obj, off, ply, stl, topology, weld};
 
 /// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +51,7 @@ pub fn import_bytes(
     let raw = match format(&source)? {
         Format::Obj => obj::read(&source, wanted)?,
         Format::Gltf => gltf::flatten::read(&source, wanted)?,
-        Format::Ply => ply::read(&source, wanted.attributes)?,
+        Format::Ply => ply::read(&source, wanted)?,
         Format::Stl => stl::read(&source)?,
         Format::Off => off::read(&source)?,
     };
@@ -77,11 +79,14 @@ pub fn import_gltf_meshes(
     }
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = gltf::document::read(&source, &supported)?;
+    let shared = gltf::materials::SharedMaterials::default();
     let one = |mesh: &u32| {
-        let raw = gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, wanted)?;
+        let raw = gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, (wanted, &shared))?;
         finish(raw, wanted, monitor)
     };
-    meshes.iter().map(one).collect()
+    let imported = meshes.iter().map(one).collect();
+    shared.report(&source);
+    imported
 }
 
 /// The cut-outs of a model, whose triangles have the numbers that [`import`] gives them. Formats other than glTF have none.
@@ -123,16 +128,33 @@ pub fn import_gltf_cutouts(
     gltf::cutout::meshes(&Source::new(path, &data, monitor), mode, meshes)
 }
 
-/// The files that a model consists of: itself, then those that a glTF document refers to, in order. What is no glTF
-/// document refers to none.
+/// The images of the materials of a model ([`Wanted::materials`]), each with the name by which textures refer to it.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_images(path: &Path, monitor: &dyn Monitor) -> Result<Vec<ImageFile>> {
+    let data = read_file(path)?;
+    let source = Source::new(path, &data, monitor);
+    match format(&source)? {
+        Format::Gltf => gltf::materials::images(&source),
+        Format::Obj => mtl::images(&source),
+        Format::Ply | Format::Stl | Format::Off => Ok(Vec::new()),
+    }
+}
+
+/// The files that a model consists of: itself, then those that a glTF document or an OBJ file refers to, in order. Images and
+/// material libraries that do not exist are left out; reading them reports an error.
 ///
 /// # Errors
 /// `BTH-O001` when the model cannot be read.
-pub fn source_files(path: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>> {
+pub fn source_files(path: &Path, looks: impl Into<Looks>) -> Result<Vec<PathBuf>> {
+    let looks = looks.into();
     let mut files = vec![path.to_owned()];
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    if !matches!(extension.as_deref(), Some("obj" | "ply" | "stl" | "off" | "bth")) {
-        files.extend(gltf::external_files(path, &read_file(path)?, alpha));
+    match extension.as_deref() {
+        Some("obj") if looks.materials => files.extend(mtl::files(path, &read_file(path)?)),
+        Some("obj" | "ply" | "stl" | "off" | "bth") => {}
+        _ => files.extend(gltf::external_files(path, &read_file(path)?, looks)),
     }
     Ok(files)
 }
@@ -144,6 +166,10 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
     let attributes = attributes::collect(&raw, wanted.attributes)?;
     let triangles = std::mem::take(&mut raw.triangles);
     let groups = wanted.groups.then(|| std::mem::take(&mut raw.groups).finish(triangles.len()));
+    let recorder = std::mem::take(&mut raw.materials);
+    let of = |(_, kept): &(Groups, Vec<u32>)| recorder.finish(kept, triangles.len());
+    let materials = groups.as_ref().filter(|_| wanted.materials).map(of);
+    let groups = groups.map(|(groups, _)| groups);
     let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
         input_error(
             NON_FINITE,
@@ -153,7 +179,7 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
         )
     })?;
     let format = raw.format.to_owned();
-    let mesh = Mesh { groups, ..mesh };
+    let mesh = Mesh { groups, materials, ..mesh };
     Ok((mesh, Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }))
 }
 

@@ -11,10 +11,13 @@ mod cutout;
 pub mod error;
 pub mod gltf;
 mod groups;
+mod image_file;
 mod import;
+mod materials;
 mod memory;
 mod mesh;
 pub mod monitor;
+mod mtl;
 mod number;
 mod obj;
 mod off;
@@ -31,8 +34,9 @@ pub use error::{Error, Place, Result};
 pub use groups::{Group, Groups};
 pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_meshes,
-    source_files,
+    import_images, source_files,
 };
+pub use materials::{ImageFile, Looks, Materials};
 pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};

@@ -1,6 +1,7 @@
 //! The triangle mesh that importers make, and their report about it.
 
 use crate::groups::Groups;
+use crate::materials::Materials;
 use serde::{Deserialize, Serialize};
 
 /// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0).
@@ -17,6 +18,8 @@ pub struct Mesh {
     pub opacity: Option<TriangleOpacities>,
     /// Groups of triangles, if the caller wants them.
     pub groups: Option<Groups>,
+    /// How the materials of the groups look, if the caller wants them.
+    pub materials: Option<Materials>,
 }
 
 /// Opacity of each triangle, as the sections OPACITY and OPACITY_MICRO of a compiled file have it.
@@ -78,11 +81,13 @@ pub struct Wanted {
     pub attributes: Keep,
     /// Groups of triangles, with their names and materials (`--names`).
     pub groups: bool,
+    /// How materials look, and vertex colours (`--materials`). Needs groups.
+    pub materials: bool,
 }
 
 impl From<Keep> for Wanted {
     fn from(attributes: Keep) -> Self {
-        Self { attributes, groups: false }
+        Self { attributes, groups: false, materials: false }
     }
 }
 

@@ -1,4 +1,5 @@
-//! Reads Wavefront OBJ: polygons with normals and texture coordinates, and groups of them. Smoothing and what materials are is ignored.
+//! Reads Wavefront OBJ: polygons with normals and texture coordinates, and groups of them. What materials are is in
+//! [`mod@crate::mtl`]; smoothing is ignored.
 //!
 //! A reader of our own rather than `tobj`: docs/decisions.md says why.
 
@@ -7,6 +8,7 @@ use std::borrow::Cow;
 use crate::error::{Error, Result};
 use crate::groups::NamedGroups;
 use crate::mesh::{Keep, Wanted};
+use crate::mtl::{self, Library};
 use crate::number::{Lines, float, integer, shown, words};
 use crate::raw::{NONE, Raw, RowKind, check_rows};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, UNSUPPORTED};
@@ -67,6 +69,9 @@ struct Reader<'a, 's> {
     normals: bool,
     uvs: bool,
     groups: NamedGroups,
+    libraries: Vec<Library>,
+    /// Rows of the colours of positions; shorter where the last ones have none.
+    colors: Vec<Option<u32>>,
     forward: Vec<Forward>,
     face: Vec<u32>,
     face_normals: Vec<u32>,
@@ -87,6 +92,8 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         normals: wanted.attributes != Keep::None,
         uvs: wanted.attributes == Keep::All,
         groups: NamedGroups::default(),
+        libraries: Vec::new(),
+        colors: Vec::new(),
         forward: Vec::new(),
         face: Vec::new(),
         face_normals: Vec::new(),
@@ -101,6 +108,9 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
             None => {}
             Some(b"v") => {
                 let position = reader.numbers(number, &mut words, 3)?;
+                if wanted.materials {
+                    reader.color(words);
+                }
                 reader.raw.positions.push(position);
             }
             Some(b"vn") if reader.normals => {
@@ -114,6 +124,9 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
             Some(b"f" | b"fo") => reader.face(number, words)?,
             Some(b"g" | b"o") if wanted.groups => {
                 reader.groups.name(reader.raw.triangles.len(), rest(words));
+            }
+            Some(b"mtllib") if wanted.materials => {
+                reader.libraries.push(Library { line: number, names: rest(words) });
             }
             Some(b"usemtl") if wanted.groups => {
                 reader.groups.material(reader.raw.triangles.len(), rest(words));
@@ -134,8 +147,7 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         );
         source.monitor.warn(&message);
     }
-    let mut raw = reader.raw;
-    raw.groups = reader.groups.recorder;
+    let mut raw = reader.finish(wanted)?;
     if raw.normals.is_empty() {
         raw.normal_rows.clear();
     }
@@ -143,6 +155,24 @@ pub(super) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>
         raw.uv_rows.clear();
     }
     Ok(raw)
+}
+
+impl<'a> Reader<'a, '_> {
+    /// What was read, with its materials.
+    fn finish(self, wanted: Wanted) -> Result<Raw<'a>> {
+        let Reader { source, mut raw, groups, libraries, colors, .. } = self;
+        raw.groups = groups.recorder;
+        if wanted.materials {
+            mtl::read(source, &libraries, raw.groups.material_names(), &mut raw.materials)?;
+        }
+        if !colors.is_empty() {
+            // A position without a colour is white.
+            let white = raw.materials.colors.row([1.0; 4]);
+            let row = |position: u32| colors.get(position as usize).copied().flatten().unwrap_or(white);
+            raw.materials.colors.add(0, raw.triangles.iter().map(|corners| corners.map(row)));
+        }
+        Ok(raw)
+    }
 }
 
 impl Reader<'_, '_> {
@@ -165,6 +195,16 @@ impl Reader<'_, '_> {
             })?;
         }
         Ok(numbers)
+    }
+
+    /// Keeps the colour behind the coordinates of a position, sRGB, if there are three numbers.
+    fn color<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) {
+        let numbers: Vec<f32> = words.map_while(float).take(3).collect();
+        if let [r, g, b] = *numbers.as_slice() {
+            let row = self.raw.materials.colors.srgb_row([r, g, b]);
+            self.colors.resize(self.raw.positions.len(), None);
+            self.colors.push(Some(row));
+        }
     }
 
     fn face<'w>(&mut self, line: u64, words: impl Iterator<Item = &'w [u8]>) -> Result<()> {

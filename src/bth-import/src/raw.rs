@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Place, Result};
 use crate::groups::GroupRecorder;
+use crate::materials::MaterialRecorder;
 use bth_format::limits::MAX_TRIANGLES;
 
 /// Row of an attribute that a corner does not have.
@@ -43,6 +44,8 @@ pub(super) struct Raw<'a> {
     pub(super) skipped: u64,
     /// Groups of triangles, if the caller wants them and the source has some.
     pub(super) groups: GroupRecorder,
+    /// How materials look, and vertex colours, if the caller wants them.
+    pub(super) materials: MaterialRecorder,
     /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }
@@ -61,6 +64,7 @@ impl<'a> Raw<'a> {
             polygons: 0,
             skipped: 0,
             groups: GroupRecorder::default(),
+            materials: MaterialRecorder::default(),
             locate,
         }
     }

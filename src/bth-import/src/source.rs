@@ -117,6 +117,8 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>> {
 
 /// Code: the file is cut off. Use it with [`TRUNCATED_HINT`].
 pub(crate) const TRUNCATED: &str = "BTH-I003";
+/// Code: a texture, an image or a material library that cannot be read.
+pub(crate) const IMAGE: &str = "BTH-I016";
 /// Hint for a file that is cut off.
 pub(crate) const TRUNCATED_HINT: &str = "the file is cut off; copy or export it again";
 /// Code: the text or structure does not follow the format.

@@ -83,6 +83,10 @@ pub(crate) struct Args {
     /// Times that light is reflected, in mode path.
     #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64))]
     pub(crate) bounces: u32,
+    /// Light from all around in mode path, a picture in Radiance format (.hdr) over longitude and latitude; by default a sky,
+    /// and a sun where the scene has no lights.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) env: Option<PathBuf>,
     /// Upper end of the heat map of mode steps; by default according to each picture.
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) scale: Option<u32>,
@@ -109,7 +113,7 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Mode {
-    /// A matte material under two lights.
+    /// The materials of the file under two lights; what has none is clay.
     Shaded,
     /// Normals as colours.
     Normals,
@@ -117,10 +121,12 @@ pub(crate) enum Mode {
     Ao,
     /// Heat map of the traversal steps of camera rays.
     Steps,
-    /// Diffuse path tracing with sun, sky and the scene's lights.
+    /// Diffuse path tracing of the file's materials with the scene's lights and an environment.
     Path,
     /// Each instance in a colour of its own.
     Instances,
+    /// As shaded, everything of matte clay.
+    Clay,
 }
 
 /// The camera that the options name.
@@ -144,6 +150,11 @@ impl Args {
         self.file.as_deref().ok_or_else(|| Failure::Usage("a file is needed".to_owned()))
     }
 
+    /// The same options with another number of samples per pixel.
+    pub(crate) fn with_samples(&self, spp: u32) -> Self {
+        Self { spp, ..self.clone() }
+    }
+
     /// Where pictures go, which clap requires unless they go to a window.
     pub(crate) fn output(&self) -> Result<&Path, Failure> {
         self.output.as_deref().ok_or_else(|| Failure::Usage("an output is needed".to_owned()))
@@ -152,8 +163,13 @@ impl Args {
 
 impl Mode {
     /// All of them, in the order of their keys in the window.
-    pub(crate) const ALL: [Mode; 6] =
-        [Mode::Shaded, Mode::Normals, Mode::Ao, Mode::Steps, Mode::Path, Mode::Instances];
+    pub(crate) const ALL: [Mode; 7] =
+        [Mode::Shaded, Mode::Normals, Mode::Ao, Mode::Steps, Mode::Path, Mode::Instances, Mode::Clay];
+
+    /// Whether it shows how materials look.
+    pub(crate) fn shows_materials(self) -> bool {
+        matches!(self, Mode::Shaded | Mode::Path)
+    }
 
     /// As on the command line.
     pub(crate) fn name(self) -> &'static str {
@@ -164,6 +180,7 @@ impl Mode {
             Mode::Steps => "steps",
             Mode::Path => "path",
             Mode::Instances => "instances",
+            Mode::Clay => "clay",
         }
     }
 }

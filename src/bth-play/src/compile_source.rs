@@ -16,11 +16,12 @@ pub(crate) fn is_source(path: &Path) -> bool {
 }
 
 /// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. The cache does not evict
-/// it while the returned pin lives.
+/// it while the returned pin lives. With `materials` it is compiled with these and with holes by alpha, or without where its materials cannot
+/// be read.
 ///
 /// # Errors
 /// If the manifest is malformed, the source cannot be compiled, or the cache cannot be used.
-pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failure> {
+pub(crate) fn compiled(source: &Path, cache: Option<&Path>, materials: bool) -> Result<Pin, Failure> {
     // Read here, too, since the errors of this reader have their own codes, with line and column.
     if source
         .extension()
@@ -42,7 +43,15 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
         .map_err(|e| Failure::File { path: folder.clone(), message: format!("cannot be the cache: {e}") })?;
     // An entry that is damaged, or evicted before it is pinned, is compiled again.
     for _ in 0..3 {
-        let key = compile(source, &folder).map_err(&failed)?;
+        let key = match compile(source, &folder, materials) {
+            Err((_, 3 | 4)) if materials => {
+                let plain = compile(source, &folder, false).map_err(&failed)?;
+                let what = "its materials cannot be read, as above; it is shown without them";
+                crate::messages::warn(&format!("{}: {what}", source.display()));
+                plain
+            }
+            key => key.map_err(&failed)?,
+        };
         let pin = store.find_id(&key).and_then(|record| store.pin(&record));
         store.take_notes().iter().for_each(|note| crate::messages::warn(note));
         if let Some(pin) = pin {
@@ -53,7 +62,7 @@ pub(crate) fn compiled(source: &Path, cache: Option<&Path>) -> Result<Pin, Failu
 }
 
 /// Runs `bthc` to compile into the cache. Returns the key of the entry, or what failed and the exit code for it.
-fn compile(source: &Path, cache: &Path) -> Result<Digest, (String, u8)> {
+fn compile(source: &Path, cache: &Path, materials: bool) -> Result<Digest, (String, u8)> {
     let bthc = std::env::current_exe()
         .ok()
         .map(|exe| exe.with_file_name(format!("bthc{}", std::env::consts::EXE_SUFFIX)))
@@ -63,6 +72,9 @@ fn compile(source: &Path, cache: &Path) -> Result<Digest, (String, u8)> {
     };
     let mut command = Command::new(&bthc);
     command.arg("compile").arg(source).arg("--in-cache").arg("--cache-dir").arg(cache).arg("--json");
+    if materials {
+        command.args(["--materials", "--alpha", "mask"]);
+    }
     let output = command.stdin(Stdio::null()).stderr(Stdio::inherit()).output();
     let output = match output {
         Ok(output) => output,

@@ -18,6 +18,8 @@ pub(crate) enum Failure {
     BadManifest(bth_scene::Error),
     /// A scene or model that could not be compiled (exit code 3, or 4 when it could not be read).
     Source { path: PathBuf, message: String, hint: String, exit: u8 },
+    /// A picture of the surroundings that cannot be used (exit code 3) or read (exit code 4).
+    Environment { path: PathBuf, message: String, exit: u8 },
     /// The picture could not be written (exit code 4).
     File { path: PathBuf, message: String },
     /// There is no window, or it stopped working (exit code 4).
@@ -63,6 +65,10 @@ impl Failure {
             }
             Self::Source { path, message, hint, exit } => {
                 ("BTH-P003", *exit, format!("{}: BTH-P003: {message} (hint: {hint})", path.display()))
+            }
+            Self::Environment { path, message, exit } => {
+                let hint = "--env takes a picture in Radiance format (.hdr) over longitude and latitude; without it there is a sky";
+                ("BTH-P006", *exit, format!("{}: BTH-P006: {message} (hint: {hint})", path.display()))
             }
             Self::Lacks { file, what, hint } => {
                 ("BTH-P001", 3, format!("{}: BTH-P001: {what} (hint: {hint})", file.display()))

@@ -4,6 +4,7 @@ mod args;
 mod camera;
 mod compile_source;
 mod failure;
+mod materials;
 mod messages;
 mod output;
 mod render;
@@ -43,7 +44,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     // Keeps the entry from being evicted from the cache until the end of the program.
     let pinned;
     let (file, mut scene) = if compile_source::is_source(file) {
-        pinned = compile_source::compiled(file, args.cache_dir.as_deref())?;
+        pinned = compile_source::compiled(
+            file,
+            args.cache_dir.as_deref(),
+            args.window || args.mode.shows_materials(),
+        )?;
         (pinned.path.as_path(), open(&pinned.path, true)?)
     } else {
         (file, open(file, args.map)?)

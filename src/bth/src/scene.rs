@@ -94,6 +94,7 @@ impl Scene {
             file.check(object)?;
         }
         file.check_object_names()?;
+        file.check_images()?;
         Scene::with_world(file)
     }
 

@@ -2,7 +2,8 @@
 //! a file keeps. And bounds.
 //!
 //! What a file keeps is decided when it is compiled: positions of triangles by default (not with `--no-geometry`), normals and
-//! texture coordinates with `--attributes`, groups, materials and names with `--names`.
+//! texture coordinates with `--attributes`, groups, materials and names with `--names`. How materials look is in
+//! [`mod@crate::materials`].
 
 use crate::intersect::point_exact::exact_normal;
 use crate::rays::{Hit, PrimitiveRef};
@@ -173,7 +174,7 @@ impl Scene {
     }
 
     /// The object of a triangle; `None` if there is no such instance.
-    fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
+    pub(crate) fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
         let object = (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance));
         object.filter(|object| *object != NONE)
     }

@@ -12,6 +12,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(groups());
+    cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     cases

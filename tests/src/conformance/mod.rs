@@ -5,6 +5,7 @@
 
 mod edit;
 mod invalid;
+mod materials;
 mod scenes;
 mod valid;
 

@@ -22,6 +22,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("opacity", opacity()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
+        Case::new("materials", super::materials::materials()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());

@@ -8,6 +8,7 @@ mod costs;
 mod errors;
 mod inspect;
 mod interrupt;
+mod materials;
 mod mistakes;
 mod pipelines;
 mod play;

@@ -4,7 +4,8 @@ use super::rows::{HashedRows, RowReader, RowWriter};
 use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
-use bth_import::{self as mesh, Attributes, Group, Groups, Mesh, TriangleOpacities};
+use bth_format::layout::{MaterialParameters, NONE, Texture};
+use bth_import::{self as mesh, Attributes, Group, Groups, Materials, Mesh, TriangleOpacities};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -65,6 +66,15 @@ fn groups(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of how a mesh's materials look, if that is wanted.
+fn materials(mesh: &Mesh) -> Option<Digest> {
+    let mut rows = RowWriter::default();
+    mesh.materials.as_ref()?.write(&mut rows);
+    let mut hasher = HashedRows::new("materials");
+    hasher.add(&rows.finish());
+    Some(hasher.finish())
+}
+
 /// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
@@ -80,6 +90,9 @@ pub(crate) struct MeshSummary {
     /// Hash of the groups.
     #[serde(default)]
     pub(crate) groups: Option<Digest>,
+    /// Hash of how materials look.
+    #[serde(default)]
+    pub(crate) materials: Option<Digest>,
 }
 
 impl MeshSummary {
@@ -91,6 +104,7 @@ impl MeshSummary {
             shading: shading(&mesh),
             opacity: opacity(&mesh),
             groups: groups(&mesh),
+            materials: materials(&mesh),
         };
         (mesh, summary)
     }
@@ -101,7 +115,8 @@ impl Codec for Mesh {
         to.add(&self.positions);
         to.add(&self.triangles);
         let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
-        to.add(&[u8::from(self.attributes.is_some()) | has_groups]);
+        let has_materials = if self.materials.is_some() { HAS_MATERIALS } else { 0 };
+        to.add(&[u8::from(self.attributes.is_some()) | has_groups | has_materials]);
         if let Some(attributes) = &self.attributes {
             to.add(&attributes.corners);
             to.add(&attributes.normals);
@@ -109,6 +124,9 @@ impl Codec for Mesh {
         }
         if let Some(groups) = &self.groups {
             groups.write(to);
+        }
+        if let Some(materials) = &self.materials {
+            materials.write(to);
         }
         // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
         if let Some(opacity) = &self.opacity {
@@ -128,6 +146,10 @@ impl Codec for Mesh {
             0 => None,
             _ => Some(Groups::read(from)?),
         };
+        let materials = match parts & HAS_MATERIALS {
+            0 => None,
+            _ => Some(Materials::read(from)?),
+        };
         let opacity = match from.is_empty() {
             true => None,
             false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
@@ -142,13 +164,43 @@ impl Codec for Mesh {
         let groups_fit = groups
             .as_ref()
             .is_none_or(|g| g.runs.last().is_none_or(|run| (run[0] as usize) < triangles.len()));
-        let fits = attributes_fit && opacity_fits && groups_fit && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups })
+        let known = groups.as_ref().map_or(0, |g: &Groups| g.materials.len());
+        let materials_fit = materials.as_ref().is_none_or(|m: &Materials| {
+            (m.parameters.is_empty() || m.parameters.len() == known)
+                && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
+                && within(&m.color_corners, m.colors.len())
+        });
+        let fits = attributes_fit
+            && opacity_fits
+            && groups_fit
+            && materials_fit
+            && within(&triangles, positions.len());
+        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups, materials })
     }
 }
 
 /// Bit of the byte that says what follows the triangles of a mesh; the lowest stands for attributes.
 const HAS_GROUPS: u8 = 2;
+/// As [`HAS_GROUPS`], for how materials look.
+const HAS_MATERIALS: u8 = 4;
+
+impl Codec for Materials {
+    fn write(&self, to: &mut RowWriter) {
+        to.add(&self.parameters);
+        to.add(&self.textures);
+        to.add(&self.color_corners);
+        to.add(&self.colors);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        let (parameters, textures): (Vec<MaterialParameters>, Vec<Texture>) = (from.take()?, from.take()?);
+        let known = |row: u32| row == NONE || (row as usize) < textures.len();
+        let fits = |p: &MaterialParameters| known(p.base_color_texture) && known(p.emissive_texture);
+        let fits = parameters.iter().all(fits);
+        let (color_corners, colors) = (from.take()?, from.take()?);
+        fits.then_some(Materials { parameters, textures, color_corners, colors })
+    }
+}
 
 impl Codec for Groups {
     fn write(&self, to: &mut RowWriter) {
@@ -247,6 +299,24 @@ impl Codec for TetMesh {
 mod tests {
     use super::*;
 
+    fn parameters(base_color_texture: u32) -> MaterialParameters {
+        MaterialParameters {
+            base_color: [0.5; 4],
+            emissive: [0.0; 3],
+            alpha_cutoff: 0.5,
+            alpha_mode: 0,
+            flags: 0,
+            base_color_texture,
+            emissive_texture: NONE,
+            reserved: [0; 4],
+        }
+    }
+
+    fn texture() -> Texture {
+        let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        Texture { image: [7; 16], wrap: [0, 1], filter: 1, transform, reserved: [0; 3] }
+    }
+
     #[test]
     fn meshes_with_rows_out_of_range_do_not_come_back() {
         let attributes =
@@ -262,9 +332,15 @@ mod tests {
                 materials: vec!["rubber".into()],
                 runs: vec![[0, 0]],
             }),
+            materials: Some(Materials {
+                parameters: vec![parameters(0)],
+                textures: vec![texture()],
+                color_corners: vec![[0, 1, 1]],
+                colors: vec![[65535; 4], [0, 1, 2, 3]],
+            }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, opacity: None, groups: None, ..mesh.clone() };
+        let plain = Mesh { attributes: None, opacity: None, groups: None, materials: None, ..mesh.clone() };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);
@@ -273,6 +349,17 @@ mod tests {
         for change in changes {
             let mut other = mesh.clone();
             change(other.groups.as_mut().unwrap());
+            assert_eq!(decode::<Mesh>(&encode(&other)), None);
+        }
+        let changes: [fn(&mut Materials); 4] = [
+            |m| m.parameters[0] = parameters(1),
+            |m| m.parameters.push(parameters(0)),
+            |m| m.color_corners[0][2] = 2,
+            |m| m.color_corners.push([0; 3]),
+        ];
+        for change in changes {
+            let mut other = mesh.clone();
+            change(other.materials.as_mut().unwrap());
             assert_eq!(decode::<Mesh>(&encode(&other)), None);
         }
         let mut other = mesh;

@@ -137,7 +137,7 @@ fn identify(
     // In parallel, because starting the worker takes as long as hashing a small model.
     let (digest, tetgen) = std::thread::scope(|scope| {
         let tetgen = scope.spawn(|| tetgen_in_keys(options, cache, monitor));
-        let digest = clock.time("hash", || SourceDigest::of(source, options.alpha));
+        let digest = clock.time("hash", || SourceDigest::of(source, options.looks()));
         (digest, tetgen.join())
     });
     let digest = digest?;

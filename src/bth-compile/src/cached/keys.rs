@@ -25,6 +25,7 @@ const TETS: &str = "1";
 const COLLAPSE: &str = "1";
 const OPACITY: &str = "1";
 const NAMES: &str = "1";
+const MATERIALS: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
@@ -39,7 +40,10 @@ pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wante
     if wanted.groups {
         key = key.with("names", "true").with("names version", NAMES);
     }
-    match source.alpha {
+    if wanted.materials {
+        key = key.with("materials", "true").with("materials version", MATERIALS);
+    }
+    match source.looks.alpha {
         AlphaMode::None => key,
         alpha => key.with("alpha", text(&alpha)).with("opacity version", OPACITY),
     }
@@ -102,6 +106,9 @@ impl ObjectKeys {
             .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
             .with_all(mesh.opacity.iter().map(|opacity| ("opacity".to_owned(), opacity.hex())))
             .with_all(mesh.groups.iter().map(|groups| ("groups".to_owned(), groups.hex())))
+            .with_all(
+                mesh.materials.iter().map(|materials| ("surface materials".to_owned(), materials.hex())),
+            )
             .with_all(self.0.iter().cloned())
     }
 }
@@ -165,6 +172,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     }
     if options.names {
         all.extend([("names", "true".to_owned()), ("names version", NAMES.to_owned())]);
+    }
+    if options.materials {
+        all.extend([("materials", "true".to_owned()), ("materials version", MATERIALS.to_owned())]);
     }
     if options.collapse.plan != Default::default() {
         all.push(("plan", format!("{:?}", options.collapse.plan)));

@@ -24,10 +24,11 @@ pub(crate) use stages::{Direct, Stages};
 
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::source::{Model, SourceDigest};
+use crate::source::{Model, SourceDigest, changed};
 use crate::{coordinates, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Compiles a model.
@@ -40,7 +41,7 @@ pub fn compile(
     monitor: &dyn Monitor,
 ) -> Result<(Compiled, CompileReport)> {
     let mut clock = Clock::default();
-    let digest = clock.time("hash", || SourceDigest::of(source, options.alpha))?;
+    let digest = clock.time("hash", || SourceDigest::of(source, options.looks()))?;
     let model = Model { path: source, digest: &digest };
     let (compiled, report) = compile_model(&model, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);
@@ -73,8 +74,26 @@ pub(crate) fn compile_imported(
     let source_blake3 = model.digest.file.hex();
     let tetgen = provenance::tetgen(reports.tets.as_ref());
     let provenance = provenance::of_model(&source_blake3, &import.format, tetgen, options)?;
-    let (checked, file) = clock.time("file", || object.file(provenance, options))?;
+    let images = images(model, object.image_names(), monitor)?;
+    let (checked, file) = clock.time("file", || object.file(provenance, &images, options))?;
     Ok((checked, CompileReport::new(source_blake3, clock, import, reports, file)))
+}
+
+/// The images of a model that have these names.
+///
+/// # Errors
+/// `BTH-O002` where a file has changed since its material was read, so that an image is not there any more.
+fn images(
+    model: &Model<'_>,
+    mut names: BTreeSet<[u8; 16]>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<mesh::ImageFile>> {
+    if names.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut images = mesh::import_images(model.path, monitor)?;
+    images.retain(|image| names.remove(&image.name));
+    if names.is_empty() { Ok(images) } else { Err(changed(model.path)) }
 }
 
 /// Compiles a mesh into an object; `source` names the model in messages.

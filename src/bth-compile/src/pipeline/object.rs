@@ -7,7 +7,8 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, coordinates, tets, write};
 use bth_format::layout::Object as Header;
-use bth_import::Mesh;
+use bth_import::{ImageFile, Mesh};
+use std::collections::BTreeSet;
 
 /// A compiled file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -115,18 +116,25 @@ pub fn assemble(
 ) -> Result<Compiled> {
     let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
     let (object, _) = join(traced, built.to_vec(), options, monitor)?;
-    Ok(object.file("{}".to_owned(), options)?.0.compiled)
+    Ok(object.file("{}".to_owned(), &[], options)?.0.compiled)
 }
 
 impl Object {
     /// The file with this object only, after the checks of a reader.
-    pub(super) fn file(&self, provenance: String, options: &CompileOptions) -> Result<(Checked, FileReport)> {
+    pub(super) fn file(
+        &self,
+        provenance: String,
+        images: &[ImageFile],
+        options: &CompileOptions,
+    ) -> Result<(Checked, FileReport)> {
         let parts = self.parts(options);
         let mut builder = write::FileBuilder::new();
         write::object(&mut builder, 0, &parts)?;
+        write::images(&mut builder, images.iter().map(|image| (image.name, image.bytes.as_slice())))?;
         builder.provenance(provenance)?;
         let bytes = builder.finish();
         let file = write::checked(&bytes)?;
+        file.check_images().map_err(write::defect)?;
         let resident_bytes = resident_bytes(&parts);
         let triangles = self.traced.mesh.triangles.len();
         let report = FileReport {
@@ -137,6 +145,12 @@ impl Object {
             resident_bytes_per_triangle: resident_bytes as f64 / triangles.max(1) as f64,
         };
         Ok((Checked { compiled: Compiled { bytes }, file }, report))
+    }
+
+    /// Names of the images that its textures refer to.
+    pub(super) fn image_names(&self) -> BTreeSet<[u8; 16]> {
+        let materials = self.traced.mesh.materials.iter();
+        materials.flat_map(|m| &m.textures).map(|texture| texture.image).collect()
     }
 
     /// The report on the coordinates, if vertices were moved.
@@ -157,6 +171,7 @@ impl Object {
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
             packed_nodes: self.packed_nodes,
             groups: self.groups.as_ref(),
+            materials: mesh.materials.as_ref(),
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };

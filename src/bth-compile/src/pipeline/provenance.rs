@@ -59,6 +59,9 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
     if options.names {
         json["names"] = json!(true);
     }
+    if options.materials {
+        json["materials"] = json!(true);
+    }
     if options.coordinates != Default::default() {
         json["coordinates"] = json!(options.coordinates);
     }

@@ -24,8 +24,9 @@ pub(crate) trait Stages {
         monitor: &dyn Monitor,
     ) -> Result<(Mesh, mesh::Report)> {
         let (mut mesh, mut report) = mesh::import(model.path, wanted, monitor)?;
-        if model.digest.alpha != mesh::AlphaMode::None {
-            let cutouts = mesh::import_cutouts(model.path, model.digest.alpha, monitor)?;
+        let alpha = model.digest.looks.alpha;
+        if alpha != mesh::AlphaMode::None {
+            let cutouts = mesh::import_cutouts(model.path, alpha, monitor)?;
             opacity::add(&mut mesh, &mut report, &cutouts, monitor)?;
         }
         model.digest.unchanged(model.path, (mesh, report))

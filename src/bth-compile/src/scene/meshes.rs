@@ -104,7 +104,9 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let opacity =
         mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
     let groups = mesh.groups.as_ref().map_or_else(String::new, |groups| format!(" groups {}", groups.hex()));
-    blake3::hash(format!("mesh {} {shading:?}{opacity}{groups}", mesh.geometry.hex()).as_bytes())
+    let materials = mesh.materials.as_ref();
+    let materials = materials.map_or_else(String::new, |materials| format!(" materials {}", materials.hex()));
+    blake3::hash(format!("mesh {} {shading:?}{opacity}{groups}{materials}", mesh.geometry.hex()).as_bytes())
 }
 
 /// Adds the opacity of triangles to meshes of a file: the whole file's without numbers.

@@ -7,6 +7,7 @@ mod compile;
 mod context;
 mod encode;
 mod file_index;
+mod images;
 mod in_memory;
 mod meshes;
 mod object;

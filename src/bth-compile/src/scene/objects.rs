@@ -15,8 +15,8 @@ use crate::tets;
 use crate::write::FileBuilder;
 use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
@@ -273,6 +273,18 @@ impl Objects {
             stored.write(number as u32, builder)?;
         }
         Ok(())
+    }
+
+    /// Names of the images that textures of the objects refer to.
+    ///
+    /// # Errors
+    /// When the previous file cannot be read.
+    pub(super) fn image_names(&self) -> Result<BTreeSet<[u8; 16]>> {
+        let mut names = BTreeSet::new();
+        for stored in &self.stored {
+            names.extend(stored.image_names()?);
+        }
+        Ok(names)
     }
 
     /// Adds the OBJECT rows only, which suffice to place instances.

@@ -3,7 +3,7 @@
 use super::{encode, sources, visible};
 use crate::error::Result;
 use crate::pipeline::Clock;
-use bth_import::AlphaMode;
+use bth_import::Looks;
 use bth_scene::Manifest;
 use std::path::Path;
 
@@ -24,19 +24,14 @@ impl<'a> ScenePlan<'a> {
     ///
     /// # Errors
     /// When a file cannot be read.
-    pub(super) fn of(
-        manifest: &'a Manifest,
-        folder: &Path,
-        alpha: AlphaMode,
-        clock: &mut Clock,
-    ) -> Result<Self> {
+    pub(super) fn of(manifest: &'a Manifest, folder: &Path, looks: Looks, clock: &mut Clock) -> Result<Self> {
         let order = encode::order(manifest);
         let visible = visible::visible(manifest, &order);
         let mut used = vec![false; manifest.objects.len()];
         for (node, _) in manifest.nodes.iter().zip(&visible).filter(|(_, visible)| **visible) {
             node.object.into_iter().for_each(|object| used[object] = true);
         }
-        let sources = clock.time("hash", || sources::files(manifest, folder, &used, alpha))?;
+        let sources = clock.time("hash", || sources::files(manifest, folder, &used, looks))?;
         Ok(Self { order, visible, used, sources })
     }
 }

@@ -3,17 +3,19 @@
 
 use super::file_index::{FileIndex, SectionRow};
 use crate::cached::{self, Cache};
+use crate::error::{Error, Result};
 use crate::monitor::Monitor;
 use crate::options::CompileOptions;
 use crate::write::{Bytes, HEADER, are_zeros, name};
 use bth_files::OpenFile;
 use bth_format::file::hash128;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// An earlier file with its index.
 pub(super) struct Previous {
     pub(super) index: FileIndex,
+    path: PathBuf,
     file: Arc<OpenFile>,
     /// Whether the file is known to be unchanged since it was written; else each section is read and checked.
     untouched: bool,
@@ -36,7 +38,7 @@ impl Previous {
         let record = cache.find(&cached::file_index(&named, options, tetgen), monitor)?;
         let index = cached::decode(&cache.read(&record, monitor)?)?;
         let untouched = store.content_of_open(path, &file) == Some(named);
-        Some(Self { index, file: Arc::new(file), untouched })
+        Some(Self { index, path: path.to_owned(), file: Arc::new(file), untouched })
     }
 
     /// Whether an object of the index is whole in the file.
@@ -64,6 +66,20 @@ impl Previous {
             at = last;
             whole
         })
+    }
+
+    /// The bytes of a section.
+    ///
+    /// # Errors
+    /// `BTH-O001` when they cannot be read.
+    pub(super) fn read(&self, section: &SectionRow) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; section.length as usize];
+        self.file.read_at(section.offset, &mut bytes).map_err(|e| Error::File {
+            code: "BTH-O001",
+            path: self.path.clone(),
+            message: format!("cannot read: {e}"),
+        })?;
+        Ok(bytes)
     }
 
     /// Range of a section's bytes in the file.

@@ -4,8 +4,9 @@ use super::file_index::Hash;
 use super::previous::Previous;
 use crate::error::Result;
 use crate::tets;
-use crate::write::{Bytes, FileBuilder, SectionHead};
+use crate::write::{Bytes, FileBuilder, SectionHead, named_images};
 use bth_format::layout::{self, SectionEntry, kind};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use zerocopy::FromBytes;
 
@@ -59,6 +60,23 @@ impl ObjectSections {
             }
         }
         Ok(())
+    }
+
+    /// Names of the images that its textures refer to.
+    ///
+    /// # Errors
+    /// When the previous file cannot be read.
+    pub(super) fn image_names(&self) -> Result<BTreeSet<[u8; 16]>> {
+        match self {
+            Self::InFile { file, object, .. } => {
+                Ok(file.materials(*object).textures.iter().map(|texture| texture.image).collect())
+            }
+            Self::InPrevious { file, object } => {
+                let rows = file.index.sections_of(*object);
+                let bytes = rows.iter().find(|row| row.kind == kind::TEXTURES).map(|row| file.read(row));
+                Ok(named_images(&bytes.transpose()?.unwrap_or_default()))
+            }
+        }
     }
 
     /// Its OBJECT row.

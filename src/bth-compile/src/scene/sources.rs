@@ -4,7 +4,7 @@ use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
-use bth_import::AlphaMode;
+use bth_import::{AlphaMode, Looks};
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -33,11 +33,17 @@ impl File<'_> {
 
     /// Identity of a part by content, which does not depend on the path of the file.
     pub(super) fn content(&self, part: Option<u32>) -> String {
-        let alpha = match self.digest.alpha {
+        let alpha = match self.digest.looks.alpha {
             AlphaMode::None => String::new(),
             mode => format!(" {mode:?}"),
         };
-        format!("{} {} {}{alpha}", self.digest.text(), self.part(part), cached::extension(&self.full))
+        let materials = if self.digest.looks.materials { " materials" } else { "" };
+        format!(
+            "{} {} {}{alpha}{materials}",
+            self.digest.text(),
+            self.part(part),
+            cached::extension(&self.full)
+        )
     }
 
     /// The name of a part in explanations of misses.
@@ -66,10 +72,10 @@ pub(super) fn files<'a>(
     manifest: &'a Manifest,
     folder: &Path,
     used: &[bool],
-    alpha: AlphaMode,
+    looks: Looks,
 ) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), alpha };
+    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), looks };
     let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
     let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
@@ -92,7 +98,7 @@ pub(super) fn files<'a>(
         parts[place].1.push(row);
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
-    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, alpha)).collect();
+    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, looks)).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;
     }

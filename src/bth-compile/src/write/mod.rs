@@ -4,6 +4,7 @@ mod atomic;
 mod builder;
 mod content;
 mod groups;
+mod images;
 mod object;
 mod scene;
 mod whole;
@@ -14,6 +15,8 @@ pub(crate) use builder::SectionHead;
 pub(crate) use content::Bytes;
 pub use content::Content;
 pub use groups::{GroupParts, object_names};
+pub use images::images;
+pub(crate) use images::named_images;
 pub use object::{ObjectParts, Source, object};
 pub use scene::{SceneParts, scene};
 pub use whole::name_if_whole;
@@ -45,6 +48,6 @@ pub fn self_check(bytes: &[u8], deep: bool) -> Result<()> {
     Ok(())
 }
 
-fn defect(error: bth::Error) -> Error {
+pub(crate) fn defect(error: bth::Error) -> Error {
     Error::Internal { code: "BTH-X030", message: format!("the written file fails: {error}") }
 }

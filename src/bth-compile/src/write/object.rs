@@ -4,6 +4,7 @@ use super::builder::defect;
 use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
+use bth_import::Materials;
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -46,6 +47,8 @@ pub struct ObjectParts<'a> {
     pub opacity_micro: &'a [u32],
     /// Groups of triangles to keep.
     pub groups: Option<&'a GroupParts>,
+    /// How the materials of the groups look, and vertex colours.
+    pub materials: Option<&'a Materials>,
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -120,6 +123,12 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     }
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
+    if let Some(materials) = parts.materials {
+        builder.rows(kind::MATERIAL_PARAMETERS, index, &materials.parameters)?;
+        builder.rows(kind::TEXTURES, index, &materials.textures)?;
+        builder.rows(kind::COLOR_CORNERS, index, &materials.color_corners)?;
+        builder.rows(kind::COLORS, index, &materials.colors)?;
+    }
     Ok(())
 }
 

@@ -10,6 +10,7 @@ mod boxes;
 mod groups;
 mod header;
 mod leaves;
+mod materials;
 mod nodes;
 mod opacity;
 mod rows;
@@ -21,6 +22,7 @@ mod tracks;
 mod tree;
 
 pub(crate) use adjacency::TetAdjacency;
+pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
 
 use crate::error::Result;

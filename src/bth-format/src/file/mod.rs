@@ -11,6 +11,7 @@ pub use table::{content_id, hash128, kind_stride};
 use crate::check;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
+use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
@@ -271,11 +272,42 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], and `BTH-F101` to `BTH-F147`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160` and `BTH-F161`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
+        let materials = self.materials(object);
+        check::materials(&materials, view.materials.len(), view.header.triangles)
+            .map_err(|e| self.locate(e, object))?;
         Ok(view)
+    }
+
+    /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or there is
+    /// no such object.
+    pub fn materials(&self, object: u32) -> MaterialsView<'_> {
+        MaterialsView {
+            parameters: self.slice(object, kind::MATERIAL_PARAMETERS),
+            textures: self.slice(object, kind::TEXTURES),
+            color_corners: self.slice(object, kind::COLOR_CORNERS),
+            colors: self.slice(object, kind::COLORS),
+        }
+    }
+
+    /// The images of all textures, whose **indices are not checked**.
+    pub fn images(&self) -> ImagesView<'_> {
+        ImagesView { images: self.slice(NONE, kind::IMAGES), bytes: self.slice(NONE, kind::IMAGE_BYTES) }
+    }
+
+    /// Checks the images and that textures have one. Costs O(textures and images).
+    ///
+    /// # Errors
+    /// `BTH-F162`.
+    pub fn check_images(&self) -> Result<()> {
+        let images = self.images();
+        check::images(&images).map_err(|e| self.locate(e, NONE))?;
+        (0..self.object_count()).try_for_each(|object| {
+            check::image_names(&self.materials(object), &images).map_err(|e| self.locate(e, object))
+        })
     }
 
     /// The name of an object; empty where the file keeps none or there is no such object.

@@ -1,4 +1,5 @@
-//! Section kinds. Specification: "Kinds". Kinds 1 to 31 belong to an object, the others to the whole file.
+//! Section kinds. Specification: "Kinds". Kinds 1 to 31 and 35 to 38 belong to an object, the others to the whole
+//! file.
 
 /// One [`super::Object`].
 pub const OBJECT: u32 = 1;
@@ -46,6 +47,18 @@ pub const PROVENANCE: u32 = 32;
 pub const OBJECT_NAMES: u32 = 33;
 /// UTF-8 bytes of the names of objects.
 pub const OBJECT_LABELS: u32 = 34;
+/// [`super::MaterialParameters`], one per row of `MATERIALS`. This section and the three that follow belong to an object.
+pub const MATERIAL_PARAMETERS: u32 = 35;
+/// [`super::Texture`]s that material parameters refer to.
+pub const TEXTURES: u32 = 36;
+/// `[u32; 3]` per source triangle: rows of `COLORS`.
+pub const COLOR_CORNERS: u32 = 37;
+/// `[u16; 4]`: vertex colours, linear red, green, blue and alpha; 65,535 stands for 1.
+pub const COLORS: u32 = 38;
+/// [`super::Image`]s of textures, ascending by name. This section and the next one belong to the whole file.
+pub const IMAGES: u32 = 39;
+/// Bytes of the image files.
+pub const IMAGE_BYTES: u32 = 40;
 /// One [`super::Scene`]. This section and the following ones belong to the whole file.
 pub const SCENE: u32 = 48;
 /// [`super::Node`]s, parents before children.
@@ -71,7 +84,7 @@ pub const fn is_scene(kind: u32) -> bool {
 }
 /// Whether sections of this kind belong to the whole file.
 pub const fn is_of_file(kind: u32) -> bool {
-    kind == PROVENANCE || kind == OBJECT_NAMES || kind == OBJECT_LABELS || is_scene(kind)
+    (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {

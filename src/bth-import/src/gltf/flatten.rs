@@ -8,6 +8,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document::{self, GRAPH};
 use crate::gltf::extensions::SUPPORTED;
+use crate::gltf::materials::{self, SharedMaterials};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::gltf::rest_pose::RestPose;
 use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
@@ -47,6 +48,8 @@ struct GroupNumbers {
     groups: HashMap<(usize, usize), u32>,
     /// By the number of the material.
     materials: HashMap<usize, u32>,
+    /// The numbers of the materials by the numbers that groups refer to.
+    numbers: Vec<usize>,
 }
 
 /// Appends primitives to a raw mesh.
@@ -57,6 +60,8 @@ struct Flattener<'r, 'a> {
     keep: Keep,
     /// `None` where the caller does not want groups.
     groups: Option<GroupNumbers>,
+    /// Whether the caller wants vertex colours.
+    colors: bool,
 }
 
 /// Reads a glTF or GLB file: its default scene, else its first, else all root nodes, at rest. Lines count each segment, points each point as skipped.
@@ -71,7 +76,10 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>
     if !document.animations.is_empty() && placed.iter().any(deforms) {
         source.monitor.warn("animations are ignored: meshes with skins or morph targets are read at rest");
     }
-    read_placed(source, &document, binary, wanted, &placed)
+    let shared = SharedMaterials::default();
+    let raw = read_placed(source, &document, binary, (wanted, &shared), &placed)?;
+    shared.report(source);
+    Ok(raw)
 }
 
 /// Reads one mesh of a document in its own space.
@@ -80,7 +88,7 @@ pub(crate) fn read_mesh<'a>(
     document: &GltfDocument,
     binary: Option<&[u8]>,
     mesh: usize,
-    wanted: Wanted,
+    wanted: (Wanted, &SharedMaterials),
 ) -> Result<Raw<'a>> {
     read_placed(source, document, binary, wanted, &[PlacedMesh::alone(mesh)])
 }
@@ -89,7 +97,7 @@ fn read_placed<'a>(
     source: &'a Source<'a>,
     document: &GltfDocument,
     binary: Option<&[u8]>,
-    wanted: Wanted,
+    (wanted, shared): (Wanted, &SharedMaterials),
     placed: &[PlacedMesh],
 ) -> Result<Raw<'a>> {
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
@@ -100,12 +108,16 @@ fn read_placed<'a>(
         spans: Vec::new(),
         keep: wanted.attributes,
         groups: wanted.groups.then(GroupNumbers::default),
+        colors: wanted.materials,
     };
     for (done, mesh) in placed.iter().enumerate() {
         source.progress(source.data.len() / placed.len() * done)?;
         flattener.mesh(mesh)?;
     }
-    let Flattener { mut raw, spans, .. } = flattener;
+    let Flattener { mut raw, spans, accessors, groups, .. } = flattener;
+    if let (true, Some(GroupNumbers { numbers, .. })) = (wanted.materials, groups) {
+        materials::read(&accessors, shared, &numbers, &mut raw.materials)?;
+    }
     if raw.normals.is_empty() {
         raw.normal_rows.clear();
     }
@@ -198,19 +210,37 @@ impl Flattener<'_, '_> {
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
         pose.apply(&reader, &mut triangles)?;
+        let mut colors = None;
+        if self.colors {
+            warn_without_coordinates(&reader, &triangles);
+            colors = vertex_colors(&reader, &triangles)?;
+        }
         self.start_group(placed.mesh, index, primitive.material);
         let world = if pose.is_skinned() { DAffine3::IDENTITY } else { placed.world };
+        self.append_colors(colors.as_deref(), &triangles.corners, transform::is_mirrored(&world));
         self.append(&triangles, &world)
+    }
+
+    /// Adds the colours of the corners of a primitive's triangles, which will be appended next.
+    fn append_colors(&mut self, colors: Option<&[[f32; 4]]>, corners: &[[u32; 3]], mirrored: bool) {
+        let Some(colors) = colors else { return };
+        let recorder = &mut self.raw.materials.colors;
+        let rows: Vec<u32> = colors.iter().map(|color| recorder.row(*color)).collect();
+        let turned = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        let corners = corners.iter().map(|triangle| turned(triangle).map(|row| rows[row as usize]));
+        recorder.add(self.raw.triangles.len(), corners);
     }
 
     /// Notes that the triangles of a primitive follow. It is the same group wherever its mesh is placed.
     fn start_group(&mut self, mesh: usize, index: usize, material: Option<usize>) {
-        let Some(GroupNumbers { groups, materials }) = &mut self.groups else { return };
+        let Some(GroupNumbers { groups, materials, numbers }) = &mut self.groups else { return };
         let (document, recorder) = (self.accessors.document, &mut self.raw.groups);
         let group = *groups.entry((mesh, index)).or_insert_with(|| {
             let material = material.map(|number| {
-                let add = || recorder.material(material_name(document, number));
-                *materials.entry(number).or_insert_with(add)
+                *materials.entry(number).or_insert_with(|| {
+                    numbers.push(number);
+                    recorder.material(material_name(document, number))
+                })
             });
             let GltfMesh { name, primitives, .. } = &document.meshes[mesh];
             let mut name = if name.is_empty() { format!("mesh {mesh}") } else { name.clone() };
@@ -261,4 +291,24 @@ impl Flattener<'_, '_> {
 fn material_name(document: &GltfDocument, number: usize) -> String {
     let name = document.materials.get(number).and_then(|material| material.get("name")?.as_str());
     name.filter(|name| !name.is_empty()).map_or_else(|| format!("material {number}"), str::to_owned)
+}
+
+/// The colours of a primitive's vertices (`COLOR_0`), linear, if it has some.
+fn vertex_colors(reader: &PrimitiveReader<'_, '_>, triangles: &Triangles) -> Result<Option<Vec<[f32; 4]>>> {
+    let Some(accessor) = reader.primitive.attributes.get("COLOR_0") else { return Ok(None) };
+    if reader.accessors.document.accessors.get(*accessor).is_some_and(|a| a.shape == "VEC3") {
+        let colors = reader.optional::<3>(triangles, "COLOR_0")?;
+        return Ok(colors.map(|colors| colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()));
+    }
+    reader.optional::<4>(triangles, "COLOR_0")
+}
+
+/// Warns if the material of a primitive has a base colour texture and the primitive no coordinates for it.
+fn warn_without_coordinates(reader: &PrimitiveReader<'_, '_>, triangles: &Triangles) {
+    let material = reader.primitive.material.and_then(|m| reader.accessors.document.materials.get(m));
+    let texture = material.and_then(|m| m.get("pbrMetallicRoughness")?.get("baseColorTexture"));
+    if texture.is_some() && triangles.uvs.is_none() {
+        let warning = format!("{}: its texture has no coordinates; (0, 0) is taken everywhere", reader.part);
+        reader.accessors.source.monitor.warn(&warning);
+    }
 }

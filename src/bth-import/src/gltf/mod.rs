@@ -11,6 +11,7 @@ pub(crate) mod document;
 mod draco;
 pub(crate) mod extensions;
 pub(crate) mod flatten;
+pub(crate) mod materials;
 mod meshopt;
 mod primitive;
 mod rest_pose;
@@ -18,8 +19,9 @@ pub mod scene;
 pub(crate) mod schema;
 mod source_files;
 mod texture;
+mod texture_parts;
 mod transform;
-mod uri;
+pub(crate) mod uri;
 
 pub use scene::options::Chosen;
 pub use source_files::external_files;

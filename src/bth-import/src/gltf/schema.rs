@@ -201,7 +201,7 @@ pub(crate) struct MetallicRoughness {
 }
 
 /// A material's use of a texture.
-#[derive(Deserialize, Default)]
+#[derive(Deserialize, Default, Clone)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct TextureReference {
     /// Number of the set of texture coordinates: n for `TEXCOORD_n`.

@@ -4,23 +4,30 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::cutout::AlphaMode;
 use crate::gltf::container::split;
-use crate::gltf::cutout;
 use crate::gltf::extensions::MESHOPT;
 use crate::gltf::schema::{Buffer, GltfDocument, MeshoptFallback};
 use crate::gltf::uri::beside;
+use crate::gltf::{cutout, materials};
+use crate::materials::Looks;
 use crate::monitor::Silent;
 use crate::source::Source;
 
-/// The files beside a glTF document that hold its buffers and the images of its cut-out materials, in order; none for what is no document, which reading it
+/// The files beside a glTF document that hold its buffers and images that its looks need, in order; none for what is no document, which reading it
 /// reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not read.
-pub fn external_files(path: &Path, data: &[u8], alpha: AlphaMode) -> Vec<PathBuf> {
+pub fn external_files(path: &Path, data: &[u8], looks: Looks) -> Vec<PathBuf> {
     let source = Source::new(path, data, &Silent);
     let json = split(&source).map_or(&[][..], |(json, _)| json);
     let document = serde_json::from_slice::<GltfDocument>(json).ok();
-    let images = cutout::files(json, alpha);
-    let images = images.iter().filter_map(|uri| beside(path, uri));
+    let of_materials = if looks.materials { materials::files(json) } else { Vec::new() };
+    let of_materials = of_materials.iter().filter_map(|uri| beside(path, uri)).filter(|file| file.exists());
+    let images = cutout::files(json, looks.alpha);
+    let mut images: Vec<PathBuf> = images.iter().filter_map(|uri| beside(path, uri)).collect();
+    of_materials.for_each(|file| {
+        if !images.contains(&file) {
+            images.push(file);
+        }
+    });
     let buffers = document.into_iter().flat_map(|document| document.buffers);
     let file = |buffer: Buffer| {
         let uri = buffer.uri.as_deref().filter(|uri| !uri.starts_with("data:"))?;

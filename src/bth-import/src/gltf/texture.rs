@@ -3,6 +3,7 @@
 //! A mesh keeps one set. The base colour texture decides, since it is what most renderers show; where a material has none,
 //! the next of its textures in the order of the specification does. Without any texture it is `TEXCOORD_0`, unchanged.
 
+use glam::DAffine2;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
@@ -34,15 +35,8 @@ impl TextureCoordinates {
             |e: serde_json::Error| error(source, &part, format!("expected a glTF material, found: {e}"));
         let material = Material::deserialize(value).map_err(parsed)?;
         let Some(texture) = deciding_texture(&material) else { return Ok(plain) };
-        let transform = match texture.extensions.get(TEXTURE_TRANSFORM) {
-            Some(value) => TextureTransform::deserialize(value).map_err(parsed)?,
-            None => TextureTransform::default(),
-        };
-        let set = transform.tex_coord.unwrap_or(texture.tex_coord);
-        Ok(TextureCoordinates {
-            attribute: format!("TEXCOORD_{set}"),
-            transform: UvTransform::new(&transform),
-        })
+        let (set, transform) = set_of(texture).map_err(parsed)?;
+        Ok(TextureCoordinates { attribute: format!("TEXCOORD_{set}"), transform })
     }
 
     /// Transforms the kept coordinates in place.
@@ -66,7 +60,53 @@ fn deciding_texture(material: &Material) -> Option<&TextureReference> {
     .find_map(Option::as_ref)
 }
 
+/// The set of texture coordinates of a material that is kept, and the transform that is applied to it.
+pub(super) struct KeptSet {
+    set: u32,
+    transform: Option<UvTransform>,
+}
+
+/// The set that is kept for a material.
+pub(super) fn kept_set(material: &serde_json::Value) -> serde_json::Result<KeptSet> {
+    let material = Material::deserialize(material)?;
+    match deciding_texture(&material) {
+        None => Ok(KeptSet { set: 0, transform: None }),
+        Some(texture) => {
+            let (set, transform) = set_of(texture)?;
+            Ok(KeptSet { set, transform })
+        }
+    }
+}
+
+/// The set of a texture's coordinates and their transform.
+fn set_of(texture: &TextureReference) -> serde_json::Result<(u32, Option<UvTransform>)> {
+    let transform = match texture.extensions.get(TEXTURE_TRANSFORM) {
+        Some(value) => TextureTransform::deserialize(value)?,
+        None => TextureTransform::default(),
+    };
+    Ok((transform.tex_coord.unwrap_or(texture.tex_coord), UvTransform::new(&transform)))
+}
+
+impl KeptSet {
+    /// Rows of the transform from kept coordinates to those of a texture; `None` where they cannot be had from them.
+    pub(super) fn relative(&self, texture: &TextureReference) -> serde_json::Result<Option<[[f32; 3]; 2]>> {
+        let (set, transform) = set_of(texture)?;
+        let matrix = |t: &Option<UvTransform>| t.as_ref().map_or(DAffine2::IDENTITY, UvTransform::matrix);
+        if set != self.set {
+            return Ok(None);
+        }
+        let relative = match transform == self.transform {
+            true => DAffine2::IDENTITY,
+            false => matrix(&transform) * matrix(&self.transform).inverse(),
+        };
+        let [x, y, z] = relative.to_cols_array_2d();
+        let rows = [0, 1].map(|k| [x[k], y[k], z[k]].map(|number| number as f32));
+        Ok(rows.as_flattened().iter().all(|x| x.is_finite()).then_some(rows))
+    }
+}
+
 /// Scale, then rotation, then offset, in f64.
+#[derive(PartialEq)]
 struct UvTransform {
     /// Rows of the linear part.
     linear: [[f64; 2]; 2],
@@ -86,6 +126,11 @@ impl UvTransform {
         }
         let (sin, cos) = rotation.sin_cos();
         Some(UvTransform { linear: [[cos * su, sin * sv], [-sin * su, cos * sv]], offset })
+    }
+
+    fn matrix(&self) -> DAffine2 {
+        let [[a, b], [c, d]] = self.linear;
+        DAffine2::from_cols_array(&[a, c, b, d, self.offset[0], self.offset[1]])
     }
 
     fn apply(&self, uv: [f32; 2]) -> [f32; 2] {

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::number::{Lines, float, integer, shown, words};
 use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
-use crate::ply::sink::{BadIndex, Refused, Sink, slot};
+use crate::ply::sink::{BadIndex, Refused, Sink, Vertex, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Reads all elements.
@@ -54,7 +54,7 @@ fn read_row(
         let message = format!("expected {expected} of element {}, found \"{}\"", element.name, shown(word));
         source.error_at_line(MALFORMED, number, message, MALFORMED_HINT)
     };
-    let mut vertex = [0.0; 8];
+    let mut vertex = Vertex::default();
     for property in &element.properties {
         let mut count = 1;
         if property.list.is_some() {

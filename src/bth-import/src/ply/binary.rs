@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::ply::header::{Element, ElementKind, Header, Meaning, Scalar};
-use crate::ply::sink::{BadIndex, Refused, Sink, slot};
+use crate::ply::sink::{BadIndex, Refused, Sink, Vertex, slot};
 use crate::source::{INDEX, INDEX_HINT, MALFORMED, MALFORMED_HINT, Source, TRUNCATED, TRUNCATED_HINT};
 
 /// Reads all elements; `BIG` is whether the byte order is big-endian.
@@ -48,7 +48,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
         if element.properties.iter().any(|property| property.list.is_some()) {
             for row in 0..element.count {
                 self.source.tick(row, self.at)?;
-                let mut vertex = [0.0; 8];
+                let mut vertex = Vertex::default();
                 for property in &element.properties {
                     let bytes = self.property(property.list, property.scalar, element)?;
                     if let Some(slot) = slot(property.meaning) {
@@ -70,7 +70,7 @@ impl<'d, const BIG: bool> Cursor<'_, 'd, BIG> {
         for row in 0..element.count {
             self.source.tick(row, self.at)?;
             let bytes = self.take(offset, element)?;
-            let mut vertex = [0.0; 8];
+            let mut vertex = Vertex::default();
             for (slot, scalar, range) in &fields {
                 vertex[*slot] = coordinate::<BIG>(*scalar, &bytes[range.clone()]);
             }

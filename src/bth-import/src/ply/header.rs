@@ -65,6 +65,8 @@ pub(super) enum Meaning {
     Normal(usize),
     /// A texture coordinate.
     Uv(usize),
+    /// A component of a colour.
+    Color(usize),
     /// Vertex indices of a face or of strips.
     Indices,
     /// Skipped.
@@ -119,6 +121,29 @@ impl Header {
         self.elements.iter().find(|element| element.kind == ElementKind::Vertices)
     }
 
+    /// The greatest value of a component of vertex colours, 1 for numbers with a fraction; `None` without all three of one type.
+    pub(super) fn color_scale(&self) -> Option<f32> {
+        let properties = self.vertices()?.properties.iter();
+        let mut types = properties.filter(|p| matches!(p.meaning, Meaning::Color(_))).map(|p| p.scalar);
+        let first = types.next()?;
+        let scale = match first {
+            Scalar::U8 => f32::from(u8::MAX),
+            Scalar::U16 => f32::from(u16::MAX),
+            Scalar::F32 | Scalar::F64 => 1.0,
+            Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::U32 => return None,
+        };
+        (types.filter(|scalar| *scalar == first).count() == 2).then_some(scale)
+    }
+
+    /// Skips vertex colours.
+    pub(super) fn skip_colors(&mut self) {
+        for property in self.elements.iter_mut().flat_map(|element| &mut element.properties) {
+            if matches!(property.meaning, Meaning::Color(_)) {
+                property.meaning = Meaning::Other;
+            }
+        }
+    }
+
     /// Whether vertices have all of the `N` properties of a meaning.
     pub(super) fn has<const N: usize>(&self, meaning: impl Fn(usize) -> Meaning) -> bool {
         let properties = self.vertices().map_or(&[][..], |vertices| &vertices.properties);
@@ -136,6 +161,9 @@ fn meaning(kind: ElementKind, name: &[u8], list: bool) -> Meaning {
         (ElementKind::Vertices, b"nz", false) => Meaning::Normal(2),
         (ElementKind::Vertices, b"u" | b"s" | b"texture_u" | b"texture_s", false) => Meaning::Uv(0),
         (ElementKind::Vertices, b"v" | b"t" | b"texture_v" | b"texture_t", false) => Meaning::Uv(1),
+        (ElementKind::Vertices, b"red" | b"diffuse_red", false) => Meaning::Color(0),
+        (ElementKind::Vertices, b"green" | b"diffuse_green", false) => Meaning::Color(1),
+        (ElementKind::Vertices, b"blue" | b"diffuse_blue", false) => Meaning::Color(2),
         (ElementKind::Faces | ElementKind::Strips, b"vertex_indices" | b"vertex_index", true) => {
             Meaning::Indices
         }
@@ -229,7 +257,10 @@ impl HeaderReader<'_, '_> {
         if list.is_some_and(|count| !count.is_integer()) {
             return Err(self.malformed("an integer type for the count of a list"));
         }
-        let meaning = meaning(element.kind, name, list.is_some());
+        let mut meaning = meaning(element.kind, name, list.is_some());
+        if matches!(meaning, Meaning::Color(_)) && element.properties.iter().any(|p| p.meaning == meaning) {
+            meaning = Meaning::Other;
+        }
         if meaning == Meaning::Indices && !item.is_integer() {
             return Err(self.malformed("an integer type for indices"));
         }

@@ -11,16 +11,19 @@ mod sink;
 use self::header::{ElementKind, Encoding, Header};
 use self::sink::Sink;
 use crate::error::{Place, Result};
-use crate::mesh::Keep;
+use crate::mesh::Wanted;
 use crate::raw::{Raw, check_rows};
 use crate::source::Source;
 
 /// Reads a PLY file. Edges count as skipped elements.
-pub(crate) fn read<'a>(source: &'a Source<'_>, keep: Keep) -> Result<Raw<'a>> {
-    let header = header::read(source)?;
+pub(crate) fn read<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+    let mut header = header::read(source)?;
+    if !wanted.materials || header.color_scale().is_none() {
+        header.skip_colors();
+    }
     check_rows(header.vertices().map_or(0, |v| v.count))?;
     let raw = Raw::new("ply", Box::new(|_, _| Place::File(source.path.to_owned())));
-    let mut sink = Sink::new(raw, &header, keep);
+    let mut sink = Sink::new(raw, &header, wanted);
     for element in header.elements.iter().filter(|e| e.kind == ElementKind::Edges) {
         sink.raw.skipped = sink.raw.skipped.saturating_add(element.count);
     }

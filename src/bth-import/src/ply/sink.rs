@@ -1,12 +1,12 @@
 //! Collects the rows that the text and the binary reader of PLY bodies read.
 
 use crate::error::Error;
-use crate::mesh::Keep;
+use crate::mesh::{Keep, Wanted};
 use crate::ply::header::{ElementKind, Header, Meaning};
 use crate::raw::{Raw, check_triangles, strip};
 
-/// Values of a vertex that are kept: position, normal, texture coordinate.
-pub(super) type Vertex = [f32; 8];
+/// Values of a vertex that are kept: position, normal, texture coordinate, colour.
+pub(super) type Vertex = [f32; 11];
 
 /// The index of a property in a [`Vertex`].
 pub(super) fn slot(meaning: Meaning) -> Option<usize> {
@@ -14,6 +14,7 @@ pub(super) fn slot(meaning: Meaning) -> Option<usize> {
         Meaning::Position(k) => Some(k),
         Meaning::Normal(k) => Some(3 + k),
         Meaning::Uv(k) => Some(6 + k),
+        Meaning::Color(k) => Some(8 + k),
         Meaning::Indices | Meaning::Other => None,
     }
 }
@@ -23,6 +24,10 @@ pub(super) struct Sink<'a> {
     pub(super) raw: Raw<'a>,
     normals: bool,
     uvs: bool,
+    /// Greatest value of a component of the colours, if they are kept.
+    color_scale: Option<f32>,
+    /// Rows of the colours of vertices.
+    colors: Vec<u32>,
     vertices: u64,
     face: Vec<u32>,
 }
@@ -41,8 +46,14 @@ pub(super) enum Refused {
 
 impl<'a> Sink<'a> {
     /// An empty sink for the vertices that the header announces.
-    pub(super) fn new(raw: Raw<'a>, header: &Header, keep: Keep) -> Self {
+    pub(super) fn new(
+        raw: Raw<'a>,
+        header: &Header,
+        Wanted { attributes: keep, materials, .. }: Wanted,
+    ) -> Self {
         Sink {
+            color_scale: header.color_scale().filter(|_| materials),
+            colors: Vec::new(),
             raw,
             normals: keep != Keep::None && header.has::<3>(Meaning::Normal),
             uvs: keep == Keep::All && header.has::<2>(Meaning::Uv),
@@ -53,7 +64,11 @@ impl<'a> Sink<'a> {
 
     /// What was collected. Normals and texture coordinates are in the vertices' rows.
     pub(super) fn finish(self) -> Raw<'a> {
-        let Sink { mut raw, normals, uvs, .. } = self;
+        let Sink { mut raw, normals, uvs, colors, .. } = self;
+        if !colors.is_empty() {
+            let corners = raw.triangles.iter().map(|corners| corners.map(|row| colors[row as usize]));
+            raw.materials.colors.add(0, corners);
+        }
         if normals {
             raw.normal_rows = raw.triangles.clone();
         }
@@ -65,13 +80,16 @@ impl<'a> Sink<'a> {
 
     /// Adds a vertex.
     #[inline]
-    pub(super) fn vertex(&mut self, [x, y, z, nx, ny, nz, u, v]: Vertex) {
+    pub(super) fn vertex(&mut self, [x, y, z, nx, ny, nz, u, v, red, green, blue]: Vertex) {
         self.raw.positions.push([x, y, z]);
         if self.normals {
             self.raw.normals.push([nx, ny, nz]);
         }
         if self.uvs {
             self.raw.uvs.push([u, v]);
+        }
+        if let Some(scale) = self.color_scale {
+            self.colors.push(self.raw.materials.colors.srgb_row([red, green, blue].map(|x| x / scale)));
         }
     }
 

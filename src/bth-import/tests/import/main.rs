@@ -5,6 +5,7 @@ mod cutouts;
 mod data;
 mod gltf;
 mod groups;
+mod materials;
 mod obj;
 mod off;
 mod ply;

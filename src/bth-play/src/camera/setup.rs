@@ -5,14 +5,17 @@ use super::exterior::exterior_camera;
 use super::interior::interior_camera;
 use super::projection::Camera;
 use super::scene_camera::scene_camera;
-use crate::args::{Args, View};
+use crate::args::{Args, Axis, Mode, View};
 use crate::failure::Failure;
+use crate::materials::SceneMaterials;
 use crate::sampling::fibonacci_sphere;
+use crate::shading::Environment;
 use bth::Scene;
 use bth::rays::Ray;
 use bth_format::layout::NONE;
 use glam::DVec3;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Where the camera of a frame comes from.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +33,10 @@ pub(crate) struct SceneSetup {
     source: CameraSource,
     /// Whether the camera is inside a room.
     pub(crate) interior: bool,
+    /// Materials, for modes that show them.
+    pub(crate) materials: Arc<SceneMaterials>,
+    /// The surroundings that the options name.
+    pub(crate) environment: Option<Arc<Environment>>,
 }
 
 impl SceneSetup {
@@ -56,7 +63,12 @@ impl SceneSetup {
             None if args.inside => CameraSource::Fixed(interior_camera(scene, &bounds, args)),
             None => CameraSource::Fixed(exterior_camera(args, &bounds)),
         };
-        let mut setup = SceneSetup { bounds, source, interior: false };
+        let shows_materials = args.window || args.mode.shows_materials();
+        let materials =
+            if shows_materials { SceneMaterials::load(scene, file) } else { SceneMaterials::default() };
+        let environment = args.env.as_deref().map(|path| read_environment(path, args)).transpose()?;
+        let (materials, environment) = (Arc::new(materials), environment.map(Arc::new));
+        let mut setup = SceneSetup { bounds, source, interior: false, materials, environment };
         let eye = setup.camera(scene, args).eye;
         // The floor of a scene may extend far beyond its objects, so being within the bounds does not make a room.
         setup.interior = args.inside || setup.bounds.contains(eye) && (!is_scene || is_enclosed(scene, eye));
@@ -78,6 +90,18 @@ impl SceneSetup {
             CameraSource::Scene(row) => scene_camera(scene, row, args),
         }
     }
+}
+
+/// The surroundings of the option --env.
+fn read_environment(path: &Path, args: &Args) -> Result<Environment, Failure> {
+    if !args.window && args.mode != Mode::Path {
+        return Err(Failure::Usage(format!("--env is for --mode path, found --mode {}", args.mode.name())));
+    }
+    let (front, vertical) = match args.up {
+        Axis::Y => (DVec3::Z, DVec3::Y),
+        Axis::Z => (DVec3::NEG_Y, DVec3::Z),
+    };
+    Environment::read(path, front, vertical)
 }
 
 /// The row of the scene's camera that the options name, or else of the scene's default camera.

@@ -25,7 +25,7 @@ pub(crate) fn to_picture(colors: &[Vec3], args: &Args) -> Picture {
         _ => 0,
     };
     let display = |color: &Vec3| match args.mode {
-        Mode::Shaded | Mode::Ao | Mode::Path | Mode::Instances => color.to_array().map(srgb),
+        Mode::Shaded | Mode::Ao | Mode::Path | Mode::Instances | Mode::Clay => color.to_array().map(srgb),
         Mode::Normals => color.to_array(),
         Mode::Steps => color_map::color(color.x / maximum as f32),
     };

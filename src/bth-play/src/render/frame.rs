@@ -40,7 +40,7 @@ pub(super) fn render_frame(frame: &FrameContext<'_>, progress: &Progress) -> (Pi
     let mut colors = vec![Vec3::ZERO; pixel_count(args.size)];
     let mut total = Counters::default();
     for tile in &tiles {
-        tile.write_to(&mut colors, args.size.0, |color, mean| *color = mean);
+        tile.write_to(&mut colors, args.size.0, |color, sum| *color = sum / args.spp as f32);
         total += tile.counters;
     }
     (to_picture(&colors, args), summary(args, &total, seconds))

@@ -11,28 +11,28 @@ const TILE: u32 = 16;
 #[derive(Default)]
 pub(crate) struct Tile {
     pixels: Vec<(u32, u32)>,
-    /// Mean colours of the samples of each pixel.
-    colors: Vec<Vec3>,
+    /// Sums of the samples of each pixel.
+    sums: Vec<Vec3>,
     pub(super) counters: Counters,
 }
 
-/// Renders the samples `indices` of the tile of a number. If the first sample is rendered alone, its rays go through the
-/// middles of the pixels.
+/// Renders the samples `indices` of the tile of a number. If pixels get no more than one sample (`--spp 1`), its rays go through their
+/// middles.
 pub(crate) fn render_tile(
     frame: &FrameContext<'_>,
     number: u32,
     indices: Range<u32>,
-    shader: &Shader,
+    shader: &Shader<'_>,
 ) -> Tile {
     let columns = frame.args.size.0.div_ceil(TILE);
     let pixels = pixels(frame.args.size, number % columns * TILE, number / columns * TILE);
-    let mut tile = Tile { colors: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
-    let (count, centered) = (indices.len() as f32, indices == (0..1));
+    let mut tile = Tile { sums: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
+    let centered = frame.args.spp == 1;
     for index in indices {
         let samples: Vec<Sample> =
             tile.pixels.iter().map(|&pixel| frame.sample(pixel, index, centered)).collect();
         let colors = shader.shade(frame, &samples, &mut tile.counters);
-        tile.colors.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color / count);
+        tile.sums.iter_mut().zip(colors).for_each(|(sum, color)| *sum += color);
     }
     tile
 }
@@ -47,10 +47,10 @@ fn pixels((width, height): (u32, u32), left: u32, top: u32) -> Vec<(u32, u32)> {
 }
 
 impl Tile {
-    /// Calls `update` with each pixel of a picture, in rows of `width` from the top, and its mean colour in the tile.
+    /// Calls `update` with each pixel of a picture, in rows of `width` from the top, and the sum of its samples in the tile.
     pub(crate) fn write_to(&self, picture: &mut [Vec3], width: u32, update: impl Fn(&mut Vec3, Vec3)) {
-        for (&(x, y), &mean) in self.pixels.iter().zip(&self.colors) {
-            update(&mut picture[y as usize * width as usize + x as usize], mean);
+        for (&(x, y), &sum) in self.pixels.iter().zip(&self.sums) {
+            update(&mut picture[y as usize * width as usize + x as usize], sum);
         }
     }
 }

@@ -24,11 +24,12 @@ pub(super) fn shade(
         let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
         for ray in 0..RAYS {
             let at = sample.sampler.point(1, sample.index * RAYS + ray);
-            rays.push(origin, cosine_hemisphere(normal, at), frame.occlusion_distance);
+            let chance = sample.chance(1 + u64::from(ray));
+            rays.push(origin, cosine_hemisphere(normal, at), frame.occlusion_distance, chance);
         }
     }
     *any_rays += rays.len() as u64;
-    let blocked = rays.trace(frame.scene);
+    let blocked = rays.trace(frame);
     let mut of_hits = blocked.chunks(RAYS as usize);
     let color = |hit: &Hit| {
         if !hit.is_hit() {

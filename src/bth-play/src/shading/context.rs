@@ -1,20 +1,31 @@
 //! What all samples of a frame share, and what is counted while they are shaded.
 
+use super::environment::Environment;
 use super::geometry::ShadingGeometry;
+use super::visibility::Chance;
 use crate::args::{Args, Mode};
 use crate::camera::{Camera, CameraRay, SceneBounds, SceneSetup};
 use crate::failure::Failure;
+use crate::materials::SceneMaterials;
 use crate::sampling::Sampler;
 use bth::Scene;
 use bth::rays::Hit;
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 use std::path::Path;
+use std::sync::OnceLock;
+
+/// The materials of modes that show none.
+static NO_MATERIALS: OnceLock<SceneMaterials> = OnceLock::new();
 
 /// A scene at one time, seen by a camera.
 pub(crate) struct FrameContext<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) geometry: ShadingGeometry<'a>,
+    /// Empty in modes that show none.
+    pub(crate) materials: &'a SceneMaterials,
+    /// The surroundings in mode path.
+    pub(crate) environment: Option<&'a Environment>,
     /// Bounds of all frames of the sequence.
     pub(crate) bounds: &'a SceneBounds,
     pub(crate) camera: Camera,
@@ -74,7 +85,23 @@ impl<'a> FrameContext<'a> {
         }
         let interior = setup.interior;
         let occlusion_distance = setup.bounds.diagonal() * if interior { 0.08 } else { 0.5 };
-        Ok(Self { scene, geometry, bounds: &setup.bounds, camera, interior, occlusion_distance, args })
+        let materials = match args.mode {
+            Mode::Shaded | Mode::Path => &setup.materials,
+            _ => NO_MATERIALS.get_or_init(SceneMaterials::default),
+        };
+        let environment = setup.environment.as_deref();
+        let bounds = &setup.bounds;
+        Ok(Self {
+            scene,
+            geometry,
+            materials,
+            environment,
+            bounds,
+            camera,
+            interior,
+            occlusion_distance,
+            args,
+        })
     }
 
     /// The sample of a pixel; the ray goes through the middle of the pixel, or through a random point of it.
@@ -92,6 +119,13 @@ impl<'a> FrameContext<'a> {
     pub(crate) fn point_and_normal(&self, sample: &Sample, hit: &Hit) -> (DVec3, DVec3) {
         let point = sample.ray.origin + sample.ray.direction * f64::from(hit.t);
         (point, self.geometry.geometric_normal(hit.primitive, -sample.ray.direction))
+    }
+}
+
+impl Sample {
+    /// What decides by chance for a ray of the sample; the ray of the camera has the number 0.
+    pub(crate) fn chance(&self, ray: u64) -> Chance {
+        Chance { sampler: self.sampler, index: self.index, ray }
     }
 }
 

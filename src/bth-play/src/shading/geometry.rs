@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use bth::Scene;
-use bth::rays::{Hit, PrimitiveRef};
+use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::object::ObjectView;
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -41,7 +41,8 @@ impl<'a> ShadingGeometry<'a> {
         })
     }
 
-    fn object(&self, primitive: PrimitiveRef) -> &ObjectView<'a> {
+    /// The object of a primitive.
+    pub(super) fn object(&self, primitive: PrimitiveRef) -> &ObjectView<'a> {
         &self.objects[self.object_of[primitive.instance as usize] as usize]
     }
 
@@ -53,14 +54,26 @@ impl<'a> ShadingGeometry<'a> {
 
     /// The geometric normal of a hit triangle in the world: unit, on the side that `towards` points to.
     pub(crate) fn geometric_normal(&self, primitive: PrimitiveRef, towards: DVec3) -> DVec3 {
+        let normal = self.front_normal(primitive).unwrap_or(towards);
+        if normal.dot(towards) < 0.0 { -normal } else { normal }
+    }
+
+    /// Whether a ray meets the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of the
+    /// object.
+    pub(super) fn is_front(&self, primitive: PrimitiveRef, ray: &Ray) -> bool {
+        let direction = to_f64(ray.direction);
+        self.front_normal(primitive).is_none_or(|normal| normal.dot(direction) < 0.0)
+    }
+
+    /// The unit normal of a triangle's plane in the world on the side of its front; `None` where it cannot be computed.
+    fn front_normal(&self, primitive: PrimitiveRef) -> Option<DVec3> {
         let object = self.object(primitive);
         let [a, b, c] =
             object.triangles[primitive.triangle as usize].map(|v| to_f64(object.positions[v as usize]));
         let (e, f) = (b - a, c - a);
         // Scaled first: the square of the cross product of two edges of 1e-20 underflows in f64.
         let scale = e.abs().max_element().max(f.abs().max_element());
-        let normal = self.to_world(primitive, (e / scale).cross(f / scale)).unwrap_or(towards);
-        if normal.dot(towards) < 0.0 { -normal } else { normal }
+        self.to_world(primitive, (e / scale).cross(f / scale))
     }
 
     /// The interpolated normal of the source on the side of the geometric one, or the geometric

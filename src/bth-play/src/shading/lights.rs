@@ -1,11 +1,14 @@
-//! The light of mode path: the scene's lights, or else a sun, and a sky. Brightness is relative to the brightest light and to
+//! The light of mode path: the scene's lights, or else a sun, and a sky or the surroundings of `--env`. Brightness is relative to the brightest light and to
 //! the size of the scene, so that no exposure is needed and frames do not flicker.
 
+use super::context::FrameContext;
+use super::environment::{Environment, EnvironmentSample};
 use crate::camera::SceneBounds;
 use crate::sampling::uniform_disc;
 use bth::Scene;
 use bth_format::layout;
 use glam::{DVec2, DVec3, Vec3};
+use std::f64::consts::PI;
 
 /// Tangent of half the angle under which the sun is seen: larger than the real one, for softer shadows.
 const SUN_RADIUS: f64 = 0.02;
@@ -42,44 +45,58 @@ struct Cone {
 }
 
 /// All light of a frame.
-pub(crate) struct Lights {
+pub(crate) struct Lights<'a> {
     lights: Vec<Light>,
     vertical: DVec3,
     /// Length of shadow rays to directional lights: beyond the bounds of the scene.
     far_distance: f64,
+    /// What takes the place of the built-in sky and sun.
+    environment: Option<&'a Environment>,
 }
 
-impl Lights {
+impl<'a> Lights<'a> {
     /// The lights of a scene at the time to which it is set. A scene without lights gets a sun, or in a room a lamp, given by
     /// its position and the distance at which it is as bright as [`LAMP`].
-    pub(crate) fn new(
-        scene: &Scene,
-        bounds: &SceneBounds,
-        vertical: DVec3,
-        lamp: Option<(DVec3, f64)>,
-    ) -> Self {
+    pub(crate) fn new(frame: &FrameContext<'a>, vertical: DVec3, lamp: Option<(DVec3, f64)>) -> Self {
+        let FrameContext { scene, bounds, environment, .. } = *frame;
         let mut lights = of_scene(scene, bounds);
         if let Some((position, distance)) = lamp.filter(|_| lights.is_empty()) {
             let light = Vec3::splat((LAMP * distance * distance) as f32);
             lights.push(Light::Point { position, light, range: f64::INFINITY, cone: None });
         }
-        if lights.is_empty() {
+        if lights.is_empty() && environment.is_none() {
             // Fixed in the world, so that it does not turn with a moving camera.
             let (side, front) = vertical.any_orthonormal_pair();
             let towards = (vertical * 0.9 + side * 0.45 + front * 0.35).normalize();
             lights.push(Light::Directional { towards, light: SUN });
         }
-        Self { lights, vertical, far_distance: 4.0 * bounds.diagonal() }
+        Self { lights, vertical, far_distance: 4.0 * bounds.diagonal(), environment }
     }
 
     /// Radiance of the sky in a unit direction.
     pub(crate) fn sky(&self, direction: DVec3) -> Vec3 {
+        if let Some(environment) = self.environment {
+            return environment.radiance(direction);
+        }
         let height = direction.dot(self.vertical) as f32;
         if height < 0.0 {
             HORIZON.lerp(BELOW, (-height * 4.0).min(1.0))
         } else {
             HORIZON.lerp(ZENITH, height.sqrt())
         }
+    }
+
+    /// A sample of the surroundings for a point of the unit square, and its density with regard to solid angle. The light is radiance
+    /// divided by that density and by π. `None` for the built-in sky, which is the same nearly everywhere.
+    pub(crate) fn surroundings(&self, point: DVec2) -> Option<(LightSample, f64)> {
+        let EnvironmentSample { direction, radiance, density } = self.environment?.sample(point)?;
+        let light = (radiance.as_dvec3() / (density * PI)).as_vec3();
+        Some((LightSample { direction, distance: self.far_distance, light }, density))
+    }
+
+    /// Density of [`Self::surroundings`] in a unit direction; 0 for the built-in sky.
+    pub(crate) fn density(&self, direction: DVec3) -> f64 {
+        self.environment.map_or(0.0, |environment| environment.density(direction))
     }
 
     /// Samples of the lights as seen from a point: one of each directional light, and one of a point light that is chosen

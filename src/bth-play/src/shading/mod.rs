@@ -2,6 +2,7 @@
 
 mod ambient_occlusion;
 mod context;
+mod environment;
 mod geometry;
 mod lights;
 mod occlusion_rays;
@@ -11,6 +12,8 @@ mod shader;
 mod step_counts;
 mod studio;
 mod surface_colors;
+mod visibility;
 
 pub(crate) use context::{Counters, FrameContext, Sample, Steps};
+pub(crate) use environment::Environment;
 pub(crate) use shader::Shader;

@@ -1,7 +1,8 @@
 //! Shadow and ambient-occlusion rays: any-hit rays of a batch of samples, traced together, each with the primitive on which
 //! it starts.
 
-use bth::Scene;
+use super::context::FrameContext;
+use super::visibility::{self, Chance};
 use bth::rays::{PrimitiveRef, Ray};
 use glam::DVec3;
 
@@ -32,15 +33,17 @@ impl Origin {
 pub(crate) struct OcclusionRays {
     rays: Vec<Ray>,
     from: Vec<PrimitiveRef>,
+    chances: Vec<Chance>,
 }
 
 impl OcclusionRays {
     /// Adds a ray of a length, in world units, along a unit direction.
-    pub(crate) fn push(&mut self, origin: Origin, direction: DVec3, length: f64) {
+    pub(crate) fn push(&mut self, origin: Origin, direction: DVec3, length: f64, chance: Chance) {
         let direction = direction.as_vec3().to_array();
         let point = origin.point.as_vec3().to_array();
         self.rays.push(Ray { origin: point, tmin: 0.0, direction, tmax: length as f32 });
         self.from.push(origin.primitive);
+        self.chances.push(chance);
     }
 
     /// Number of rays.
@@ -49,9 +52,9 @@ impl OcclusionRays {
     }
 
     /// Whether each ray is blocked.
-    pub(crate) fn trace(&self, scene: &Scene) -> Vec<bool> {
+    pub(crate) fn trace(&self, frame: &FrameContext<'_>) -> Vec<bool> {
         let mut blocked = vec![false; self.rays.len()];
-        scene.batch(&self.rays).from(&self.from[..]).any(&mut blocked);
+        visibility::any(frame, (&self.rays, &self.from), &self.chances, &mut blocked);
         blocked
     }
 }

@@ -1,19 +1,24 @@
-//! Mode path: diffuse path tracing with sun, sky and the scene's lights. Each bounce of all samples of a tile is one batch of
+//! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each bounce of all samples of a tile is one batch of
 //! rays, each with the primitive on which it starts.
 
 use super::context::{Counters, FrameContext, Sample};
-use super::lights::Lights;
+use super::lights::{LightSample, Lights};
 use super::occlusion_rays::{OcclusionRays, Origin};
 use super::surface_colors::instance_color;
+use super::visibility;
+use crate::materials::Look;
 use crate::output::reinhard;
 use crate::sampling::cosine_hemisphere;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use glam::{DVec2, DVec3, Vec3};
+use std::f64::consts::PI;
 
-/// Albedo of the first instance.
-const FIRST_ALBEDO: Vec3 = Vec3::new(0.68, 0.66, 0.63);
+/// Albedo of what has no material.
+const CLAY_ALBEDO: Vec3 = Vec3::new(0.68, 0.66, 0.63);
 /// Dimension pairs of sample points for each bounce, after the one of the camera.
 const DIMENSIONS: u64 = 4;
+/// Numbers of rays for each bounce, for [`Sample::chance`].
+const RAYS: u64 = 1 << 20;
 
 /// A path that has not ended.
 struct PathState {
@@ -25,12 +30,14 @@ struct PathState {
     direction: DVec3,
     /// The primitive on which the next ray starts.
     from: PrimitiveRef,
+    /// Density with which its direction was chosen, with regard to solid angle; `None` for rays of the camera.
+    density: Option<f64>,
 }
 
 /// The colours (linear) of a batch of samples.
 pub(super) fn shade(
     frame: &FrameContext<'_>,
-    lights: &Lights,
+    lights: &Lights<'_>,
     samples: &[Sample],
     hits: &[Hit],
     counters: &mut Counters,
@@ -42,64 +49,104 @@ pub(super) fn shade(
         origin: s.ray.origin,
         direction: s.ray.direction,
         from: PrimitiveRef::NONE,
+        density: None,
     };
     let mut paths: Vec<PathState> = samples.iter().enumerate().map(start).collect();
     let mut hits = hits.to_vec();
-    for bounce in 0..=frame.args.bounces {
-        let mut shadow_rays = OcclusionRays::default();
-        let mut contributions = Vec::new();
-        let mut next = Vec::new();
+    for number in 0..=frame.args.bounces {
+        let mut bounce = Bounce::new(frame, lights, samples, number);
         for (path, hit) in paths.iter().zip(&hits) {
-            if !hit.is_hit() {
-                colors[path.sample] += path.throughput * lights.sky(path.direction);
-                continue;
-            }
-            let Sample { sampler, index, .. } = samples[path.sample];
-            let sample =
-                |dimension: u64| sampler.point(DIMENSIONS * u64::from(bounce) + 1 + dimension, index);
-            let point = path.origin + path.direction * f64::from(hit.t);
-            let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
-            let shading = frame.geometry.shading_normal(hit, normal);
-            let throughput = path.throughput * albedo(hit.primitive);
-            let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
-            for light in lights.samples(origin.point, sample(0), sample(1)) {
-                // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
-                let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
-                if cosine > 0.0 {
-                    shadow_rays.push(origin, light.direction, light.distance);
-                    contributions.push((path.sample, throughput * light.light * cosine as f32));
-                }
-            }
-            if bounce < frame.args.bounces {
-                let direction = scattered(shading, normal, sample(2));
-                next.push(PathState {
-                    sample: path.sample,
-                    throughput,
-                    origin: origin.point,
-                    direction,
-                    from: hit.primitive,
-                });
-            }
+            colors[path.sample] += path.throughput * bounce.meet(path, hit);
         }
+        let Bounce { shadow_rays, contributions, next, .. } = bounce;
         counters.any_rays += shadow_rays.len() as u64;
-        for (&(sample, light), blocked) in contributions.iter().zip(shadow_rays.trace(frame.scene)) {
+        for (&(sample, light), blocked) in contributions.iter().zip(shadow_rays.trace(frame)) {
             colors[sample] += if blocked { Vec3::ZERO } else { light };
         }
-        let ray = |path: &PathState| Ray {
-            origin: path.origin.as_vec3().to_array(),
-            tmin: 0.0,
-            direction: path.direction.as_vec3().to_array(),
-            tmax: f32::INFINITY,
-        };
-        let rays: Vec<Ray> = next.iter().map(ray).collect();
-        let from: Vec<PrimitiveRef> = next.iter().map(|path| path.from).collect();
-        hits.clear();
-        hits.resize(rays.len(), Hit::MISS);
-        frame.scene.batch(&rays).from(&from[..]).nearest(&mut hits);
-        counters.nearest_rays += rays.len() as u64;
+        hits = trace(frame, &next, samples, number);
+        counters.nearest_rays += hits.len() as u64;
         paths = next;
     }
     colors.into_iter().map(reinhard).collect()
+}
+
+/// What the paths of a batch meet after the bounce of a number.
+fn trace(frame: &FrameContext<'_>, paths: &[PathState], samples: &[Sample], number: u32) -> Vec<Hit> {
+    let ray = |path: &PathState| Ray {
+        origin: path.origin.as_vec3().to_array(),
+        tmin: 0.0,
+        direction: path.direction.as_vec3().to_array(),
+        tmax: f32::INFINITY,
+    };
+    let rays: Vec<Ray> = paths.iter().map(ray).collect();
+    let from: Vec<PrimitiveRef> = paths.iter().map(|path| path.from).collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let chance = |row: usize| samples[paths[row].sample].chance(RAYS * (u64::from(number) + 1));
+    visibility::nearest(frame, (&rays, Some(&from)), false, chance, &mut hits);
+    hits
+}
+
+/// What the paths of a batch meet at once.
+struct Bounce<'a> {
+    frame: &'a FrameContext<'a>,
+    lights: &'a Lights<'a>,
+    samples: &'a [Sample],
+    number: u32,
+    shadow_rays: OcclusionRays,
+    /// For each shadow ray its sample, and the light that it brings if it is not blocked.
+    contributions: Vec<(usize, Vec3)>,
+    /// Paths that go on.
+    next: Vec<PathState>,
+}
+
+impl<'a> Bounce<'a> {
+    fn new(frame: &'a FrameContext<'a>, lights: &'a Lights<'a>, samples: &'a [Sample], number: u32) -> Self {
+        let (shadow_rays, contributions) = (OcclusionRays::default(), Vec::new());
+        Self { frame, lights, samples, number, shadow_rays, contributions, next: Vec::new() }
+    }
+
+    /// Adds the shadow rays and the next ray of a path that meets a surface. Returns the radiance that it finds there, or in the
+    /// surroundings.
+    fn meet(&mut self, path: &PathState, hit: &Hit) -> Vec3 {
+        let Self { frame, lights, number, .. } = *self;
+        if !hit.is_hit() {
+            return lights.sky(path.direction) * share(path.density, lights.density(path.direction));
+        }
+        let surface = Surface::of(frame, hit);
+        if surface.albedo == Vec3::ZERO {
+            return surface.emitted;
+        }
+        let Sample { sampler, index, .. } = self.samples[path.sample];
+        let sample = |dimension: u64| sampler.point(DIMENSIONS * u64::from(number) + 1 + dimension, index);
+        let point = path.origin + path.direction * f64::from(hit.t);
+        let normal = frame.geometry.geometric_normal(hit.primitive, -path.direction);
+        let shading = frame.geometry.shading_normal(hit, normal);
+        let throughput = path.throughput * surface.albedo;
+        let origin = Origin::above(point, normal, hit.primitive, frame.bounds.diagonal());
+        let last = number == frame.args.bounces;
+        let surroundings = lights.surroundings(sample(3)).map(|(light, density)| {
+            // A path that goes on may find the surroundings by itself.
+            let scattered = if last { 0.0 } else { shading.dot(light.direction).max(0.0) / PI };
+            LightSample { light: light.light * share(Some(density), scattered), ..light }
+        });
+        let of_scene = lights.samples(origin.point, sample(0), sample(1));
+        for (ray, light) in of_scene.chain(surroundings).enumerate() {
+            // The cosine at the shading normal, faded to 0 where the light goes below the geometric surface.
+            let cosine = shading.dot(light.direction).min(normal.dot(light.direction) * 1e3);
+            if cosine > 0.0 {
+                let chance = self.samples[path.sample].chance(RAYS * u64::from(number) + 1 + ray as u64);
+                self.shadow_rays.push(origin, light.direction, light.distance, chance);
+                self.contributions.push((path.sample, throughput * light.light * cosine as f32));
+            }
+        }
+        if !last {
+            let direction = scattered(shading, normal, sample(2));
+            let density = Some(shading.dot(direction).max(0.0) / PI);
+            let (origin, from) = (origin.point, hit.primitive);
+            self.next.push(PathState { sample: path.sample, throughput, origin, direction, from, density });
+        }
+        surface.emitted
+    }
 }
 
 /// A cosine-distributed direction around the shading normal, on the side of the geometric one.
@@ -110,10 +157,42 @@ fn scattered(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
     if depth >= 0.0 { direction } else { direction - normal * (2.0 * depth) }
 }
 
-/// The albedo of a hit. Instances differ in hue, so that they can be told apart; the first is neutral.
-fn albedo(primitive: PrimitiveRef) -> Vec3 {
+/// The share of light from the surroundings that is taken of a direction chosen with a density, if another way to choose it has the
+/// density `other` (the balance heuristic; Veach and Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", 1995). All
+/// of it where there is no choice.
+fn share(chosen: Option<f64>, other: f64) -> f32 {
+    match chosen {
+        Some(chosen) if other > 0.0 => (chosen / (chosen + other)) as f32,
+        _ => 1.0,
+    }
+}
+
+/// How a path meets a surface.
+struct Surface {
+    /// Radiance, towards wherever the path comes from.
+    emitted: Vec3,
+    /// Share of light that is scattered.
+    albedo: Vec3,
+}
+
+impl Surface {
+    fn of(frame: &FrameContext<'_>, hit: &Hit) -> Self {
+        let (emitted, albedo) =
+            match frame.materials.look(frame.scene, frame.geometry.object(hit.primitive), hit) {
+                Some(Look { base_color, emissive, unlit: true }) => (base_color + emissive, Vec3::ZERO),
+                // More than all light is never scattered.
+                Some(Look { base_color, emissive, .. }) => (emissive, base_color.min(Vec3::ONE)),
+                None if frame.materials.is_empty() => (Vec3::ZERO, instance_albedo(hit.primitive)),
+                None => (Vec3::ZERO, CLAY_ALBEDO),
+            };
+        Self { emitted, albedo }
+    }
+}
+
+/// The albedo of an instance in a file without materials. Instances differ in hue, so that they can be told apart; the first is neutral.
+fn instance_albedo(primitive: PrimitiveRef) -> Vec3 {
     match primitive.instance {
-        0 => FIRST_ALBEDO,
-        instance => FIRST_ALBEDO.lerp(instance_color(instance), 0.4),
+        0 => CLAY_ALBEDO,
+        instance => CLAY_ALBEDO.lerp(instance_color(instance), 0.4),
     }
 }

@@ -4,28 +4,28 @@ use super::context::{Counters, FrameContext, Sample};
 use super::lights::Lights;
 use super::room_lamp::room_lamp;
 use super::studio::Studio;
-use super::{ambient_occlusion, path_tracer, step_counts, surface_colors};
+use super::{ambient_occlusion, path_tracer, step_counts, surface_colors, visibility};
 use crate::args::Mode;
 use crate::camera::up_vector;
 use bth::rays::{Hit, Ray};
 use glam::Vec3;
 
 /// Shades batches of samples; what it needs besides the frame is computed once a frame.
-pub(crate) enum Shader {
+pub(crate) enum Shader<'a> {
     Studio(Studio),
-    Path(Lights),
+    Path(Lights<'a>),
     Normals,
     AmbientOcclusion,
     Instances,
     Steps,
 }
 
-impl Shader {
+impl<'a> Shader<'a> {
     /// The shader of the frame's mode.
-    pub(crate) fn new(frame: &FrameContext<'_>) -> Self {
+    pub(crate) fn new(frame: &FrameContext<'a>) -> Self {
         let vertical = up_vector(frame.args.up);
         match frame.args.mode {
-            Mode::Shaded => {
+            Mode::Shaded | Mode::Clay => {
                 let ground = !frame.args.no_ground && frame.scene.description().is_none();
                 Shader::Studio(Studio::new(frame, vertical, ground))
             }
@@ -34,7 +34,7 @@ impl Shader {
                     let position = room_lamp(frame, vertical);
                     (position, 1.5 * (position - frame.camera.eye).length())
                 });
-                Shader::Path(Lights::new(frame.scene, frame.bounds, vertical, lamp))
+                Shader::Path(Lights::new(frame, vertical, lamp))
             }
             Mode::Normals => Shader::Normals,
             Mode::Ao => Shader::AmbientOcclusion,
@@ -57,7 +57,7 @@ impl Shader {
             return step_counts::shade(frame.scene, &rays, &mut counters.steps);
         }
         let mut hits = vec![Hit::MISS; rays.len()];
-        frame.scene.batch(&rays).nearest(&mut hits);
+        visibility::nearest(frame, (&rays, None), true, |row| samples[row].chance(0), &mut hits);
         match self {
             Shader::Studio(studio) => studio.shade(frame, samples, &hits, &mut counters.any_rays),
             Shader::Path(lights) => path_tracer::shade(frame, lights, samples, &hits, counters),

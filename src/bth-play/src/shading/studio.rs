@@ -1,9 +1,10 @@
-//! The studio shader of mode shaded: a matte material under a soft key light and a fill light, with ambient occlusion, on a
-//! ground that only catches shadows.
+//! The studio shader of modes shaded and clay: base colours, or a matte clay, under a soft key light and a fill light, with ambient
+//! occlusion, on a ground that only catches shadows.
 
 use super::context::{FrameContext, Sample};
 use super::occlusion_rays::{OcclusionRays, Origin};
 use super::room_lamp::room_lamp;
+use crate::materials::Look;
 use crate::output::shoulder;
 use crate::sampling::{cosine_hemisphere, uniform_disc};
 use bth::rays::{Hit, PrimitiveRef};
@@ -13,7 +14,7 @@ use glam::{DVec3, Vec3};
 const AMBIENT_RAYS: u32 = 2;
 /// Radius of the key light at distance 1, which decides how soft its shadows are.
 const KEY_RADIUS: f64 = 0.16;
-/// Albedo of the material.
+/// Albedo of the clay.
 const STUDIO_ALBEDO: Vec3 = Vec3::new(0.57, 0.515, 0.465);
 /// Irradiance of the key light, of the fill light, and of the ambient light from above and from below.
 const KEY: Vec3 = Vec3::new(1.15, 1.08, 0.97);
@@ -51,8 +52,17 @@ struct ShadingPoint {
     sample: usize,
     normal: DVec3,
     to_key: DVec3,
-    /// How strongly a shadow shows, for points of the ground; `None` for those of the model.
-    ground: Option<f64>,
+    what: Surface,
+}
+
+/// What is lit.
+#[derive(Clone, Copy, Debug)]
+enum Surface {
+    /// The ground, and how strongly a shadow shows there.
+    Ground(f64),
+    /// The clay of what has no material.
+    Clay,
+    Material(Look),
 }
 
 impl Studio {
@@ -82,11 +92,17 @@ impl Studio {
         let mut points = Vec::new();
         for (index, (sample, hit)) in samples.iter().zip(hits).enumerate() {
             if hit.is_hit() {
+                let look = frame.materials.look(frame.scene, frame.geometry.object(hit.primitive), hit);
+                if let Some(Look { base_color, emissive, unlit: true }) = look {
+                    colors[index] = base_color + emissive;
+                    continue;
+                }
                 let (point, geometric) = frame.point_and_normal(sample, hit);
                 let origin = Origin::above(point, geometric, hit.primitive, self.diagonal);
                 let to_key = self.push(&mut rays, origin, geometric, sample, frame.occlusion_distance);
                 let normal = frame.geometry.shading_normal(hit, geometric);
-                points.push(ShadingPoint { sample: index, normal, to_key, ground: None });
+                let what = look.map_or(Surface::Clay, Surface::Material);
+                points.push(ShadingPoint { sample: index, normal, to_key, what });
             } else if let Some((point, share)) = self.on_ground(frame, sample) {
                 let origin = Origin::above(point, self.vertical, PrimitiveRef::NONE, self.diagonal);
                 let distance = frame.occlusion_distance;
@@ -95,19 +111,27 @@ impl Studio {
                     sample: index,
                     normal: self.vertical,
                     to_key,
-                    ground: Some(share),
+                    what: Surface::Ground(share),
                 });
             }
         }
         *any_rays += rays.len() as u64;
-        let blocked = rays.trace(frame.scene);
+        let blocked = rays.trace(frame);
         for (point, blocked) in points.iter().zip(blocked.chunks(1 + AMBIENT_RAYS as usize)) {
             let open = blocked[1..].iter().filter(|b| !**b).count() as f32 / AMBIENT_RAYS as f32;
             let key = if blocked[0] { 0.0 } else { 1.0 };
             let color = &mut colors[point.sample];
-            *color = match point.ground {
-                Some(share) => *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key))),
-                None => self.reflected(point, samples[point.sample].ray.direction, key, open),
+            let direction = samples[point.sample].ray.direction;
+            *color = match point.what {
+                Surface::Ground(share) => {
+                    *color * (1.0 - share as f32 * (0.62 * (1.0 - open) + 0.30 * (1.0 - key)))
+                }
+                Surface::Clay => {
+                    shoulder(STUDIO_ALBEDO * self.light(point, key, open) + self.gloss(point, direction, key))
+                }
+                Surface::Material(look) => {
+                    shoulder(look.base_color * self.light(point, key, open) + look.emissive)
+                }
             };
         }
         colors
@@ -131,26 +155,28 @@ impl Studio {
         };
         let (tangent, bitangent) = to_key.any_orthonormal_pair();
         let spread = uniform_disc(sample.sampler.point(1, sample.index)) * KEY_RADIUS;
-        rays.push(origin, (to_key + tangent * spread.x + bitangent * spread.y).normalize(), length * 0.999);
+        let towards = (to_key + tangent * spread.x + bitangent * spread.y).normalize();
+        rays.push(origin, towards, length * 0.999, sample.chance(1));
         for ray in 0..AMBIENT_RAYS {
             let at = sample.sampler.point(2, sample.index * AMBIENT_RAYS + ray);
-            rays.push(origin, cosine_hemisphere(normal, at), distance);
+            rays.push(origin, cosine_hemisphere(normal, at), distance, sample.chance(2 + u64::from(ray)));
         }
         to_key
     }
 
-    /// The light that a point of the model reflects towards the camera; `direction` is that of the camera ray, `key` the
-    /// visible share of the key light, `open` that of the hemisphere.
-    fn reflected(&self, point: &ShadingPoint, direction: DVec3, key: f32, open: f32) -> Vec3 {
+    /// The light that falls on a point of the model; `key` is the visible share of the key light, `open` that of the hemisphere.
+    fn light(&self, point: &ShadingPoint, key: f32, open: f32) -> Vec3 {
         let facing = |towards: DVec3| point.normal.dot(towards).max(0.0) as f32;
         let height = (point.normal.dot(self.vertical) * 0.5 + 0.5) as f32;
         let ambient = BOUNCE.lerp(SKY, height) * open;
-        // A weak specular term (Blinn), which shows curvature in the lit parts.
+        KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient
+    }
+
+    /// A weak specular term (Blinn), which shows curvature in the lit parts of clay; `direction` is that of the camera ray.
+    fn gloss(&self, point: &ShadingPoint, direction: DVec3, key: f32) -> Vec3 {
         let half = (point.to_key - direction).normalize_or(point.normal);
-        let gloss = 0.06 * facing(half).powi(24) * key;
-        let light =
-            KEY * (key * facing(point.to_key)) + FILL * (facing(self.fill) * (0.4 + 0.6 * open)) + ambient;
-        shoulder(STUDIO_ALBEDO * light + KEY * gloss)
+        let facing = point.normal.dot(half).max(0.0) as f32;
+        KEY * (0.06 * facing.powi(24) * key)
     }
 
     /// Where the camera ray meets the ground, and how much of the shadow there shows.

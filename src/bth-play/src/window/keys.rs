@@ -5,7 +5,7 @@ use winit::keyboard::KeyCode;
 
 /// The list of keys that H prints. The README and the help of the program promise these keys.
 pub(crate) const HELP: &str = "\
-1 2 3 4 5 6     mode: shaded, normals, ao, steps, path, instances
+1 2 3 4 5 6 7   mode: shaded, normals, ao, steps, path, instances, clay
 Space           play, pause
 Left, Right     one frame back, on; Shift: ten
 Home, End       first, last frame; or drag the bar at the bottom
@@ -45,6 +45,7 @@ pub(crate) fn action(key: KeyCode, shift: bool) -> Option<Action> {
         KeyCode::Digit4 | KeyCode::Numpad4 => Action::Mode(Mode::ALL[3]),
         KeyCode::Digit5 | KeyCode::Numpad5 => Action::Mode(Mode::ALL[4]),
         KeyCode::Digit6 | KeyCode::Numpad6 => Action::Mode(Mode::ALL[5]),
+        KeyCode::Digit7 | KeyCode::Numpad7 => Action::Mode(Mode::ALL[6]),
         KeyCode::Space => Action::TogglePlayback,
         KeyCode::ArrowLeft => Action::Step(-step),
         KeyCode::ArrowRight => Action::Step(step),

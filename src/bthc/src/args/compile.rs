@@ -5,6 +5,7 @@ use super::choices::*;
 use super::common::{EXIT_CODES, threads};
 use super::jobs::Jobs;
 use bth_format::layout::GridBits;
+use bth_import::Keep;
 use clap::Args as Group;
 use std::path::PathBuf;
 
@@ -54,6 +55,10 @@ pub(crate) struct Compile {
     /// Keep groups of triangles, materials and names, so that hits lead back to parts of the source: see docs/models.md.
     #[arg(long)]
     pub(crate) names: bool,
+    /// Keep how materials look: base colour, emission, alpha, sidedness, their textures, and vertex colours: see docs/models.md.
+    /// Includes --attributes all and --names.
+    #[arg(long)]
+    pub(crate) materials: bool,
     /// glTF materials whose alpha makes holes, through which rays pass: see docs/models.md.
     #[arg(long, value_enum, default_value_t = Alpha::None, value_name = "MATERIALS")]
     pub(crate) alpha: Alpha,
@@ -179,8 +184,9 @@ impl Compile {
     pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
         let mut options = bth_compile::pipeline::CompileOptions {
             structure: self.structure.into(),
-            attributes: self.attributes.into(),
-            names: self.names,
+            attributes: if self.materials { Keep::All } else { self.attributes.into() },
+            names: self.names || self.materials,
+            materials: self.materials,
             alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),

@@ -27,8 +27,8 @@ pub(super) fn write(path: &Path, context: &JobContext<'_>, jobs: &[Job]) -> Resu
 /// When a file that refers to others cannot be read.
 pub(super) fn inputs(context: &JobContext<'_>, job: &Job) -> Result<Vec<PathBuf>, Failure> {
     match scene::is_scene(&job.model, context.args) {
-        true => scene::inputs(&job.model, context.options.alpha),
-        false => Ok(source::files(&job.model, context.options.alpha)?),
+        true => scene::inputs(&job.model, context.options.looks()),
+        false => Ok(source::files(&job.model, context.options.looks())?),
     }
 }
 

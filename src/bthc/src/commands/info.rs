@@ -8,7 +8,7 @@ use crate::table::{Table, bytes, count};
 use bth::Isa;
 use bth_format::File;
 use bth_format::error::kind_name;
-use bth_format::layout::{NONE, RecordKind};
+use bth_format::layout::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
 use bth_format::object::ObjectView;
 use serde_json::{Value, json};
 
@@ -60,6 +60,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
             "name": file.object_name(i), "groups": groups(&view),
             "materials": (0..view.materials.len() as u32).map(|m| view.material_name(m)).collect::<Vec<_>>(),
+            "parameters": materials(file, i),
             "geometry": !view.triangles.is_empty(), "normals": view.normals.len(), "uvs": view.uvs.len()}))
     };
     let header = file.header();
@@ -82,6 +83,22 @@ fn groups(view: &ObjectView<'_>) -> Vec<Value> {
     rows.map(|(group, triangles)| {
         let material = view.material_of(group);
         json!({"name": view.group_name(group), "triangles": triangles, "material": material})
+    })
+    .collect()
+}
+
+/// Names of alpha modes, by their codes.
+const ALPHA_MODES: [&str; 3] = ["opaque", "mask", "blend"];
+
+/// How the materials of an object look; empty where the file keeps no more than their names.
+fn materials(file: &File, object: u32) -> Vec<Value> {
+    let texture = |row: u32| (row != NONE).then_some(row);
+    let rows = file.materials(object).parameters.iter();
+    rows.map(|p| {
+        json!({"base_color": p.base_color, "emissive": p.emissive, "double_sided": p.flags & MATERIAL_DOUBLE_SIDED != 0,
+            "unlit": p.flags & MATERIAL_UNLIT != 0, "alpha_cutoff": p.alpha_cutoff,
+            "alpha": ALPHA_MODES.get(p.alpha_mode as usize),
+            "base_color_texture": texture(p.base_color_texture), "emissive_texture": texture(p.emissive_texture)})
     })
     .collect()
 }

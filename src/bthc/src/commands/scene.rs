@@ -10,7 +10,7 @@ use bth_compile::Monitor;
 use bth_compile::cached::{Cache, DryRun};
 use bth_compile::scene::{self, CachePolicy, SceneReport, SceneSource};
 use bth_compile::source;
-use bth_import::AlphaMode;
+use bth_import::Looks;
 use bth_import::gltf::scene::{ImportReport, import};
 use bth_scene::Manifest;
 use serde_json::json;
@@ -73,7 +73,7 @@ pub(super) fn compile(
     };
     let outcome = scene::compile_cached(&manifest, source, &context.options, &cache, policy, monitor)?;
     let mut report =
-        deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model, context.options.alpha))?;
+        deliver(context, job, &outcome, &cache, &|| files(&manifest, &job.model, context.options.looks()))?;
     report.json["scene"] = outcome.report;
     report.json["import"] = json!(import);
     if let Some(built) = &outcome.built {
@@ -110,14 +110,14 @@ pub(super) fn dry_run(
 }
 
 /// All files that a scene is made from.
-pub(super) fn inputs(model: &Path, alpha: AlphaMode) -> Result<Vec<PathBuf>, Failure> {
+pub(super) fn inputs(model: &Path, looks: Looks) -> Result<Vec<PathBuf>, Failure> {
     if is_gltf(model) {
-        return Ok(source::files(model, alpha)?);
+        return Ok(source::files(model, looks)?);
     }
-    Ok(files(&bth_scene::read(model)?, model, alpha)?)
+    Ok(files(&bth_scene::read(model)?, model, looks)?)
 }
 
-fn files(manifest: &Manifest, model: &Path, alpha: AlphaMode) -> bth_compile::Result<Vec<PathBuf>> {
+fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result<Vec<PathBuf>> {
     let mut files = vec![model.to_owned()];
     let mut paths: Vec<&str> = manifest.objects.iter().map(|o| o.source.path()).collect();
     paths.sort_unstable();
@@ -127,7 +127,7 @@ fn files(manifest: &Manifest, model: &Path, alpha: AlphaMode) -> bth_compile::Re
         let path = model.parent().unwrap_or(Path::new("")).join(path);
         // The file of an object without visible instances may be missing.
         if path != *model && path.exists() {
-            files.extend(source::files(&path, alpha)?);
+            files.extend(source::files(&path, looks)?);
         }
     }
     Ok(files)

@@ -9,16 +9,16 @@ use crate::cutout::{AlphaMode, CutoutCorner, CutoutTriangle, Cutouts};
 use crate::error::Result;
 use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
-use crate::gltf::container::split;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::gltf::flatten::{PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{KeptAttributes, PrimitiveReader, Triangles};
 use crate::gltf::schema::GltfDocument;
+use crate::gltf::texture_parts::TextureParts;
 use crate::gltf::transform;
 use crate::mesh::Keep;
-use crate::source::{MALFORMED, MALFORMED_HINT, Source};
-use material::{Materials, TextureParts};
+use crate::source::Source;
+use material::Materials;
 
 /// The cut-outs of a document's default scene, as [`crate::import`] reads it.
 pub(crate) fn flat(source: &Source<'_>, mode: AlphaMode) -> Result<Cutouts> {
@@ -40,7 +40,7 @@ pub(crate) fn files(json: &[u8], mode: AlphaMode) -> Vec<String> {
     if mode == AlphaMode::None {
         return Vec::new();
     }
-    from_slice::<TextureParts>(json).map_or(Vec::new(), |parts| parts.files(mode))
+    from_slice::<TextureParts>(json).map_or(Vec::new(), |parts| material::files(&parts, mode))
 }
 
 /// The cut-outs of models, each of which consists of placed meshes.
@@ -51,10 +51,7 @@ fn placed_cutouts(
     mode: AlphaMode,
     models: &[Vec<PlacedMesh>],
 ) -> Result<Vec<Cutouts>> {
-    let parts: TextureParts = from_slice(split(source)?.0).map_err(|e| {
-        let message = format!("expected a glTF document, found: {e}");
-        source.error_in_part(MALFORMED, "JSON", message, MALFORMED_HINT)
-    })?;
+    let parts = TextureParts::of(source)?;
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let mut reader = CutoutReader {
         accessors: &accessors,

@@ -92,16 +92,18 @@ impl<'a> App<'a> {
         range: (i32, i32),
         rate: f64,
     ) -> Self {
+        // Samples are those of a picture with as many of them, so that the window converges to what -o writes.
+        let samples = args.spp.max(args.window_frames.unwrap_or(0));
         Self {
             content,
             pool,
-            renderer: ProgressiveRenderer::new(args),
+            renderer: ProgressiveRenderer::new(&args.with_samples(samples)),
             playback: Playback::new(range, rate),
             view: ViewCamera::Initial,
             mode: args.mode,
             screen: None,
             picture: None,
-            samples: args.spp.max(args.window_frames.unwrap_or(0)),
+            samples,
             picture_limit: args.window_frames.map(u64::from),
             screenshot: args.screenshot.clone(),
             save_requested: false,

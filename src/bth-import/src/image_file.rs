@@ -1,0 +1,77 @@
+//! What is checked of an image file without decoding it: its format and its size.
+
+use imagesize::{ImageError, ImageType};
+
+/// Greatest number of texels of an image that is kept: 8,192 by 8,192.
+pub(crate) const MAX_TEXELS: u64 = 1 << 26;
+/// Greatest number of bytes of an image file.
+pub(crate) const MAX_FILE: u64 = 1 << 28;
+
+/// Why an image is not kept.
+#[derive(Debug, PartialEq)]
+pub(crate) enum Refused {
+    /// It is of another format, or malformed.
+    Malformed(String),
+    /// It has this many texels, more than [`MAX_TEXELS`].
+    TooLarge(u64),
+}
+
+/// Checks that the header of a file is that of a PNG, JPEG or WebP image of a size that is kept.
+pub(crate) fn check(bytes: &[u8]) -> Result<(), Refused> {
+    let malformed = |what: &str| Err(Refused::Malformed(what.to_owned()));
+    match imagesize::image_type(bytes) {
+        Ok(ImageType::Png | ImageType::Jpeg | ImageType::Webp) => {}
+        _ => return malformed("expected a PNG, JPEG or WebP image, found something else"),
+    }
+    match imagesize::blob_size(bytes) {
+        Ok(size) if size.width == 0 || size.height == 0 => {
+            malformed("expected an image with texels, found none")
+        }
+        Ok(size) => match size.width as u64 * size.height as u64 {
+            texels if texels > MAX_TEXELS => Err(Refused::TooLarge(texels)),
+            _ => Ok(()),
+        },
+        Err(ImageError::CorruptedImage | ImageError::IoError(_)) => {
+            malformed("expected a whole image, found one that is cut off or damaged")
+        }
+        Err(_) => malformed("expected a PNG, JPEG or WebP image, found something else"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn png(width: u32, height: u32) -> Vec<u8> {
+        let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR".to_vec();
+        bytes.extend(width.to_be_bytes());
+        bytes.extend(height.to_be_bytes());
+        bytes.extend([8, 6, 0, 0, 0, 0, 0, 0, 0]);
+        bytes
+    }
+
+    #[test]
+    fn formats_and_sizes() {
+        assert_eq!(check(&png(8192, 8192)), Ok(()));
+        assert_eq!(check(&png(8193, 8192)), Err(Refused::TooLarge(8193 * 8192)));
+        assert!(matches!(check(&png(u32::MAX, u32::MAX)), Err(Refused::TooLarge(_))));
+        for bad in
+            [&b""[..], b"GIF89a\x01\0\x01\0", b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n", b"RIFF\0\0\0\0WEBP"]
+        {
+            assert!(matches!(check(bad), Err(Refused::Malformed(_))), "{bad:?}");
+        }
+        assert!(check(&png(0, 3)).is_err());
+    }
+
+    #[test]
+    fn no_bytes_panic() {
+        let mut random = bth_random::Rng::new(11);
+        let starts: [&[u8]; 4] =
+            [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0", b"RIFF\x20\0\0\0WEBPVP8X", b"RIFF\x20\0\0\0WEBPVP8 "];
+        for round in 0..20_000 {
+            let mut bytes = starts[round % 4].to_vec();
+            bytes.extend((0..random.below(60)).map(|_| random.below(256) as u8));
+            let _ = check(&bytes);
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! How the materials of a mesh look, as the sections of a compiled file have it: parameters, textures and vertex colours.
+
+use crate::cutout::AlphaMode;
+use bth_format::file::hash128;
+use bth_format::layout::{MaterialParameters, NONE, Texture};
+use std::collections::HashMap;
+
+/// The materials of a mesh's groups, and the colours of its vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Materials {
+    /// For each material of the groups its parameters; empty where the source tells of none.
+    pub parameters: Vec<MaterialParameters>,
+    /// The textures that parameters refer to. Their images are [`ImageFile`]s of the source.
+    pub textures: Vec<Texture>,
+    /// Per triangle rows of `colors`; empty without vertex colours.
+    pub color_corners: Vec<[u32; 3]>,
+    /// Distinct vertex colours, linear red, green, blue and alpha; 65,535 stands for 1.
+    pub colors: Vec<[u16; 4]>,
+}
+
+/// What of a model's looks is read, for which files besides the model itself are needed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Looks {
+    /// Materials whose alpha makes holes.
+    pub alpha: AlphaMode,
+    /// How materials look.
+    pub materials: bool,
+}
+
+impl From<AlphaMode> for Looks {
+    fn from(alpha: AlphaMode) -> Self {
+        Self { alpha, materials: false }
+    }
+}
+
+/// An image file of a source: PNG, JPEG or WebP.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImageFile {
+    /// The first 128 bits of the BLAKE3 hash of its bytes, by which textures name it.
+    pub name: [u8; 16],
+    /// Its bytes, as they are in the source.
+    pub bytes: Vec<u8>,
+}
+
+impl ImageFile {
+    /// The image in these bytes.
+    pub(crate) fn new(bytes: Vec<u8>) -> Self {
+        Self { name: hash128(&bytes), bytes }
+    }
+}
+
+/// The colour of what has no vertex colour.
+const WHITE: [f32; 4] = [1.0; 4];
+
+/// The parameters of a material about which the source says nothing: white, opaque, seen from both sides.
+pub(crate) const PLAIN: MaterialParameters = MaterialParameters {
+    base_color: [1.0; 4],
+    emissive: [0.0; 3],
+    alpha_cutoff: 0.5,
+    alpha_mode: bth_format::layout::ALPHA_OPAQUE,
+    flags: bth_format::layout::MATERIAL_DOUBLE_SIDED,
+    base_color_texture: NONE,
+    emissive_texture: NONE,
+    reserved: [0; 4],
+};
+
+/// Collects materials while a source is read.
+#[derive(Debug, Default)]
+pub(crate) struct MaterialRecorder {
+    /// By the numbers that groups refer to.
+    pub(crate) parameters: Vec<MaterialParameters>,
+    textures: Vec<Texture>,
+    rows: HashMap<TextureKey, u32>,
+    pub(crate) colors: ColorRecorder,
+}
+
+/// What makes two textures equal.
+type TextureKey = ([u8; 16], [u32; 2], u32, [u32; 6]);
+
+impl MaterialRecorder {
+    /// The row of a texture, which is added if there is none like it.
+    pub(crate) fn texture(&mut self, texture: Texture) -> u32 {
+        let mut bits = [0; 6];
+        bits.iter_mut().zip(texture.transform.as_flattened()).for_each(|(to, x)| *to = x.to_bits());
+        let next = self.textures.len() as u32;
+        let row = *self.rows.entry((texture.image, texture.wrap, texture.filter, bits)).or_insert(next);
+        if row == next {
+            self.textures.push(texture);
+        }
+        row
+    }
+
+    /// The materials of a mesh of so many triangles. `kept` are the numbers of the materials that its groups have, in order.
+    pub(crate) fn finish(self, kept: &[u32], triangles: usize) -> Materials {
+        let Self { parameters, textures, colors, .. } = self;
+        let parameters: Vec<_> = match parameters.is_empty() {
+            true => Vec::new(),
+            false => kept.iter().map(|row| parameters.get(*row as usize).copied().unwrap_or(PLAIN)).collect(),
+        };
+        let (color_corners, colors) = colors.finish(triangles);
+        used_textures(Materials { parameters, textures, color_corners, colors })
+    }
+}
+
+/// The materials without the textures that none of them refers to.
+fn used_textures(mut materials: Materials) -> Materials {
+    let mut rows = HashMap::new();
+    let mut used = Vec::new();
+    for parameters in &mut materials.parameters {
+        for texture in [&mut parameters.base_color_texture, &mut parameters.emissive_texture] {
+            if *texture != NONE {
+                *texture = *rows.entry(*texture).or_insert_with(|| {
+                    used.push(materials.textures[*texture as usize]);
+                    used.len() as u32 - 1
+                });
+            }
+        }
+    }
+    materials.textures = used;
+    materials
+}
+
+/// Collects vertex colours; each different one stands once.
+#[derive(Debug, Default)]
+pub(crate) struct ColorRecorder {
+    corners: Vec<[u32; 3]>,
+    colors: Vec<[u16; 4]>,
+    rows: HashMap<[u16; 4], u32>,
+}
+
+impl ColorRecorder {
+    /// The row of a colour. What is no number counts as 1; other numbers are clamped to 0 and 1.
+    pub(crate) fn row(&mut self, color: [f32; 4]) -> u32 {
+        let unit = |x: f32| if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) };
+        let color = color.map(|x| (f64::from(unit(x)) * f64::from(u16::MAX)).round() as u16);
+        let next = self.colors.len() as u32;
+        let row = *self.rows.entry(color).or_insert(next);
+        if row == next {
+            self.colors.push(color);
+        }
+        row
+    }
+
+    /// The row of a colour in sRGB.
+    pub(crate) fn srgb_row(&mut self, color: [f32; 3]) -> u32 {
+        let [r, g, b] = color.map(|x| if x.is_nan() { x } else { linear(x.clamp(0.0, 1.0)) });
+        self.row([r, g, b, 1.0])
+    }
+
+    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without colours are white.
+    pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>) {
+        self.fill(first);
+        self.corners.extend(corners);
+    }
+
+    fn fill(&mut self, triangles: usize) {
+        if self.corners.len() < triangles {
+            let white = self.row(WHITE);
+            self.corners.resize(triangles, [white; 3]);
+        }
+    }
+
+    fn finish(mut self, triangles: usize) -> (Vec<[u32; 3]>, Vec<[u16; 4]>) {
+        if self.corners.is_empty() {
+            return (Vec::new(), Vec::new());
+        }
+        self.fill(triangles);
+        (self.corners, self.colors)
+    }
+}
+
+/// A component from 0 to 1 of a colour in sRGB (IEC 61966-2-1), linear.
+pub(crate) fn linear(srgb: f32) -> f32 {
+    if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_are_merged_and_triangles_without_any_are_white() {
+        let mut recorder = ColorRecorder::default();
+        let red = recorder.row([2.0, -1.0, 0.0, f32::NAN]);
+        assert_eq!(recorder.row([1.0, 0.0, 0.0, 1.0]), red);
+        recorder.add(2, [[red; 3]].into_iter());
+        let (corners, colors) = recorder.finish(4);
+        assert_eq!(colors, [[65535, 0, 0, 65535], [65535; 4]]);
+        assert_eq!(corners, [[1; 3], [1; 3], [0; 3], [1; 3]]);
+        assert_eq!(ColorRecorder::default().finish(7), (Vec::new(), Vec::new()));
+    }
+
+    #[test]
+    fn only_textures_of_kept_materials_stay() {
+        let mut recorder = MaterialRecorder::default();
+        let texture = |byte| Texture {
+            image: [byte; 16],
+            wrap: [0; 2],
+            filter: 0,
+            transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            reserved: [0; 3],
+        };
+        let rows = [recorder.texture(texture(1)), recorder.texture(texture(2)), recorder.texture(texture(1))];
+        assert_eq!(rows, [0, 1, 0]);
+        recorder.parameters = vec![
+            MaterialParameters { base_color_texture: 0, ..PLAIN },
+            PLAIN,
+            MaterialParameters { emissive_texture: 1, ..PLAIN },
+        ];
+        let materials = recorder.finish(&[2, 1], 3);
+        assert_eq!(materials.parameters, [MaterialParameters { emissive_texture: 0, ..PLAIN }, PLAIN]);
+        assert_eq!(materials.textures, [texture(2)]);
+    }
+
+    #[test]
+    fn srgb_becomes_linear_by_its_definition() {
+        for (srgb, expected) in [(0.0, 0.0), (0.04045, 0.003_130_8), (0.5, 0.214_041_14), (1.0, 1.0)] {
+            assert!((linear(srgb) - expected).abs() < 1e-6, "{srgb}");
+        }
+    }
+}

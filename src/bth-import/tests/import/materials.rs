@@ -1,0 +1,179 @@
+//! Materials of glTF documents: what is read, what is left out with a warning, and the sets of texture coordinates.
+
+use super::gltf::glb;
+use super::*;
+use bth_format::layout::*;
+use bth_import::{Materials, Wanted, import_images};
+use serde_json::{Value, json};
+use std::path::Path;
+
+const WANTED: Wanted = Wanted { attributes: Keep::All, groups: true, materials: true };
+
+/// The smallest file that begins as a PNG image of one texel.
+fn image(seed: u8) -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x06\0\0\0".to_vec();
+    bytes.extend([seed; 8]);
+    bytes
+}
+
+/// A triangle with two sets of texture coordinates and two images.
+fn document(materials: Value) -> (Value, Vec<u8>) {
+    let floats = |numbers: &[f32]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let mut bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    bytes.extend(floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
+    bytes.extend(floats(&[0.5, 0.5, 0.25, 0.5, 0.5, 0.75]));
+    let (first, second) = (image(1), image(2));
+    let start = bytes.len();
+    bytes.extend(&first);
+    bytes.extend([0; 3]);
+    let next = bytes.len();
+    bytes.extend(&second);
+    let view =
+        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
+    let accessor =
+        |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 3, "type": kind});
+    let document = json!({
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 2}, "material": 0}]}],
+        "materials": materials,
+        "textures": [{"source": 0}, {"source": 1, "sampler": 0}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}],
+        "samplers": [{"magFilter": 9728, "wrapS": 33071, "wrapT": 33648}],
+        "images": [{"bufferView": 3, "mimeType": "image/png"}, {"bufferView": 4, "mimeType": "image/png"}],
+        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC2"), accessor(2, "VEC2")],
+        "bufferViews": [view(0, 36), view(36, 24), view(60, 24), view(start, first.len()), view(next, second.len())],
+        "buffers": [{"byteLength": bytes.len()}]
+    });
+    (document, bytes)
+}
+
+/// Writes a document with one material; its materials and what was warned of.
+fn read(folder: &Path, material: Value) -> Result<(Mesh, Vec<String>)> {
+    let path = folder.join("a.glb");
+    let (document, bytes) = document(json!([material]));
+    std::fs::write(&path, glb(&document, &bytes)).unwrap();
+    let heard = Listener::default();
+    let (mesh, _) = import(&path, WANTED, &heard)?;
+    for texture in &mesh.materials.as_ref().unwrap().textures {
+        assert!(import_images(&path, &heard)?.iter().any(|image| image.name == texture.image));
+    }
+    Ok((mesh, heard.0.into_inner().unwrap()))
+}
+
+fn materials(material: Value) -> (Materials, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, warnings) = read(folder.path(), material).unwrap();
+    (mesh.materials.unwrap(), warnings)
+}
+
+#[test]
+fn factors_and_modes_are_those_of_the_document() {
+    let (read, warnings) = materials(json!({"alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true,
+        "emissiveFactor": [1, 0.5, 0], "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1, 0.75]},
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}, "KHR_materials_unlit": {}}}));
+    let expected = MaterialParameters {
+        base_color: [0.5, 0.25, 1.0, 0.75],
+        emissive: [4.0, 2.0, 0.0],
+        alpha_cutoff: 0.25,
+        alpha_mode: ALPHA_MASK,
+        flags: MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT,
+        base_color_texture: NONE,
+        emissive_texture: NONE,
+        reserved: [0; 4],
+    };
+    assert_eq!(read.parameters, [expected]);
+    assert!(read.textures.is_empty() && warnings.is_empty(), "{warnings:?}");
+    let (plain, _) = materials(json!({}));
+    let expected = MaterialParameters {
+        base_color: [1.0; 4],
+        emissive: [0.0; 3],
+        alpha_cutoff: 0.5,
+        alpha_mode: ALPHA_OPAQUE,
+        flags: 0,
+        ..expected
+    };
+    assert_eq!(plain.parameters, [expected]);
+}
+
+#[test]
+fn textures_of_one_set_share_it_by_a_transform() {
+    let transform = |offset: [f64; 2], scale: [f64; 2]| json!({"KHR_texture_transform": {"offset": offset, "scale": scale}});
+    let (read, warnings) = materials(json!({"emissiveFactor": [1, 1, 1],
+        "emissiveTexture": {"index": 0, "extensions": transform([0.5, 0.0], [4.0, 1.0])},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1, "extensions": transform([0.0, 0.25], [2.0, 2.0])}}}));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let base = &read.textures[read.parameters[0].base_color_texture as usize];
+    let expected = (identity, [WRAP_CLAMP, WRAP_MIRROR], FILTER_NEAREST);
+    assert_eq!((base.transform, base.wrap, base.filter), expected);
+    // u of the image is 0.5 + 4 u, and 2 u is kept; v is v, and 0.25 + 2 v is kept.
+    let emissive = &read.textures[read.parameters[0].emissive_texture as usize];
+    assert_eq!(emissive.transform, [[2.0, 0.0, 0.5], [0.0, 0.5, -0.125]]);
+    assert_eq!((emissive.wrap, emissive.filter), ([WRAP_REPEAT; 2], FILTER_LINEAR));
+}
+
+#[test]
+fn what_is_left_out_is_reported() {
+    let (read, warnings) = materials(json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0},
+        "normalTexture": {"index": 1}, "extensions": {"KHR_materials_clearcoat": {}},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1, "texCoord": 1}}}));
+    assert_eq!(read.parameters[0].emissive_texture, NONE);
+    let all = warnings.join("\n");
+    for part in [
+        "material 0: its emissive texture is left out: its texture coordinates",
+        "normal textures",
+        "KHR_materials_clearcoat",
+    ] {
+        assert!(all.contains(part), "{part} in {all}");
+    }
+    let (read, warnings) = materials(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}));
+    assert_eq!(read.parameters[0].base_color_texture, NONE);
+    assert!(warnings[0].contains("no image in PNG, JPEG or WebP"), "{warnings:?}");
+}
+
+#[test]
+fn malformed_materials_are_errors_with_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    for (material, text) in [
+        (json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 2]}}), "material 0: BTH-I002"),
+        (json!({"emissiveFactor": [-1, 0, 0]}), "material 0: BTH-I002"),
+        (json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 9}}}), "texture 9: BTH-I002"),
+        (json!({"alphaCutoff": "much"}), "material 0: BTH-I002"),
+    ] {
+        let error = read(folder.path(), material).unwrap_err().to_string();
+        assert!(error.contains(text) && error.contains("--materials"), "{error}");
+    }
+}
+
+#[test]
+fn older_models_have_diffuse_colors() {
+    let (read, _) = materials(json!({"extensions": {"KHR_materials_pbrSpecularGlossiness":
+        {"diffuseFactor": [0.5, 0, 0, 1], "diffuseTexture": {"index": 0}}}}));
+    assert_eq!(read.parameters[0].base_color, [0.5, 0.0, 0.0, 1.0]);
+    assert_eq!(read.textures.len(), 1);
+}
+
+/// Colours of vertices in PLY and OBJ are sRGB; 188 of 255 is half the light. A vertex without a colour is white.
+#[test]
+fn vertices_of_ply_and_obj_have_colors() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\n\
+        end_header\n0 0 0 255 0 188\n1 0 0 0 0 0\n0 1 0 255 0 188\n3 0 1 2\n";
+    let obj = "v 0 0 0 1 0 nan\nv 1 0 0 0 0 0\nv 0 1 0\nf 1 2 3\n";
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        import(&path, WANTED, &Silent).unwrap().0.materials.unwrap()
+    };
+    let of_ply = read("a.ply", ply);
+    assert_eq!(of_ply.color_corners, [[0, 1, 0]]);
+    assert_eq!(of_ply.colors[1], [0, 0, 0, 65535]);
+    let [r, g, b, a] = of_ply.colors[0];
+    assert_eq!([r, g, a], [65535, 0, 65535]);
+    assert!(b.abs_diff(32957) < 5, "0.5029 of 65,535: {b}");
+    let of_obj = read("a.obj", obj);
+    let colors = of_obj.color_corners[0].map(|row| of_obj.colors[row as usize]);
+    assert_eq!(colors, [[65535, 0, 65535, 65535], [0, 0, 0, 65535], [65535; 4]]);
+    assert_eq!(read("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), Materials::default());
+}

@@ -1,0 +1,8 @@
+//! Materials of the scene: textures decoded, and how the surface at a hit looks.
+
+mod decode;
+mod load;
+mod look;
+mod texels;
+
+pub(crate) use look::{Look, SceneMaterials};

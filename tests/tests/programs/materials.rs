@@ -1,0 +1,378 @@
+//! Materials from the source to pixels: colours of small made glTF and OBJ models in pictures of `bth-play`, and errors.
+
+use crate::support::{Run, bthc, command, folder, run, run_with};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// What the player adds to every picture here: 40 by 40 pixels that show x and y from 0 to 2, from the front.
+const VIEW: [&str; 8] =
+    ["--size", "40x40", "--spp", "4", "--camera", "1,1,5,1,1,0", "--fov", "22.61986494804043"];
+
+fn base64(bytes: &[u8]) -> String {
+    let digits = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |g: &[u8]| {
+        let bits = g.iter().fold(0u32, |bits, b| bits << 8 | u32::from(*b)) << (8 * (3 - g.len()));
+        let mut text: String =
+            (0..=g.len()).map(|k| digits[(bits >> (18 - 6 * k)) as usize & 63] as char).collect();
+        text.extend(std::iter::repeat_n('=', 3 - g.len()));
+        text
+    };
+    bytes.chunks(3).map(group).collect()
+}
+
+fn uri(bytes: &[u8]) -> String {
+    format!("data:application/octet-stream;base64,{}", base64(bytes))
+}
+
+fn png(width: u32, rgba: &[[u8; 4]]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, rgba.len() as u32 / width);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.write_header().unwrap().write_image_data(rgba.as_flattened()).unwrap();
+    bytes
+}
+
+/// A square from (0, 0, 0) to (2, 2, 0) of two triangles that faces +z, of a material whose textures are those of `images`. Its vertices
+/// have the colours, linear, if there are some.
+fn square(material: &Value, images: &[Value], colors: Option<[[f32; 4]; 4]>) -> String {
+    let mut floats: Vec<f32> = vec![0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 2.0, 2.0, 0.0, 0.0, 2.0, 0.0];
+    floats.extend([0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+    floats.extend(colors.unwrap_or([[1.0; 4]; 4]).as_flattened());
+    let mut bytes: Vec<u8> = floats.iter().flat_map(|x| x.to_le_bytes()).collect();
+    bytes.extend([0u8, 1, 2, 0, 2, 3]);
+    let mut attributes = json!({"POSITION": 0, "TEXCOORD_0": 1});
+    if colors.is_some() {
+        attributes["COLOR_0"] = json!(2);
+    }
+    let accessor =
+        |view: u32, kind: &str| json!({"bufferView": view, "componentType": 5126, "count": 4, "type": kind});
+    let view =
+        |offset: usize, length: usize| json!({"buffer": 0, "byteOffset": offset, "byteLength": length});
+    json!({
+        "asset": {"version": "2.0"},
+        "extensionsUsed": ["KHR_materials_unlit"],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 3, "material": 0}]}],
+        "materials": [material],
+        "textures": images.iter().enumerate().map(|(k, _)| json!({"source": k, "sampler": 0})).collect::<Vec<_>>(),
+        "samplers": [{"magFilter": 9728}],
+        "images": images,
+        "accessors": [accessor(0, "VEC3"), accessor(1, "VEC2"), accessor(2, "VEC4"),
+            {"bufferView": 3, "componentType": 5121, "count": 6, "type": "SCALAR"}],
+        "bufferViews": [view(0, 48), view(48, 32), view(80, 64), view(144, 6)],
+        "buffers": [{"byteLength": bytes.len(), "uri": uri(&bytes)}]
+    })
+    .to_string()
+}
+
+/// A material that is shown as it is, without light.
+fn unlit(mut material: Value) -> Value {
+    material["extensions"] = json!({"KHR_materials_unlit": {}});
+    material
+}
+
+/// The picture of a model: a colour for each pixel, rows from the top.
+fn picture(model: &str, args: &[&str]) -> Vec<[u8; 3]> {
+    let folder = folder(&[("a.gltf", model)]);
+    bthc(folder.path(), &["compile", "a.gltf", "--materials", "--flatten", "-o", "a.bth"]).expect(0);
+    bthc(folder.path(), &["verify", "a.bth"]).expect(0);
+    shown(folder.path(), args)
+}
+
+fn shown(folder: &Path, args: &[&str]) -> Vec<[u8; 3]> {
+    let mut all = vec!["a.bth", "-o", "a.png", "--no-ground"];
+    all.extend(VIEW.chunks(2).filter(|pair| !args.contains(&pair[0])).flatten());
+    all.extend(args);
+    run("bth-play", folder, &all).expect(0);
+    let mut reader = png::Decoder::new(std::io::Cursor::new(std::fs::read(folder.join("a.png")).unwrap()))
+        .read_info()
+        .unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut bytes).unwrap();
+    bytes.as_chunks::<3>().0.to_vec()
+}
+
+/// The pixel at x and y of the square, each from 0 to 2.
+fn at(picture: &[[u8; 3]], x: f64, y: f64) -> [u8; 3] {
+    picture[((2.0 - y) * 20.0) as usize * 40 + (x * 20.0) as usize]
+}
+
+/// What is seen where there is nothing: a square with a hole everywhere.
+fn nothing(args: &[&str]) -> Vec<[u8; 3]> {
+    let hole = json!({"alphaMode": "MASK", "doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}});
+    picture(&square(&hole, &[], None), args)
+}
+
+#[test]
+fn four_texels_are_where_the_texture_has_them_with_their_bytes() {
+    let texels = [[255, 0, 0, 255], [0, 188, 0, 255], [10, 20, 230, 255], [188, 188, 188, 255]];
+    let material = unlit(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    let picture = picture(&square(&material, &[json!({"uri": uri(&png(2, &texels))})], None), &[]);
+    for ((x, y), texel) in [(0.5, 1.5), (1.5, 1.5), (0.5, 0.5), (1.5, 0.5)].into_iter().zip(texels) {
+        assert_eq!(at(&picture, x, y), texel[..3], "({x}, {y})");
+    }
+}
+
+/// Every step of the chain is linear light: 0.5 of it is the byte 188 (IEC 61966-2-1).
+#[test]
+fn half_the_light_is_mid_grey_from_factors_vertices_and_texels() {
+    let grey = png(1, &[[188, 188, 188, 255]]);
+    let factor = unlit(json!({"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}));
+    assert_eq!(at(&picture(&square(&factor, &[], None), &[]), 1.2, 0.7), [188; 3]);
+    let white = unlit(json!({}));
+    assert_eq!(at(&picture(&square(&white, &[], Some([[0.5, 0.5, 0.5, 1.0]; 4])), &[]), 1.2, 0.7), [188; 3]);
+    let texel = unlit(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    let image = [json!({"uri": uri(&grey)})];
+    assert_eq!(at(&picture(&square(&texel, &image, None), &[]), 1.2, 0.7), [188; 3]);
+    // Vertex colours are interpolated linearly: 0.25 on the left to 0.75 on the right.
+    let ramp =
+        [[0.25, 0.25, 0.25, 1.0], [0.75, 0.75, 0.75, 1.0], [0.75, 0.75, 0.75, 1.0], [0.25, 0.25, 0.25, 1.0]];
+    let ramped = picture(&square(&white, &[], Some(ramp)), &[]);
+    let light = |byte: u8| ((f64::from(byte) / 255.0 + 0.055) / 1.055).powf(2.4);
+    for x in [0.2, 0.6, 1.3, 1.8] {
+        // The pixel shows the mean over its width of 0.05.
+        let expected = 0.25 + 0.25 * ((x * 20.0f64).floor() + 0.5) / 20.0;
+        assert!((light(at(&ramped, x, 1.0)[0]) - expected).abs() < 0.01, "{x}");
+    }
+}
+
+#[test]
+fn masks_are_holes_for_all_rays_and_blending_lets_a_share_pass() {
+    let half = [json!({"uri": uri(&png(2, &[[255, 255, 255, 0], [255, 255, 255, 255]]))})];
+    let mask = unlit(
+        json!({"alphaMode": "MASK", "doubleSided": true, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}),
+    );
+    for args in [&[][..], &["--mode", "path"]] {
+        let (seen, empty) = (picture(&square(&mask, &half, None), args), nothing(args));
+        assert_eq!(at(&seen, 0.5, 1.0), at(&empty, 0.5, 1.0), "{args:?}");
+        assert_ne!(at(&seen, 1.5, 1.0), at(&empty, 1.5, 1.0), "{args:?}");
+    }
+    assert_eq!(at(&picture(&square(&mask, &half, None), &[]), 1.5, 1.0), [255; 3]);
+    let black = unlit(
+        json!({"alphaMode": "BLEND", "doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 0.5]}}),
+    );
+    let many = ["--spp", "64"];
+    let (seen, empty) = (picture(&square(&black, &[], None), &many), nothing(&many));
+    let light = |pixel: [u8; 3]| ((f64::from(pixel[1]) / 255.0 + 0.055) / 1.055).powf(2.4);
+    let share = light(at(&seen, 1.0, 1.0)) / light(at(&empty, 1.0, 1.0));
+    assert!((share - 0.5).abs() < 0.05, "half of the light behind passes: {share}");
+}
+
+#[test]
+fn backs_are_seen_only_of_double_sided_materials() {
+    let behind = ["--camera", "1,1,-5,1,1,0"];
+    let material = |double| {
+        unlit(json!({"doubleSided": double, "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}))
+    };
+    let [single, double] =
+        [false, true].map(|double| picture(&square(&material(double), &[], None), &behind));
+    assert_eq!(at(&double, 1.0, 1.0), [255, 0, 0]);
+    assert_eq!(at(&single, 1.0, 1.0), at(&nothing(&behind), 1.0, 1.0));
+    assert_eq!(at(&picture(&square(&material(false), &[], None), &[]), 1.0, 1.0), [255, 0, 0]);
+}
+
+/// A black surface shows its emission alone: 0.2 of the light is the byte 124, and in mode path Reinhard's curve comes first.
+#[test]
+fn emission_is_added_to_reflected_light() {
+    let texels = [json!({"uri": uri(&png(1, &[[255, 188, 255, 255]]))})];
+    let material = json!({"emissiveFactor": [0.2, 0.4, 0], "emissiveTexture": {"index": 0},
+        "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}});
+    let model = square(&material, &texels, None);
+    let [r, g, b] = at(&picture(&model, &[]), 1.0, 1.0);
+    assert_eq!([r, b], [124, 0]);
+    assert!(g.abs_diff(124) <= 1, "0.4 times 0.503: {g}");
+    let mapped: f64 = 0.2 * (1.0 + 0.2 / 16.0) / 1.2;
+    let expected = 255.0 * (1.055 * mapped.powf(1.0 / 2.4) - 0.055);
+    let traced = at(&picture(&model, &["--mode", "path"]), 1.0, 1.0);
+    assert!((f64::from(traced[0]) - expected).abs() <= 1.0, "{traced:?} for {expected}");
+}
+
+#[test]
+fn light_falls_on_base_colors_and_clay_stays_what_it_was() {
+    let red = json!({"doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.1, 0.1, 1]}});
+    let model = square(&red, &[], None);
+    let [r, g, b] = at(&picture(&model, &[]), 1.0, 1.0);
+    assert!(r > 2 * g && r > 2 * b && r < 255, "{r} {g} {b}");
+    let folder = folder(&[("a.gltf", &model)]);
+    bthc(folder.path(), &["compile", "a.gltf", "--flatten", "-o", "a.bth"]).expect(0);
+    let plain = shown(folder.path(), &[]);
+    assert!(plain == picture(&model, &["--mode", "clay"]), "clay, and a file without materials");
+}
+
+#[test]
+fn pictures_do_not_depend_on_threads_and_instruction_sets() {
+    let texels: Vec<[u8; 4]> =
+        (0..64u8).map(|k| [4 * k, 255 - 4 * k, 128, if k % 3 == 0 { 0 } else { 200 }]).collect();
+    let material = json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    let model = square(&material, &[json!({"uri": uri(&png(8, &texels))})], Some([[1.0, 0.5, 0.2, 0.9]; 4]));
+    let folder = folder(&[("a.gltf", &model)]);
+    bthc(folder.path(), &["compile", "a.gltf", "--materials", "-o", "a.bth"]).expect(0);
+    for mode in ["shaded", "path"] {
+        let one = shown(folder.path(), &["--mode", mode, "--threads", "1", "--isa", "scalar"]);
+        assert!(one == shown(folder.path(), &["--mode", mode, "--threads", "3"]), "{mode}");
+    }
+}
+
+/// The text of a Radiance file of one color.
+fn hdr(width: u32, height: u32, rgbe: [u8; 4]) -> Vec<u8> {
+    let mut bytes = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+    (0..width * height).for_each(|_| bytes.extend(rgbe));
+    bytes
+}
+
+#[test]
+fn surroundings_light_the_scene_in_their_color() {
+    let white = json!({"doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.8, 0.8, 1]}});
+    let folder = folder(&[("a.gltf", &square(&white, &[], None))]);
+    bthc(folder.path(), &["compile", "a.gltf", "--materials", "-o", "a.bth"]).expect(0);
+    std::fs::write(folder.path().join("blue.hdr"), hdr(4, 2, [10, 20, 200, 129])).unwrap();
+    std::fs::write(folder.path().join("bad.hdr"), b"#?RADIANCE\n\n-Y 4").unwrap();
+    let seen = shown(folder.path(), &["--mode", "path", "--env", "blue.hdr", "--spp", "16"]);
+    let [r, g, b] = at(&seen, 1.0, 1.0);
+    assert!(b > g && g > r && b > 100, "{r} {g} {b}");
+    // In uniform surroundings of radiance L a diffuse plane shows its albedo times L: 0.6 in the mean.
+    std::fs::write(folder.path().join("grey.hdr"), hdr(4, 2, [128, 128, 128, 129])).unwrap();
+    let [r, ..] =
+        at(&shown(folder.path(), &["--mode", "path", "--env", "grey.hdr", "--spp", "256"]), 1.0, 1.0);
+    let light = 0.8 * 0.6f64;
+    let expected = 255.0 * (1.055 * (light * (1.0 + light / 16.0) / (1.0 + light)).powf(1.0 / 2.4) - 0.055);
+    assert!((f64::from(r) - expected).abs() < 3.0, "{r} for {expected}");
+    let failed = |args: &[&str], code: i32, text: &str| {
+        let all: Vec<&str> = ["a.bth", "-o", "x.png"].iter().chain(args).copied().collect();
+        let run = run("bth-play", folder.path(), &all).expect(code);
+        assert!(run.stderr.contains(text) && run.stderr.contains("hint") == (code != 2), "{run:?}");
+    };
+    failed(&["--mode", "path", "--env", "bad.hdr"], 3, "bad.hdr: BTH-P006");
+    failed(&["--mode", "path", "--env", "none.hdr"], 4, "none.hdr: BTH-P006");
+    failed(&["--env", "blue.hdr"], 2, "--mode path");
+}
+
+/// A square of two triangles of OBJ with a library.
+fn obj(folder: &Path, library: &str) -> Run {
+    let text = "mtllib a.mtl\nv 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl paint\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.join("a.obj"), text).unwrap();
+    std::fs::write(folder.join("a.mtl"), library).unwrap();
+    bthc(folder, &["compile", "a.obj", "--materials", "-o", "a.bth"])
+}
+
+#[test]
+fn material_libraries_of_obj_files_are_read() {
+    let folder = folder(&[]);
+    let texels = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 255]];
+    std::fs::write(folder.path().join("four texels.png"), png(2, &texels)).unwrap();
+    // Black, so that the emission alone is seen; the second coordinate of OBJ grows upwards.
+    obj(folder.path(), "newmtl paint\nKd 0 0 0\nKe 0.2 0.2 0.2\nmap_Ke -clamp on four texels.png\n")
+        .expect(0);
+    let seen = shown(folder.path(), &[]);
+    for ((x, y), [r, g, b, _]) in [(0.2, 1.8), (1.8, 1.8), (0.2, 0.2), (1.8, 0.2)].into_iter().zip(texels) {
+        assert_eq!(at(&seen, x, y), [r, g, b].map(|byte| if byte == 255 { 124 } else { 0 }), "({x}, {y})");
+    }
+    let other = obj(folder.path(), "newmtl other\nKd 1 0 0\nmap_Bump x.png\nbump y.png\n").expect(0);
+    assert!(
+        other.stderr.contains("\"paint\" is in no library") && other.stderr.contains("bump, map_bump"),
+        "{other:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_read_is_an_error_with_place_and_hint() {
+    let folder = folder(&[]);
+    let refused = |run: Run, texts: &[&str]| {
+        let run = run.expect(if texts.contains(&"BTH-L003") { 5 } else { 3 });
+        assert!(texts.iter().chain(&["hint"]).all(|text| run.stderr.contains(text)), "{texts:?} in {run:?}");
+    };
+    let gltf = |image: Value| {
+        let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+        std::fs::write(folder.path().join("a.gltf"), square(&material, &[image], None)).unwrap();
+        bthc(folder.path(), &["compile", "a.gltf", "--materials", "-o", "b.bth"])
+    };
+    refused(gltf(json!({"uri": "none.png"})), &["a.gltf: image 0: BTH-I016", "none.png", "--materials"]);
+    refused(
+        gltf(json!({"uri": uri(b"no image at all")})),
+        &["a.gltf: image 0: BTH-I016", "PNG, JPEG or WebP"],
+    );
+    let mut huge = png(1, &[[1; 4]]);
+    huge[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
+    refused(gltf(json!({"uri": uri(&huge)})), &["image 0", "BTH-L003", "4294967296 texels"]);
+    refused(obj(folder.path(), "newmtl paint\nmap_Kd none.png\n"), &["a.mtl:2: BTH-I016", "none.png"]);
+    refused(obj(folder.path(), "newmtl paint\nKd 1 x 0\n"), &["a.mtl:2: BTH-I002", "red, green and blue"]);
+    refused(obj(folder.path(), "newmtl paint\nd 7\n"), &["a.mtl:2: BTH-I002", "0 to 1"]);
+    refused(obj(folder.path(), "newmtl paint\nmap_Kd C:\\x.png\n"), &["a.mtl:2: BTH-I016", "relative"]);
+    std::fs::remove_file(folder.path().join("a.mtl")).unwrap();
+    let lost = bthc(folder.path(), &["compile", "a.obj", "--materials", "-o", "a.bth"]);
+    refused(lost, &["a.obj:1: BTH-I016", "a.mtl"]);
+    // An image whose header alone is right shows when it is decoded; the rest is shown.
+    let good = png(16, &[[9; 4]; 256]);
+    gltf(json!({"uri": uri(&good[..good.len() - 20])})).expect(0);
+    let shown = run("bth-play", folder.path(), &["b.bth", "-o", "x.png", "--size", "20x20"]).expect(0);
+    assert!(
+        shown.stderr.contains("b.bth: image 0: BTH-P005") && shown.stderr.contains("--mode clay"),
+        "{shown:?}"
+    );
+}
+
+/// The player compiles models with materials; where these cannot be read it says so and shows the rest.
+#[test]
+fn models_are_shown_in_their_colors() {
+    let folder = folder(&[]);
+    let play = |model: &str, args: &[&str]| {
+        let all: Vec<&str> = [model, "-o", "a.png"].iter().chain(&VIEW).chain(args).copied().collect();
+        let mut play = command("bth-play", folder.path(), &all);
+        play.env_remove("BTH_NO_CACHE").env("BTH_CACHE_DIR", folder.path().join("cache"));
+        let run = run_with(play).expect(0);
+        (run.stderr, std::fs::read(folder.path().join("a.png")).unwrap())
+    };
+    let red = unlit(json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}));
+    std::fs::write(folder.path().join("a.gltf"), square(&red, &[], None)).unwrap();
+    let (shown, clay) = (play("a.gltf", &[]).1, play("a.gltf", &["--mode", "clay"]).1);
+    assert_ne!(shown, clay);
+    let broken = unlit(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    std::fs::write(folder.path().join("b.gltf"), square(&broken, &[json!({"uri": "none.png"})], None))
+        .unwrap();
+    let (said, picture) = play("b.gltf", &[]);
+    assert!(
+        said.contains("BTH-I016") && said.contains("warning: b.gltf: its materials cannot be read"),
+        "{said}"
+    );
+    assert_eq!(picture, clay);
+}
+
+/// Files without the option are what they were; with it only sections are added, and a scene stores each image once.
+#[test]
+fn materials_are_sections_of_their_own_and_images_are_stored_once() {
+    let folder = folder(&[]);
+    let image = uri(&png(2, &[[1, 2, 3, 255], [9, 8, 7, 255]]));
+    let material = json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}});
+    for name in ["a.gltf", "b.gltf"] {
+        let shift = if name == "a.gltf" { json!({}) } else { json!({"name": "another"}) };
+        let mut model: Value =
+            serde_json::from_str(&square(&material, &[json!({"uri": image})], None)).unwrap();
+        model["materials"][0].as_object_mut().unwrap().extend(shift.as_object().unwrap().clone());
+        std::fs::write(folder.path().join(name), model.to_string()).unwrap();
+    }
+    let manifest = "version = 1\n[[objects]]\nname = \"a\"\nmodel = \"a.gltf\"\n[[objects]]\nname = \"b\"\nmodel = \"b.gltf\"\n\
+        [[nodes]]\nname = \"a\"\nobject = \"a\"\n[[nodes]]\nname = \"b\"\nobject = \"b\"\n";
+    std::fs::write(folder.path().join("s.manifest"), manifest).unwrap();
+    bthc(folder.path(), &["compile", "s.manifest", "--materials", "-o", "s.bth"]).expect(0);
+    bthc(folder.path(), &["verify", "s.bth"]).expect(0);
+    let info = bthc(folder.path(), &["info", "s.bth", "--json"]).expect(0).json();
+    let count = |kind: &str| {
+        let sections = info["sections"].as_array().unwrap().iter().filter(|s| s["kind"] == kind);
+        sections.map(|s| s["count"].as_u64().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        (count("MATERIAL_PARAMETERS"), count("TEXTURES"), count("IMAGES")),
+        (vec![1, 1], vec![1, 1], vec![1])
+    );
+    bthc(folder.path(), &["compile", "a.gltf", "-o", "plain.bth", "--attributes", "all", "--names"])
+        .expect(0);
+    bthc(folder.path(), &["compile", "a.gltf", "-o", "rich.bth", "--materials"]).expect(0);
+    let [plain, rich] =
+        ["plain.bth", "rich.bth"].map(|file| bth_format::File::read(folder.path().join(file)).unwrap());
+    let added = [35, 36, 39, 40];
+    for section in rich.sections().filter(|s| s.entry.kind != 32 && !added.contains(&s.entry.kind)) {
+        let same = plain.section(section.entry.object, section.entry.kind).unwrap();
+        assert!(same.bytes == section.bytes, "kind {}", section.entry.kind);
+    }
+    assert_eq!(rich.table().len(), plain.table().len() + added.len());
+}

@@ -1,0 +1,89 @@
+"""Materials, textures, vertex colors and images (format-spec/README.md, "Materials") and F149 and F160 to F162."""
+
+import math
+import struct
+from collections import namedtuple
+
+import bth_container as c
+from bth_container import NONE, Invalid, kind_name
+
+Parameters = namedtuple(
+    "Parameters",
+    "base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved",
+)
+Texture = namedtuple("Texture", "image wrap filter transform reserved")
+Image = namedtuple("Image", "name first length")
+
+
+def amount(x):
+    """Whether a number is finite and not negative."""
+    return math.isfinite(x) and x >= 0
+
+
+class MaterialsView:
+    """The materials of an object."""
+
+    def __init__(self, view):
+        self.view = view
+        rows = view.rows(c.MATERIAL_PARAMETERS, "<8f8I")
+        self.parameters = [Parameters(r[:4], r[4:7], r[7], *r[8:12], r[12:]) for r in rows]
+        rows = view.rows(c.TEXTURES, "<16s3I6f3I")
+        self.textures = [Texture(r[0], r[1:3], r[3], r[4:10], r[10:]) for r in rows]
+        self.color_corners = view.rows(c.COLOR_CORNERS, "<3I")
+        self.colors = view.rows(c.COLORS, "<4H")
+
+    def describe(self):
+        """Counts, as a JSON-able value."""
+        return {
+            "parameters": len(self.parameters),
+            "textures": len(self.textures),
+            "vertex_colors": len(self.colors),
+        }
+
+    def check(self):
+        """F149, F160 and F161."""
+
+        def need(condition, number, message, kind):
+            if not condition:
+                raise self.view.invalid(number, message, kind)
+
+        known = len(self.view.bytes(c.MATERIALS)) // 16
+        count = len(self.parameters)
+        need(count in (0, known), "F149", f"{count} rows for {known} materials", c.MATERIAL_PARAMETERS)
+        for p in self.parameters:
+            good = all(map(amount, (*p.base_color, *p.emissive, p.alpha_cutoff))) and p.base_color[3] <= 1
+            good = good and p.alpha_mode <= 2 and p.flags <= 3 and not any(p.reserved)
+            textures = (p.base_color_texture, p.emissive_texture)
+            good = good and all(t == NONE or t < len(self.textures) for t in textures)
+            need(good, "F149", f"{p}", c.MATERIAL_PARAMETERS)
+        for t in self.textures:
+            good = max(t.wrap) <= 2 and t.filter <= 1 and all(map(math.isfinite, t.transform))
+            need(good and not any(t.reserved), "F160", f"{t}", c.TEXTURES)
+        corners = self.color_corners
+        need(len(corners) in (0, self.view.triangles), "F161", f"{len(corners)} rows", c.COLOR_CORNERS)
+        for corner in corners:
+            need(max(corner) < len(self.colors), "F161", f"row {max(corner)}", c.COLOR_CORNERS)
+
+
+def check_images(container, materials):
+    """F162. `materials` are those of all objects."""
+    images = [Image(*r) for r in struct.iter_unpack("<16s2Q", container.section(NONE, c.IMAGES))]
+    size, end, before = len(container.section(NONE, c.IMAGE_BYTES)), 0, None
+    entry = container.by_key.get((NONE, c.IMAGES))
+
+    def fail(message):
+        raise Invalid("F162", message, kind_name(c.IMAGES), entry.offset if entry else None)
+
+    for image in images:
+        if before is not None and before >= image.name:
+            fail("names do not ascend")
+        if image.first != end or image.length == 0 or image.first + image.length > size:
+            fail(f"{image.length} bytes at {image.first}")
+        before, end = image.name, image.first + image.length
+    if end != size:
+        fail(f"images of {end} of {size} bytes")
+    names = {image.name for image in images}
+    for view in materials:
+        for texture in view.textures:
+            if texture.image not in names:
+                raise view.view.invalid("F162", f"no image {texture.image.hex()}", c.TEXTURES)

@@ -7,12 +7,14 @@
 //! | `rays`, `output` | arrays to rays, and hits to arrays, chunk by chunk |
 //! | `scene`, `shared` | a scene that threads share
 //! | `queries`, `many`, `points` | its queries |
+//! | `attributes` | texture coordinates |
 //! | `options`, `compile` | the compiler |
 //! | `errors` | exceptions |
 
 // Functions take what Python passes, and return tuples of arrays.
 #![allow(clippy::too_many_arguments, clippy::type_complexity)]
 
+mod attributes;
 mod compile;
 mod errors;
 mod many;
@@ -47,6 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(points::signed_distance, module)?)?;
     module.add_function(wrap_pyfunction!(points::closest, module)?)?;
     module.add_function(wrap_pyfunction!(compile::compile_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(attributes::texture_coordinates, module)?)?;
     module.add_function(wrap_pyfunction!(work::processors, module)?)?;
     module.add_function(wrap_pyfunction!(isa, module)?)?;
     Ok(())

@@ -143,3 +143,10 @@ def with_keys(picture: NDArray[np.uint8], keys: Sequence[tuple[str, Sequence[flo
 def _strip(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """The picture with a pale strip of 42 pixels below it."""
     return np.concatenate([picture, np.full((42, picture.shape[1], 3), 245, np.uint8)])
+
+
+def draw_line(picture: NDArray[np.uint8], camera: Camera, start: Floats, end: Floats, color: NDArray[np.uint8]) -> None:
+    """Draws a line of 2 pixels between points in world space; what is behind the camera is left out."""
+    steps = np.linspace(0.0, 1.0, 4 * sum(picture.shape[:2]))[:, None]
+    points = start + steps * (end - start)
+    draw_points(picture, camera, points, np.tile(color, (len(points), 1)), 1.0)

@@ -18,6 +18,10 @@ from ._options import Job, add_parser, number, size, whole
 from ._vertices import color_of_vertices, require_surface, write_values
 
 
+#: Dark enough that open surfaces, which are white, stand out.
+_DARK = np.array([0.30, 0.33, 0.37]), np.array([0.42, 0.44, 0.47])
+
+
 def add_to(commands: Any) -> None:
     parser = add_parser(commands, "ao", "ambient occlusion to vertex colours (.ply, .npy) or to a texture (.png)", _run)
     parser.add_argument("--rays", type=whole(1, 1 << 20), default=64, metavar="N", help="rays for each point (64)")
@@ -99,7 +103,9 @@ def _by_corner(mesh: Any, values: Floats, seen: Seen) -> Floats:
 def _draw(job: Job, at: SurfacePoints, color: Any) -> None:
     if job.arguments.picture:
         camera = job.camera(at.mesh.vertices)
-        picture = render(job.scene, camera, color, up=job.up, strength=0.25, threads=job.threads, progress=job.progress)
+        picture = render(
+            job.scene, camera, color, up=job.up, strength=0.25, background=_DARK, threads=job.threads, progress=job.progress
+        )
         save(job.arguments.picture, with_color_bar(picture, "share of the sky that is open", 0.0, 1.0, GRAY))
 
 

@@ -139,3 +139,19 @@ def test_a_bar_on_a_terminal_and_ctrl_c(folder):
     os.close(leader)
     assert child.returncode == 130 and json.loads(out)["error"]["exit_code"] == 130
     assert os.listdir() == ["ball.ply"]
+
+
+def test_without_pillow_there_is_a_hint_before_anything_is_computed(folder, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    code, _, err = call(capsys, "sdf", "ball.ply", "-o", "out.npz", "--picture", "p.png")
+    assert code == 4 and "pip install pillow" in err and os.listdir() == ["ball.ply"]
+    assert main(["sdf", "ball.ply", "-o", "out.npz", "--resolution", "4", "-q"]) == 0
+
+
+def test_a_reader_that_goes_away_is_no_error(folder):
+    reader, writer = os.pipe()
+    os.close(reader)
+    arguments = [sys.executable, "-m", "bth", "ao", "ball.ply", "-o", "out.ply", "--rays", "4"]
+    child = subprocess.run(arguments, stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert (child.returncode, child.stderr) == (0, b"") and os.path.exists("out.ply")

@@ -21,7 +21,7 @@ GRAY = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 NOTHING = np.array([0.85, 0.20, 0.75])
 
 
-def colors(values: Floats, stops: Floats) -> Floats:
+def colors(values: NDArray[np.floating], stops: Floats) -> Floats:
     """Colours (..., 3) of values (...), clamped to 0 to 1; NOTHING for NaN."""
     values = np.asarray(values, np.float64)
     at = np.clip(np.nan_to_num(values), 0.0, 1.0) * (len(stops) - 1)
@@ -45,7 +45,7 @@ def to_srgb(color: Floats) -> Floats:
     return np.where(color <= 0.0031308, color * 12.92, 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def scale(values: Floats, low: float | None = None, high: float | None = None) -> tuple[float, float]:
+def scale(values: NDArray[np.floating], low: float | None = None, high: float | None = None) -> tuple[float, float]:
     """The range of a colour map: what is not given is the 1st or 99th percentile of the values, so that single ones do not hide the rest."""
     known = np.asarray(values, np.float64)
     known = known[np.isfinite(known)]

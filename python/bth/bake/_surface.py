@@ -136,7 +136,7 @@ class SurfacePoints:
     @property
     def usable(self) -> NDArray[np.bool_]:
         """Where there is a normal."""
-        return self.normal.any(axis=1)
+        return np.asarray(self.normal.any(axis=1))
 
 
 def lifts(scene: Scene) -> Floats:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import _native
+from .. import _native  # type: ignore[attr-defined]
 from .._compile import compile
 from .._scene import Scene
 from ._arithmetic import Floats

@@ -55,7 +55,7 @@ def thickness(
 def _around(at: SurfacePoints, points: NDArray[np.int64], hits) -> NDArray[np.bool_]:
     """Whether rays hit a triangle that has the vertex where they start."""
     faces = at.mesh.faces[at.mesh.rows(hits.instance, hits.triangle)]
-    return (hits.triangle != NONE) & (faces == at.vertex[points, None, None]).any(axis=-1)
+    return np.asarray((hits.triangle != NONE) & (faces == at.vertex[points, None, None]).any(axis=-1))
 
 
 def _reduced(lengths: Floats, cosines: Floats, reduce: str) -> Floats:
@@ -74,7 +74,7 @@ def _reduced(lengths: Floats, cosines: Floats, reduce: str) -> Floats:
         angles = 2.0 * arctangent(np.sqrt((1.0 - cosines) / (1.0 + cosines)))
         weights = np.where(near, 1.0 / np.maximum(angles, 2.0**-24), 0.0)
         # With two lengths both may be farther from their median than the deviation.
-        weights = np.where(near.any(axis=1)[:, None], weights, known)
+        weights = np.where(near.any(axis=1, keepdims=True), weights, known)
     return _mean(lengths, weights)
 
 

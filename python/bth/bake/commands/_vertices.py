@@ -23,7 +23,7 @@ def write_values(path: str, mesh: WorldMesh, name: str, values: NDArray[np.float
     write_ply(path, columns, mesh.faces, "baked by bth")
 
 
-def color_of_vertices(mesh: WorldMesh, values: Floats, stops: Floats, low: float = 0.0, high: float = 1.0):
+def color_of_vertices(mesh: WorldMesh, values: NDArray[np.floating], stops: Floats, low: float = 0.0, high: float = 1.0):
     """A function of the renderer that interpolates values of vertices and maps them from low to high to colours."""
     scaled = (np.asarray(values, np.float64) - low) / (high - low)
 

@@ -40,7 +40,7 @@ def _run(arguments: argparse.Namespace) -> None:
     with Bar(quiet=arguments.quiet) as bar:
         job = Job(arguments, (".ply",), bar)
         scan = lidar(
-            job.scene, _poses(job), elevations=np.linspace(*arguments.elevation, arguments.beams), columns=arguments.columns,
+            job.scene, _poses(job), elevations=np.linspace(arguments.elevation[0], arguments.elevation[1], arguments.beams), columns=arguments.columns,
             nearest=near, farthest=far, noise=arguments.noise, seed=arguments.seed, threads=job.threads, progress=job.progress,
         )
         points = scan.point[scan.hit]

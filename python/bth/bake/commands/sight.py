@@ -88,7 +88,8 @@ def _bake(job: Job, at: SurfacePoints, observers: Floats, seen: NDArray[np.bool_
             weight = at.mesh.interpolated(share.astype(np.float64), hits.instance, hits.triangle, hits.u, hits.v)
             return _UNSEEN + (_SEEN - _UNSEEN) * weight[:, None]
 
-        _draw(job, at, color_of, observers, [("seen", _SEEN), ("hidden", _UNSEEN), ("observer", _OBSERVER)])
+        seen_keys = [("seen", _SEEN)] if len(observers) == 1 else [("seen by all", _SEEN), ("by some", 0.5 * (_SEEN + _UNSEEN))]
+        _draw(job, at, color_of, observers, [*seen_keys, ("hidden", _UNSEEN), ("observer", _OBSERVER)])
     by_any = float((count > 0).mean())
     return f"{len(share)} vertices, {100 * by_any:.1f} % seen by {len(observers)} observer{'s' * (len(observers) > 1)}", {
         "observers": observers, "points": len(share), "points_seen": int((count > 0).sum()),

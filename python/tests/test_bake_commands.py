@@ -155,3 +155,15 @@ def test_a_reader_that_goes_away_is_no_error(folder):
     child = subprocess.run(arguments, stdout=writer, stderr=subprocess.PIPE)
     os.close(writer)
     assert (child.returncode, child.stderr) == (0, b"") and os.path.exists("out.ply")
+
+
+def test_the_same_bits_with_other_instructions(folder):
+    """With plain code of the library, and numpy without its dispatched code where it has any. Names that numpy does not know are left out by it."""
+    plain = {"BTH_ISA": "scalar", "NPY_DISABLE_CPU_FEATURES": "X86_V4 X86_V3 AVX512_SKX AVX512F AVX2 FMA3"}
+    results = []
+    for environment in ({}, plain):
+        for command in (["ao", "--rays", "64", "--side", "back", "--distance", "1.2"], ["thickness", "--reduce", "diameter"]):
+            arguments = [sys.executable, "-m", "bth", *command, "ball.ply", "-o", f"{command[0]}.npy", "-q"]
+            subprocess.run(arguments, check=True, env={**os.environ, **environment}, stderr=subprocess.DEVNULL)
+            results.append((folder / f"{command[0]}.npy").read_bytes())
+    assert results[:2] == results[2:] and len(set(np.load("ao.npy"))) > 3

@@ -1,6 +1,6 @@
 """Functions made of operations that IEEE 754 defines to the last bit, so that bakes are the same on every machine.
 
-numpy's own trigonometric functions differ in the last bit between instruction sets.
+numpy's own trigonometric functions may differ in the last bit between its versions, systems and instruction sets.
 """
 
 import numpy as np

@@ -1,31 +1,31 @@
-"""python -m bth compile|info …"""
+"""python -m bth compile|info|ao|thickness|sight|lidar|sdf …"""
 
 import argparse
 import sys
 
 import bth
+from bth._command import Parser, run
+from bth.bake._progress import Bar
+from bth.bake.commands import ao, lidar, sdf, sight, thickness
 
 
-def _compile(arguments):
-    def progress(stage, done, total):
-        share = f" {100 * done // total:3d} %" if total else ""
-        print(f"\r{stage}{share}      ", end="", file=sys.stderr, flush=True)
-
+def _compile(arguments: argparse.Namespace) -> None:
     output = arguments.output or arguments.model.rpartition(".")[0] + ".bth"
-    scene = bth.compile(arguments.model, output=output, quality=arguments.quality, progress=progress if sys.stderr.isatty() else None)
+    with Bar() as bar:
+        scene = bth.compile(arguments.model, output=output, quality=arguments.quality, progress=bar if bar.shown else None)
     print(f"{output}: {scene!r}")
 
 
-def _info(arguments):
+def _info(arguments: argparse.Namespace) -> None:
     for path in arguments.files:
         with bth.open(path) as scene:
             bounds = scene.bounds
             print(f"{path}: {scene!r}, {scene.nbytes} bytes, box {None if bounds is None else bounds.tolist()}, frames {scene.frames}")
 
 
-def main(arguments=None):
-    parser = argparse.ArgumentParser(prog="python -m bth", description="Compiles models and shows what is in compiled files.")
-    commands = parser.add_subparsers(required=True)
+def main(arguments: list[str] | None = None) -> int:
+    parser = Parser(prog="python -m bth", description="Compiles models, shows what is in compiled files, and bakes what rays find out.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
     compiler = commands.add_parser("compile", help="compile a model or a scene")
     compiler.add_argument("model")
     compiler.add_argument("-o", "--output")
@@ -34,13 +34,9 @@ def main(arguments=None):
     info = commands.add_parser("info", help="what is in compiled files")
     info.add_argument("files", nargs="+")
     info.set_defaults(run=_info)
-    parsed = parser.parse_args(arguments)
-    try:
-        parsed.run(parsed)
-    except (bth.Error, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+    for baker in (ao, thickness, sight, lidar, sdf):
+        baker.add_to(commands)
+    return run(parser, sys.argv[1:] if arguments is None else arguments)
 
 
 if __name__ == "__main__":

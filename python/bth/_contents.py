@@ -76,6 +76,11 @@ class Contents:
         """For each triangle of an object its rows of `vertices`, (m, 3) uint32."""
         return self._native.geometry(_index(obj, "obj"))[1]
 
+    def texture_coordinates(self, obj=0):
+        """Texture coordinates of the corners of an object's triangles, (m, 3, 2) float32 as the source has them; None where the scene
+        keeps none (`attributes='all'` of `bth.compile` keeps them)."""
+        return _native.texture_coordinates(self._native, _index(obj, "obj"))
+
     @property
     def triangle_counts(self):
         """For each object its number of triangles."""

@@ -9,12 +9,14 @@
 //! | `queries`, `many`, `points`, `overlaps` | its queries |
 //! | `conditions` | what rays may hit, filters in Python included |
 //! | `surface`, `parts` | what hits lead to: normals and the like, names and masks |
+//! | `attributes` | texture coordinates |
 //! | `options`, `compile`, `caching` | the compiler |
 //! | `errors` | exceptions |
 
 // Functions take what Python passes, and return tuples of arrays.
 #![allow(clippy::too_many_arguments, clippy::type_complexity)]
 
+mod attributes;
 mod caching;
 mod compile;
 mod conditions;
@@ -71,6 +73,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(parts::set_group_masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::masks, module)?)?;
     module.add_function(wrap_pyfunction!(parts::set_masks, module)?)?;
+    module.add_function(wrap_pyfunction!(attributes::texture_coordinates, module)?)?;
     module.add_function(wrap_pyfunction!(work::processors, module)?)?;
     module.add_function(wrap_pyfunction!(isa, module)?)?;
     Ok(())

@@ -1,0 +1,1 @@
+"""The bakers as commands of `python -m bth`, one file each."""

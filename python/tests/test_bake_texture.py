@@ -1,0 +1,107 @@
+"""Ambient occlusion to textures: which texels a surface covers, where they are on it, and what is written."""
+
+import json
+
+import numpy as np
+import pytest
+
+import bth
+import bth.bake
+from bth.__main__ import main
+from bth.bake._texels import dilated
+
+# A square of side 2 in the plane z = 0, facing up, whose texture coordinates fill the texture.
+SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float), np.array([[0, 1, 2], [0, 2, 3]])
+WHOLE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)[SQUARE[1]]
+
+
+@pytest.fixture(scope="module")
+def square():
+    return bth.compile(SQUARE)
+
+
+@pytest.mark.parametrize("v_up", [True, False])
+def test_each_texel_is_at_its_place(square, v_up):
+    texels = bth.bake.at_texels(square, 8, 4, WHOLE, v_up=v_up)
+    # Neighbouring triangles leave no texel out, also not those whose middle is on the edge between them.
+    assert len(texels.points) == 32 and texels.shape == (4, 8) and texels.shared == 0
+    y = (texels.rows + 0.5) / 4 * 2 - 1
+    expected = np.stack([(texels.columns + 0.5) / 8 * 2 - 1, -y if v_up else y, np.zeros(32)], axis=-1)
+    np.testing.assert_allclose(texels.points.position, expected, atol=1e-6)
+    assert (texels.points.normal == [0, 0, 1]).all()
+    assert (bth.bake.ambient_occlusion(square, texels.points) == 1).all()
+
+
+def test_charts_that_repeat_overlap_or_leave_texels_out(square):
+    half = bth.bake.at_texels(square, 8, 8, WHOLE * [0.5, 1])
+    assert len(half.points) == 32 and half.columns.max() == 3
+    shifted = bth.bake.at_texels(square, 8, 8, WHOLE + [3, -2])
+    np.testing.assert_allclose(shifted.points.position, bth.bake.at_texels(square, 8, 8, WHOLE).points.position, atol=1e-5)
+    across = bth.bake.at_texels(square, 8, 8, WHOLE + [0.5, 0])
+    assert len(across.points) == 64 and across.points.position[(across.rows == 0) & (across.columns == 4)][0, 0] == pytest.approx(-0.875, abs=1e-5)
+    twice = bth.bake.at_texels(square, 8, 8, np.stack([WHOLE[0], WHOLE[0]]))
+    assert 20 < twice.shared <= 36
+
+
+@pytest.mark.parametrize("uv, error, match", [
+    (WHOLE * np.nan, ValueError, "finite"), (WHOLE[:1], ValueError, "uv"), (WHOLE * 100, bth.Error, "repeat"), (None, bth.Error, "texture coordinates"),
+])
+def test_wrong_texture_coordinates(square, uv, error, match):
+    with pytest.raises(error, match=match):
+        bth.bake.at_texels(square, 8, 8, uv)
+    with pytest.raises(ValueError, match="texture"):
+        bth.bake.at_texels(square, 0, 8, WHOLE)
+
+
+def test_borders_are_means_of_neighbours():
+    random = np.random.default_rng(1)
+    texture = np.where(random.random((12, 9)) < 0.3, random.random((12, 9)), np.nan).astype(np.float32)
+    expected = texture.copy()
+    for y, x in np.argwhere(np.isnan(texture)):
+        near = texture[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2]
+        if not np.isnan(near).all():
+            expected[y, x] = np.nanmean(near)
+    np.testing.assert_allclose(dilated(texture, 1), expected, rtol=1e-6)
+    assert not np.isnan(dilated(texture, 20)).any() and np.isnan(dilated(np.full((2, 2), np.nan, np.float32), 3)).all()
+    assert (dilated(texture, 0)[~np.isnan(texture)] == texture[~np.isnan(texture)]).all()
+
+
+OBJ = """
+v -1 -1 0
+v 1 -1 0
+v 1 1 0
+v -1 1 0
+v 1 -1 1
+v 1 1 1
+vt 0 0
+vt 0.5 0
+vt 0.5 0.5
+vt 0 0.5
+vt 0.6 0.6
+vt 0.9 0.6
+vt 0.9 0.9
+vt 0.6 0.9
+f 1/1 2/2 3/3 4/4
+f 2/5 5/6 6/7 3/8
+"""
+
+
+def test_a_texture_of_an_obj(tmp_path, monkeypatch, capsys):
+    """A floor in the lower left quarter of the texture, and a wall at its right edge."""
+    Image = pytest.importorskip("PIL.Image")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "floor.obj").write_text(OBJ)
+    arguments = ["ao", "floor.obj", "-o", "ao.png", "--texture", "40x20", "--border", "0", "--rays", "256", "--side", "both"]
+    assert main([*arguments, "--picture", "p.png", "--size", "40x30", "--up", "z", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["points"] == 20 * 10 + 12 * 6 and summary["texels_shared"] == 0
+    texture = np.asarray(Image.open("ao.png")).astype(int)
+    assert texture.shape == (20, 40) and (texture[:10, :24] == 255).all()
+    front = bth.compile("floor.obj", attributes="all")
+    texels = bth.bake.at_texels(front, 40, 20)
+    values = bth.bake.ambient_occlusion(front, texels.points, rays=256)
+    floor = texels.rows >= 10
+    near, far = values[floor & (texels.columns == 19)], values[floor & (texels.columns == 0)]
+    # The wall hides half of the sky at its foot, and 5 % from the other end (1 - d / sqrt(d^2 + h^2)) / 2 at most.
+    assert 0.5 <= near.mean() < 0.62 and far.mean() > 0.94
+    assert (texels.texture(values)[10:, 0] > 0.9).all()

@@ -15,9 +15,9 @@ pub(crate) fn is_source(path: &Path) -> bool {
     extension.is_some_and(|e| SOURCES.contains(&e.as_str()))
 }
 
-/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. The cache does not evict
-/// it while the returned pin lives. With `materials` it is compiled with these and with holes by alpha, or without where its materials cannot
-/// be read.
+/// The compiled file of a scene or model in the cache, checked; compiled now if the cache lacks it. The cache does not evict it
+/// while the returned pin lives. With `materials` it is compiled with these and with holes by alpha, or without where its
+/// materials cannot be read.
 ///
 /// # Errors
 /// If the manifest is malformed, the source cannot be compiled, or the cache cannot be used.

@@ -1,5 +1,5 @@
-//! How surfaces look: parameters of materials, textures as the image files that they are, and vertex colours, from the sections that
-//! a file keeps with `bthc compile --materials`. Nothing is decoded here.
+//! How surfaces look: parameters of materials, textures as the image files that they are, and vertex colours, from the sections
+//! that a file keeps with `bthc compile --materials`. Nothing is decoded here.
 
 use crate::rays::Hit;
 use crate::scene::Scene;
@@ -8,8 +8,8 @@ use bth_format::layout::{
     WRAP_MIRROR,
 };
 
-/// What the alpha of a material means: the fourth component of its base colour, times that of the base colour texture, times that of
-/// the vertex colour.
+/// What the alpha of a material means: the fourth component of its base colour, times that of the base colour texture, times
+/// that of the vertex colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Alpha {
     /// Nothing.
@@ -61,15 +61,15 @@ pub struct Texture<'a> {
     pub wrap: [Wrap; 2],
     /// Whether the nearest texel is taken; else four are interpolated bilinearly, after they have been made linear.
     pub nearest: bool,
-    /// Rows of the transform from (u, v, 1), where u and v are those of [`SurfacePoint::uv`](crate::SurfacePoint::uv), to coordinates
-    /// of the image. There (0, 0) is the upper left corner, (1, 1) the lower right one, and the center of texel (i, j) is at
-    /// ((i + ½) / width, (j + ½) / height).
+    /// Rows of the transform from (u, v, 1), where u and v are those of [`SurfacePoint::uv`](crate::SurfacePoint::uv), to
+    /// coordinates of the image. There (0, 0) is the upper left corner, (1, 1) the lower right one, and the center of texel (i,
+    /// j) is at ((i + ½) / width, (j + ½) / height).
     pub transform: [[f32; 3]; 2],
 }
 
 impl Scene {
-    /// How a material of an object looks. `None` if the file keeps no more of it than its name, or if there is no such object or material.
-    /// The material of a hit is [`SurfacePoint::material`](crate::SurfacePoint::material).
+    /// How a material of an object looks. `None` if the file keeps no more of it than its name, or if there is no such object or
+    /// material. The material of a hit is [`SurfacePoint::material`](crate::SurfacePoint::material).
     ///
     /// ```no_run
     /// let scene = bth::open("house.bth")?;
@@ -125,8 +125,8 @@ impl Scene {
         })
     }
 
-    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None` if the file keeps none, or if there is
-    /// no such instance or triangle.
+    /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None` if the file keeps none, or
+    /// if there is no such instance or triangle.
     pub fn vertex_color(&self, hit: &Hit) -> Option<[f32; 4]> {
         let object = self.object_at(hit.primitive)?;
         let (file, row) = self.objects().locate(object)?;

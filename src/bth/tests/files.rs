@@ -9,10 +9,11 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 20] = files![
+const VALID: [(&str, &[u8]); 21] = files![
     "grid-16",
     "grid-21",
     "groups",
+    "materials",
     "packed-nodes",
     "packed-nodes-grid-16",
     "no-objects",
@@ -123,4 +124,43 @@ fn damaged_files_are_refused() {
             assert!(refused, "{name} with byte {at} flipped");
         }
     }
+}
+
+/// The file `materials`: what its three objects look like, and the bytes of its images.
+#[test]
+fn materials_and_textures_are_those_of_the_file() {
+    let (_, bytes) = VALID.into_iter().find(|(name, _)| *name == "materials").unwrap();
+    let scene = bth::from_bytes(bytes).unwrap();
+    let lamp = scene.material(0, 0).unwrap();
+    assert_eq!((lamp.emissive, lamp.emissive_texture), ([4.0, 3.0, 0.0], Some(2)));
+    assert_eq!((lamp.alpha, lamp.double_sided, lamp.base_color_texture), (bth::Alpha::Opaque, true, None));
+    let leaf = scene.material(0, 1).unwrap();
+    assert_eq!((leaf.base_color, leaf.base_color_texture), ([0.5, 0.25, 1.0, 1.0], Some(0)));
+    assert_eq!((leaf.alpha, leaf.double_sided, leaf.unlit), (bth::Alpha::Mask(0.5), false, false));
+    let glass = scene.material(1, 0).unwrap();
+    assert_eq!((glass.alpha, glass.unlit), (bth::Alpha::Blend, true));
+    let nowhere = [(0, 2), (2, 0), (3, 0)].map(|(object, material)| scene.material(object, material));
+    assert_eq!(nowhere, [None; 3]);
+
+    assert_eq!([0, 1, 2, 3].map(|object| scene.texture_count(object)), [3, 1, 0, 0]);
+    let texture = scene.texture(0, 0).unwrap();
+    assert_eq!((texture.wrap, texture.nearest), ([bth::Wrap::Repeat, bth::Wrap::Mirror], true));
+    assert_eq!(texture.coordinates([0.5, 0.25]), [0.75, 0.75]);
+    assert!(texture.bytes.starts_with(b"\x89PNG") && texture.bytes.ends_with(b"IEND\xaeB`\x82"));
+    assert_eq!(scene.texture(0, 1).map(|t| (t.image, t.bytes)), Some((texture.image, texture.bytes)));
+    assert_ne!(scene.texture(0, 2).unwrap().bytes, texture.bytes);
+    assert_eq!(scene.texture(0, 2).unwrap().image, scene.texture(1, 0).unwrap().image);
+    assert_eq!((scene.texture(0, 3), scene.texture(9, 0)), (None, None));
+
+    let hit = |instance: u32, u: f32, v: f32| Hit {
+        t: 1.0,
+        u,
+        v,
+        primitive: PrimitiveRef { instance, triangle: 0 },
+    };
+    assert_eq!(scene.vertex_color(&hit(0, 0.0, 0.0)), Some([1.0; 4]));
+    let [r, g, b, a] = scene.vertex_color(&hit(0, 0.5, 0.25)).unwrap();
+    assert_eq!((r, g, a), (1.0, 0.5, 1.0));
+    assert!((b - 0.75).abs() < 1e-5, "{b}");
+    assert_eq!((scene.vertex_color(&hit(1, 0.0, 0.0)), scene.vertex_color(&hit(9, 0.0, 0.0))), (None, None));
 }

@@ -282,8 +282,8 @@ impl File {
         Ok(view)
     }
 
-    /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or there is
-    /// no such object.
+    /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or
+    /// there is no such object.
     pub fn materials(&self, object: u32) -> MaterialsView<'_> {
         MaterialsView {
             parameters: self.slice(object, kind::MATERIAL_PARAMETERS),

@@ -13,8 +13,9 @@ use crate::materials::Looks;
 use crate::monitor::Silent;
 use crate::source::Source;
 
-/// The files beside a glTF document that hold its buffers and images that its looks need, in order; none for what is no document, which reading it
-/// reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not read.
+/// The files beside a glTF document that hold its buffers and images that its looks need, in order; none for what is no
+/// document, which reading it reports. A file of a fallback buffer counts only if it exists: with the compressed views it is not
+/// read.
 pub fn external_files(path: &Path, data: &[u8], looks: Looks) -> Vec<PathBuf> {
     let source = Source::new(path, data, &Silent);
     let json = split(&source).map_or(&[][..], |(json, _)| json);

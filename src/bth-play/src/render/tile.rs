@@ -16,8 +16,8 @@ pub(crate) struct Tile {
     pub(super) counters: Counters,
 }
 
-/// Renders the samples `indices` of the tile of a number. If pixels get no more than one sample (`--spp 1`), its rays go through their
-/// middles.
+/// Renders the samples `indices` of the tile of a number. If pixels get no more than one sample (`--spp 1`), its rays go through
+/// their middles.
 pub(crate) fn render_tile(
     frame: &FrameContext<'_>,
     number: u32,

@@ -58,8 +58,8 @@ impl<'a> ShadingGeometry<'a> {
         if normal.dot(towards) < 0.0 { -normal } else { normal }
     }
 
-    /// Whether a ray meets the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of the
-    /// object.
+    /// Whether a ray meets the front of a triangle: the side from which its vertices are seen counter-clockwise, in the space of
+    /// the object.
     pub(super) fn is_front(&self, primitive: PrimitiveRef, ray: &Ray) -> bool {
         let direction = to_f64(ray.direction);
         self.front_normal(primitive).is_none_or(|normal| normal.dot(direction) < 0.0)

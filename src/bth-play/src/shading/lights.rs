@@ -1,5 +1,5 @@
-//! The light of mode path: the scene's lights, or else a sun, and a sky or the surroundings of `--env`. Brightness is relative to the brightest light and to
-//! the size of the scene, so that no exposure is needed and frames do not flicker.
+//! The light of mode path: the scene's lights, or else a sun, and a sky or the surroundings of `--env`. Brightness is relative
+//! to the brightest light and to the size of the scene, so that no exposure is needed and frames do not flicker.
 
 use super::context::FrameContext;
 use super::environment::{Environment, EnvironmentSample};
@@ -86,8 +86,8 @@ impl<'a> Lights<'a> {
         }
     }
 
-    /// A sample of the surroundings for a point of the unit square, and its density with regard to solid angle. The light is radiance
-    /// divided by that density and by π. `None` for the built-in sky, which is the same nearly everywhere.
+    /// A sample of the surroundings for a point of the unit square, and its density with regard to solid angle. The light is
+    /// radiance divided by that density and by π. `None` for the built-in sky, which is the same nearly everywhere.
     pub(crate) fn surroundings(&self, point: DVec2) -> Option<(LightSample, f64)> {
         let EnvironmentSample { direction, radiance, density } = self.environment?.sample(point)?;
         let light = (radiance.as_dvec3() / (density * PI)).as_vec3();

@@ -1,5 +1,5 @@
-//! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each bounce of all samples of a tile is one batch of
-//! rays, each with the primitive on which it starts.
+//! Mode path: diffuse path tracing with the scene's lights, sun and sky, or surroundings. Each bounce of all samples of a tile
+//! is one batch of rays, each with the primitive on which it starts.
 
 use super::context::{Counters, FrameContext, Sample};
 use super::lights::{LightSample, Lights};
@@ -157,9 +157,9 @@ fn scattered(shading: DVec3, normal: DVec3, point: DVec2) -> DVec3 {
     if depth >= 0.0 { direction } else { direction - normal * (2.0 * depth) }
 }
 
-/// The share of light from the surroundings that is taken of a direction chosen with a density, if another way to choose it has the
-/// density `other` (the balance heuristic; Veach and Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", 1995). All
-/// of it where there is no choice.
+/// The share of light from the surroundings that is taken of a direction chosen with a density, if another way to choose it has
+/// the density `other` (the balance heuristic; Veach and Guibas, "Optimally combining sampling techniques for Monte Carlo
+/// rendering", 1995). All of it where there is no choice.
 fn share(chosen: Option<f64>, other: f64) -> f32 {
     match chosen {
         Some(chosen) if other > 0.0 => (chosen / (chosen + other)) as f32,
@@ -189,7 +189,8 @@ impl Surface {
     }
 }
 
-/// The albedo of an instance in a file without materials. Instances differ in hue, so that they can be told apart; the first is neutral.
+/// The albedo of an instance in a file without materials. Instances differ in hue, so that they can be told apart; the first is
+/// neutral.
 fn instance_albedo(primitive: PrimitiveRef) -> Vec3 {
     match primitive.instance {
         0 => CLAY_ALBEDO,

@@ -1,8 +1,8 @@
-//! What rays meet: surfaces, but not the holes that alpha makes in them, and for rays of the camera not the backs of surfaces that are
-//! seen from the front only.
+//! What rays meet: surfaces, but not the holes that alpha makes in them, and for rays of the camera not the backs of surfaces
+//! that are seen from the front only.
 //!
-//! Rays are traced in batches first. Only those that meet such a surface are traced again, one at a time, with a filter that asks for the alpha
-//! of the texture. The file's own opacity (`bthc compile --alpha`) saves that work where it is certain.
+//! Rays are traced in batches first. Only those that meet such a surface are traced again, one at a time, with a filter that
+//! asks for the alpha of the texture. The file's own opacity (`bthc compile --alpha`) saves that work where it is certain.
 
 use super::context::FrameContext;
 use crate::sampling::Sampler;

@@ -12,8 +12,8 @@ _GLTF = ("flatten", "scene", "animation", "rate", "strict")
 
 def compile(
     model, *, output=None, quality=None, structure=None, coordinates=None, max_error=None, boxes=None, attributes=None, alpha=None,
-    tets=None, subtrees=None, compact=None, geometry=None, names=None, estimator=None, select=None, optimize_for=None, profile=None,
-    max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
+    tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None, estimator=None, select=None, optimize_for=None,
+    profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
     tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, strict=None,
     cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
@@ -28,7 +28,7 @@ def compile(
     threads: by default one for each processor; the result does not depend on it.
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
-    attributes ('normals', 'all'), alpha ('mask', 'blend') and names (True) keep what models in files have of these.
+    attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
     if isinstance(model, (str, os.PathLike)):

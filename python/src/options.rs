@@ -89,11 +89,13 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
             "compact stands for tets='tet16' and subtrees='prune': leave these out",
         ));
     }
+    let materials = keywords.value::<bool>("materials")?.unwrap_or(false);
+    let attributes = keywords
+        .choice("attributes", &[("none", Keep::None), ("normals", Keep::Normals), ("all", Keep::All)])?
+        .unwrap_or_default();
     let mut options = CompileOptions {
         structure,
-        attributes: keywords
-            .choice("attributes", &[("none", Keep::None), ("normals", Keep::Normals), ("all", Keep::All)])?
-            .unwrap_or_default(),
+        attributes: if materials { Keep::All } else { attributes },
         record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
         coordinates: coordinates(keywords)?,
         keep_subtrees: subtrees.unwrap_or(structure == Structure::Bth && !compact),
@@ -104,7 +106,8 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
             )?
             .unwrap_or_default(),
         geometry: keywords.value("geometry")?.unwrap_or(true),
-        names: keywords.value("names")?.unwrap_or(false),
+        names: materials || keywords.value("names")?.unwrap_or(false),
+        materials,
         ..CompileOptions::default()
     };
     selection(keywords, &mut options)?;

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._scene import NONE, Scene
+from .._hits import NONE
+from .._scene import Scene
 from ._arithmetic import Floats, dot, turn, unit
 from ._progress import Progress, chunks
 from ._sampling import uniform

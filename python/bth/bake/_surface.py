@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._scene import NONE, Scene
+from .._hits import NONE
+from .._scene import Scene
 from ._arithmetic import Floats, angle_between, dot, unit
 from ._errors import lacks_geometry
 
@@ -67,7 +68,7 @@ def geometry(scene: Scene, obj: int) -> tuple[NDArray[np.float32], NDArray[np.ui
     """Vertices and triangles of an object. Raises bth.Error for a file without."""
     try:
         return scene.vertices(obj), scene.triangles(obj)
-    except KeyError:
+    except LookupError:
         raise lacks_geometry() from None
 
 

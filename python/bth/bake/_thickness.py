@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .._scene import NONE, Scene
+from .._hits import NONE
+from .._scene import Scene
 from ._arithmetic import Floats, arctangent, dot
 from ._progress import Progress, chunks
 from ._sampling import cone

@@ -48,7 +48,7 @@ impl Masks {
         store(&mut self.instances, instance, mask);
     }
 
-/// The masks of an object's groups, for [`Self::of_group`]; `None` if all have all bits set.
+    /// The masks of an object's groups, for [`Self::of_group`]; `None` if all have all bits set.
     pub(crate) fn groups(&self, object: u32) -> Option<&[u32]> {
         self.groups.get(object as usize).map(Vec::as_slice).filter(|masks| !masks.is_empty())
     }

@@ -63,9 +63,10 @@ fn object_materials(scene: &Scene, object: u32, images: &BTreeMap<u32, Arc<Texel
             transform: texture.transform,
         })
     };
+    let (file, row) = scene.file_of(object);
     ObjectMaterials {
         materials: (0..scene.material_count(object)).map(|row| scene.material(object, row)).collect(),
         textures: (0..scene.texture_count(object)).map(texture).collect(),
-        has_colors: !scene.file().materials(object).colors.is_empty(),
+        has_colors: !file.materials(row).colors.is_empty(),
     }
 }

@@ -136,10 +136,11 @@ impl<'a> Searcher<'a> {
                 }
                 // The boxes are wider than the triangles by far more than these roundings.
                 if squared <= search.squared {
-                    stack.push((squared, child));
+                    // Inserted into the children of this node, of which the nearest comes last.
+                    let nearer = stack[first..].iter().rev().take_while(|entry| entry.0 < squared).count();
+                    stack.insert(stack.len() - nearer, (squared, child));
                 }
             }
-            stack[first..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         }
     }
 

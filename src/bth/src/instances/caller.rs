@@ -156,12 +156,18 @@ impl World {
         new: &impl Fn(u32) -> NewInstance,
         placed: &mut [Result<Option<Placement>, PlacementError>],
     ) {
-        Isa::chosen().run(PlaceKernel { world: self, objects, changed, new, placed });
+        // Its loops are of four f64, so AVX-512 would not make it faster.
+        Isa::chosen().min(Isa::Avx2).run(PlaceKernel { world: self, objects, changed, new, placed });
     }
 
-    /// The placement of an instance; `None` if it is not visible.
+    /// The placement of an instance; `None` if it is not visible. `inlined`: it is compiled inside of a kernel.
     #[inline(always)]
-    fn place(&self, objects: &Objects, new: &NewInstance) -> Result<Option<Placement>, PlacementError> {
+    fn place(
+        &self,
+        objects: &Objects,
+        new: &NewInstance,
+        inlined: bool,
+    ) -> Result<Option<Placement>, PlacementError> {
         let InstanceRow { object, to_world, .. } = &new.row;
         if !new.visible || *object == NONE {
             return Ok(None);
@@ -180,7 +186,12 @@ impl World {
             None if is_loaded() => parts.get_or_init(|| Box::new(PartBoxes::of_root_children(view))),
             None => &PartBoxes::whole(view.header),
         };
-        Placement::new(to_world, *object, view.header, parts).map(Some)
+        let placement = if inlined {
+            Placement::inlined(to_world, *object, view.header, parts)
+        } else {
+            Placement::new(to_world, *object, view.header, parts)
+        };
+        placement.map(Some)
     }
 }
 
@@ -200,7 +211,7 @@ impl<N: Fn(u32) -> NewInstance> Kernel for PlaceKernel<'_, N> {
     fn run<S: Simd>(self, _: S) {
         // The loops of a placement are vectorized with the registers of the instruction set.
         for (&instance, placed) in self.changed.iter().zip(self.placed) {
-            *placed = self.world.place(self.objects, &(self.new)(instance));
+            *placed = self.world.place(self.objects, &(self.new)(instance), S::HAS_VECTORS);
         }
     }
 }

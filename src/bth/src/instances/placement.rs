@@ -41,12 +41,12 @@ pub(crate) struct PartBoxes {
 impl PartBoxes {
     /// The first `count` of some boxes, given as those of a node, at least one.
     fn new(count: usize, boxes: &[[[f32; WIDTH]; 2]; 3]) -> PartBoxes {
-        let bounds = boxes.map(|ends| {
-            ends.map(|end| {
-                let value = |i: usize| f64::from(if i < count { end[i] } else { end[0] });
-                std::array::from_fn(|block| std::array::from_fn(|i| value(block * BLOCK + i)))
-            })
-        });
+        let mut bounds = [[[[0.0; BLOCK]; WIDTH / BLOCK]; 2]; 3];
+        for (bounds, boxes) in bounds.as_flattened_mut().iter_mut().zip(boxes.as_flattened()) {
+            for (i, value) in bounds.as_flattened_mut().iter_mut().enumerate() {
+                *value = f64::from(boxes[if i < count { i } else { 0 }]);
+            }
+        }
         PartBoxes { blocks: count.div_ceil(BLOCK), bounds }
     }
 
@@ -111,8 +111,19 @@ impl Placement {
     /// in world space by at most |M| times that: 2^-24 (2 κ (|o| + |T|) + |M| b) where κ = |M| |A|, in the maximum norm.
     ///
     /// `parts` are boxes that contain all triangles of the object. Tighter boxes give a tighter world box.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn new(
+        world: &Affine,
+        index: u32,
+        object: &Object,
+        parts: &PartBoxes,
+    ) -> Result<Placement, PlacementError> {
+        Placement::inlined(world, index, object, parts)
+    }
+
+    /// As [`Self::new`], compiled inside of a kernel.
+    #[inline(always)]
+    pub(crate) fn inlined(
         world: &Affine,
         index: u32,
         object: &Object,

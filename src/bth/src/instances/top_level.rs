@@ -190,10 +190,11 @@ impl TopLevel {
         let mut ranges = [range; WIDTH];
         let count = split_into(items, &mut ranges);
         // The ranges follow each other, once sorted.
-        let mut order: Vec<usize> = (0..count).collect();
-        order.sort_unstable_by_key(|&slot| ranges[slot].first);
+        let mut order: Vec<u64> =
+            (0..count).map(|slot| u64::from(ranges[slot].first) << 32 | slot as u64).collect();
+        order.sort_unstable();
         let (mut rest, mut tasks) = (items, Vec::new());
-        for &slot in &order {
+        for slot in order.into_iter().map(|key| key as u32 as usize) {
             let (items, others) = rest.split_at_mut(ranges[slot].len() as usize);
             rest = others;
             tasks.push((slot, items, ItemRange { first: 0, end: ranges[slot].len(), ..ranges[slot] }));

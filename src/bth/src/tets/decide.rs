@@ -4,7 +4,7 @@
 //! after which the ray returns to the lanes; and the flood, where a sign is uncertain in f64, too. Therefore the answers have the
 //! same bits as those of walks of single rays.
 
-use super::batch::{Reached, WalkBatch, WalkStart, WalkState};
+use super::batch::{Reached, WalkBatch, WalkStart, WalkState, Walks};
 use super::lanes::UNCERTAIN;
 use super::leaf_of_face;
 use super::records::{Entered, ReadRecords};
@@ -18,7 +18,7 @@ const MAX_RETURNS: u8 = 16;
 /// Slack of bounds of t, relative to the bound. It exceeds the sum of all rounding errors.
 const T_BOUND_SLACK: f64 = 1.0 / (1 << 20) as f64;
 
-impl<Q: Query + Copy> WalkBatch<'_, Q> {
+impl Walks<'_> {
     /// The line of a ray that was prepared for lanes.
     pub(super) fn line(&self, ray: u32) -> Line {
         Line::new(&self.rays[ray as usize]).expect("a ray that was set up for lanes has a line")
@@ -36,40 +36,53 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
 
     /// Records how the walk of a ray has ended.
     pub(super) fn finish(&mut self, ray: u32, outcome: WalkOutcome) {
-        self.walks[ray as usize] =
+        self.states[ray as usize] =
             if outcome == WalkOutcome::Done { WalkState::Done } else { WalkState::Left };
+    }
+}
+
+impl<Q: Query + Copy> WalkBatch<'_, Q> {
+    /// Walks the rays that cannot be walked in lanes.
+    #[inline(never)]
+    pub(super) fn walk_without_lanes(&mut self) {
+        for (ray, position) in std::mem::take(&mut self.walks.without_lanes) {
+            match position {
+                Some(position) => self.walk_in_f64(ray, position),
+                None => self.flood(ray),
+            }
+        }
     }
 
     /// Walks a ray from a position to its end in f64.
     #[inline(never)]
     pub(super) fn walk_in_f64(&mut self, ray: u32, position: TetPosition) {
-        let (line, mut query) = (self.line(ray), self.queries[ray as usize]);
-        let walker = self.walker(ray, &line);
+        let (line, mut query) = (self.walks.line(ray), self.queries[ray as usize]);
+        let walker = self.walks.walker(ray, &line);
         let outcome = match walker.walk(position, &mut query, &mut ()) {
             WalkOutcome::Uncertain => walker.flood(&mut query, &mut ()),
             outcome => outcome,
         };
         self.queries[ray as usize] = query;
-        self.finish(ray, outcome);
+        self.walks.finish(ray, outcome);
     }
 
     /// Repeats the walk of a ray as a flood, whose answer is right for every line.
     #[inline(never)]
     pub(super) fn flood(&mut self, ray: u32) {
-        let (line, mut query) = (self.line(ray), self.queries[ray as usize]);
-        let outcome = self.walker(ray, &line).flood(&mut query, &mut ());
+        let (line, mut query) = (self.walks.line(ray), self.queries[ray as usize]);
+        let outcome = self.walks.walker(ray, &line).flood(&mut query, &mut ());
         self.queries[ray as usize] = query;
-        self.finish(ray, outcome);
+        self.walks.finish(ray, outcome);
     }
 
     /// Returns a ray to the lanes, or walks it to its end if it has returned too often.
     fn return_to_lanes(&mut self, ray: u32, position: TetPosition) {
-        let returns = &mut self.returns[ray as usize];
+        let returns = &mut self.walks.returns[ray as usize];
         *returns += 1;
         if *returns > MAX_RETURNS {
             self.walk_in_f64(ray, position);
         } else {
-            self.starts.push(WalkStart { ray, tet: position.tet, entered: position.entered });
+            self.walks.starts.push(WalkStart { ray, tet: position.tet, entered: position.entered });
         }
     }
 
@@ -77,19 +90,19 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
     #[inline(never)]
     fn step_in_f64(&mut self, start: WalkStart) {
         let ray = start.ray;
-        let line = self.line(ray);
-        let walker = self.walker(ray, &line);
+        let line = self.walks.line(ray);
+        let walker = self.walks.walker(ray, &line);
         let mut entered = start.entered;
-        entered.apex = self.object.records.apex(start.tet, entered.face, entered.apex);
+        entered.apex = self.walks.object.records.apex(start.tet, entered.face, entered.apex);
         let mut position =
             TetPosition { tet: start.tet, entered, corner: entered.face.map(|v| walker.project(v)) };
         let Some(link) = walker.exit(&mut position) else { return self.flood(ray) };
         if link.next != NONE && link.next & FACE_BIT != 0 {
             let reached = Reached { ray, face: link.next & !FACE_BIT };
-            return self.reached.push(reached);
+            return self.walks.reached.push(reached);
         }
         match walker.beyond(position.tet, link, position.entered.face) {
-            None => self.finish(ray, WalkOutcome::Left),
+            None => self.walks.finish(ray, WalkOutcome::Left),
             Some((tet, apex, behind)) => {
                 (position.tet, position.entered.apex, position.entered.behind) = (tet, apex, behind);
                 self.return_to_lanes(ray, position);
@@ -100,9 +113,9 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
     /// Tests exactly a constrained face that the line of a ray certainly crosses, and ends the walk or returns the ray to the
     /// lanes in the tetrahedron behind the face.
     fn test_face(&mut self, Reached { ray, face }: Reached) {
-        let line = self.line(ray);
-        let walker = self.walker(ray, &line);
-        let constrained: &TetFace = &self.object.tet_faces[face as usize];
+        let line = self.walks.line(ray);
+        let walker = self.walks.walker(ray, &line);
+        let constrained: &TetFace = &self.walks.object.tet_faces[face as usize];
         let mut query = self.queries[ray as usize];
         let done = walker.offer(constrained, &mut query);
         // If the line certainly leaves the next tetrahedron beyond the limit, no face further along it can change the result.
@@ -122,21 +135,21 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
         };
         self.queries[ray as usize] = query;
         match (done, left) {
-            (true, _) => self.finish(ray, WalkOutcome::Done),
-            (_, true) => self.finish(ray, WalkOutcome::Left),
+            (true, _) => self.walks.finish(ray, WalkOutcome::Done),
+            (_, true) => self.walks.finish(ray, WalkOutcome::Left),
             _ => self.return_to_lanes(ray, position),
         }
     }
 
     /// Tests the faces in `reached`.
     pub(super) fn test_reached_faces(&mut self) {
-        let mut reached = std::mem::take(&mut self.reached);
+        let mut reached = std::mem::take(&mut self.walks.reached);
         for face in reached.drain(..) {
             self.test_face(face);
         }
-        // Faces that were added to `self.reached` during the tests are kept.
-        reached.append(&mut self.reached);
-        self.reached = reached;
+        // Faces that were added to `self.walks.reached` during the tests are kept.
+        reached.append(&mut self.walks.reached);
+        self.walks.reached = reached;
     }
 
     /// Evaluates a lane that has stopped. `start` holds its words, with `tet` as described at `word::TET`; `depth` holds the
@@ -145,25 +158,25 @@ impl<Q: Query + Copy> WalkBatch<'_, Q> {
     pub(super) fn evaluate(&mut self, start: WalkStart, depth: [f32; 3]) {
         let WalkStart { ray, tet, .. } = start;
         if tet == NONE {
-            return self.finish(ray, WalkOutcome::Left);
+            return self.walks.finish(ray, WalkOutcome::Left);
         }
         if tet & UNCERTAIN == UNCERTAIN {
             return self.step_in_f64(WalkStart { tet: tet & !UNCERTAIN, ..start });
         }
         if !Q::KEEPS_DEPTHS {
-            return self.reached.push(Reached { ray, face: tet & !FACE_BIT });
+            return self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
         }
         let [a, b, c] = depth;
         let (least, greatest) = (f64::from(a.min(b).min(c)), f64::from(a.max(b).max(c)));
-        let per_t = self.rays[ray as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));
+        let per_t = self.walks.rays[ray as usize].direction.iter().fold(0.0_f32, |m, d| m.max(d.abs()));
         // Depths have a relative error of 2^-24, and the t of a hit is rounded once more.
         let (low, high) = (
             least * (1.0 - T_BOUND_SLACK.copysign(least)),
             greatest * (1.0 + T_BOUND_SLACK.copysign(greatest)),
         );
         if self.queries[ray as usize].offer_bounds((low / f64::from(per_t), high / f64::from(per_t))) {
-            return self.finish(ray, WalkOutcome::Done);
+            return self.walks.finish(ray, WalkOutcome::Done);
         }
-        self.reached.push(Reached { ray, face: tet & !FACE_BIT });
+        self.walks.reached.push(Reached { ray, face: tet & !FACE_BIT });
     }
 }

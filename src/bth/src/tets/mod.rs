@@ -11,6 +11,7 @@ pub(crate) mod locate;
 pub(crate) mod queue;
 pub(crate) mod records;
 pub(crate) mod rounds;
+mod starts;
 pub(crate) mod walk;
 
 use self::walk::{TetWalker, WalkOutcome};

@@ -121,14 +121,14 @@ impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
     /// Walks all rays of the batch.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let records = self.records;
-        let vertices = vertices(self.object);
+        let records = self.walks.records;
+        let vertices = vertices(self.walks.object);
         let mut queue = PreparedQueue::new();
         let idle =
             LaneGroup { lanes: Lanes::idle(s), step: Step::empty(s), held: 0, start_round: s.splat_u(0) };
         let mut groups = [idle; 3];
         // A line passes each tetrahedron at most once, so a valid walk ends within this number of steps.
-        let steps_per_round = self.object.records.len();
+        let steps_per_round = self.walks.object.records.len();
         let mut state = RefillState { round: 0, rays_left: true };
         let mut steps = 0;
         let one = s.splat_u(std::hint::black_box(1));

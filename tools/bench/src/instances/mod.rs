@@ -47,7 +47,7 @@ pub struct Row {
 
 /// Scenes of instances that can be moved.
 enum Contender {
-    Ours(bth::SceneBuilder),
+    Ours(Box<bth::SceneBuilder>),
     Embree(EmbreeScene),
 }
 
@@ -123,7 +123,7 @@ fn contenders(instances: u32, threads: usize) -> Result<Vec<(&'static str, Conte
     for _ in 0..instances {
         builder.instance(object, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0])?;
     }
-    let mut contenders = vec![("bth", Contender::Ours(builder))];
+    let mut contenders = vec![("bth", Contender::Ours(Box::new(builder)))];
     let view = scene.object(0);
     for (name, variant) in EMBREES {
         let mesh = (embree::padded(view.positions), view.triangles.to_vec());

@@ -128,7 +128,10 @@ def test_failed_writes_leave_what_was_there(folder, monkeypatch):
 def test_a_bar_on_a_terminal_and_ctrl_c(folder):
     arguments = [sys.executable, "-m", "bth", "ao", "ball.ply", "-o", "out.ply", "--rays", "1000000", "--json"]
     leader, follower = os.openpty()
-    child = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=follower)
+    # Scripts start what runs in the background with interrupts ignored, which a child would inherit.
+    child = subprocess.Popen(
+        arguments, stdout=subprocess.PIPE, stderr=follower, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    )
     os.close(follower)
     shown, deadline = b"", time.monotonic() + 120
     while b"ambient occlusion [" not in shown:

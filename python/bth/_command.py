@@ -19,7 +19,8 @@ class Parser(argparse.ArgumentParser):
     """A parser that raises `Usage`, and takes lists of numbers such as -1,0,2 as values of options."""
 
     def __init__(self, *arguments: Any, **options: Any):
-        super().__init__(*arguments, **options, allow_abbrev=False)
+        options["allow_abbrev"] = False
+        super().__init__(*arguments, **options)
         self._negative_number_matcher = re.compile(r"^-\.?\d")
 
     def error(self, message: str) -> NoReturn:

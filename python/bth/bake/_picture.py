@@ -33,8 +33,8 @@ def pillow():
 class Seen:
     """What rays of the camera hit: (n,) arrays as those of `bth.Hits`, without misses."""
 
-    u: Floats
-    v: Floats
+    u: NDArray[np.float32]
+    v: NDArray[np.float32]
     instance: NDArray[np.uint32]
     triangle: NDArray[np.uint32]
     normal: Floats

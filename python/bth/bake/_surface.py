@@ -37,7 +37,7 @@ class WorldMesh:
         first = self._first[np.where(none, 0, instance)]
         return np.where(none, -1, first + np.where(none, 0, triangle))
 
-    def interpolated(self, values: Floats, instance: NDArray[np.uint32], triangle: NDArray[np.uint32], u: Floats, v: Floats) -> Floats:
+    def interpolated(self, values: Floats, instance: NDArray[np.uint32], triangle: NDArray[np.uint32], u: NDArray[np.floating], v: NDArray[np.floating]) -> Floats:
         """Values of vertices, (n,) or (n, k), interpolated at hits."""
         faces = self.faces[self.rows(instance, triangle)]
         # In faces that were turned round, the second vertex of the triangle is the third.

@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -97,7 +97,7 @@ def add_parser(commands: Any, name: str, text: str, run: Callable[[argparse.Name
 class Job:
     """One call of a command: its options, its scene, and the time it takes."""
 
-    def __init__(self, arguments: argparse.Namespace, endings: tuple[str, ...], bar: Bar, *, attributes: str | None = None):
+    def __init__(self, arguments: argparse.Namespace, endings: tuple[str, ...], bar: Bar, *, attributes: Literal["none", "normals", "all"] | None = None):
         """Checks outputs before anything is computed, and opens the model. endings: of the output, such as .ply."""
         self.arguments, self.bar, self._since = arguments, bar, time.monotonic()
         self.up = UP[arguments.up]
@@ -115,7 +115,7 @@ class Job:
                 raise Usage(f"--frame: the scene has no frame {arguments.frame}; its frames are {has}")
             self.scene.set_frame(arguments.frame)
 
-    def _open(self, model: str, attributes: str | None) -> _scene.Scene:
+    def _open(self, model: str, attributes: Literal["none", "normals", "all"] | None) -> _scene.Scene:
         if model.lower().endswith(".bth"):
             return _scene.open(model)
         return _compile.compile(model, attributes=attributes, threads=self.threads, progress=self.progress)

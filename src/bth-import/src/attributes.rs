@@ -14,12 +14,17 @@ use crate::source::input_error;
 /// # Errors
 /// `BTH-I008` for a used value that is not finite.
 pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
+    Ok(collect_with_sources(raw, keep)?.map(|(attributes, _)| attributes))
+}
+
+/// As [`collect`]; the second value has for each row of normals its row in the source, or [`NONE`] for zeros.
+pub(super) fn collect_with_sources(raw: &Raw<'_>, keep: Keep) -> Result<Option<(Attributes, Vec<u32>)>> {
     let has_normals = keep != Keep::None && !raw.normal_rows.is_empty();
     let has_uvs = keep == Keep::All && !raw.uv_rows.is_empty();
     if !has_normals && !has_uvs {
         return Ok(None);
     }
-    let mut attributes = Attributes::default();
+    let (mut attributes, mut sources) = (Attributes::default(), Vec::new());
     let mut rows: HashMap<(u32, u32), u32> = HashMap::new();
     let none = [NONE; 3];
     attributes.corners.reserve_exact(raw.triangles.len());
@@ -32,6 +37,7 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
             *corner = *rows.entry(pair).or_insert(next);
             if *corner == next {
                 if has_normals {
+                    sources.push(pair.0);
                     attributes.normals.push(value(raw, RowKind::Normal, &raw.normals, pair.0)?);
                 }
                 if has_uvs {
@@ -41,7 +47,7 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
         }
         attributes.corners.push(corners);
     }
-    Ok(Some(attributes))
+    Ok(Some((attributes, sources)))
 }
 
 fn value<const N: usize>(raw: &Raw<'_>, kind: RowKind, values: &[[f32; N]], row: u32) -> Result<[f32; N]> {

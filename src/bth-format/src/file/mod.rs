@@ -9,6 +9,7 @@ mod table;
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
+use crate::deformation_view::DeformationView;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::materials_view::{ImagesView, MaterialsView};
@@ -272,14 +273,28 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160` and `BTH-F161`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161` and `BTH-F173` to `BTH-F179`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
         let materials = self.materials(object);
         check::materials(&materials, view.materials.len(), view.header.triangles)
             .map_err(|e| self.locate(e, object))?;
+        check::deformation(&self.deformation(object), &view).map_err(|e| self.locate(e, object))?;
         Ok(view)
+    }
+
+    /// What moves the vertices of an object, whose **indices are not checked**; empty where nothing does or there is no such
+    /// object.
+    pub fn deformation(&self, object: u32) -> DeformationView<'_> {
+        DeformationView {
+            rows: self.slice(object, kind::DEFORMATION),
+            joints: self.slice(object, kind::JOINTS),
+            weights: self.slice(object, kind::JOINT_WEIGHTS),
+            morphs: self.slice(object, kind::MORPHS),
+            morph_rows: self.slice(object, kind::MORPH_ROWS),
+            deltas: self.slice(object, kind::MORPH_DELTAS),
+        }
     }
 
     /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or
@@ -368,6 +383,10 @@ impl File {
             cameras: self.slice(NONE, kind::CAMERAS),
             lights: self.slice(NONE, kind::LIGHTS),
             names: self.slice(NONE, kind::NAMES),
+            deformers: self.slice(NONE, kind::DEFORMERS),
+            skins: self.slice(NONE, kind::SKINS),
+            skin_joints: self.slice(NONE, kind::SKIN_JOINTS),
+            morph_weights: self.slice(NONE, kind::MORPH_WEIGHTS),
         })
     }
 
@@ -375,10 +394,11 @@ impl File {
     /// sections).
     ///
     /// # Errors
-    /// The first violation of `BTH-F150` to `BTH-F159`.
+    /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F185`.
     pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
         let Some(view) = self.scene() else { return Ok(None) };
-        check::scene(&view, self.object_count()).map_err(|e| self.locate(e, NONE))?;
+        let deformation = |object| self.deformation(object).rows.first().copied();
+        check::scene(&view, self.object_count(), &deformation).map_err(|e| self.locate(e, NONE))?;
         Ok(Some(view))
     }
 

@@ -81,6 +81,17 @@ impl CompileOptions {
         mesh::Wanted { attributes, groups: self.names || self.materials, materials: self.materials }
     }
 
+    /// The options of an object whose vertices move: a BVH over coordinates that stay as they are, which keeps the source's
+    /// positions and triangles.
+    pub fn of_deforming(&self) -> Self {
+        Self {
+            structure: Structure::Bvh,
+            coordinates: coordinates::CoordinateOptions::default(),
+            geometry: true,
+            ..self.clone()
+        }
+    }
+
     /// What of the looks of models is read, for which files besides the models are needed.
     pub fn looks(&self) -> mesh::Looks {
         mesh::Looks { alpha: self.alpha, materials: self.materials }

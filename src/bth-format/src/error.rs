@@ -121,7 +121,7 @@ codes! {
     MorphOrder "F178" "Rows of a sparse morph ascend strictly and are rows of POSITIONS or NORMALS."
     MorphDeltas "F179" "Deltas of morphs are finite."
     Deformer "F180" "Deformers ascend strictly by node; their nodes exist, their objects have DEFORMATION, no two have the same object, and reserved fields are zero."
-    DeformerSkin "F181" "A deformer has a skin if and only if its object has joints; the skin exists and has at least as many joints as the object."
+    DeformerSkin "F181" "The skin of a deformer is NONE or exists; its object has joints then, and no more than the skin."
     MorphWeights "F182" "A deformer has a weight for each target of its object; the ranges of successive deformers follow each other, lie within MORPH_WEIGHTS and together cover it; weights are finite."
     Skin "F183" "A skin has at least one joint; the ranges of successive skins follow each other, lie within SKIN_JOINTS and together cover it; reserved fields are zero."
     SkinJoint "F184" "The node of a skin's joint exists, its matrix is finite, and its reserved fields are zero."

@@ -19,6 +19,7 @@ mod builder;
 mod bvh;
 mod closest;
 mod crossing;
+mod deformers;
 mod enumerate;
 mod hits;
 mod instances;

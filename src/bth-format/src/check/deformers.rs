@@ -65,13 +65,10 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
             let expected = "ascending nodes, an object with DEFORMATION, and zeros";
             return violation(Code::Deformer, 0, expected, deformer);
         };
-        let joints = match deformer.skin {
-            NONE => Some(0),
-            skin => view.skins.get(skin as usize).map(|skin| skin.joints),
-        };
-        let skinned = deformer.skin != NONE;
-        if skinned != (counts.joints > 0) || joints.is_none_or(|joints| joints < counts.joints) {
-            let expected = "a skin with the joints of the object, or none without joints";
+        let joints = view.skins.get(deformer.skin as usize).map(|skin| skin.joints);
+        let fits = |joints: u32| counts.joints > 0 && counts.joints <= joints;
+        if deformer.skin != NONE && !joints.is_some_and(fits) {
+            let expected = "NONE, or a skin with the joints of an object that has some";
             return violation(Code::DeformerSkin, offset_of!(Deformer, skin), expected, deformer.skin);
         }
         Ok(())

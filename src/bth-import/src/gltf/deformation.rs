@@ -145,7 +145,7 @@ impl PrimitiveReader<'_, '_> {
     }
 
     fn deformation_error(&self, code: &'static str, message: String) -> Error {
-        let hint = "export the model again, or compile it at rest with --deform off";
+        let hint = "export the model again, or compile it at rest with --at-rest";
         self.accessors.source.error_in_part(code, self.part.as_str(), message, hint)
     }
 }

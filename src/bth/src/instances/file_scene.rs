@@ -1,5 +1,6 @@
 //! The instances of a file with scene sections at a time.
 
+use super::affine::Affine;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::world::{TransformSource, Update, World};
@@ -26,6 +27,7 @@ impl World {
         let seconds = f64::from(scene.first_frame) / scene.rate;
         let source = TransformSource::File(NodeHierarchy::new(&view));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
+        world.skinned = skinned(&view, file.object_count());
         world.place_instances(file, seconds, true)?;
         Ok(Some(world))
     }
@@ -56,19 +58,29 @@ impl World {
         let mut update = Update { nodes: hierarchy.update(&view, seconds, all), ..Update::default() };
         for (row, instance) in view.instances.iter().enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };
-            if !hierarchy.moved(instance.node) {
+            let is_skinned = self.is_skinned(instance.object);
+            let hidden = match is_skinned {
+                // The transform of its node has no effect, so a scale of zero does not hide it.
+                true => hierarchy.invisible(instance.node),
+                false => hierarchy.hidden(instance.node),
+            };
+            let unmoved = is_skinned && !all && hidden == self.placements[row].is_none();
+            if unmoved || !hierarchy.moved(instance.node) {
                 continue;
             }
             self.placements[row] = None;
             update.placed += 1;
-            if hierarchy.hidden(instance.node) {
+            if hidden {
                 continue;
             }
             let object = file.object_header(instance.object);
             if object.root == NONE {
                 continue;
             }
-            let world = hierarchy.to_world(&view, instance.node);
+            let world = match is_skinned {
+                true => Affine::IDENTITY,
+                false => hierarchy.to_world(&view, instance.node),
+            };
             // The boxes of the root's children give a tighter world box. They are used only if they are in memory already:
             // reading the root of every mapped object would take longer than the tighter boxes save.
             let parts = match file.view(instance.object) {
@@ -103,6 +115,17 @@ impl World {
         let TransformSource::File(hierarchy) = &self.source else { panic!("expected a file with nodes") };
         (hierarchy.to_world(&scene_of(objects), node).rows(), !hierarchy.hidden(node))
     }
+}
+
+/// For each object whether a skin moves its vertices; empty where no skin does.
+fn skinned(view: &SceneView<'_>, objects: u32) -> Vec<bool> {
+    let objects_with_skins = view.deformers.iter().filter(|deformer| deformer.skin != NONE);
+    let mut skinned = Vec::new();
+    for deformer in objects_with_skins {
+        skinned.resize(objects as usize, false);
+        skinned[deformer.object as usize] = true;
+    }
+    skinned
 }
 
 impl PlacementError {

@@ -84,13 +84,16 @@ pub(crate) struct World {
     only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
     traced: Vec<AtomicBool>,
+    /// For each object whether its vertices are in world space, since a skin moves them; empty where none are.
+    pub(super) skinned: Vec<bool>,
 }
 
 impl World {
     /// Instances that are not placed yet, of `objects` objects.
     pub(super) fn unplaced(source: TransformSource, seconds: f64, instances: usize, objects: u32) -> World {
         let (placements, top, only_visible) = (vec![None; instances], TopLevel::default(), None);
-        let mut world = World { seconds, source, placements, top, only_visible, traced: Vec::new() };
+        let mut world =
+            World { seconds, source, placements, top, only_visible, traced: Vec::new(), skinned: Vec::new() };
         world.add_objects(objects);
         world
     }
@@ -126,6 +129,19 @@ impl World {
         self.only_visible = first.filter(|_| visible.next().is_none());
     }
 
+    /// Whether the vertices of an object are in world space, since a skin moves them.
+    pub(super) fn is_skinned(&self, object: u32) -> bool {
+        self.skinned.get(object as usize).copied().unwrap_or(false)
+    }
+
+    /// The node hierarchy of a file's scene.
+    pub(crate) fn hierarchy(&self) -> Option<&NodeHierarchy> {
+        match &self.source {
+            TransformSource::File(hierarchy) => Some(hierarchy),
+            TransformSource::Caller(_) => None,
+        }
+    }
+
     /// Whether rays have been traced in an object.
     pub(super) fn is_traced(&self, object: u32) -> bool {
         self.traced[object as usize].load(Ordering::Relaxed)
@@ -137,7 +153,10 @@ impl World {
             TransformSource::File(hierarchy) => {
                 let view = super::file_scene::scene_of(objects);
                 let row = view.instances[instance as usize];
-                let to_world = hierarchy.to_world(&view, row.node);
+                let to_world = match self.is_skinned(row.object) {
+                    true => Affine::IDENTITY,
+                    false => hierarchy.to_world(&view, row.node),
+                };
                 InstanceRow { object: row.object, node: row.node, to_world }
             }
             TransformSource::Caller(caller) => caller.rows[instance as usize],

@@ -181,14 +181,17 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
         )
     };
     let Some(deformation) = &raw.deformation else {
-        let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, not_finite)?;
+        let rows = (raw.positions.as_slice(), triangles);
+        let (mesh, counted) = weld_and_count(rows, attributes, wanted, monitor, not_finite)?;
         let mesh = Mesh { groups, materials, ..mesh };
         return Ok((mesh, report(&raw, counted)));
     };
     let mut triangles = triangles;
     let (welded, sources) = deformation.weld(&raw.positions, &mut triangles).map_err(not_finite)?;
     let deformation = Some(deformation.finish(&sources, &normal_sources));
+    let left_out = welded.non_finite_unused;
     let (mesh, counted) = count(welded, triangles, (raw.positions.len(), attributes), monitor)?;
+    warn_not_finite(left_out, "are left out", monitor);
     Ok((Mesh { groups, materials, deformation, ..mesh }, report(&raw, counted)))
 }
 
@@ -203,14 +206,28 @@ fn report(raw: &Raw<'_>, counted: Report) -> Report {
 /// # Errors
 /// `not_finite` of the row of the first used position that is not finite; cancellation.
 pub(crate) fn weld_and_count(
-    positions: &[[f32; 3]],
-    mut triangles: Vec<[u32; 3]>,
+    (positions, mut triangles): (&[[f32; 3]], Vec<[u32; 3]>),
     attributes: Option<Attributes>,
+    wanted: Wanted,
     monitor: &dyn Monitor,
     not_finite: impl FnOnce(usize) -> Error,
 ) -> Result<(Mesh, Report)> {
+    let unwelded = wanted.vertices.then(|| triangles.clone());
     let welded = weld::weld(positions, &mut triangles).map_err(not_finite)?;
-    count(welded, triangles, (positions.len(), attributes), monitor)
+    let fate = if wanted.vertices { "are kept as zeros" } else { "are left out" };
+    warn_not_finite(welded.non_finite_unused, fate, monitor);
+    let (mut mesh, report) = count(welded, triangles, (positions.len(), attributes), monitor)?;
+    if let Some(triangles) = unwelded {
+        (mesh.positions, mesh.triangles) = (positions.iter().map(kept_vertex).collect(), triangles);
+    }
+    Ok((mesh, report))
+}
+
+/// Warns of positions that are not finite and that no face uses.
+fn warn_not_finite(count: u64, fate: &str, monitor: &dyn Monitor) {
+    if count > 0 {
+        monitor.warn(&format!("{count} positions are not finite; no face uses them, they {fate}"));
+    }
 }
 
 /// The mesh of welded triangles, with counts; `positions_read` are the positions before welding.
@@ -220,10 +237,6 @@ fn count(
     (positions_read, attributes): (usize, Option<Attributes>),
     monitor: &dyn Monitor,
 ) -> Result<(Mesh, Report)> {
-    if welded.non_finite_unused > 0 {
-        let count = welded.non_finite_unused;
-        monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
-    }
     monitor.check()?;
     let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
@@ -241,6 +254,12 @@ fn count(
         ..Report::default()
     };
     Ok((mesh, report))
+}
+
+/// A vertex of the source as it is kept without welding: without negative zeros, and zeros where it is not finite, so that no face
+/// uses it.
+fn kept_vertex(position: &[f32; 3]) -> [f32; 3] {
+    if position.iter().all(|x| x.is_finite()) { position.map(|x| x + 0.0) } else { [0.0; 3] }
 }
 
 /// The format of a source by its extension, or else by its content.

@@ -20,6 +20,7 @@ mod bvh;
 mod closest;
 mod crossing;
 mod deformers;
+mod deform;
 mod enumerate;
 mod hits;
 mod instances;

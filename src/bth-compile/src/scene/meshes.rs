@@ -142,7 +142,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     }
     let Context { options, cache, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
-        let read = mesh::import_triangles(&file.full, positions, triangles, *monitor)?;
+        let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         return Ok(vec![MeshSummary::of(read)]);
     }
     let gltf = |part: &SourcePart| match part {

@@ -96,6 +96,7 @@ impl CompileOptions {
     pub fn of_deforming(&self) -> Self {
         Self {
             structure: Structure::Bvh,
+            deformable: true,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             ..self.clone()

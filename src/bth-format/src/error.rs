@@ -131,6 +131,7 @@ codes! {
     Skin "F183" "A skin has at least one joint; the ranges of successive skins follow each other, lie within SKIN_JOINTS and together cover it; reserved fields are zero."
     SkinJoint "F184" "The node of a skin's joint exists, its matrix is finite, and its reserved fields are zero."
     WeightTrack "F185" "A track of weights belongs to the node of a deformer that has weights."
+    DeformerObject "F186" "The object of a deformer has LEAF_VERTICES, or nothing that can be hit."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."

@@ -274,8 +274,11 @@ fn report(
 }
 
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by one before, so the check
-/// reads a file with their OBJECT rows only.
+/// reads a file with their OBJECT rows only; the whole file where objects deform.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
+    if !parts.deformers.deformers.is_empty() {
+        return bth::from_bytes(&cached::joined(content)?).map(drop).map_err(|e| refused(name, &e));
+    }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
     write::scene(&mut rows_only, parts)?;

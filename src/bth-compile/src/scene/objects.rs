@@ -310,16 +310,12 @@ impl Objects {
         self.stored[object as usize].deformation()
     }
 
-    /// Adds the OBJECT and DEFORMATION rows only, which suffice to place instances.
+    /// Adds the OBJECT rows only, which suffice to place instances.
     pub(super) fn write_rows(&self, builder: &mut FileBuilder<'_>) -> Result<()> {
         for (number, stored) in self.stored.iter().enumerate() {
             if let Some(row) = stored.row() {
                 let stride = size_of::<layout::Object>() as u32;
                 builder.section(kind::OBJECT, number as u32, stride, row.as_bytes().to_vec())?;
-            }
-            if let Some(row) = stored.deformation()? {
-                let stride = size_of::<layout::Deformation>() as u32;
-                builder.section(kind::DEFORMATION, number as u32, stride, row.as_bytes().to_vec())?;
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The deformers of a scene and their skins: BTH-F180 to BTH-F184.
+//! The deformers of a scene and their skins: BTH-F180 to BTH-F184 and BTH-F186.
 
 use super::rows::{RowResult, check_rows, violation};
 use crate::error::{Code, Error, Result};
@@ -6,8 +6,9 @@ use crate::layout::*;
 use crate::scene_view::SceneView;
 use std::mem::offset_of;
 
-/// What a scene's check asks of an object: its row of `DEFORMATION`, if it has one.
-pub(crate) type DeformationOf<'a> = &'a dyn Fn(u32) -> Option<Deformation>;
+/// What a scene's check asks of an object: its row of `DEFORMATION`, if it has one, and whether it can be given new positions or
+/// has nothing that can be hit.
+pub(crate) type DeformationOf<'a> = &'a dyn Fn(u32) -> (Option<Deformation>, bool);
 
 /// Checks the deformers and skins of a scene whose nodes have been checked; `objects` is the number of objects.
 pub(super) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
@@ -54,17 +55,21 @@ fn joint(view: &SceneView<'_>, joint: &SkinJoint) -> RowResult<()> {
     Ok(())
 }
 
-/// BTH-F180 without the last part, BTH-F181 and BTH-F182 of ranges.
+/// BTH-F180 without distinct objects, BTH-F181, BTH-F182 without the weights themselves, and BTH-F186.
 fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     let mut end = 0u64;
     check_rows(kind::DEFORMERS, view.deformers, |row, deformer| {
         let follows = row == 0 || view.deformers[row - 1].node < deformer.node;
         let there = (deformer.node as usize) < view.nodes.len() && deformer.object < objects;
-        let counts = there.then(|| deformation(deformer.object)).flatten();
+        let (counts, can_move) = if there { deformation(deformer.object) } else { (None, false) };
         let Some(counts) = counts.filter(|_| follows && deformer.reserved == [0; 3]) else {
             let expected = "ascending nodes, an object with DEFORMATION, and zeros";
             return violation(Code::Deformer, 0, expected, deformer);
         };
+        if !can_move {
+            let at = offset_of!(Deformer, object);
+            return violation(Code::DeformerObject, at, "an object with LEAF_VERTICES", deformer.object);
+        }
         let joints = view.skins.get(deformer.skin as usize).map(|skin| skin.joints);
         let fits = |joints: u32| counts.joints > 0 && counts.joints <= joints;
         if deformer.skin != NONE && !joints.is_some_and(fits) {
@@ -74,7 +79,7 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
         Ok(())
     })?;
     check_rows(kind::DEFORMERS, view.deformers, |_, deformer| {
-        let targets = deformation(deformer.object).map_or(0, |counts| counts.targets);
+        let targets = deformation(deformer.object).0.map_or(0, |counts| counts.targets);
         if deformer.weights != targets {
             let at = offset_of!(Deformer, weights);
             return violation(Code::MorphWeights, at, "a weight for each target", deformer.weights);

@@ -7,9 +7,9 @@
 mod adjacency;
 mod bit_set;
 mod boxes;
+mod deformable;
 mod deformation;
 mod deformers;
-mod deformable;
 mod groups;
 mod header;
 mod leaves;

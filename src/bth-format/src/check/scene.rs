@@ -15,7 +15,7 @@ const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 /// Checks the scene sections of a file; `objects` is the number of its objects.
 ///
 /// # Errors
-/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F185`, with an offset from the start of its section.
+/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset from the start of its section.
 pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     scene_row(view)?;
     check_rows(kind::NODES, view.nodes, |row, node| self::node(view, row, node))?;

@@ -398,10 +398,14 @@ impl File {
     /// sections).
     ///
     /// # Errors
-    /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F185`.
+    /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`.
     pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
         let Some(view) = self.scene() else { return Ok(None) };
-        let deformation = |object| self.deformation(object).rows.first().copied();
+        let deformation = |object| {
+            let can_move = self.section(object, kind::LEAF_VERTICES).is_some_and(|s| s.entry.count != 0);
+            let row = self.deformation(object).rows.first().copied();
+            (row, can_move || self.object_header(object).root == NONE)
+        };
         check::scene(&view, self.object_count(), &deformation).map_err(|e| self.locate(e, NONE))?;
         Ok(Some(view))
     }

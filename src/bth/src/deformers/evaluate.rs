@@ -57,7 +57,8 @@ impl Kernel for Range<'_> {
                 skin(&vertices.deformation, joints, first, moved);
             }
             for (out, moved) in out.iter_mut().zip(moved) {
-                *out = [moved[0] as f32, moved[1] as f32, moved[2] as f32];
+                // As in compiled files, no zero is negative.
+                *out = [moved[0] as f32 + 0.0, moved[1] as f32 + 0.0, moved[2] as f32 + 0.0];
             }
             first += out.len();
         }

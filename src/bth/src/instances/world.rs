@@ -6,6 +6,7 @@ use super::caller::CallerInstances;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement};
 use super::top_level::TopLevel;
+use crate::deformers::Deformers;
 use crate::objects::Objects;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -102,16 +103,23 @@ pub(crate) struct World {
     only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
     traced: Vec<AtomicBool>,
-    /// For each object whether its vertices are in world space, since a skin moves them; empty where none are.
-    pub(super) skinned: Vec<bool>,
+    /// What deforms the objects.
+    pub(crate) deformers: Deformers,
 }
 
 impl World {
     /// Instances that are not placed yet, of `objects` objects.
     pub(super) fn unplaced(source: TransformSource, seconds: f64, instances: usize, objects: u32) -> World {
         let (placements, top, only_visible) = (vec![None; instances], TopLevel::default(), None);
-        let mut world =
-            World { seconds, source, placements, top, only_visible, traced: Vec::new(), skinned: Vec::new() };
+        let mut world = World {
+            seconds,
+            source,
+            placements,
+            top,
+            only_visible,
+            traced: Vec::new(),
+            deformers: Deformers::default(),
+        };
         world.add_objects(objects);
         world
     }
@@ -147,19 +155,6 @@ impl World {
         self.only_visible = first.filter(|_| visible.next().is_none());
     }
 
-    /// Whether the vertices of an object are in world space, since a skin moves them.
-    pub(super) fn is_skinned(&self, object: u32) -> bool {
-        self.skinned.get(object as usize).copied().unwrap_or(false)
-    }
-
-    /// The node hierarchy of a file's scene.
-    pub(crate) fn hierarchy(&self) -> Option<&NodeHierarchy> {
-        match &self.source {
-            TransformSource::File(hierarchy) => Some(hierarchy),
-            TransformSource::Caller(_) => None,
-        }
-    }
-
     /// Whether rays have been traced in an object.
     pub(super) fn is_traced(&self, object: u32) -> bool {
         self.traced[object as usize].load(Ordering::Relaxed)
@@ -171,7 +166,7 @@ impl World {
             TransformSource::File(hierarchy) => {
                 let view = super::file_scene::scene_of(objects);
                 let row = view.instances[instance as usize];
-                let to_world = match self.is_skinned(row.object) {
+                let to_world = match self.deformers.is_skinned(row.object) {
                     true => Affine::IDENTITY,
                     false => hierarchy.to_world(&view, row.node),
                 };
@@ -244,7 +239,7 @@ impl World {
     /// Bytes on the heap: of the instances and the top level, and of the hierarchy or the caller's transforms.
     pub(crate) fn bytes(&self) -> (usize, usize) {
         let source = match &self.source {
-            TransformSource::File(hierarchy) => hierarchy.bytes(),
+            TransformSource::File(hierarchy) => hierarchy.bytes() + self.deformers.bytes(),
             TransformSource::Caller(caller) => caller.bytes(),
         };
         (size_of_val(self.placements.as_slice()) + self.top.bytes(), source)

@@ -106,6 +106,7 @@ fn json(
         "height": args.size.1,
         "mode": args.mode.name(),
         "samples_per_pixel": args.spp,
+        "shutter": args.shutter,
         "threads": threads,
         "resident_bytes": scene.resident_bytes(),
         "rays_per_second": rate(rays, seconds),

@@ -112,6 +112,20 @@ impl Objects {
         }
     }
 
+    /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do not fit each other.
+    pub(crate) fn unchecked_view(&self, object: u32) -> Option<&ObjectView<'_>> {
+        if self.is_deforming(object) {
+            return Some(self.view(object));
+        }
+        let (file, object) = self.locate(object)?;
+        file.view(object).ok()
+    }
+
+    /// Whether the object has positions of its own.
+    fn is_deforming(&self, object: u32) -> bool {
+        self.deforming.get(object as usize).is_some_and(Option::is_some)
+    }
+
     /// The `OBJECT` row of an object. Other sections of the object are not read.
     pub(crate) fn header(&self, object: u32) -> &Object {
         if let Some(Some(deforming)) = self.deforming.get(object as usize) {
@@ -123,8 +137,7 @@ impl Objects {
 
     /// Whether reading the nodes of an object may wait for the disk: they are in a mapped file.
     pub(crate) fn is_mapped(&self, object: u32) -> bool {
-        let in_memory = self.deforming.get(object as usize).is_some_and(Option::is_some);
-        !in_memory && self.locate(object).is_some_and(|(file, _)| file.is_mapped())
+        !self.is_deforming(object) && self.locate(object).is_some_and(|(file, _)| file.is_mapped())
     }
 
     /// The file, if the scene is one.
@@ -156,7 +169,7 @@ impl Objects {
             return Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()));
         };
         let index = object as usize;
-        if !self.deforming.get(index).is_some_and(Option::is_some) {
+        if !self.is_deforming(object) {
             let new = Box::new(Deforming::new(file, row)?);
             if self.deforming.len() <= index {
                 self.deforming.resize_with(index + 1, || None);

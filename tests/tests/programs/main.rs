@@ -16,6 +16,7 @@ mod previous;
 #[cfg(unix)]
 mod recipes;
 mod scenes;
+mod shutter;
 mod stress;
 mod support;
 mod trace;

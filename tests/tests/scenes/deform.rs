@@ -65,27 +65,27 @@ fn deformed(rest: &[[f32; 3]], kind: usize, rng: &mut Rng) -> Positions {
 
 #[test]
 fn new_positions_have_the_answers_of_a_new_compilation() {
-    let (rest, triangles) = mesh(1200);
+    let (rest, triangles) = mesh(600);
     let file = bytes(&rest, &triangles, &deformable());
     let mut scene = bth::from_bytes(&file).unwrap();
     let other = bth::from_bytes(&file).unwrap();
     let before: Vec<u8> = scene.file().bytes().to_vec();
     let rng = &mut Rng::new(22);
     let mut hits = 0;
-    for kind in 0..10 {
+    for kind in 0..7 {
         let positions = deformed(&rest, kind, rng);
         let update = scene.set_positions(0, &positions).unwrap();
         assert_eq!((update.deformed, update.visible), (1, 1));
         let fresh = bth::from_bytes(&bytes(&positions, &triangles, &options())).unwrap();
         hits += compare(&fresh, &scene, 0, rng);
         let exact = World::new(&scene);
-        for ray in crate::built::rays(&scene, rng, 60) {
+        for ray in crate::built::rays(&scene, rng, 10) {
             let (found, truth) = (scene.nearest(&ray), exact.hit(&ray));
             assert_eq!(found.map_or(f32::INFINITY, |hit| hit.t), truth.t, "kind {kind}: {ray:?}");
         }
         assert!(kind % 7 != 6 || update.deformed_cost_ratio > 3.0, "{}", update.deformed_cost_ratio);
     }
-    assert!(hits > 4000, "{hits}");
+    assert!(hits > 3000, "{hits}");
     assert_eq!(scene.file().bytes(), before);
     // Another scene of the same file keeps its positions, and these come back bit for bit.
     scene.set_positions(0, &deformed(&rest, 0, rng)).unwrap();

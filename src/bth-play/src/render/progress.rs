@@ -9,9 +9,9 @@ use std::io::IsTerminal;
 pub(super) struct Progress(ProgressBar);
 
 impl Progress {
-    /// A bar for the tiles of all these frames.
-    pub(super) fn new(frames: &[i32], args: &Args) -> Self {
-        let tiles = u64::from(tile_count(args.size)) * frames.len() as u64;
+    /// A bar for the tiles of a number of frames, each sampled at a number of times.
+    pub(super) fn new(frames: usize, times: usize, args: &Args) -> Self {
+        let tiles = u64::from(tile_count(args.size)) * frames as u64 * times as u64;
         let visible = std::io::stderr().is_terminal();
         let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(tiles), target);
@@ -19,8 +19,8 @@ impl Progress {
             "rendering {bar:30} {human_pos}/{human_len} tiles  {msg}  {eta} left",
         );
         let bar = if let Ok(style) = style { bar.with_style(style) } else { bar };
-        if frames.len() > 1 {
-            bar.set_message(format!("{} frames", frames.len()));
+        if frames > 1 {
+            bar.set_message(format!("{frames} frames"));
         }
         Self(bar)
     }

@@ -1,22 +1,23 @@
 //! A sequence of frames: which ones are rendered, one after another, and the time that each took.
 
-use super::frame::{Summary, render_frame};
+use super::frame::{FrameRenderer, Summary, Updates};
 use super::progress::Progress;
+use super::shutter::Shutter;
 use crate::args::Args;
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::output::Sink;
-use crate::shading::FrameContext;
 use bth::Scene;
 use serde::Serialize;
 use std::path::Path;
-use std::time::Instant;
 
 /// Time and work of a frame.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct FrameReport {
     /// Number of the frame.
     pub(crate) frame: i32,
+    /// Times at which the scene is sampled: 1 without a shutter. What follows is the sum over all of them.
+    pub(crate) times: usize,
     /// Time to evaluate tracks, hierarchy and instances, without the top level.
     pub(crate) update_seconds: f64,
     /// Time to build or refit the top level.
@@ -25,11 +26,26 @@ pub(crate) struct FrameReport {
     pub(crate) nodes_moved: usize,
     /// Instances whose transforms changed.
     pub(crate) instances_placed: usize,
-    /// Instances that are visible.
+    /// Instances that are visible, at the last of the times.
     pub(crate) instances_visible: usize,
     /// Time and rays of the rendering.
     #[serde(flatten)]
     pub(crate) summary: Summary,
+}
+
+impl FrameReport {
+    fn new(frame: i32, times: usize, updates: &Updates, summary: Summary) -> Self {
+        Self {
+            frame,
+            times,
+            update_seconds: updates.time.as_secs_f64(),
+            top_level_seconds: updates.top_level.as_secs_f64(),
+            nodes_moved: updates.nodes,
+            instances_placed: updates.placed,
+            instances_visible: updates.visible,
+            summary,
+        }
+    }
 }
 
 /// Time and work of all frames.
@@ -46,6 +62,11 @@ pub(crate) fn frame_range(scene: &Scene) -> ((i32, i32), f64) {
         let scene = &view.scene[0];
         ((scene.first_frame, scene.last_frame), scene.rate)
     })
+}
+
+/// The shutter of the options. In a file where nothing can move it makes no difference, so that one time is enough.
+pub(crate) fn shutter(scene: &Scene, args: &Args) -> Shutter {
+    Shutter::new(args.shutter.filter(|_| scene.description().is_some()), args.spp)
 }
 
 /// The first and last frame that the options choose; without an output those for a window.
@@ -110,25 +131,16 @@ pub(crate) fn render_sequence(
     report.skipped = before - frames.len();
     if !frames.is_empty() {
         let setup = SceneSetup::new(scene, file, args, whole)?;
-        let progress = Progress::new(&frames, args);
+        let shutter = shutter(scene, args);
+        let times = shutter.exposures().len();
+        let progress = Progress::new(frames.len(), times, args);
+        let (setup, shutter) = (&setup, &shutter);
+        let renderer = FrameRenderer { file, setup, args, shutter, rate, progress: &progress };
         for number in frames {
-            let start = Instant::now();
-            let update = scene.set_frame(number)?;
-            let update_time = start.elapsed().saturating_sub(update.top_level);
-            let camera = setup.camera(scene, args);
-            let frame = FrameContext::new(scene, file, &setup, camera, args)?;
-            let (picture, summary) = render_frame(&frame, &progress);
+            let (picture, summary, updates) = renderer.render(scene, number)?;
             sink.write(number, &picture)?;
             progress.frame_done();
-            report.frames.push(FrameReport {
-                frame: number,
-                update_seconds: update_time.as_secs_f64(),
-                top_level_seconds: update.top_level.as_secs_f64(),
-                nodes_moved: update.nodes,
-                instances_placed: update.placed,
-                instances_visible: update.visible,
-                summary,
-            });
+            report.frames.push(FrameReport::new(number, times, &updates, summary));
         }
     }
     sink.finish()?;

@@ -1,8 +1,8 @@
 //! Tiles: squares of pixels that are rendered together, so that their rays are traced in coherent batches.
 
+use super::shutter::Exposure;
 use crate::shading::{Counters, FrameContext, Sample, Shader};
 use glam::Vec3;
-use std::ops::Range;
 
 /// Pixels along the side of a tile.
 const TILE: u32 = 16;
@@ -16,19 +16,20 @@ pub(crate) struct Tile {
     pub(super) counters: Counters,
 }
 
-/// Renders the samples `indices` of the tile of a number. If pixels get no more than one sample (`--spp 1`), its rays go through
-/// their middles.
+/// Renders the samples of the tile of a number that are taken at the time of an exposure, to which the scene is set. If pixels get
+/// no more than one sample (`--spp 1`), its rays go through their middles.
 pub(crate) fn render_tile(
     frame: &FrameContext<'_>,
     number: u32,
-    indices: Range<u32>,
+    exposure: &Exposure,
     shader: &Shader<'_>,
 ) -> Tile {
     let columns = frame.args.size.0.div_ceil(TILE);
-    let pixels = pixels(frame.args.size, number % columns * TILE, number / columns * TILE);
+    let mut pixels = pixels(frame.args.size, number % columns * TILE, number / columns * TILE);
+    pixels.retain(|pixel| exposure.takes(*pixel));
     let mut tile = Tile { sums: vec![Vec3::ZERO; pixels.len()], pixels, ..Tile::default() };
     let centered = frame.args.spp == 1;
-    for index in indices {
+    for index in exposure.samples.clone() {
         let samples: Vec<Sample> =
             tile.pixels.iter().map(|&pixel| frame.sample(pixel, index, centered)).collect();
         let colors = shader.shade(frame, &samples, &mut tile.counters);

@@ -2,6 +2,7 @@
 
 mod app;
 mod camera_controller;
+mod content;
 mod keys;
 mod playback;
 mod progressive;
@@ -14,8 +15,9 @@ use crate::args::Args;
 use crate::camera::SceneSetup;
 use crate::failure::Failure;
 use crate::render::{frame_range, frames_to_show};
-use app::{App, Content};
+use app::App;
 use bth::Scene;
+use content::Content;
 use rayon::ThreadPool;
 use std::path::Path;
 use winit::event_loop::EventLoop;
@@ -36,7 +38,7 @@ pub(crate) fn show(
     scene.set_frame(first)?;
     let events = EventLoop::new()
         .map_err(|e| Failure::Window(format!("no window can be opened: {}", without_source_location(&e))))?;
-    let mut app = App::new(Content { scene, file, setup }, args, pool, (first, last), rate);
+    let mut app = App::new(Content { scene, file, setup, rate }, args, pool, (first, last));
     events.run_app(&mut app).map_err(|e| Failure::Window(format!("the window stopped working: {e}")))?;
     app.finish()
 }

@@ -1,16 +1,14 @@
 //! Progressive rendering for the window: coarse while camera or scene move, refined sample by sample while they do not.
 
+use super::content::{Content, ViewCamera};
 use crate::args::Args;
-use crate::camera::{Camera, SceneSetup};
 use crate::failure::Failure;
 use crate::output::{Picture, to_picture};
-use crate::render::{Tile, pixel_count, render_tile, tile_count};
+use crate::render::{Exposure, Shutter, Tile, pixel_count, render_tile, tile_count};
 use crate::shading::{FrameContext, Shader};
-use bth::Scene;
 use glam::Vec3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Target time of a picture while something moves.
@@ -32,7 +30,10 @@ pub(super) struct ProgressiveRenderer {
     sums: Vec<Vec3>,
     /// Samples that every pixel has got.
     passes: u32,
-    /// Tiles of the next sample that are finished.
+    shutter: Shutter,
+    /// Times of the next sample that are finished.
+    slots: u32,
+    /// Tiles of the next time that are finished.
     tiles: u32,
     /// Time spent on the next sample so far.
     spent: Duration,
@@ -42,13 +43,15 @@ pub(super) struct ProgressiveRenderer {
 
 impl ProgressiveRenderer {
     /// A renderer without any samples.
-    pub(super) fn new(args: &Args) -> Self {
+    pub(super) fn new(args: &Args, shutter: Shutter) -> Self {
         let mut renderer = Self {
             args: args.clone(),
             size: args.size,
             block: 1,
             sums: Vec::new(),
             passes: 0,
+            shutter,
+            slots: 0,
             tiles: 0,
             spent: Duration::ZERO,
             cost: 0.0,
@@ -105,7 +108,7 @@ impl ProgressiveRenderer {
     fn clear(&mut self) {
         self.args.size = (self.size.0.div_ceil(self.block), self.size.1.div_ceil(self.block));
         self.sums = vec![Vec3::ZERO; pixel_count(self.args.size)];
-        (self.passes, self.tiles, self.spent) = (0, 0, Duration::ZERO);
+        (self.passes, self.slots, self.tiles, self.spent) = (0, 0, 0, Duration::ZERO);
     }
 
     /// Whether every pixel of the fine picture has so many samples.
@@ -113,16 +116,16 @@ impl ProgressiveRenderer {
         self.block == 1 && self.passes >= samples
     }
 
-    /// Renders for about [`SLICE`]; returns the picture when all pixels have got another sample.
+    /// Renders for about [`SLICE`]; returns the picture when all pixels have got another sample. The scene is set to a frame, and is
+    /// so again afterwards.
     ///
     /// # Errors
-    /// If the file lacks what the mode needs.
+    /// If the file lacks what the mode needs, or a time within the shutter cannot be set.
     pub(super) fn render(
         &mut self,
-        scene: &Scene,
-        file: &Path,
-        setup: &SceneSetup,
-        camera: Camera,
+        content: &mut Content<'_>,
+        frame: i32,
+        view: ViewCamera,
         pool: &ThreadPool,
     ) -> Result<Option<Picture>, Failure> {
         if self.block > 1 && self.passes > 0 {
@@ -131,28 +134,60 @@ impl ProgressiveRenderer {
             self.clear();
         }
         let start = Instant::now();
-        let frame = FrameContext::new(scene, file, setup, camera, &self.args)?;
+        let mut rendered = Ok(());
+        while rendered.is_ok() && self.slots < self.shutter.slots() && start.elapsed() < SLICE {
+            let exposure = self.shutter.exposure(self.passes, self.slots);
+            if self.shutter.is_open() {
+                let time = (f64::from(frame) + exposure.offset) / content.rate;
+                rendered = content.scene.set_seconds(time).map(drop).map_err(Failure::from);
+            }
+            rendered = rendered.and_then(|()| self.render_exposure(content, &exposure, view, pool, start));
+        }
+        if self.shutter.is_open() {
+            content.scene.set_frame(frame)?;
+        }
+        rendered?;
+        self.spent += start.elapsed();
+        if self.slots < self.shutter.slots() {
+            return Ok(None);
+        }
+        self.cost = self.spent.as_secs_f64() / self.sums.len().max(1) as f64;
+        self.passes += 1;
+        (self.slots, self.spent) = (0, Duration::ZERO);
+        let means: Vec<Vec3> = self.sums.iter().map(|sum| *sum / self.passes as f32).collect();
+        Ok(Some(to_picture(&means, &self.args)))
+    }
+
+    /// Renders tiles at the time to which the scene is set, until all are finished or [`SLICE`] has passed since `start`.
+    fn render_exposure(
+        &mut self,
+        content: &Content<'_>,
+        exposure: &Exposure,
+        view: ViewCamera,
+        pool: &ThreadPool,
+        start: Instant,
+    ) -> Result<(), Failure> {
+        let camera = view.camera(content, &self.args());
+        let frame = FrameContext::new(content.scene, content.file, &content.setup, camera, &self.args)?;
         let shader = Shader::new(&frame);
         let (count, width) = (tile_count(self.args.size), self.args.size.0);
         let step = 4 * pool.current_num_threads() as u32;
-        while self.tiles < count && start.elapsed() < SLICE {
+        // At least some tiles, so that setting the time is never all that is done.
+        loop {
             let end = (self.tiles + step).min(count);
-            let indices = self.passes..self.passes + 1;
-            let render = |number: u32| render_tile(&frame, number, indices.clone(), &shader);
+            let render = |number: u32| render_tile(&frame, number, exposure, &shader);
             let tiles: Vec<Tile> = pool.install(|| (self.tiles..end).into_par_iter().map(render).collect());
             for tile in &tiles {
                 tile.write_to(&mut self.sums, width, |sum, color| *sum += color);
             }
             self.tiles = end;
+            if self.tiles == count {
+                (self.slots, self.tiles) = (self.slots + 1, 0);
+                return Ok(());
+            }
+            if start.elapsed() >= SLICE {
+                return Ok(());
+            }
         }
-        self.spent += start.elapsed();
-        if self.tiles < count {
-            return Ok(None);
-        }
-        self.cost = self.spent.as_secs_f64() / self.sums.len().max(1) as f64;
-        self.passes += 1;
-        (self.tiles, self.spent) = (0, Duration::ZERO);
-        let means: Vec<Vec3> = self.sums.iter().map(|sum| *sum / self.passes as f32).collect();
-        Ok(Some(to_picture(&means, &self.args)))
     }
 }

@@ -154,10 +154,10 @@ impl World {
     /// Boxes that contain all triangles of an object. Those of the root's children give a tighter world box. They are used only
     /// if they are in memory already: reading the root of every mapped object would take longer than the tighter boxes save.
     pub(super) fn parts_of(&self, objects: &Objects, object: u32) -> PartBoxes {
-        if self.is_traced(object) || !objects.is_mapped(object) {
-            PartBoxes::of_root_children(objects.view(object))
-        } else {
-            PartBoxes::whole(objects.header(object))
+        let in_memory = self.is_traced(object) || !objects.is_mapped(object);
+        match objects.unchecked_view(object).filter(|_| in_memory) {
+            Some(view) => PartBoxes::of_root_children(view),
+            None => PartBoxes::whole(objects.header(object)),
         }
     }
 

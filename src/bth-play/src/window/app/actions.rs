@@ -1,7 +1,8 @@
 //! What keys change: mode, frame, camera, and what goes on while time passes.
 
-use super::state::{App, ViewCamera};
+use super::state::App;
 use crate::messages::note;
+use crate::window::content::ViewCamera;
 use crate::window::keys::{self, Action};
 use crate::window::playback::Playback;
 use glam::DVec3;

@@ -9,10 +9,8 @@ use winit::event_loop::ActiveEventLoop;
 impl App<'_> {
     /// Renders for a moment, and shows the picture when it got another sample.
     pub(super) fn draw(&mut self, events: &ActiveEventLoop) -> Result<(), Failure> {
-        let camera = self.camera();
-        let content = &self.content;
-        let rendered =
-            self.renderer.render(content.scene, content.file, &content.setup, camera, self.pool)?;
+        let (frame, view) = (self.playback.frame(), self.view);
+        let rendered = self.renderer.render(&mut self.content, frame, view, self.pool)?;
         let Some(picture) = rendered else { return Ok(()) };
         self.picture = Some(picture);
         self.show()?;

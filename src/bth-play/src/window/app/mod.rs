@@ -5,4 +5,4 @@ mod drawing;
 mod events;
 mod state;
 
-pub(super) use state::{App, Content};
+pub(super) use state::App;

@@ -1,19 +1,20 @@
 //! The state of the window.
 
 use crate::args::{Args, Mode};
-use crate::camera::{Camera, SceneSetup, scene_camera, up_vector};
+use crate::camera::{Camera, up_vector};
 use crate::failure::Failure;
 use crate::output::Picture;
+use crate::render::shutter;
 use crate::window::camera_controller::CameraController;
+use crate::window::content::{Content, ViewCamera};
 use crate::window::playback::Playback;
 use crate::window::progressive::ProgressiveRenderer;
 use crate::window::screen::Screen;
 use crate::window::summary::WindowSummary;
-use bth::Scene;
 use bth::rays::Hit;
 use glam::DVec2;
 use rayon::ThreadPool;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::keyboard::KeyCode;
@@ -24,24 +25,6 @@ pub(super) enum Drag {
     Orbit,
     Pan,
     Scrub,
-}
-
-/// The camera in use.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum ViewCamera {
-    /// The camera that the options chose, which may move with the scene.
-    Initial,
-    /// The camera in this row of the scene's table.
-    Scene(u32),
-    /// The camera that the user moves.
-    Free(CameraController),
-}
-
-/// What the window shows.
-pub(crate) struct Content<'a> {
-    pub(crate) scene: &'a mut Scene,
-    pub(crate) file: &'a Path,
-    pub(crate) setup: SceneSetup,
 }
 
 /// The state of the window.
@@ -85,20 +68,17 @@ pub(crate) struct App<'a> {
 
 impl<'a> App<'a> {
     /// A window that plays the frames of `range` at `rate` frames per second.
-    pub(crate) fn new(
-        content: Content<'a>,
-        args: &Args,
-        pool: &'a ThreadPool,
-        range: (i32, i32),
-        rate: f64,
-    ) -> Self {
+    pub(crate) fn new(content: Content<'a>, args: &Args, pool: &'a ThreadPool, range: (i32, i32)) -> Self {
         // Samples are those of a picture with as many of them, so that the window converges to what -o writes.
         let samples = args.spp.max(args.window_frames.unwrap_or(0));
+        let args = args.with_samples(samples);
+        let renderer = ProgressiveRenderer::new(&args, shutter(content.scene, &args));
+        let playback = Playback::new(range, content.rate);
         Self {
             content,
             pool,
-            renderer: ProgressiveRenderer::new(&args.with_samples(samples)),
-            playback: Playback::new(range, rate),
+            renderer,
+            playback,
             view: ViewCamera::Initial,
             mode: args.mode,
             screen: None,
@@ -149,14 +129,7 @@ impl<'a> App<'a> {
 
     /// The camera at the time to which the scene is set.
     pub(super) fn camera(&self) -> Camera {
-        let args = self.renderer.args();
-        match self.view {
-            ViewCamera::Initial => {
-                self.content.setup.camera(self.content.scene, &args).with_aspect_of(args.size)
-            }
-            ViewCamera::Scene(row) => scene_camera(self.content.scene, row, &args),
-            ViewCamera::Free(controller) => controller.camera(args.size),
-        }
+        self.view.camera(&self.content, &self.renderer.args())
     }
 
     /// The controller of the camera; the user takes over the current camera if another one was in use.

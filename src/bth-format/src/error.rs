@@ -113,6 +113,12 @@ codes! {
     Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
+    SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
+    SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
+    SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
+    Segments "F193" "SEGMENTS is empty or has at least two rows; their times are finite and ascend strictly, the first row and no other is of the object itself, and reserved fields are zero."
+    SegmentObjects "F194" "The objects of SEGMENTS exist; each but the first is in one row of one object, has neither SEGMENTS nor SEQUENCE_TIMES and no instance; all are deformable and have equal POSITIONS and TRIANGLES, bit for bit."
+
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
@@ -324,6 +330,9 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::GROUP_RUNS => "GROUP_RUNS",
         kind::MATERIALS => "MATERIALS",
         kind::LABELS => "LABELS",
+        kind::SEQUENCE_TIMES => "SEQUENCE_TIMES",
+        kind::SEQUENCE_POSITIONS => "SEQUENCE_POSITIONS",
+        kind::SEGMENTS => "SEGMENTS",
         kind::OPACITY => "OPACITY",
         kind::OPACITY_MICRO => "OPACITY_MICRO",
         kind::PROVENANCE => "PROVENANCE",

@@ -15,6 +15,7 @@ mod nodes;
 mod opacity;
 mod rows;
 mod scene;
+mod sequence;
 mod sources;
 mod tet_faces;
 mod tet_leaves;
@@ -24,6 +25,7 @@ mod tree;
 pub(crate) use adjacency::TetAdjacency;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
+pub(crate) use sequence::{Segmented, segments, sequence};
 
 use crate::error::Result;
 use crate::object::ObjectView;

@@ -14,6 +14,7 @@ mod materials;
 mod object;
 mod opacity;
 mod scene;
+mod sequence;
 mod tets;
 
 pub use bvh::*;
@@ -25,6 +26,7 @@ pub use materials::*;
 pub use object::*;
 pub use opacity::*;
 pub use scene::*;
+pub use sequence::*;
 pub use tets::*;
 
 /// No index: the reference leads nowhere.

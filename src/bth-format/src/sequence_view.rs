@@ -91,7 +91,8 @@ mod tests {
 
     #[test]
     fn positions_move_on_straight_lines_and_are_rounded_once() {
-        let positions = [[0.0, 1.0, -3e38], [1.0, 1.0, 1.0], [1.0, -0.0, 3e38], [1.0, 2.0, f32::MIN_POSITIVE]];
+        let positions =
+            [[0.0, 1.0, -3e38], [1.0, 1.0, 1.0], [1.0, -0.0, 3e38], [1.0, 2.0, f32::MIN_POSITIVE]];
         let view = SequenceView { times: &[0.0, 1.0], positions: &positions, segments: &[] };
         let at = |seconds: f64, first: usize| {
             let mut into = vec![[9.0; 3]; 2 - first];

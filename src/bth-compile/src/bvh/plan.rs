@@ -184,7 +184,9 @@ impl<'a> Planner<'a> {
         monitor: &'a dyn Monitor,
     ) -> Self {
         let bvh = weighed.bvh;
-        let inverse_area = 1.0 / weighed.area(0);
+        let area = weighed.area(0);
+        // A deformable mesh may lie on one line: then all trees cost the same.
+        let inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
         let visits = weighed.total() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
         Planner { mesh, bvh, costs, plan, below_cut, monitor, weighed, inverse_area, line }

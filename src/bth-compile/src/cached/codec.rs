@@ -5,7 +5,7 @@ use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
 use bth_format::layout::{MaterialParameters, NONE, Texture};
-use bth_import::{self as mesh, Attributes, Group, Groups, Materials, Mesh, TriangleOpacities};
+use bth_import::{self as mesh, Attributes, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -75,6 +75,15 @@ fn materials(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of the frames of a mesh that is a sequence.
+fn sequence(mesh: &Mesh) -> Option<Digest> {
+    let sequence = mesh.sequence.as_ref()?;
+    let mut hasher = HashedRows::new("sequence");
+    hasher.add(&sequence.times);
+    hasher.add(&sequence.positions);
+    Some(hasher.finish())
+}
+
 /// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
@@ -93,6 +102,9 @@ pub(crate) struct MeshSummary {
     /// Hash of how materials look.
     #[serde(default)]
     pub(crate) materials: Option<Digest>,
+    /// Hash of the frames of a sequence.
+    #[serde(default)]
+    pub(crate) sequence: Option<Digest>,
 }
 
 impl MeshSummary {
@@ -105,6 +117,7 @@ impl MeshSummary {
             opacity: opacity(&mesh),
             groups: groups(&mesh),
             materials: materials(&mesh),
+            sequence: sequence(&mesh),
         };
         (mesh, summary)
     }
@@ -116,7 +129,8 @@ impl Codec for Mesh {
         to.add(&self.triangles);
         let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
         let has_materials = if self.materials.is_some() { HAS_MATERIALS } else { 0 };
-        to.add(&[u8::from(self.attributes.is_some()) | has_groups | has_materials]);
+        let has_sequence = if self.sequence.is_some() { HAS_SEQUENCE } else { 0 };
+        to.add(&[u8::from(self.attributes.is_some()) | has_groups | has_materials | has_sequence]);
         if let Some(attributes) = &self.attributes {
             to.add(&attributes.corners);
             to.add(&attributes.normals);
@@ -127,6 +141,10 @@ impl Codec for Mesh {
         }
         if let Some(materials) = &self.materials {
             materials.write(to);
+        }
+        if let Some(sequence) = &self.sequence {
+            to.add(&sequence.times);
+            to.add(&sequence.positions);
         }
         // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
         if let Some(opacity) = &self.opacity {
@@ -150,6 +168,10 @@ impl Codec for Mesh {
             0 => None,
             _ => Some(Materials::read(from)?),
         };
+        let sequence = match parts & HAS_SEQUENCE {
+            0 => None,
+            _ => Some(Sequence { times: from.take()?, positions: from.take()? }),
+        };
         let opacity = match from.is_empty() {
             true => None,
             false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
@@ -170,12 +192,16 @@ impl Codec for Mesh {
                 && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
                 && within(&m.color_corners, m.colors.len())
         });
+        let sequence_fits = sequence.as_ref().is_none_or(|s: &Sequence| {
+            !s.times.is_empty() && s.times.len().checked_mul(positions.len()) == Some(s.positions.len())
+        });
         let fits = attributes_fit
+            && sequence_fits
             && opacity_fits
             && groups_fit
             && materials_fit
             && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups, materials })
+        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups, materials, sequence })
     }
 }
 
@@ -183,6 +209,8 @@ impl Codec for Mesh {
 const HAS_GROUPS: u8 = 2;
 /// As [`HAS_GROUPS`], for how materials look.
 const HAS_MATERIALS: u8 = 4;
+/// As [`HAS_GROUPS`], for the frames of a sequence.
+const HAS_SEQUENCE: u8 = 16;
 
 impl Codec for Materials {
     fn write(&self, to: &mut RowWriter) {
@@ -338,9 +366,20 @@ mod tests {
                 color_corners: vec![[0, 1, 1]],
                 colors: vec![[65535; 4], [0, 1, 2, 3]],
             }),
+            sequence: Some(Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 6] }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, opacity: None, groups: None, materials: None, ..mesh.clone() };
+        let short = Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 5] };
+        let short = Mesh { sequence: Some(short), ..mesh.clone() };
+        assert_eq!(decode::<Mesh>(&encode(&short)), None);
+        let plain = Mesh {
+            attributes: None,
+            opacity: None,
+            groups: None,
+            materials: None,
+            sequence: None,
+            ..mesh.clone()
+        };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);

@@ -5,6 +5,7 @@
 
 mod clock;
 mod limit;
+mod moving;
 pub(crate) mod object;
 pub(crate) mod provenance;
 mod report;
@@ -16,6 +17,7 @@ pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
+pub use moving::{MotionOptions, MotionReport, SegmentReport};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
 pub(crate) use report::StageReports;
@@ -25,7 +27,7 @@ pub(crate) use stages::{Direct, Stages};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest, changed};
-use crate::{coordinates, tets};
+use crate::{bvh, coordinates, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::collections::BTreeSet;
@@ -105,13 +107,22 @@ pub(crate) fn compile_mesh(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Object, StageReports)> {
+    options.check()?;
+    if let Some(sequence) = mesh.sequence.clone() {
+        let moving = options.of_moving();
+        if moving.coordinates != options.coordinates {
+            monitor.warn(&format!("{}: coordinates stay f32, since vertices move", source.display()));
+        }
+        return moving::compile_moving(mesh, &sequence, &moving, clock, monitor);
+    }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
-    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &options.bvh, monitor))?;
-    let traced = TracedMesh { mesh, on_grid, tree };
-    let (leaves, tets) = match options.structure {
+    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
+    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
+    let traced = TracedMesh { mesh, on_grid, tree, probabilities: None };
+    let (leaves, tets) = match options.built_structure() {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };

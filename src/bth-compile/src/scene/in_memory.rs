@@ -100,7 +100,15 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
         let path = manifest.objects[row].source.path();
         let digest = SourceDigest::of_triangles(meshes[row]);
         let in_memory = Some(meshes[row]);
-        File { path, full: path.into(), compiled: false, parts: vec![(None, vec![row])], digest, in_memory }
+        File {
+            path,
+            full: path.into(),
+            compiled: false,
+            parts: vec![(None, vec![row])],
+            digest,
+            moving: None,
+            in_memory,
+        }
     };
     let rows: Vec<usize> = (0..meshes.len()).filter(|row| used[*row]).collect();
     let sources = clock.time("hash", || rows.into_par_iter().map(file).collect());

@@ -106,7 +106,10 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let groups = mesh.groups.as_ref().map_or_else(String::new, |groups| format!(" groups {}", groups.hex()));
     let materials = mesh.materials.as_ref();
     let materials = materials.map_or_else(String::new, |materials| format!(" materials {}", materials.hex()));
-    blake3::hash(format!("mesh {} {shading:?}{opacity}{groups}{materials}", mesh.geometry.hex()).as_bytes())
+    let sequence = mesh.sequence.as_ref();
+    let sequence = sequence.map_or_else(String::new, |sequence| format!(" sequence {}", sequence.hex()));
+    let text = format!("mesh {} {shading:?}{opacity}{groups}{materials}{sequence}", mesh.geometry.hex());
+    blake3::hash(text.as_bytes())
 }
 
 /// Adds the opacity of triangles to meshes of a file: the whole file's without numbers.
@@ -140,10 +143,14 @@ fn import(
     if numbers.is_empty() {
         return Ok(Vec::new());
     }
-    let Context { options, cache, monitor, .. } = context;
+    let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
-        let read = mesh::import_triangles(&file.full, positions, triangles, *monitor)?;
+        let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         return Ok(vec![MeshSummary::of(read)]);
+    }
+    if let Some(moving) = &file.moving {
+        let read = moving.import(file, context)?;
+        return Ok(vec![keep_mesh(file, None, read, context)]);
     }
     let single: Vec<u32> = numbers.iter().filter_map(|number| *number).collect();
     let meshes = if single.is_empty() {
@@ -153,14 +160,23 @@ fn import(
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
-    let keep = |(number, read): (&Option<u32>, (Mesh, mesh::Report))| {
-        let (mesh, summary) = MeshSummary::of(read);
-        if cache.store().is_some() {
-            let part = file.name_of(*number);
-            cache.miss(&key(file, *number, context), &part);
-            cache.put(&key(file, *number, context), &part, &cached::encode(&mesh), &summary, *monitor);
-        }
-        (mesh, summary)
-    };
-    Ok(numbers.iter().zip(meshes).map(keep).collect())
+    let keep = |(number, read)| keep_mesh(file, number, read, context);
+    Ok(numbers.iter().copied().zip(meshes).map(keep).collect())
+}
+
+/// Keeps a mesh in the cache.
+fn keep_mesh(
+    file: &File<'_>,
+    number: Option<u32>,
+    read: (Mesh, mesh::Report),
+    context: &Context<'_>,
+) -> (Mesh, MeshSummary) {
+    let (mesh, summary) = MeshSummary::of(read);
+    let Context { cache, monitor, .. } = context;
+    if cache.store().is_some() {
+        let part = file.name_of(number);
+        cache.miss(&key(file, number, context), &part);
+        cache.put(&key(file, number, context), &part, &cached::encode(&mesh), &summary, *monitor);
+    }
+    (mesh, summary)
 }

@@ -1,9 +1,9 @@
 //! The source files of a scene's objects.
 
+use super::moving::{Moving, unhashed};
 use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
-use bth_files::Digest;
 use bth_import::{AlphaMode, Looks};
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
@@ -20,6 +20,8 @@ pub(super) struct File<'a> {
     /// Number of a mesh or object in the file (`None` for the whole file), and the manifest's objects that refer to it.
     pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
     pub(super) digest: SourceDigest,
+    /// What moves the vertices; the file is the first of several then.
+    pub(super) moving: Option<Moving>,
     /// What takes the place of the file's content.
     pub(super) in_memory: Option<TriangleMesh<'a>>,
 }
@@ -27,6 +29,9 @@ pub(super) struct File<'a> {
 impl File<'_> {
     /// The name of a part in keys.
     pub(super) fn part(&self, part: Option<u32>) -> String {
+        if let Some(moving) = &self.moving {
+            return moving.part();
+        }
         let kind = if self.compiled { "object" } else { "mesh" };
         part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
     }
@@ -75,19 +80,22 @@ pub(super) fn files<'a>(
     looks: Looks,
 ) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), looks };
-    let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
+    let mut row_of_file: HashMap<(&str, bool, bool, Option<usize>), usize> = HashMap::new();
     let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
         let (compiled, part) = match &object.source {
             Source::Model { mesh, .. } => (false, *mesh),
+            Source::Sequence { .. } | Source::Cached { .. } => (false, None),
             Source::Compiled { object, .. } => (true, Some(*object)),
         };
         let path = object.source.path();
         // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
-        let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
-            let full = folder.join(path);
-            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing(), in_memory: None });
+        let moving = Moving::of(manifest, &object.source, folder)?;
+        let own = moving.is_some().then_some(row);
+        let file = *row_of_file.entry((path, compiled, part.is_some(), own)).or_insert_with(|| {
+            let full = moving.as_ref().map_or_else(|| folder.join(path), |moving| moving.first().to_owned());
+            let digest = unhashed(looks);
+            files.push(File { path, full, compiled, parts: Vec::new(), digest, moving, in_memory: None });
             files.len() - 1
         });
         let parts = &mut files[file].parts;
@@ -98,7 +106,11 @@ pub(super) fn files<'a>(
         parts[place].1.push(row);
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
-    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, looks)).collect();
+    let digest = |file: &File<'_>| match &file.moving {
+        Some(moving) => moving.digest(looks),
+        None => SourceDigest::of(&file.full, looks),
+    };
+    let digests: Vec<_> = files.par_iter().map(digest).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;
     }

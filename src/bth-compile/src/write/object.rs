@@ -27,6 +27,8 @@ pub struct ObjectParts<'a> {
     pub lines: &'a [CacheLine],
     /// Source id of each triangle in leaf order.
     pub triangle_ids: &'a [u32],
+    /// Vertices of the source in each leaf; empty but in deformable objects.
+    pub leaf_vertices: &'a [[u32; WIDTH]],
     /// Record of the tetrahedra; `None` without tet leaves.
     pub record: Option<RecordKind>,
     /// Tet leaves.
@@ -49,6 +51,12 @@ pub struct ObjectParts<'a> {
     pub groups: Option<&'a GroupParts>,
     /// How the materials of the groups look, and vertex colours.
     pub materials: Option<&'a Materials>,
+    /// Seconds of the frames of a sequence; empty where the vertices do not move by themselves.
+    pub sequence_times: &'a [f64],
+    /// Positions of the frames of a sequence.
+    pub sequence_positions: &'a [[f32; 3]],
+    /// Hierarchies for ranges of time.
+    pub segments: &'a [Segment],
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -56,7 +64,7 @@ pub struct ObjectParts<'a> {
 /// Positions and attributes of the source; empty slices are left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Source<'a> {
-    /// Welded positions.
+    /// Welded positions; those of all vertices in deformable objects.
     pub positions: &'a [[f32; 3]],
     /// Rows of `positions` per triangle.
     pub triangles: &'a [[u32; 3]],
@@ -101,6 +109,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.section(kind::OBJECT, index, size_of::<Object>() as u32, row)?;
     builder.rows(kind::LINES, index, parts.lines)?;
     builder.rows(kind::TRIANGLE_IDS, index, parts.triangle_ids)?;
+    builder.rows(kind::LEAF_VERTICES, index, parts.leaf_vertices)?;
     builder.rows(kind::TET_LEAVES, index, parts.tet_leaves)?;
     if let Some(record) = record {
         builder.section(kind::TETS, index, record.stride() as u32, parts.tets)?;
@@ -121,6 +130,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     if let Some(groups) = parts.groups {
         groups.write(builder, index)?;
     }
+    builder.rows(kind::SEQUENCE_TIMES, index, parts.sequence_times)?;
+    builder.rows(kind::SEQUENCE_POSITIONS, index, parts.sequence_positions)?;
+    builder.rows(kind::SEGMENTS, index, parts.segments)?;
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     if let Some(materials) = parts.materials {

@@ -75,8 +75,13 @@ pub(crate) fn segments<'a>(
         let first = object(number)?;
         for (row, segment) in segments.iter().enumerate().skip(1) {
             let at = number.checked_add(segment.object).filter(|at| *at < objects);
-            let Some(at) = at.filter(|at| owner[*at as usize].is_none() && segments_of(*at).is_empty()) else {
-                return fail(Code::SegmentObjects, row, "an object without segments, in one row of one object");
+            let Some(at) = at.filter(|at| owner[*at as usize].is_none() && segments_of(*at).is_empty())
+            else {
+                return fail(
+                    Code::SegmentObjects,
+                    row,
+                    "an object without segments, in one row of one object",
+                );
             };
             owner[at as usize] = Some(number);
             let other = object(at)?;
@@ -85,7 +90,11 @@ pub(crate) fn segments<'a>(
             let equal = a.positions.as_bytes() == b.positions.as_bytes()
                 && a.triangles.as_bytes() == b.triangles.as_bytes();
             if !same || !equal || !other.sequence.times.is_empty() {
-                return fail(Code::SegmentObjects, row, "a deformable object of equal source without a sequence");
+                return fail(
+                    Code::SegmentObjects,
+                    row,
+                    "a deformable object of equal source without a sequence",
+                );
             }
         }
     }

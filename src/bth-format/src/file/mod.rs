@@ -4,8 +4,10 @@
 //! indices of an object, [`File::check_scene`] those of the scene, [`crate::verify`] everything.
 
 mod buffer;
+mod deformed;
 mod table;
 
+pub use deformed::{DeformedObject, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
@@ -16,7 +18,7 @@ use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
 use crate::sequence_view::SequenceView;
-use buffer::Buffer;
+use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
@@ -153,7 +155,7 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_required(e.kind);
+        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_traced(e.kind);
         self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
@@ -236,6 +238,7 @@ impl File {
             tet_faces: self.slice(object, kind::TET_FACES),
             hull_faces: self.slice(object, kind::HULL_FACES),
             triangle_faces: self.slice(object, kind::TRIANGLE_FACES),
+            leaf_vertices: self.slice(object, kind::LEAF_VERTICES),
             positions: self.slice(object, kind::POSITIONS),
             triangles: self.slice(object, kind::TRIANGLES),
             corners: self.slice(object, kind::CORNERS),
@@ -273,7 +276,7 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160` and `BTH-F161`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161` and `BTH-F163` to `BTH-F167`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
@@ -310,14 +313,15 @@ impl File {
     /// # Errors
     /// `BTH-F193` and `BTH-F194`.
     pub fn check_segments(&self) -> Result<()> {
-        let object = |object: u32| {
-            Ok(check::Segmented { view: self.view(object)?, sequence: self.sequence(object) })
-        };
-        check::segments(self.object_count(), self.instances(), object, |object| self.slice(object, kind::SEGMENTS))
-            .map_err(|e| match e.section() {
-                Some(section) => self.locate(e, section.object),
-                None => e,
-            })
+        let object =
+            |object: u32| Ok(check::Segmented { view: self.view(object)?, sequence: self.sequence(object) });
+        check::segments(self.object_count(), self.instances(), object, |object| {
+            self.slice(object, kind::SEGMENTS)
+        })
+        .map_err(|e| match e.section() {
+            Some(section) => self.locate(e, section.object),
+            None => e,
+        })
     }
 
     /// The images of all textures, whose **indices are not checked**.

@@ -38,7 +38,7 @@ pub fn import_sequence(
     for file in others {
         let data = read_file(file)?;
         let source = Source::new(file, &data, monitor);
-        let plain = Wanted { attributes: Keep::None, groups: false, materials: false };
+        let plain = Wanted::from(Keep::None);
         let frame = read_frame(&source, plain)?;
         check_topology(&source, first, &raw, &frame)?;
         frames.push(frame.positions);
@@ -100,7 +100,7 @@ pub(super) fn finish(
     let recorder = std::mem::take(&mut raw.materials);
     let materials =
         groups.as_ref().filter(|_| wanted.materials).map(|(_, kept)| recorder.finish(kept, triangles.len()));
-    let kept = weld(&frames, &mut triangles).map_err(|(frame, row)| {
+    let kept = merge(&frames, &mut triangles, wanted.vertices).map_err(|(frame, row)| {
         let place = Place::Part(file_of(frame), format!("vertex {row} of frame {frame}"));
         let message = format!("expected finite coordinates, found {:?}", frames[frame][row]);
         input_error(
@@ -114,8 +114,10 @@ pub(super) fn finish(
     let read = raw.positions.len() as u64;
     let mut positions = Vec::with_capacity(kept.len() * frames.len());
     for frame in frames {
-        // -0 becomes 0, as in all compiled files.
-        positions.extend(kept.iter().map(|row| frame[*row as usize].map(|x| x + 0.0)));
+        // -0 becomes 0, as in all compiled files; what is not finite is used by no triangle.
+        let finite =
+            |p: [f32; 3]| if p.iter().all(|x| x.is_finite()) { p.map(|x| x + 0.0) } else { [0.0; 3] };
+        positions.extend(kept.iter().map(|row| finite(frame[*row as usize])));
     }
     let mesh = Mesh {
         positions: positions[..kept.len()].to_vec(),
@@ -143,6 +145,21 @@ pub(super) fn finish(
         ..Report::default()
     };
     Ok((mesh, report))
+}
+
+/// The rows of the source that are kept: all of them, or one for each vertex that differs from others in some frame and is used.
+/// Errors are those of [`weld`].
+fn merge(
+    frames: &[Vec<[f32; 3]>],
+    triangles: &mut [[u32; 3]],
+    all: bool,
+) -> std::result::Result<Vec<u32>, (usize, usize)> {
+    if !all {
+        return weld(frames, triangles);
+    }
+    // Of this result only the error is needed.
+    weld(frames, &mut triangles.to_vec())?;
+    Ok((0..frames.first().map_or(0, Vec::len) as u32).collect())
 }
 
 fn without_normals(mut attributes: Attributes) -> Option<Attributes> {

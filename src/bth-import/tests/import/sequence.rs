@@ -5,7 +5,7 @@ use bth_import::{Timing, Wanted, import_sequence, import_vertex_cache, read_vert
 use std::path::{Path, PathBuf};
 
 const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
-const PLAIN: Wanted = Wanted { attributes: Keep::None, groups: false, materials: false };
+const PLAIN: Wanted = Wanted { attributes: Keep::None, groups: false, materials: false, vertices: false };
 
 /// Two triangles whose shared edge comes as vertices of its own for each, and which part in the second frame if `lift` is not 0.
 fn frame(lift: f32) -> String {
@@ -39,7 +39,7 @@ fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
         ],
     );
     let files = sequence_files(&folder.path().join("w_##.obj")).unwrap();
-    let wanted = Wanted { attributes: Keep::All, groups: true, materials: false };
+    let wanted = Wanted { attributes: Keep::All, groups: true, ..PLAIN };
     let (mesh, report) = import_sequence(&files, &TIMING, wanted, &Silent).unwrap();
     assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
     let sequence = mesh.sequence.unwrap();
@@ -51,6 +51,10 @@ fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
     let attributes = mesh.attributes.unwrap();
     assert!(attributes.normals.is_empty() && attributes.uvs == [[0.0; 2]]);
     assert_eq!((report.format.as_str(), report.frames, report.positions_read), ("sequence of obj", 3, 6));
+    // All vertices of the source stay where they are wanted.
+    let wanted = Wanted { vertices: true, ..PLAIN };
+    let (all, _) = import_sequence(&files[..2], &TIMING, wanted, &Silent).unwrap();
+    assert_eq!((all.triangles, all.positions.len()), (vec![[0, 1, 2], [3, 5, 4]], 6));
     // Without the third frame the shared edge is welded.
     let (mesh, report) = import_sequence(&files[..2], &TIMING, PLAIN, &Silent).unwrap();
     assert_eq!((mesh.triangles, report.positions), (vec![[0, 1, 2], [1, 3, 2]], 4));

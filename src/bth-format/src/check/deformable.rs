@@ -11,7 +11,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         return Ok(());
     }
     prerequisites(view)?;
-    Walk { view, next_node: 0, leaves: None, row: 0 }.check()
+    let leaves = leaves_in_order(view)?;
+    Rows { view, row: 0 }.check(&leaves)
 }
 
 /// BTH-F163.
@@ -31,56 +32,68 @@ fn prerequisites(view: &ObjectView) -> Result<()> {
     Err(Error::within(Code::Deformable, kind::LEAF_VERTICES, 0, expected, found))
 }
 
-/// A walk through the tree, depth first.
-struct Walk<'a> {
+/// BTH-F164: the blocks lie in depth-first order, nodes before leaves. Returns the leaves.
+fn leaves_in_order(view: &ObjectView) -> Result<Vec<Child>> {
+    let (mut leaves, mut next) = (Vec::new(), 0);
+    let mut stack = vec![view.header.root];
+    while let Some(code) = stack.pop() {
+        match Child::from_code(code) {
+            Some(Child::Node(line)) => {
+                in_order(line, next)?;
+                next += NODE_LINES;
+                let children = view.node(line).child;
+                stack.extend(children.into_iter().rev().filter(|child| *child != NONE));
+            }
+            // No tet leaves and packed nodes, by BTH-F163.
+            leaf => leaves.extend(leaf),
+        }
+    }
+    for leaf in &leaves {
+        let (line, lines) = match leaf {
+            Child::Raw(line) => (*line, RAW_LINES),
+            Child::Indexed(line) | Child::Node(line) | Child::Packed(line) | Child::Tets(line) => {
+                (*line, INDEXED_LINES)
+            }
+        };
+        in_order(line, next)?;
+        next += lines;
+    }
+    Ok(leaves)
+}
+
+/// The rows of LEAF_VERTICES, leaf by leaf.
+struct Rows<'a> {
     view: &'a ObjectView<'a>,
-    /// Line of the next node.
-    next_node: usize,
-    /// Line of the first leaf, and that of the next one.
-    leaves: Option<(usize, usize)>,
-    /// Row of LEAF_VERTICES of the next leaf.
+    /// Row of the next leaf.
     row: usize,
 }
 
-impl Walk<'_> {
-    fn check(mut self) -> Result<()> {
-        let mut stack = vec![self.view.header.root];
-        while let Some(code) = stack.pop() {
-            match Child::from_code(code) {
-                Some(Child::Node(line)) => {
-                    in_order(line, self.next_node)?;
-                    self.next_node += NODE_LINES;
-                    let children = self.view.node(line).child;
-                    stack.extend(children.into_iter().rev().filter(|child| *child != NONE));
-                }
-                Some(Child::Indexed(line)) => self.indexed(line)?,
-                Some(Child::Raw(line)) => self.raw(line)?,
-                // No tet leaves and packed nodes, by BTH-F163.
-                _ => {}
+impl Rows<'_> {
+    fn check(mut self, leaves: &[Child]) -> Result<()> {
+        for leaf in leaves {
+            match *leaf {
+                Child::Indexed(line) => self.indexed(line)?,
+                Child::Raw(line) => self.raw(line)?,
+                Child::Node(_) | Child::Packed(_) | Child::Tets(_) => {}
             }
-        }
-        if let Some((first, _)) = self.leaves {
-            in_order(first as u32, self.next_node)?;
         }
         let rows = self.view.leaf_vertices.len();
         if rows == self.row { Ok(()) } else { Err(wrong_count(self.row, rows)) }
     }
 
-    /// BTH-F164 and BTH-F165: the leaf is the next one. Returns its rows and the first of them.
-    fn leaf<const ROWS: usize>(&mut self, line: u32, lines: usize) -> Result<(&[[u32; WIDTH]; ROWS], usize)> {
-        let (first, next) = self.leaves.unwrap_or((line as usize, line as usize));
-        in_order(line, next)?;
-        self.leaves = Some((first, next + lines));
+    /// BTH-F165: takes the rows of a leaf; also returns the first of them.
+    fn take<const ROWS: usize>(&mut self) -> Result<(&[[u32; WIDTH]; ROWS], usize)> {
         let row = self.row;
         self.row += ROWS;
-        let rows = self.view.leaf_vertices[row.min(self.view.leaf_vertices.len())..].first_chunk();
-        rows.map(|rows| (rows, row)).ok_or_else(|| wrong_count(self.row, self.view.leaf_vertices.len()))
+        let all = self.view.leaf_vertices;
+        let rows = all.get(row..).and_then(<[_]>::first_chunk);
+        rows.map(|rows| (rows, row)).ok_or_else(|| wrong_count(row + ROWS, all.len()))
     }
 
     fn indexed(&mut self, line: u32) -> Result<()> {
         let view = self.view;
         let leaf = view.indexed_leaf(line);
-        let ([slots], row) = self.leaf::<1>(line, INDEXED_LINES)?;
+        let ([slots], row) = self.take::<1>()?;
         check_slots(view, slots, row, leaf.vertices as usize)?;
         for triangle in 0..leaf.triangles as usize {
             let corners = leaf.corner.map(|vertices| slots[vertices[triangle] as usize]);
@@ -92,7 +105,7 @@ impl Walk<'_> {
     fn raw(&mut self, line: u32) -> Result<()> {
         let view = self.view;
         let leaf = view.raw_leaf(line);
-        let (slots, row) = self.leaf::<3>(line, RAW_LINES)?;
+        let (slots, row) = self.take::<3>()?;
         for (k, slots) in slots.iter().enumerate() {
             check_slots(view, slots, row + k, leaf.triangles as usize)?;
         }

@@ -16,10 +16,14 @@ pub struct DeformedObject {
     view: ObjectView<'static>,
     lines: Owned,
     positions: Vec<[f32; 3]>,
+    normals: Normals,
     header: Arc<Object>,
     file: File,
     object: u32,
 }
+
+/// Normals of a deformed object, in the rows of NORMALS.
+pub type Normals = Option<Vec<[f32; 3]>>;
 
 /// What a refit computes the boxes and vertices of an object from, and where it stores them.
 #[derive(Debug)]
@@ -60,7 +64,7 @@ impl DeformedObject {
         let header = Arc::new(*view.header);
         // SAFETY: `file`, which the view borrows from, is held beside it; see `extended`.
         let view = unsafe { extended(view) };
-        let mut deformed = Self { view, lines, positions, header, file: file.clone(), object };
+        let mut deformed = Self { view, lines, positions, normals: None, header, file: file.clone(), object };
         deformed.set_view(true)?;
         Ok(deformed)
     }
@@ -76,8 +80,8 @@ impl DeformedObject {
         self.lines.bytes().len() + size_of_val(self.positions.as_slice()) + size_of::<Object>()
     }
 
-    /// Replaces the positions by others, of which there are as many, and returns the former ones in their place. `refit` computes the
-    /// boxes of nodes and the vertices of leaves from them, changes nothing else of the lines, and returns the bounds of all
+    /// Replaces the positions by others, of which there are as many, and the normals: by others, by none at all (an empty vector), or by
+    /// those of the file (`None`). Returns the former ones in their place. `refit` computes the boxes of nodes and the vertices of leaves from them, changes nothing else of the lines, and returns the bounds of all
     /// triangles: lower and upper end.
     ///
     /// # Errors
@@ -85,12 +89,14 @@ impl DeformedObject {
     pub fn refit<T>(
         &mut self,
         positions: &mut Vec<[f32; 3]>,
+        normals: &mut Normals,
         refit: impl FnOnce(RefitParts<'_>) -> ([[f32; 3]; 2], T),
     ) -> Result<T> {
         // While memory is written to, nothing borrows from it; should `refit` panic, the view remains that of the file.
         self.set_view(false)?;
         let (root, leaf_vertices) = (self.view.header.root, self.view.leaf_vertices);
         std::mem::swap(&mut self.positions, positions);
+        std::mem::swap(&mut self.normals, normals);
         let lines = <[CacheLine]>::mut_from_bytes(self.lines.bytes_mut()).expect("a whole number of lines");
         let ([lower, upper], result) =
             refit(RefitParts { lines, leaf_vertices, positions: &self.positions, root });
@@ -107,9 +113,10 @@ impl DeformedObject {
             let lines = <[CacheLine]>::ref_from_bytes(self.lines.bytes()).expect("a whole number of lines");
             let header: &Object = &self.header;
             let (bounds, positions) = (ObjectBounds::new(header), self.positions.as_slice());
-            view = ObjectView { header, bounds, lines, positions, ..view };
+            let normals = self.normals.as_deref().unwrap_or(view.normals);
+            view = ObjectView { header, bounds, lines, positions, normals, ..view };
         }
-        // SAFETY: the view borrows from `file` and, if `own`, from `lines`, `positions` and `header`, which are held beside it. They
+        // SAFETY: the view borrows from `file` and, if `own`, from `lines`, `positions`, `normals` and `header`, which are held beside it. They
         // lie on the heap or in mapped pages, so they do not move when `self` does, and are written to and replaced only in
         // `refit`, which first replaces the view by one that does not borrow from them. See `extended`.
         self.view = unsafe { extended(view) };

@@ -7,7 +7,7 @@ mod buffer;
 mod deformed;
 mod table;
 
-pub use deformed::{DeformedObject, RefitParts};
+pub use deformed::{DeformedObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;

@@ -3,7 +3,7 @@
 use super::cost::cost;
 use super::plan::RefitPlan;
 use super::refit::refit;
-use bth_format::file::DeformedObject;
+use bth_format::file::{DeformedObject, Normals};
 use bth_format::object::ObjectView;
 use bth_format::{Code, Error, File};
 
@@ -14,6 +14,8 @@ pub(crate) struct Deforming {
     plan: RefitPlan,
     /// Positions of the next refit, or those of the one before.
     staged: Vec<[f32; 3]>,
+    /// The same for normals. New positions without normals have those of the triangles.
+    staged_normals: Normals,
     /// Expected cost of the tree for the positions of the file.
     compiled_cost: f64,
     /// The same for the positions of the last refit.
@@ -38,7 +40,8 @@ impl Deforming {
         let plan = RefitPlan::new(view);
         let compiled_cost = cost(&view.lines[..plan.node_lines as usize]);
         let staged = view.positions.to_vec();
-        Ok(Deforming { object, plan, staged, compiled_cost, cost: compiled_cost })
+        let staged_normals = Some(Vec::new());
+        Ok(Deforming { object, plan, staged, staged_normals, compiled_cost, cost: compiled_cost })
     }
 
     /// The sections of the object, with its own positions.
@@ -58,13 +61,15 @@ impl Deforming {
         }
         check_finite(positions)?;
         copy_positions(positions, &mut self.staged);
+        self.staged_normals = Some(Vec::new());
         Ok(())
     }
 
     /// Makes positions that [`Self::stage`] has staged those of the object.
     pub(crate) fn refit_staged(&mut self) {
         let plan = &self.plan;
-        let refitted = self.object.refit(&mut self.staged, |mut parts| {
+        let (positions, normals) = (&mut self.staged, &mut self.staged_normals);
+        let refitted = self.object.refit(positions, normals, |mut parts| {
             let ends = refit(plan, &mut parts);
             (ends, cost(&parts.lines[..plan.node_lines as usize]))
         });

@@ -95,11 +95,12 @@ impl CompileOptions {
         }
     }
 
-    /// The options of an object whose vertices move by themselves: a BVH that can be refitted.
-    pub(crate) fn of_moving(&self) -> Self {
+    /// The options of an object whose vertices move: a BVH over coordinates that stay as they are, which keeps the source's
+    /// positions and triangles.
+    pub fn of_deforming(&self) -> Self {
         Self {
-            deformable: true,
             structure: Structure::Bvh,
+            deformable: true,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             ..self.clone()

@@ -19,6 +19,7 @@
 #![warn(missing_docs)]
 
 mod check;
+mod deformation_view;
 pub mod error;
 pub mod exact;
 pub mod file;
@@ -32,6 +33,7 @@ mod sequence_view;
 mod unpack;
 pub mod verify;
 
+pub use deformation_view::{DeformationView, MorphDeltas};
 pub use error::{Code, Error};
 pub use file::File;
 pub use materials_view::{ImagesView, MaterialsView};

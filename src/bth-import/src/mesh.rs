@@ -1,5 +1,6 @@
 //! The triangle mesh that importers make, and their report about it.
 
+use crate::deformation::Deformation;
 use crate::groups::Groups;
 use crate::materials::Materials;
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,9 @@ pub struct Mesh {
     pub materials: Option<Materials>,
     /// The positions at other times, if the mesh is a sequence; `positions` are then those of the first frame.
     pub sequence: Option<Sequence>,
+    /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions are then distinct together with what
+    /// moves them.
+    pub deformation: Option<Deformation>,
 }
 
 /// Positions of a mesh at several times. Between two frames vertices move on straight lines at constant speed; before the first and

@@ -6,13 +6,24 @@ use crate::read::path;
 use crate::table::Table;
 
 /// Keys of an object.
-pub(crate) const OBJECT_KEYS: &[&str] =
-    &["name", "model", "mesh", "file", "object", "sequence", "vertex_cache", "rate", "start"];
+pub(crate) const OBJECT_KEYS: &[&str] = &[
+    "name",
+    "model",
+    "mesh",
+    "deforms",
+    "node",
+    "file",
+    "object",
+    "sequence",
+    "vertex_cache",
+    "rate",
+    "start",
+];
 
 /// The source of an object with a sequence; `None` for others.
 pub(crate) fn sequence(table: &Table<'_>) -> Result<Option<Source>> {
     let Some(value) = table.get("sequence") else { return Ok(None) };
-    for key in ["model", "mesh", "file", "object", "vertex_cache"] {
+    for key in ["model", "mesh", "deforms", "node", "file", "object", "vertex_cache"] {
         table.exclude("sequence", key)?;
     }
     let timing = timing(table)?;
@@ -45,7 +56,7 @@ pub(crate) fn vertex_cache(table: &Table<'_>) -> Result<Option<Source>> {
         }
         return Ok(None);
     };
-    for key in ["mesh", "file", "object"] {
+    for key in ["mesh", "deforms", "node", "file", "object"] {
         table.exclude("vertex_cache", key)?;
     }
     let (path, cache) = (path(&table.need("model")?)?, path(&cache)?);

@@ -2,7 +2,7 @@
 
 use super::valid::{CORNERS, bounds, indexed, lines};
 use super::{Case, Editor, Seal};
-use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
+use bth_compile::write::{DeformerParts, FileBuilder, ObjectParts, SceneParts, object, scene};
 use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
@@ -34,6 +34,7 @@ fn still() -> SceneParts {
         cameras: Vec::new(),
         lights: Vec::new(),
         names: Vec::new(),
+        deformers: DeformerParts::default(),
     }
 }
 
@@ -215,7 +216,7 @@ fn tracks() -> Vec<Case> {
     };
     vec![
         word("F155-node", kind::TRACKS, 3 * row, 3),
-        word("F155-property", kind::TRACKS, 3 * row + 4, 4),
+        word("F155-property", kind::TRACKS, 3 * row + 4, 5),
         word("F155-interpolation", kind::TRACKS, 3 * row + 8, 3),
         word("F155-twice", kind::TRACKS, 3 * row + 4, Property::Rotation as u32),
         word("F155-fading", kind::TRACKS, 8, Interpolation::Linear as u32),

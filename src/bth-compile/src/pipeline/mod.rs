@@ -109,7 +109,7 @@ pub(crate) fn compile_mesh(
 ) -> Result<(Object, StageReports)> {
     options.check()?;
     if let Some(sequence) = mesh.sequence.clone() {
-        let moving = options.of_moving();
+        let moving = options.of_deforming();
         if moving.coordinates != options.coordinates {
             monitor.warn(&format!("{}: coordinates stay f32, since vertices move", source.display()));
         }

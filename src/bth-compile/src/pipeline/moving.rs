@@ -109,7 +109,7 @@ struct Compiler<'a> {
 }
 
 /// Compiles a mesh whose vertices move into an object, with objects of its segments behind it. `options` are those of deformable
-/// objects ([`CompileOptions::of_moving`]).
+/// objects ([`CompileOptions::of_deforming`]).
 pub(crate) fn compile_moving(
     mesh: Mesh,
     source: &dyn PoseSource,

@@ -4,7 +4,7 @@ use super::compile::{build, key, warn_over_limit};
 use super::context::Context;
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
-use super::sources::File;
+use super::sources::{File, SourcePart};
 use crate::cached::{self, Cache, CachedCompilation};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
@@ -104,7 +104,7 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
             path,
             full: path.into(),
             compiled: false,
-            parts: vec![(None, vec![row])],
+            parts: vec![(SourcePart::Whole, vec![row])],
             digest,
             moving: None,
             in_memory,

@@ -32,7 +32,7 @@ pub fn moving_files(source: &Source, folder: &Path) -> Result<Vec<PathBuf>> {
             Ok(files.iter().map(|file| folder.join(file)).collect())
         }
         Source::Cached { path, cache, .. } => Ok(vec![folder.join(path), folder.join(cache)]),
-        Source::Model { .. } | Source::Compiled { .. } => Ok(Vec::new()),
+        _ => Ok(Vec::new()),
     }
 }
 
@@ -45,7 +45,7 @@ impl Moving {
         let (is_cache, SequenceTiming { rate, start }) = match source {
             Source::Sequence { timing, .. } => (false, *timing),
             Source::Cached { timing, .. } => (true, *timing),
-            Source::Model { .. } | Source::Compiled { .. } => return Ok(None),
+            _ => return Ok(None),
         };
         let timing = Timing { rate, usual_rate: manifest.frames.rate, start };
         Ok(Some(Moving { files: moving_files(source, folder)?, is_cache, timing }))

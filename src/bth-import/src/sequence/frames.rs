@@ -94,7 +94,8 @@ pub(super) fn finish(
 ) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows((raw.positions.len() as u64).saturating_mul(frames.len() as u64))?;
-    let attributes = attributes::collect(&raw, wanted.attributes)?.and_then(without_normals);
+    let attributes = attributes::collect(&raw, wanted.attributes)?;
+    let attributes = attributes.and_then(|(attributes, _)| without_normals(attributes));
     let mut triangles = std::mem::take(&mut raw.triangles);
     let groups = wanted.groups.then(|| std::mem::take(&mut raw.groups).finish(triangles.len()));
     let recorder = std::mem::take(&mut raw.materials);

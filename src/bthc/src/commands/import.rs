@@ -66,6 +66,10 @@ fn summary(path: &Path, report: &ImportReport) -> String {
     table.row(["instances", &count(report.instances)]);
     table.row(["objects", &count(report.objects)]);
     table.row(["animations", &report.animations.join(", ")]);
+    if !report.animations_left_out.is_empty() {
+        table.row(["animations left out", &report.animations_left_out.join(", ")]);
+    }
+    table.row(["objects that deform", &count(report.deformers)]);
     table.row(["tracks", &count(report.tracks)]);
     table.row(["cameras", &count(report.cameras)]);
     table.row(["lights", &count(report.lights)]);

@@ -22,7 +22,7 @@ fn node(transform: [f64; 12], parent: u32, flags: u32, name: (u32, u32)) -> Node
     Node { transform, parent, flags, name: name.0, name_length: name.1, reserved: [0; 4] }
 }
 
-fn still() -> SceneParts {
+pub(super) fn still() -> SceneParts {
     let identity = parts([0.0; 3], [0.0, 0.0, 0.0, 1.0], [1.0; 3]);
     SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 0, camera: NONE, reserved: [0; 11] },

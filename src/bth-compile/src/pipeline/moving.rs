@@ -167,8 +167,9 @@ impl Compiler<'_> {
         PoseOptions { effort: self.options.bvh.quality.effort(), keep_zero_area: true }
     }
 
-    fn costs(&self) -> &Costs {
-        &self.options.collapse.costs
+    /// The costs by which trees are compared: of rays alone, not of the size of files.
+    fn costs(&self) -> Costs {
+        Costs { line: 0.0, ..self.options.collapse.costs }
     }
 
     /// The tree of a mesh over some poses, and what its nodes are worth on average.
@@ -179,13 +180,14 @@ impl Compiler<'_> {
         Ok((TreeOfPoses { tree, probabilities }, report))
     }
 
-    /// The cost of a tree's wide form in each pose.
+    /// The cost of the best wide form of a tree in each pose.
     fn cost(&self, mesh: &Mesh, tree: &TreeOfPoses, positions: &[Vec<[f32; 3]>]) -> Result<Vec<f64>> {
         let weighed = tree.weighed();
-        let options = bvh::CollapseOptions { keep_subtrees: false, ..self.options.collapse };
+        let costs = self.costs();
+        let options = bvh::CollapseOptions { keep_subtrees: false, costs, ..self.options.collapse };
         let (wide, _) = bvh::collapse(mesh, weighed, &[], &options, self.monitor)?;
         let poses = Poses::new(mesh, positions)?;
-        Ok(bvh::pose_costs(mesh, &wide, self.costs(), &poses).into_iter().map(|pose| pose.cost).collect())
+        Ok(bvh::pose_costs(mesh, &wide, &costs, &poses).into_iter().map(|pose| pose.cost).collect())
     }
 
     /// Times of comparison, and the costs of trees that are built for these poses alone.

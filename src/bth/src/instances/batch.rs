@@ -224,7 +224,8 @@ impl World {
     }
 }
 
-/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
+/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene. Visits
+/// whose ray leaves its triangle in a free direction are left out.
 fn trace_visits<Q: Query>(
     batch: &SceneBatch<'_>,
     object: &ObjectView<'_>,
@@ -232,6 +233,16 @@ fn trace_visits<Q: Query>(
     scratch: &mut Scratch,
     answers: &mut [Q::Answer],
 ) {
+    if let Some(from) = object_rays.hints()
+        && scratch.free[usize::from(Q::ANY)].find_rest(object, &object_rays.rays, from)
+    {
+        let rest = std::mem::take(&mut scratch.free[usize::from(Q::ANY)].rest);
+        let (rest_rays, visits) = object_rays.part(visits, &rest);
+        scratch.free[usize::from(Q::ANY)].rest = rest;
+        let scene = SceneRays { rays: batch.rays, visits: &visits, t_scale: &rest_rays.t_scale };
+        let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
+        return object::trace_batch(object, &rest_rays.rays, rest_rays.hints(), scratch, &mut sink);
+    }
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
     let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
     object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);

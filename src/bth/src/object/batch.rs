@@ -35,8 +35,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    let mut sink = Sink::<Nearest>::new(object.triangle_ids, hits, instance);
-    trace_batch(object, rays, from, scratch, &mut sink);
+    trace_from::<Nearest>(object, rays, from, instance, scratch, hits);
 }
 
 /// Computes whether rays in object space hit anything; `from` as for [`nearest_batch`].
@@ -47,8 +46,36 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    let mut sink = Sink::<Any>::new(object.triangle_ids, found, 0);
-    trace_batch(object, rays, from, scratch, &mut sink);
+    trace_from::<Any>(object, rays, from, 0, scratch, found);
+}
+
+/// Stores the answers of those rays that hit anything. Rays that leave their triangle in a free direction are not traced.
+fn trace_from<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    if let Some(from) = from
+        && scratch.free[usize::from(Q::ANY)].find_rest(object, rays, from)
+    {
+        // The rest is traced like a batch of its own, so that its rays can go in packets.
+        let rest = std::mem::take(&mut scratch.free[usize::from(Q::ANY)].rest);
+        let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
+        let rest_from: Vec<u32> = rest.iter().map(|ray| from[*ray as usize]).collect();
+        let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
+        let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
+        let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
+        trace_batch(object, &rest_rays, Some(&rest_from), scratch, &mut sink);
+        for (ray, found) in rest.iter().zip(found) {
+            answers[*ray as usize] = found;
+        }
+        scratch.free[usize::from(Q::ANY)].rest = rest;
+        return;
+    }
+    trace_batch(object, rays, from, scratch, &mut Sink::<Q>::new(object.triangle_ids, answers, instance));
 }
 
 /// Fills `hits` with [`Hit::MISS`].

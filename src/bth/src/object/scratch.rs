@@ -3,6 +3,7 @@
 use super::strategy::StrategyTable;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
+use crate::free::FreeScratch;
 use std::cell::Cell;
 
 /// Memory that the traversals of batches use, and the measured costs of strategies.
@@ -11,6 +12,8 @@ pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
     pub(super) choices: StrategyTable,
+    /// Look-ups of free directions, for nearest and for any hits.
+    pub(crate) free: [FreeScratch; 2],
 }
 
 /// Calls `work` with the thread's scratch memory.

@@ -23,4 +23,5 @@ pub(crate) mod single_rays;
 mod tests;
 pub(crate) mod traverse;
 
+pub(crate) use coherence::PacketBackoff;
 pub(crate) use runs::{MINIMUM_USE, PacketScratch, trace};

@@ -102,11 +102,14 @@ impl Differences {
     #[inline]
     fn face(&self, axis: usize, [near, far]: [f64; 2]) -> u16 {
         let (x, y) = ((axis + 1) % 3, (axis + 2) % 3);
-        let columns = depths([self.lower[x], self.upper[x]]);
-        let rows = depths([self.lower[y], self.upper[y]]);
+        let columns = depths(self.lower[x], self.upper[x]);
+        let rows = depths(self.lower[y], self.upper[y]);
         let mut bins = 0;
         for (j, [y_near, y_far]) in rows.into_iter().enumerate() {
             let (least, most) = (near.max(y_near), far.min(y_far));
+            if least > most {
+                continue;
+            }
             for (i, [x_near, x_far]) in columns.into_iter().enumerate() {
                 bins |= u16::from(least.max(x_near) <= most.min(x_far)) << (FREE_SIDE * j + i);
             }
@@ -115,21 +118,31 @@ impl Differences {
     }
 }
 
-/// For each column of bins the depths at which some component between the ends lies within the column, rounded outwards.
-#[inline]
-fn depths([lower, upper]: [f64; 2]) -> [[f64; 2]; FREE_SIDE] {
-    static ENDS: LazyLock<[[f64; 2]; FREE_SIDE]> =
-        LazyLock::new(|| std::array::from_fn(|column| free_column(column).map(|end| 1.0 / end)));
-    let mut depths = [[0.0; 2]; FREE_SIDE];
-    for (out, [a, b]) in depths.iter_mut().zip(*ENDS) {
-        // The component is a z at least and b z at most: a z <= upper and b z >= lower. No end is zero.
-        let (at_a, at_b) = (upper * a, lower * b);
-        let (a_slack, b_slack) = (at_a.abs() * OUTWARDS, at_b.abs() * OUTWARDS);
-        let far = if a > 0.0 { at_a + a_slack } else { f64::INFINITY };
-        let near = if a > 0.0 { 0.0 } else { at_a - a_slack };
-        *out = if b > 0.0 { [near.max(at_b - b_slack), far] } else { [near, far.min(at_b + b_slack)] };
+/// Reciprocals of the least and greatest end of each column of bins, of which none is zero.
+const RECIPROCALS: [[f64; 2]; FREE_SIDE] = {
+    let ends = [free_column(0), free_column(1), free_column(2), free_column(3)];
+    let mut reciprocals = [[0.0; 2]; FREE_SIDE];
+    let mut column = 0;
+    while column < FREE_SIDE {
+        reciprocals[column] = [1.0 / ends[column][0], 1.0 / ends[column][1]];
+        column += 1;
     }
-    depths
+    reciprocals
+};
+
+/// For each column of bins the depths z at which a component from `lower` to `upper` lies within the column, from a z to b z, rounded
+/// outwards: a z is at most `upper`, and b z at least `lower`. The sign of an end says which of these bounds z from which side.
+#[inline]
+fn depths(lower: f64, upper: f64) -> [[f64; 2]; FREE_SIDE] {
+    let down = |x: f64| x - x.abs() * OUTWARDS;
+    let up = |x: f64| x + x.abs() * OUTWARDS;
+    let [[a0, b0], [a1, b1], [a2, b2], [a3, b3]] = RECIPROCALS;
+    [
+        [down(upper * a0), up(lower * b0)],
+        [down((upper * a1).max(lower * b1)), f64::INFINITY],
+        [down((upper * a2).max(lower * b2)), f64::INFINITY],
+        [down(lower * b3), up(upper * a3)],
+    ]
 }
 
 #[cfg(test)]

@@ -84,9 +84,11 @@ pub struct FreeReport {
     pub seconds: f64,
 }
 
-/// Consecutive triangles in the order of the BVH that one task decides. Part of the result: what blocked a bin is remembered within
+/// Most triangles of a subtree whose bins are decided together.
+const CLUSTER: u32 = 16;
+/// Most triangles of a subtree that one task decides, cluster by cluster. Part of the result: what blocked a bin is remembered within
 /// a task.
-const TASK: usize = 256;
+const TASK: u32 = 512;
 
 impl FreeReport {
     /// Whether the directions are worth their bytes.
@@ -112,20 +114,36 @@ pub fn find(
     monitor.stage("free directions", Some(tree.order.len() as u64));
     let reach = reach(tree, options.reach);
     let around = Surroundings::new(mesh, tree, reach);
-    let parts = tree.order.par_chunks(TASK).map(|triangles| {
+    let parts = subtrees(tree, 0, TASK).into_par_iter().map(|task| {
         monitor.check()?;
         let mut search = Search::new(&around);
-        let classes: Vec<_> = triangles.iter().map(|triangle| search.classes(*triangle)).collect();
-        monitor.advance(triangles.len() as u64);
+        let mut classes = Vec::with_capacity(TASK as usize);
+        for cluster in subtrees(tree, task, CLUSTER) {
+            search.decide(cluster, &mut |row, of_row| classes.push((row, FreeDirections::new(NONE, &of_row).classes)));
+        }
+        monitor.advance(classes.len() as u64);
         Ok(classes)
     });
     let parts = parts.collect::<Result<Vec<_>>>()?;
     let mut free = Free { reach, classes: vec![[0; FREE_BYTES]; mesh.triangles.len()] };
-    for (triangle, classes) in tree.order.iter().zip(parts.iter().flatten()) {
-        free.classes[*triangle as usize] = FreeDirections::new(NONE, classes).classes;
+    for (row, classes) in parts.into_iter().flatten() {
+        free.classes[tree.order[row as usize] as usize] = classes;
     }
     let report = report(mesh, tree, &free);
     Ok((free, report))
+}
+
+/// The largest subtrees of at most `most` triangles below a node, from left to right.
+fn subtrees(tree: &BinaryBvh, node: u32, most: u32) -> Vec<u32> {
+    let (mut stack, mut found) = (vec![node], Vec::new());
+    while let Some(node) = stack.pop() {
+        match tree.nodes.get(node as usize) {
+            Some(inner) if inner.count > most => stack.extend([inner.right, node + 1]),
+            Some(_) => found.push(node),
+            None => {}
+        }
+    }
+    found
 }
 
 /// The reach in object space; 0, within which nothing lies, where it would not be in the range of the format.

@@ -1,4 +1,4 @@
-//! The classes of the bins of one triangle: a traversal of the BVH that stops at what no undecided shaft may meet.
+//! The classes of the bins of triangles: a traversal of the BVH that stops at what no undecided shaft may meet.
 
 use super::bins::{ALL_BINS, BinSet, CONES, Differences};
 use super::shaft::{Corners, Shaft, Start};
@@ -99,6 +99,18 @@ impl State {
         (free_bin(d.map(|x| x as f32)), d.iter().map(|x| x * x).sum())
     }
 
+    /// What has become of the bins.
+    fn classes(&self) -> [FreeClass; FREE_BINS] {
+        std::array::from_fn(|bin| {
+            let is_open = |which: usize| self.open[which] >> bin & 1 == 1;
+            match (is_open(ALL), is_open(NEAR)) {
+                (true, _) => FreeClass::All,
+                (false, true) => FreeClass::Near,
+                (false, false) => FreeClass::Unknown,
+            }
+        })
+    }
+
     fn shaft(&mut self, bin: usize) -> usize {
         match self.shafts.iter().position(|(of, _)| *of == bin) {
             Some(at) => at,
@@ -111,16 +123,65 @@ impl State {
     }
 }
 
+/// Bins that are open for any of the start triangles.
+fn open_of(states: &[State]) -> [BinSet; 2] {
+    states.iter().fold([0; 2], |[near, all], state| [near | state.open[NEAR], all | state.open[ALL]])
+}
+
+/// Length of the longest side of a box.
+fn greatest_side([lower, upper]: &[[f64; 3]; 2]) -> f64 {
+    (0..3).fold(0.0, |most: f64, k| most.max(upper[k] - lower[k]))
+}
+
 impl<'a> Search<'a> {
     pub(super) fn new(around: &'a Surroundings<'a>) -> Self {
         Search { around, blockers: [[NONE; FREE_BINS]; 2], stack: Vec::new() }
     }
 
-    /// The classes of the bins of a triangle, which has an area.
-    pub(super) fn classes(&mut self, triangle: u32) -> [FreeClass; FREE_BINS] {
-        let mut state = State::new(self.around.mesh, triangle);
-        self.ask_blockers(&mut state);
-        self.push(&state, 0);
+    /// Decides the bins of the triangles of a subtree. `decided` is called with the row of `order` and the classes of each.
+    ///
+    /// Where the box of a subtree is no larger than that of all start triangles, it is searched for each of these by itself. Down to
+    /// there the box of the start triangles stands for all: most of what is far away is left out for all of them together.
+    pub(super) fn decide(&mut self, subtree: u32, decided: &mut impl FnMut(u32, [FreeClass; FREE_BINS])) {
+        let around = self.around;
+        let node = &around.tree.nodes[subtree as usize];
+        let rows = node.first..node.first + node.count;
+        let mut states: Vec<State> = Vec::with_capacity(node.count as usize);
+        for row in rows.clone() {
+            let mut state = State::new(around.mesh, around.tree.order[row as usize]);
+            self.ask_blockers(&mut state);
+            states.push(state);
+        }
+        let from = &around.boxes[subtree as usize];
+        let (mut open, mut stack) = (open_of(&states), vec![(0, 0.0)]);
+        while let Some((node, squared_gap)) = stack.pop() {
+            let differences = Differences::new(from, &around.boxes[node as usize]);
+            let bins = open[usize::from(!self.is_near(squared_gap))];
+            if bins == 0 || differences.bins(bins) == 0 {
+                continue;
+            }
+            let below = &around.tree.nodes[node as usize];
+            if below.is_leaf() || greatest_side(&around.boxes[node as usize]) <= greatest_side(from) {
+                for state in &mut states {
+                    self.search(state, node);
+                }
+                open = open_of(&states);
+                continue;
+            }
+            let gap = |child: u32| Differences::new(from, &around.boxes[child as usize]).squared_gap();
+            let mut children = [node + 1, below.right].map(|child| (child, gap(child)));
+            // The nearer child is popped first.
+            children.sort_by(|a, b| b.1.total_cmp(&a.1));
+            stack.extend(children);
+        }
+        for (row, state) in rows.zip(states) {
+            decided(row, state.classes());
+        }
+    }
+
+    /// Blocks the bins of a start triangle whose shafts triangles of a subtree may meet.
+    fn search(&mut self, state: &mut State, subtree: u32) {
+        self.push(state, subtree);
         while let Some(Entry { node, squared_gap, bins }) = self.stack.pop() {
             if bins & state.blockable(self.is_near(squared_gap)) == 0 {
                 continue;
@@ -128,26 +189,17 @@ impl<'a> Search<'a> {
             let below = &self.around.tree.nodes[node as usize];
             if below.is_leaf() {
                 for row in below.first..below.first + below.count {
-                    self.meet(&mut state, self.around.tree.order[row as usize]);
+                    self.meet(state, self.around.tree.order[row as usize]);
                 }
                 continue;
             }
             let first = self.stack.len();
-            self.push(&state, node + 1);
-            self.push(&state, below.right);
-            // The nearer child is popped first.
+            self.push(state, node + 1);
+            self.push(state, below.right);
             if self.stack.len() == first + 2 && self.stack[first].squared_gap < self.stack[first + 1].squared_gap {
                 self.stack.swap(first, first + 1);
             }
         }
-        std::array::from_fn(|bin| {
-            let is_open = |which: usize| state.open[which] >> bin & 1 == 1;
-            match (is_open(ALL), is_open(NEAR)) {
-                (true, _) => FreeClass::All,
-                (false, true) => FreeClass::Near,
-                (false, false) => FreeClass::Unknown,
-            }
-        })
     }
 
     #[inline]

@@ -174,10 +174,10 @@ pub fn free_bin(direction: [f32; 3]) -> usize {
 }
 
 /// Ends of a column of bins on a face of the cube, with the margin: a and b of the promise a ≤ component / depth ≤ b.
-pub fn free_column(column: usize) -> [f64; 2] {
-    let border = f64::from(FREE_BORDER);
+pub const fn free_column(column: usize) -> [f64; 2] {
+    let border = FREE_BORDER as f64;
     let ends = [-1.0, -border, 0.0, border, 1.0];
-    let margin = f64::from(FREE_MARGIN);
+    let margin = FREE_MARGIN as f64;
     [ends[column] - margin, ends[column + 1] + margin]
 }
 

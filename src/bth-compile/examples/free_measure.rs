@@ -78,6 +78,19 @@ fn main() {
         for _ in 0..4 { ao.push(Ray::new(p.map(|x| x as f32), d()).with_range(0.0, (0.05 * diag) as f32)); afrom.push(hit.primitive); }
     }
     println!("  {} diffuse {} ao", diffuse.len(), ao.len());
+    for (name, rays, from) in [("diffuse", &diffuse, &dfrom), ("ao", &ao, &afrom)] {
+        let (mut done, mut free_bits, mut near_bits, mut n) = (0, 0, 0, 0);
+        for (ray, f) in rays.iter().zip(from.iter()).take(20000) {
+            n += 1;
+            let (_, steps) = scene.nearest_counted(ray, *f);
+            let (_, plain) = scene.nearest_counted(ray, PrimitiveRef::NONE);
+            done += usize::from(steps == Default::default() && plain != Default::default());
+            let class = view.free[f.triangle as usize].class(bth_format::layout::free_bin(ray.direction));
+            free_bits += usize::from(class == bth_format::layout::FreeClass::All);
+            near_bits += usize::from(class == bth_format::layout::FreeClass::Near);
+        }
+        println!("  {name}: done {:.3} class all {:.3} near {:.3}", done as f64 / n as f64, free_bits as f64 / n as f64, near_bits as f64 / n as f64);
+    }
     for batch in [1024usize, 1] {
         for (name, rays, from, any) in [("diffuse", &diffuse, &dfrom, false), ("ao", &ao, &afrom, true)] {
             if batch == 1 && rays.len() < 10 { continue; }

@@ -1,9 +1,10 @@
-"""Geometry (format-spec/README.md, "Verifying"): F201 to F208, with exact rational arithmetic."""
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F209, with exact rational arithmetic."""
 
 import struct
 from fractions import Fraction
 
 import bth_container as c
+import bth_free
 import bth_leaves
 from bth_container import NONE
 from bth_indices import TETS, child
@@ -51,6 +52,7 @@ def check_geometry(view, tets):
     for t in missing:
         if view.source and not is_zero_area(_source(view, t)):
             raise view.invalid("F207", f"triangle {t} has an area but no leaf", c.TRIANGLES, 12 * t)
+    bth_free.check_met(view, side)
 
 
 def _source(view, t):

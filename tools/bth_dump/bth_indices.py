@@ -1,9 +1,10 @@
-"""The index check (format-spec/README.md, "Index check"): F101 to F147."""
+"""The index check (format-spec/README.md, "Index check"): F101 to F147 and F168 to F171."""
 
 import math
 import struct
 
 import bth_container as c
+import bth_free
 import bth_leaves
 from bth_container import NONE
 from bth_leaves import INDEXED, NODE, PACKED, RAW
@@ -30,6 +31,7 @@ def check_indices(view):
     _header(view)
     _sources(view)
     _opacity(view)
+    bth_free.check(view)
     _tet_ranges(view)
     _triangle_faces(view)
     _tree(view)
@@ -133,7 +135,7 @@ def _triangle_faces(view):
 def _tree(view):
     """F105 to F118 and F123."""
     halves = len(view.lines) // 32
-    claimed, referenced = set(), set()
+    claimed, referenced, placed = set(), set(), set()
     # Code, nodes above, first half line of the parent, whether in a subtree, section and byte of the reference.
     stack = [(view.root, 0, -1, False, c.OBJECT, 24)]
     while stack:
@@ -170,12 +172,14 @@ def _tree(view):
                 stack.append((codes[slot], depth + 1, block.start, in_subtree, c.LINES, at))
         else:
             bth_leaves.check(view, kind, index)
+            placed.update(bth_free.placed(view, kind, index))
     for half in range(halves):
         spare = view.grid and half % 2 and not any(view.lines[32 * half : 32 * half + 32])
         if half not in claimed and not spare:
             raise view.invalid("F109", f"half line {half} is no block's", c.LINES, 32 * half)
     if len(referenced) != len(view.tet_leaves):
         raise view.invalid("F123", "a tet leaf without a reference", c.TET_LEAVES)
+    bth_free.check_places(view, placed)
     for row, triangle in enumerate(view.triangle_ids):
         if triangle >= view.triangles:
             raise view.invalid("F116", f"id {triangle}", c.TRIANGLE_IDS, 4 * row)

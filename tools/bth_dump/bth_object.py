@@ -47,6 +47,8 @@ class ObjectView:
         self.corners = self.rows(c.CORNERS, "<3I")
         self.normals = self.rows(c.NORMALS, "<3f")
         self.uvs = self.rows(c.UVS, "<2f")
+        self.free = self.rows(c.FREE_DIRECTIONS, "<I20s")
+        self.free_reach = self.rows(c.FREE_REACH, "<f3I")
         self.opacity = self.rows(c.OPACITY, "<I", scalar=True)
         self.opacity_micro = self.rows(c.OPACITY_MICRO, "<I", scalar=True)
         self._read_tets()

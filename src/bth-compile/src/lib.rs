@@ -17,6 +17,7 @@ pub mod cached;
 pub mod comparison;
 pub mod coordinates;
 pub mod costs;
+pub mod free;
 pub mod jobs;
 pub mod marks;
 pub mod memory;

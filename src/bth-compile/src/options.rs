@@ -1,6 +1,6 @@
 //! The options of a compilation: those of all stages.
 
-use crate::{bvh, coordinates, costs, tets};
+use crate::{bvh, coordinates, costs, free, tets};
 use bth_format::layout::RecordKind;
 use bth_import as mesh;
 use serde::Serialize;
@@ -37,6 +37,8 @@ pub struct CompileOptions {
     pub bvh: bvh::BvhOptions,
     /// Collapse to the wide BVH; its field `keep_subtrees` is overridden by the one below.
     pub collapse: bvh::CollapseOptions,
+    /// Directions in which rays from a triangle meet nothing.
+    pub free: free::FreeOptions,
     /// Selection of the nodes to tetrahedralize.
     pub costs: costs::CostOptions,
     /// Tetrahedralization.
@@ -64,6 +66,7 @@ impl Default for CompileOptions {
             coordinates: coordinates::CoordinateOptions::default(),
             bvh: bvh::BvhOptions::default(),
             collapse: bvh::CollapseOptions::default(),
+            free: free::FreeOptions::default(),
             costs: costs::CostOptions::default(),
             tets: tets::TetOptions::default(),
             record: RecordKind::Link32,

@@ -20,6 +20,7 @@ mod bvh;
 mod closest;
 mod crossing;
 mod enumerate;
+mod free;
 mod hits;
 mod instances;
 mod intersect;

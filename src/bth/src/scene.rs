@@ -1,5 +1,6 @@
 //! Scenes: opening of compiled files and queries by rays in world space.
 
+use crate::free;
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::object;
@@ -383,9 +384,9 @@ fn start_primitive(from: Option<&[PrimitiveRef]>, ray: usize) -> PrimitiveRef {
 }
 
 /// For each ray the triangle of an instance's object on which it starts, or `NONE`. `None` if there are no hints, or if the
-/// object has no tetrahedra, because only their traversal uses hints.
+/// object has neither tetrahedra nor free directions, because only these use hints.
 fn hints(object: &ObjectView<'_>, from: Option<&[PrimitiveRef]>, instance: u32) -> Option<Vec<u32>> {
-    let from = from.filter(|_| !object.tet_leaves.is_empty())?;
+    let from = from.filter(|_| !object.tet_leaves.is_empty() || free::is_known(object))?;
     Some(from.iter().map(|&from| hint(from, instance)).collect())
 }
 

@@ -9,6 +9,7 @@ pub fn invalid() -> Vec<Case> {
     let mut cases = container();
     cases.extend(tree());
     cases.extend(opacity());
+    cases.extend(free_directions());
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(groups());
@@ -295,6 +296,45 @@ fn tree() -> Vec<Case> {
         field("F140-triangles", base, kind::TRIANGLES, 0, 30),
         field("F140-corners", base, kind::CORNERS, 8, NONE),
         field("F141-nan", base, kind::POSITIONS, 4, nan),
+    ]
+}
+
+/// Faults of free directions.
+fn free_directions() -> Vec<Case> {
+    let base = "free-directions";
+    let (directions, reach) = (kind::FREE_DIRECTIONS, kind::FREE_REACH);
+    let rows = |name: &str, kind: u32, [stride, before, count]: [usize; 3]| {
+        broken(name, base, Seal::Sections, |e| {
+            let end = e.section_at(kind) + stride * count;
+            e.put(end, &vec![0; stride * (before - count)]);
+            let at = e.entry_at(0, kind);
+            e.put(at + offset_of!(SectionEntry, length), &((stride * count) as u64).to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &(count as u64).to_le_bytes());
+        })
+    };
+    let byte = |name: &str, at: usize, value: u8| {
+        broken(name, base, Seal::Sections, |e| {
+            e.put(e.section_at(directions) + at, &[value]);
+        })
+    };
+    let place = |leaf, slot| FreePlace { leaf, slot }.code();
+    vec![
+        rows("F168-rows", directions, [24, 2, 1]),
+        rows("F168-no-reach", reach, [16, 1, 0]),
+        rows("F168-reach-alone", directions, [24, 2, 0]),
+        field("F169-place-of-another", base, directions, 0, place(Child::Indexed(0), 0)),
+        field("F169-other-leaf", base, directions, 0, place(Child::Raw(0), 1)),
+        field("F169-beyond", base, directions, 24, place(Child::Indexed(1 << 20), 0)),
+        field("F169-classes-without-a-place", base, directions, 0, NONE),
+        byte("F170-byte", 4 + 13, 243),
+        byte("F170-last-byte", 4 + 19, 3),
+        field("F171-infinite", base, reach, 0, f32::INFINITY.to_bits()),
+        field("F171-negative", base, reach, 0, (-1f32).to_bits()),
+        field("F171-reserved", base, reach, 12, 1),
+        // All digits of bins 65 to 69, which lead up, are 2.
+        byte("F209-met", 4 + 13, 242),
+        // With a longer reach the triangle above is met.
+        field("F209-met-within-the-reach", base, reach, 0, 20f32.to_bits()),
     ]
 }
 

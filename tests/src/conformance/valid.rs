@@ -20,6 +20,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("packed-nodes", two_levels(None, true)),
         Case::new("packed-nodes-grid-16", two_levels(Some(GridBits::B16), true)),
         Case::new("opacity", opacity()),
+        Case::new("free-directions", free_directions()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
         Case::new("materials", super::materials::materials()),
@@ -117,6 +118,34 @@ fn triangle() -> Vec<u8> {
     object(&mut builder, 0, &parts).unwrap();
     builder.provenance("{\"tool\":\"conformance\"}".into()).unwrap();
     builder.finish()
+}
+
+/// Two parallel triangles, one high above the other. Straight up and down there is nothing within the reach between them and
+/// nothing at all on the other side.
+fn free_directions() -> Vec<u8> {
+    let above = CORNERS.map(|[x, y, _]| [x, y, 10.0]);
+    let lines = lines(indexed(&[above, CORNERS], 0).as_bytes());
+    let classes = |down, up| {
+        let mut classes = [FreeClass::Unknown; FREE_BINS];
+        classes[64..80].fill(up);
+        classes[80..96].fill(down);
+        classes
+    };
+    let row = |slot, classes| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), &classes);
+    let free = [
+        row(1, classes(FreeClass::All, FreeClass::Near)),
+        row(0, classes(FreeClass::Near, FreeClass::All)),
+    ];
+    file(&ObjectParts {
+        bounds: Some(bounds(CORNERS.iter().chain(&above))),
+        root: Child::Indexed(0).code(),
+        triangles: 2,
+        lines: &lines,
+        triangle_ids: &[1, 0],
+        free: &free,
+        free_reach: &[FreeReach { reach: 1.0, reserved: [0; 3] }],
+        ..ObjectParts::default()
+    })
 }
 
 /// Six triangles side by side: opaque, transparent, unknown, and divided at levels 1 and 2 and once more at level 1 by the

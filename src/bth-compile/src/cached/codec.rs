@@ -1,6 +1,7 @@
 //! Encodes results of the stages as bytes, and decodes them with checks.
 
 use super::rows::{HashedRows, RowReader, RowWriter};
+use crate::free::Free;
 use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
@@ -244,6 +245,17 @@ impl Codec for Marks {
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
         let suitable: Vec<u8> = from.take()?;
         Some(Marks { suitable: suitable.iter().map(|s| *s != 0).collect() })
+    }
+}
+
+impl Codec for Free {
+    fn write(&self, to: &mut RowWriter) {
+        to.add(&[self.reach]);
+        to.add(&self.classes);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        Some(Free { reach: from.one()?, classes: from.take()? })
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::codec::MeshSummary;
 use super::rows::HashedRows;
-use crate::bvh;
+use crate::{bvh, free};
 use crate::options::{CompileOptions, Structure};
 use crate::source::SourceDigest;
 use crate::write::SceneParts;
@@ -19,6 +19,7 @@ use std::path::Path;
 const MESH: &str = "2";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
+const FREE: &str = "1";
 const MARKS: &str = "1";
 const COSTS: &str = "3";
 const TETS: &str = "1";
@@ -62,6 +63,14 @@ pub(crate) fn bvh(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
         .with("geometry", geometry.hex())
         .with("quality", text(&options.quality))
         .with("bvh version", BVH)
+}
+
+/// The free directions of its triangles. What is too close to decide may depend on the BVH.
+pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::FreeOptions) -> Key {
+    Key::new("free directions")
+        .with_all(self::bvh(geometry, bvh).components().iter().cloned())
+        .with("reach", text(&options.reach))
+        .with("free directions version", FREE)
 }
 
 /// The marks of its nodes.
@@ -175,6 +184,13 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     }
     if options.materials {
         all.extend([("materials", "true".to_owned()), ("materials version", MATERIALS.to_owned())]);
+    }
+    if options.free.keep != free::KeepFree::None {
+        all.extend([
+            ("free directions", text(&options.free.keep)),
+            ("reach", text(&options.free.reach)),
+            ("free directions version", FREE.to_owned()),
+        ]);
     }
     if options.collapse.plan != Default::default() {
         all.push(("plan", format!("{:?}", options.collapse.plan)));

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::pipeline::{Direct, Stages, timed};
 use crate::source::Model;
-use crate::{bvh, marks, tets};
+use crate::{bvh, free, marks, tets};
 use bth_files::Digest;
 use bth_import::{self as mesh, Mesh, Wanted};
 use std::path::Path;
@@ -90,6 +90,26 @@ impl Stages for CachedStages<'_> {
             |bytes| decode::<Topology>(bytes)?.over(mesh),
             |tree| encode(&Topology::of(tree)),
             || Direct.bvh(mesh, options, monitor),
+        )
+    }
+
+    fn free(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        (bvh, options): (&bvh::BvhOptions, &free::FreeOptions),
+        monitor: &dyn Monitor,
+    ) -> Result<(free::Free, free::FreeReport)> {
+        if self.cache.store().is_none() {
+            return Direct.free(mesh, tree, (bvh, options), monitor);
+        }
+        let geometry = hash_once(&mut self.geometry, mesh);
+        self.cache.get_or_build(
+            (keys::free(&geometry, bvh, options), self.part),
+            monitor,
+            |bytes| decode(bytes).filter(|f: &free::Free| f.classes.len() == mesh.triangles.len()),
+            encode,
+            || Direct.free(mesh, tree, (bvh, options), monitor),
         )
     }
 

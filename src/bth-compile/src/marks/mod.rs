@@ -17,7 +17,7 @@ mod triangle_contact;
 #[cfg(test)]
 mod oracle;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use bad_pairs::{BadPairs, bad_pairs};
 pub use mark::{MarkReport, mark};

@@ -2,7 +2,7 @@
 //! options.
 
 use crate::error::Result;
-use crate::{bvh, costs, marks, tets};
+use crate::{bvh, costs, free, marks, tets};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -34,6 +34,12 @@ impl StageReport for marks::MarkReport {
 }
 
 impl StageReport for costs::CostReport {
+    fn seconds(&mut self) -> &mut f64 {
+        &mut self.seconds
+    }
+}
+
+impl StageReport for free::FreeReport {
     fn seconds(&mut self) -> &mut f64 {
         &mut self.seconds
     }

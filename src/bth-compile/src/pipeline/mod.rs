@@ -25,7 +25,7 @@ pub(crate) use stages::{Direct, Stages};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest, changed};
-use crate::{coordinates, tets};
+use crate::{coordinates, free, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::collections::BTreeSet;
@@ -115,9 +115,29 @@ pub(crate) fn compile_mesh(
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };
-    let (object, collapse) = clock.time("collapse", || object::join(traced, leaves, options, monitor))?;
+    let (free, free_report) = free_directions(&traced, options, stages, clock, monitor)?;
+    let (object, collapse) = clock.time("collapse", || object::join(traced, leaves, free, options, monitor))?;
     let coordinates = object.coordinates_report();
-    Ok((object, StageReports::new(coordinates, bvh, tets, collapse)))
+    Ok((object, StageReports::new(coordinates, (bvh, free_report), tets, collapse)))
+}
+
+/// Decides in which directions rays from a triangle meet nothing, and whether that is kept. A tetrahedralization of the whole model
+/// has no leaves in which its triangles could be found.
+fn free_directions(
+    traced: &TracedMesh,
+    options: &CompileOptions,
+    stages: &mut dyn Stages,
+    clock: &mut Clock,
+    monitor: &dyn Monitor,
+) -> Result<(Option<free::Free>, Option<free::FreeReport>)> {
+    if options.free.keep == free::KeepFree::None || options.structure == Structure::Tets {
+        return Ok((None, None));
+    }
+    let TracedMesh { mesh, tree, .. } = traced;
+    let find = || stages.free(mesh, tree, (&options.bvh, &options.free), monitor);
+    let (free, mut report) = clock.time("free directions", find)?;
+    report.kept = report.is_worthwhile(options.free.keep);
+    Ok((report.kept.then_some(free), Some(report)))
 }
 
 /// Tetrahedralizes the nodes for which that saves time: marks → costs → tets → probe → limit.

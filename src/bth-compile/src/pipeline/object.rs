@@ -5,7 +5,7 @@ use super::{CompileOptions, FileReport};
 use crate::coordinates::{Boxes, OnGrid};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::{bvh, coordinates, tets, write};
+use crate::{bvh, coordinates, free, tets, write};
 use bth_format::layout::Object as Header;
 use bth_import::{ImageFile, Mesh};
 use std::collections::BTreeSet;
@@ -51,6 +51,8 @@ pub(crate) struct Object {
     traced: TracedMesh,
     wide: bvh::Wide,
     packed_nodes: bool,
+    /// Absent where free directions are not kept.
+    free: Option<free::FreeRows>,
     /// Absent without tet leaves.
     encoded: Option<tets::Encoded>,
     /// Absent where no groups are kept.
@@ -63,6 +65,7 @@ pub(crate) struct Object {
 pub(super) fn join(
     traced: TracedMesh,
     leaves: Vec<tets::Leaf>,
+    free: Option<free::Free>,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Object, bvh::CollapseReport)> {
@@ -77,7 +80,9 @@ pub(super) fn join(
     let tet_leaves = meshes.len() as u64;
     let tet_triangles = meshes.iter().map(|m| m.faces.len() as u64).sum();
     let groups = traced.mesh.groups.as_ref().map(write::GroupParts::of);
-    Ok((Object { traced, wide, packed_nodes, encoded, groups, tet_leaves, tet_triangles }, collapse))
+    let grid = traced.on_grid.as_ref().map(|on_grid| &on_grid.grid);
+    let free = free.map(|free| free::FreeRows::new(&free, &wide, grid));
+    Ok((Object { traced, wide, packed_nodes, free, encoded, groups, tet_leaves, tet_triangles }, collapse))
 }
 
 /// A wide BVH as it will be stored.
@@ -115,7 +120,7 @@ pub fn assemble(
     monitor: &dyn Monitor,
 ) -> Result<Compiled> {
     let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
-    let (object, _) = join(traced, built.to_vec(), options, monitor)?;
+    let (object, _) = join(traced, built.to_vec(), None, options, monitor)?;
     Ok(object.file("{}".to_owned(), &[], options)?.0.compiled)
 }
 
@@ -175,6 +180,10 @@ impl Object {
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };
+        if let Some(free) = &self.free {
+            parts.free = &free.directions;
+            parts.free_reach = &free.reach;
+        }
         if let Some(opacity) = &mesh.opacity {
             parts.opacity = &opacity.rows;
             parts.opacity_micro = &opacity.micro;
@@ -218,6 +227,8 @@ fn resident_bytes(parts: &write::ObjectParts<'_>) -> u64 {
         + size_of_val(parts.tet_faces)
         + size_of_val(parts.hull_faces)
         + size_of_val(parts.triangle_faces)
+        + size_of_val(parts.free)
+        + size_of_val(parts.free_reach)
         + size_of_val(parts.opacity)
         + size_of_val(parts.opacity_micro);
     bytes as u64

@@ -1,7 +1,7 @@
 //! Reports of a compilation.
 
 use super::{Clock, StageTime};
-use crate::{bvh, coordinates, costs, marks, tets};
+use crate::{bvh, coordinates, costs, free, marks, tets};
 use bth_import as mesh;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,9 @@ pub struct CompileReport {
     pub coordinates: Option<coordinates::CoordinateReport>,
     /// Binary BVH.
     pub bvh: bvh::BvhReport,
+    /// Free directions, if they were decided.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub free: Option<free::FreeReport>,
     /// Marking; absent, as the next two, for structures without tetrahedra.
     pub marks: Option<marks::MarkReport>,
     /// Selection.
@@ -52,6 +55,7 @@ pub struct FileReport {
 pub(crate) struct StageReports {
     coordinates: Option<coordinates::CoordinateReport>,
     bvh: bvh::BvhReport,
+    pub(crate) free: Option<free::FreeReport>,
     marks: Option<marks::MarkReport>,
     costs: Option<costs::CostReport>,
     pub(crate) tets: Option<tets::TetReport>,
@@ -71,11 +75,11 @@ pub(super) struct TetReports {
 impl StageReports {
     pub(super) fn new(
         coordinates: Option<coordinates::CoordinateReport>,
-        bvh: bvh::BvhReport,
+        (bvh, free): (bvh::BvhReport, Option<free::FreeReport>),
         TetReports { marks, costs, tets, probe }: TetReports,
         collapse: bvh::CollapseReport,
     ) -> Self {
-        Self { coordinates, bvh, marks, costs, tets, probe, collapse }
+        Self { coordinates, bvh, free, marks, costs, tets, probe, collapse }
     }
 }
 
@@ -87,8 +91,8 @@ impl CompileReport {
         stages: StageReports,
         file: FileReport,
     ) -> Self {
-        let StageReports { coordinates, bvh, marks, costs, tets, probe, collapse } = stages;
+        let StageReports { coordinates, bvh, free, marks, costs, tets, probe, collapse } = stages;
         let seconds = clock.into_times();
-        Self { source_blake3, seconds, mesh, coordinates, bvh, marks, costs, tets, probe, collapse, file }
+        Self { source_blake3, seconds, mesh, coordinates, bvh, free, marks, costs, tets, probe, collapse, file }
     }
 }

@@ -5,7 +5,7 @@ use crate::coordinates::OnGrid;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::Model;
-use crate::{bvh, coordinates, marks, opacity, tets};
+use crate::{bvh, coordinates, free, marks, opacity, tets};
 use bth_import::{self as mesh, Mesh, Wanted};
 use std::path::Path;
 
@@ -57,6 +57,21 @@ pub(crate) trait Stages {
         monitor: &dyn Monitor,
     ) -> Result<(bvh::BinaryBvh, bvh::BvhReport)> {
         timed(|| bvh::build(mesh, options, monitor))
+    }
+
+    /// Decides in which directions rays from a triangle meet nothing. The result does not depend on how the BVH was built, by
+    /// `_bvh`, but for what is too close to decide.
+    ///
+    /// # Errors
+    /// As [`free::find`].
+    fn free(
+        &mut self,
+        mesh: &Mesh,
+        tree: &bvh::BinaryBvh,
+        (_bvh, options): (&bvh::BvhOptions, &free::FreeOptions),
+        monitor: &dyn Monitor,
+    ) -> Result<(free::Free, free::FreeReport)> {
+        timed(|| free::find(mesh, tree, options, monitor))
     }
 
     /// Marks the nodes of a BVH, built with `_options`, that can be tetrahedralized.

@@ -41,6 +41,10 @@ pub struct ObjectParts<'a> {
     pub hull_faces: &'a [HullFace],
     /// Row of `tet_faces` per source triangle; left out without tet leaves.
     pub triangle_faces: &'a [u32],
+    /// What rays that start on each triangle cannot meet; empty where nothing is known.
+    pub free: &'a [FreeDirections],
+    /// The reach of the free directions, one row if there are any.
+    pub free_reach: &'a [FreeReach],
     /// Opacity of each triangle; empty where all are opaque.
     pub opacity: &'a [u32],
     /// States of micro-triangles.
@@ -110,6 +114,10 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.rows(kind::HULL_FACES, index, parts.hull_faces)?;
     if record.is_some() {
         builder.rows(kind::TRIANGLE_FACES, index, parts.triangle_faces)?;
+    }
+    builder.rows(kind::FREE_DIRECTIONS, index, parts.free)?;
+    if !parts.free.is_empty() {
+        builder.rows(kind::FREE_REACH, index, parts.free_reach)?;
     }
     if let Some(source) = &parts.source {
         builder.rows(kind::POSITIONS, index, source.positions)?;

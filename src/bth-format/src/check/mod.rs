@@ -7,6 +7,7 @@
 mod adjacency;
 mod bit_set;
 mod boxes;
+mod free;
 mod groups;
 mod header;
 mod leaves;
@@ -31,13 +32,14 @@ use crate::object::ObjectView;
 /// Checks every index of an object.
 ///
 /// # Errors
-/// The first violation of `BTH-F101` to `BTH-F147`, with an offset from the start of its section;
+/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F168` to `BTH-F171`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
 pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
     sources::check(view)?;
     groups::check(view)?;
     opacity::check(view)?;
+    free::check(view)?;
     tet_leaves::check(view)?;
     tree::check(view)?;
     leaves::check_ids(view)?;

@@ -4,7 +4,7 @@
 //! half line that is claimed twice is an error. So every block is visited once, the work is O(lines), and there is no cycle.
 
 use super::bit_set::BitSet;
-use super::{leaves, nodes};
+use super::{free, leaves, nodes};
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::MAX_DEPTH;
@@ -33,12 +33,13 @@ impl Reference {
 }
 
 /// Checks that the blocks of LINES and the tet leaves form one tree that covers both: BTH-F105 to BTH-F115, BTH-F117,
-/// BTH-F118 and BTH-F123.
+/// BTH-F118, BTH-F123 and BTH-F169.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     let mut tree = Tree {
         view,
         claimed: BitSet::new(2 * view.lines.len()),
         referenced: BitSet::new(view.tet_leaves.len()),
+        placed: BitSet::new(view.free.len()),
         stack: Vec::new(),
     };
     let at = offset_of!(Object, root) as u64;
@@ -50,7 +51,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         }
     }
     tree.check_claimed()?;
-    tree.check_referenced()
+    tree.check_referenced()?;
+    free::check_places(view, &tree.placed)
 }
 
 struct Tree<'a> {
@@ -59,6 +61,8 @@ struct Tree<'a> {
     claimed: BitSet,
     /// Tet leaves that a code leads to.
     referenced: BitSet,
+    /// Triangles that lie where FREE_DIRECTIONS says.
+    placed: BitSet,
     stack: Vec<Reference>,
 }
 
@@ -72,7 +76,11 @@ impl Tree<'_> {
         let first_half = self.claim(reference, child)?;
         match child {
             Child::Node(_) | Child::Packed(_) => self.follow_node(reference, child, first_half),
-            _ => leaves::check(self.view, child, first_half * HALF_LINE as u64),
+            _ => {
+                leaves::check(self.view, child, first_half * HALF_LINE as u64)?;
+                free::mark_placed(self.view, child, &mut self.placed);
+                Ok(())
+            }
         }
     }
 

@@ -152,7 +152,7 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_required(e.kind);
+        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_traced(e.kind);
         self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
@@ -235,6 +235,8 @@ impl File {
             tet_faces: self.slice(object, kind::TET_FACES),
             hull_faces: self.slice(object, kind::HULL_FACES),
             triangle_faces: self.slice(object, kind::TRIANGLE_FACES),
+            free: self.slice(object, kind::FREE_DIRECTIONS),
+            free_reach: self.slice(object, kind::FREE_REACH),
             positions: self.slice(object, kind::POSITIONS),
             triangles: self.slice(object, kind::TRIANGLES),
             corners: self.slice(object, kind::CORNERS),
@@ -272,7 +274,7 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160` and `BTH-F161`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161` and `BTH-F168` to `BTH-F171`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;

@@ -48,6 +48,8 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::TET_VERTICES => size_of::<TetVertex>(),
         kind::TET_FACES => size_of::<TetFace>(),
         kind::HULL_FACES => size_of::<HullFace>(),
+        kind::FREE_DIRECTIONS => size_of::<FreeDirections>(),
+        kind::FREE_REACH => size_of::<FreeReach>(),
         kind::POSITIONS | kind::TRIANGLES | kind::CORNERS | kind::NORMALS => 12,
         kind::UVS => 8,
         kind::GROUPS => size_of::<Group>(),
@@ -80,6 +82,8 @@ fn max_count(kind: u32) -> u64 {
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::TRIANGLES | kind::CORNERS | kind::OPACITY => {
             limits::MAX_TRIANGLES as u64
         }
+        kind::FREE_DIRECTIONS => limits::MAX_TRIANGLES as u64,
+        kind::FREE_REACH => 1,
         kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Links hold rows in 31 bits, other references in 32; NONE is no row.

@@ -19,6 +19,10 @@ pub const TET_FACES: u32 = 7;
 pub const HULL_FACES: u32 = 8;
 /// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
 pub const TRIANGLE_FACES: u32 = 9;
+/// [`super::FreeDirections`] per source triangle: what rays that start on it cannot meet.
+pub const FREE_DIRECTIONS: u32 = 12;
+/// One [`super::FreeReach`], if there are free directions.
+pub const FREE_REACH: u32 = 13;
 /// `[f32; 3]`: distinct positions of the source, object space.
 pub const POSITIONS: u32 = 16;
 /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
@@ -85,6 +89,10 @@ pub const fn is_scene(kind: u32) -> bool {
 /// Whether sections of this kind belong to the whole file.
 pub const fn is_of_file(kind: u32) -> bool {
     (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
+}
+/// Whether tracing reads sections of this kind of an object.
+pub const fn is_traced(kind: u32) -> bool {
+    is_required(kind) || kind == FREE_DIRECTIONS || kind == FREE_REACH
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {

@@ -29,6 +29,10 @@ pub struct ObjectView<'a> {
     pub hull_faces: &'a [HullFace],
     /// Per source triangle its row of `tet_faces`, or [`NONE`]; empty when there are no tet leaves.
     pub triangle_faces: &'a [u32],
+    /// Per source triangle what rays that start on it cannot meet; empty where nothing is known.
+    pub free: &'a [FreeDirections],
+    /// The row of FREE_REACH, if there is one.
+    pub free_reach: &'a [FreeReach],
     /// Distinct positions of the source, object space, if kept.
     pub positions: &'a [[f32; 3]],
     /// Per source triangle its rows of `positions`, if kept.

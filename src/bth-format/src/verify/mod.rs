@@ -2,6 +2,7 @@
 //! predicates. Costs O(bytes of the file). Specification: "Verifying".
 
 mod aabb;
+mod free;
 mod object;
 mod report;
 mod source;
@@ -19,7 +20,7 @@ use crate::layout::*;
 ///
 /// # Errors
 /// All damaged sections and gaps, and for each object the first violation; at least one error. Codes are `BTH-F020`,
-/// `BTH-F021` and `BTH-F101` to `BTH-F208`. The scene sections count as one object.
+/// `BTH-F021` and `BTH-F101` to `BTH-F209`. The scene sections count as one object.
 pub fn verify(file: &File) -> std::result::Result<Report, Vec<Error>> {
     let mut errors = Vec::new();
     let mut report =

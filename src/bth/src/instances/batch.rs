@@ -8,6 +8,7 @@ use super::placement::Placement;
 use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
+use crate::free;
 use crate::object::{self, Scratch};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
@@ -224,7 +225,8 @@ impl World {
     }
 }
 
-/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
+/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene. Visits
+/// whose ray leaves its triangle in a free direction are left out.
 fn trace_visits<Q: Query>(
     batch: &SceneBatch<'_>,
     object: &ObjectView<'_>,
@@ -232,9 +234,23 @@ fn trace_visits<Q: Query>(
     scratch: &mut Scratch,
     answers: &mut [Q::Answer],
 ) {
-    let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
-    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
-    object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);
+    let mut all = |visits: &[Visit], rays: &ObjectRays, scratch: &mut Scratch| {
+        let scene = SceneRays { rays: batch.rays, visits, t_scale: &rays.t_scale };
+        let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
+        object::trace_batch(object, &rays.rays, rays.hints(), scratch, &mut sink);
+    };
+    match object_rays.hints().filter(|_| free::is_known(object)) {
+        None => all(visits, object_rays, scratch),
+        Some(from) => {
+            object::without_free::<Q>(object, &object_rays.rays, from, scratch, |rest, scratch| match rest {
+                None => all(visits, object_rays, scratch),
+                Some(rest) => {
+                    let (rest_rays, rest_visits) = object_rays.part(visits, rest);
+                    all(&rest_visits, &rest_rays, scratch);
+                }
+            });
+        }
+    }
 }
 
 struct SceneNearest<'a> {

@@ -2,6 +2,7 @@
 
 use super::affine::{ObjectRay, RayLanes};
 use super::scene_batch::SceneBatch;
+use crate::free;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
@@ -34,11 +35,23 @@ impl ObjectRays {
         self.from.clear();
         self.tmax.clear();
         self.tmax.extend(visits.iter().map(|visit| tmax(visit.ray as usize)));
-        // Only objects with tetrahedra use hints.
-        if batch.from.is_some() && !object.tet_leaves.is_empty() {
+        // Only objects with tetrahedra or free directions use hints.
+        if batch.from.is_some() && (!object.tet_leaves.is_empty() || free::is_known(object)) {
             self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
         }
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });
+    }
+
+    /// Some of the rays, by their indices, and their visits.
+    pub(super) fn part(&self, visits: &[Visit], rays: &[u32]) -> (ObjectRays, Vec<Visit>) {
+        let index = |ray: &u32| *ray as usize;
+        let part = ObjectRays {
+            rays: rays.iter().map(|ray| self.rays[index(ray)]).collect(),
+            t_scale: rays.iter().map(|ray| self.t_scale[index(ray)]).collect(),
+            from: rays.iter().map(|ray| self.from[index(ray)]).collect(),
+            tmax: Vec::new(),
+        };
+        (part, rays.iter().map(|ray| visits[index(ray)]).collect())
     }
 
     /// The triangles on which rays start, if there are any.

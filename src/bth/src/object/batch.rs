@@ -4,11 +4,12 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{self, MIN_MEASURED_RAYS, Strategy};
+use super::strategy::{self, HintUse, MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::packet;
 use crate::bvh::single::TetOutcome;
+use crate::free;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
 use crate::query::{AnswerLanes, Any, Nearest, Query};
@@ -35,8 +36,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    let mut sink = Sink::<Nearest>::new(object.triangle_ids, hits, instance);
-    trace_batch(object, rays, from, scratch, &mut sink);
+    trace_from::<Nearest>(object, rays, from, instance, scratch, hits);
 }
 
 /// Computes whether rays in object space hit anything; `from` as for [`nearest_batch`].
@@ -47,8 +47,83 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    let mut sink = Sink::<Any>::new(object.triangle_ids, found, 0);
-    trace_batch(object, rays, from, scratch, &mut sink);
+    trace_from::<Any>(object, rays, from, 0, scratch, found);
+}
+
+/// Stores the answers of those rays that hit anything. Rays that leave their triangle in a free direction are not traced.
+fn trace_from<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[u32]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let Some(hints) = from.filter(|_| free::is_known(object)) else {
+        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+        return trace_batch(object, rays, from, scratch, &mut sink);
+    };
+    without_free::<Q>(object, rays, hints, scratch, |rest, scratch| {
+        let Some(rest) = rest else {
+            let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+            return trace_batch(object, rays, from, scratch, &mut sink);
+        };
+        // The rest is traced like a batch of its own, so that its rays can go in packets.
+        let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
+        let rest_from: Vec<u32> = rest.iter().map(|ray| hints[*ray as usize]).collect();
+        let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
+        let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
+        let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
+        trace_batch(object, &rest_rays, Some(&rest_from), scratch, &mut sink);
+        for (ray, found) in rest.iter().zip(found) {
+            answers[*ray as usize] = found;
+        }
+    });
+}
+
+/// Calls `trace` with the indices of the rays that may hit something, by what is known of free directions at the triangles
+/// `from`; with `None` for all rays where that takes longer than it saves.
+pub(crate) fn without_free<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: &[u32],
+    scratch: &mut Scratch,
+    trace: impl FnOnce(Option<&[u32]>, &mut Scratch),
+) {
+    // Small batches come before measurements: then the look-up decides by how many of the first rays end.
+    by_hint::<Q>((object, HintUse::Free), rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
+        let mut rest = std::mem::take(&mut scratch.rest);
+        let finds = strategy == Strategy::Hinted && free::find_rest(object, rays, from, &mut rest);
+        trace(finds.then_some(&rest), scratch);
+        scratch.rest = rest;
+    });
+}
+
+/// Traces a batch by the strategy that was measured to be faster for such rays through the object on this thread, and measures it.
+/// `unmeasured` is the strategy of small batches before there are measurements.
+fn by_hint<Q: Query>(
+    (object, used): (&ObjectView<'_>, HintUse),
+    rays: usize,
+    unmeasured: Strategy,
+    scratch: &mut Scratch,
+    trace: impl FnOnce(Strategy, &mut Scratch),
+) {
+    let hinted = Hinted::chosen();
+    let (address, kind) = (std::ptr::from_ref(object.header).addr(), 2 * used as usize + usize::from(Q::ANY));
+    let choice = scratch.choices.of(address, kind);
+    let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
+    let strategy = match hinted {
+        Hinted::Bvh => Strategy::Bvh,
+        Hinted::Tets => Strategy::Hinted,
+        Hinted::Measured if measured => choice.next(),
+        Hinted::Measured => choice.best_or(unmeasured),
+    };
+    let start = if measured { strategy::now() } else { None };
+    trace(strategy, scratch);
+    if let Some(start) = start {
+        let seconds_per_ray = start.elapsed().as_secs_f64() / rays as f64;
+        scratch.choices.of(address, kind).record(strategy, seconds_per_ray);
+    }
 }
 
 /// Fills `hits` with [`Hit::MISS`].
@@ -101,22 +176,9 @@ pub(crate) fn trace_batch<Q: Query>(
     if from.is_none() || !has_subtrees(object) {
         return trace_with(object, rays, from, scratch, sink);
     }
-    let hinted = Hinted::chosen();
-    let address = std::ptr::from_ref(object.header).addr();
-    let choice = scratch.choices.of(address, usize::from(Q::ANY));
-    let measured = rays.len() >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
-    let strategy = match hinted {
-        Hinted::Bvh => Strategy::Bvh,
-        Hinted::Tets => Strategy::Tets,
-        Hinted::Measured if measured => choice.next(),
-        Hinted::Measured => choice.best(),
-    };
-    let start = if measured { strategy::now() } else { None };
-    trace_with(object, rays, from.filter(|_| strategy == Strategy::Tets), scratch, sink);
-    if let Some(start) = start {
-        let seconds_per_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
-        scratch.choices.of(address, usize::from(Q::ANY)).record(strategy, seconds_per_ray);
-    }
+    by_hint::<Q>((object, HintUse::Tets), rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
+        trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
+    });
 }
 
 /// Traces rays with the hints `from` if they are given or the object is a single tet leaf, else in packets and through the BVH.

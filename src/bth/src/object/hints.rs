@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// Environment variable with the default: `measured`, `bvh` or `tets`.
 const HINTS_VARIABLE: &str = "BTH_HINTS";
 
-/// How batches use hints where a file has tetrahedra and a BVH over the same triangles. Answers have the same bits in all cases;
+/// How batches use hints where a file has tetrahedra and a BVH over the same triangles, or knows of free directions. Answers have the same bits in all cases;
 /// the setting serves measurements and tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Hinted {
@@ -15,7 +15,8 @@ pub enum Hinted {
     Measured,
     /// Hints are not used: all rays go through the BVH.
     Bvh,
-    /// Rays that may be faster through tetrahedra walk through them first.
+    /// Hints are used wherever they can be: rays in free directions end, rays that may be faster through tetrahedra walk through them
+    /// first.
     Tets,
 }
 

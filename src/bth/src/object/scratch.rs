@@ -11,6 +11,8 @@ pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
     pub(super) choices: StrategyTable,
+    /// Indices of the rays that remain after those in free directions have ended.
+    pub(crate) rest: Vec<u32>,
 }
 
 /// Calls `work` with the thread's scratch memory.

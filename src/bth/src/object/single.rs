@@ -5,6 +5,7 @@ use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Query};
+use crate::free;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::{TetStart, enter_tets, start_in_tets};
@@ -22,7 +23,7 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    if from == NONE || object.tet_leaves.is_empty() {
+    if from == NONE || object.tet_leaves.is_empty() && !free::is_known(object) {
         let mut query = Q::new(ray);
         through_bvh(object, ray, &mut query, NONE, count);
         *answer = query.answer(object.triangle_ids, instance);
@@ -31,7 +32,7 @@ pub(crate) fn trace<Q: Query, C: Count>(
     trace_from::<Q, C>(object, ray, from, instance, count, answer);
 }
 
-/// As [`trace`], from a triangle that may be a face of tetrahedra.
+/// As [`trace`], from a triangle whose directions may be free and which may be a face of tetrahedra.
 #[inline(never)]
 fn trace_from<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -42,6 +43,10 @@ fn trace_from<Q: Query, C: Count>(
     answer: &mut Q::Answer,
 ) {
     let mut query = Q::new(ray);
+    if free::is_known(object) && free::certainly_misses(object, ray, from) {
+        *answer = query.answer(object.triangle_ids, instance);
+        return;
+    }
     match start_in_tets(object, ray, from, &mut query, count) {
         TetStart::Done => {}
         TetStart::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}

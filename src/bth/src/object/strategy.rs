@@ -1,4 +1,4 @@
-//! Choice between two strategies of tracing, by measuring both on the caller's batches.
+//! Choice between two strategies of tracing, with and without a use of hints, by measuring both on the caller's batches.
 //!
 //! Whether rays that start on a known triangle are faster through tetrahedra or through the BVH depends on the model, the rays,
 //! the caches and the speed of gathers on the machine: ratios from 0.5 to 1.3 have been measured (docs/notes/tets.md). Answers
@@ -12,8 +12,17 @@ use std::time::Instant;
 pub(crate) enum Strategy {
     /// Through the BVH, without hints.
     Bvh,
-    /// Through tetrahedra first, from the triangle on which the ray starts.
+    /// By what is known of the triangle on which the ray starts: through tetrahedra first, or not at all in a free direction.
+    Hinted,
+}
+
+/// What a hint is used for, where both ways are measured.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum HintUse {
+    /// Walks through tetrahedra.
     Tets,
+    /// Look-ups of free directions.
+    Free,
 }
 
 /// Least number of rays of a batch that is measured. Smaller batches take the strategy that is faster by the measurements so far.
@@ -48,9 +57,15 @@ impl StrategyChoice {
 
     /// The strategy that is faster by the measurements so far; [`Strategy::Bvh`] without measurements of both.
     pub(crate) fn best(&self) -> Strategy {
+        self.best_or(Strategy::Bvh)
+    }
+
+    /// As [`Self::best`], with the strategy for batches that come before there are measurements.
+    pub(crate) fn best_or(&self, unmeasured: Strategy) -> Strategy {
         match self.cost {
-            [Some(bvh), Some(tets)] if tets < bvh => Strategy::Tets,
-            _ => Strategy::Bvh,
+            [Some(bvh), Some(hinted)] if hinted < bvh => Strategy::Hinted,
+            [Some(_), Some(_)] => Strategy::Bvh,
+            _ => unmeasured,
         }
     }
 
@@ -58,14 +73,14 @@ impl StrategyChoice {
     pub(crate) fn next(&mut self) -> Strategy {
         let best = self.best();
         if self.batches < TRIALS {
-            return if self.batches.is_multiple_of(2) { Strategy::Bvh } else { Strategy::Tets };
+            return if self.batches.is_multiple_of(2) { Strategy::Bvh } else { Strategy::Hinted };
         }
         if self.remaining > 0 {
             self.remaining -= 1;
             return best;
         }
         self.remaining = self.interval;
-        if best == Strategy::Bvh { Strategy::Tets } else { Strategy::Bvh }
+        if best == Strategy::Bvh { Strategy::Hinted } else { Strategy::Bvh }
     }
 
     /// Records the time of a batch.
@@ -99,10 +114,10 @@ pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 impl StrategyTable {
     const ROWS: usize = 32;
 
-    /// The choice for a kind of rays, 0 or 1, through the object with the address `object`. If another object had this address
+    /// The choice for a kind of rays, below 4, through the object with the address `object`. If another object had this address
     /// before, a few batches may take the slower strategy.
     pub(crate) fn of(&mut self, object: usize, kind: usize) -> &mut StrategyChoice {
-        let key = (object / 8).wrapping_mul(2).wrapping_add(kind);
+        let key = (object / 8).wrapping_mul(4).wrapping_add(kind);
         let row = (key.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
         let (stored_key, choice) = &mut self.0[row];
         if *stored_key != key {
@@ -128,13 +143,13 @@ mod tests {
     use super::*;
     use bth_random::Rng;
 
-    /// Number of batches that take [`Strategy::Tets`], of `batches` with the given seconds per ray, one in twenty of which is
+    /// Number of batches that take [`Strategy::Hinted`], of `batches` with the given seconds per ray, one in twenty of which is
     /// interrupted.
     fn tets_taken(choice: &mut StrategyChoice, rng: &mut Rng, batches: u32, cost: [f64; 2]) -> u32 {
         let mut taken = 0;
         for _ in 0..batches {
             let strategy = choice.next();
-            taken += u32::from(strategy == Strategy::Tets);
+            taken += u32::from(strategy == Strategy::Hinted);
             let noise = 0.95 + 0.1 * f64::from(rng.below(1000) as u32) / 1000.0;
             let interruption = if rng.below(20) == 0 { 30.0 } else { 1.0 };
             choice.record(strategy, cost[strategy as usize] * noise * interruption);
@@ -162,7 +177,7 @@ mod tests {
         tets_taken(&mut choice, &mut rng, 2000, [100e-9, 150e-9]);
         assert_eq!(choice.best(), Strategy::Bvh);
         tets_taken(&mut choice, &mut rng, 4000, [100e-9, 50e-9]);
-        assert_eq!(choice.best(), Strategy::Tets);
+        assert_eq!(choice.best(), Strategy::Hinted);
     }
 
     #[test]
@@ -170,10 +185,10 @@ mod tests {
         let mut choices = StrategyTable::default();
         for _ in 0..TRIALS {
             choices.of(4096, 0).record(Strategy::Bvh, 2.0);
-            choices.of(4096, 0).record(Strategy::Tets, 1.0);
+            choices.of(4096, 0).record(Strategy::Hinted, 1.0);
         }
-        assert_eq!(choices.of(4096, 0).best(), Strategy::Tets);
+        assert_eq!(choices.of(4096, 0).best(), Strategy::Hinted);
         assert_eq!(choices.of(4096, 1).best(), Strategy::Bvh);
-        assert_eq!(choices.of(4096, 0).best(), Strategy::Tets);
+        assert_eq!(choices.of(4096, 0).best(), Strategy::Hinted);
     }
 }

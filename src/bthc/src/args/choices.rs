@@ -205,3 +205,24 @@ impl From<Structure> for bth_compile::pipeline::Structure {
         }
     }
 }
+
+/// Where free directions are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Free {
+    /// Nowhere.
+    None,
+    /// Where enough directions are free.
+    Auto,
+    /// Everywhere.
+    All,
+}
+
+impl From<Free> for bth_compile::free::KeepFree {
+    fn from(free: Free) -> Self {
+        match free {
+            Free::None => Self::None,
+            Free::Auto => Self::Auto,
+            Free::All => Self::All,
+        }
+    }
+}

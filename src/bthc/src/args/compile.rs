@@ -49,6 +49,13 @@ pub(crate) struct Compile {
     /// (0.01%). The fewest bits that honour it are taken; with --coordinates, more is refused.
     #[arg(long, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
     pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
+    /// Directions in which rays that start on a triangle meet nothing, so that they end at once where a caller says on which triangle
+    /// they start: 24 bytes a triangle. With `auto` where enough directions are free.
+    #[arg(long, value_enum, default_value_t = Free::None, value_name = "WHERE")]
+    pub(crate) free_directions: Free,
+    /// Distance within which free directions are told for rays that end there, as a share of the diagonal of the object's box.
+    #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.0625)]
+    pub(crate) free_reach: f64,
     /// Shading attributes to keep.
     #[arg(long, value_enum, default_value_t = Attributes::None)]
     pub(crate) attributes: Attributes,
@@ -190,6 +197,7 @@ impl Compile {
             alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),
+            free: bth_compile::free::FreeOptions { keep: self.free_directions.into(), reach: self.free_reach },
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
                 None => self.structure == Structure::Bth && !self.compact,

@@ -26,6 +26,11 @@ pub(super) fn summary(report: &CompileReport) -> String {
             .map(|share| format!("{:.1} %", 100.0 * share));
         facts.row(["opaque, transparent, unknown", &format!("{opaque}, {transparent}, {unknown}")]);
     }
+    if let Some(free) = &report.free {
+        let [all, near] = [free.free, free.free_nearby].map(|share| 100.0 * share);
+        let kept = if free.kept { "kept" } else { "not worth their bytes" };
+        facts.row(["free directions", &format!("{all:.0} %, {near:.0} % nearby, {kept}")]);
+    }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);
         facts.row(["vertices moved by at most", &found.displacement.to_string()]);

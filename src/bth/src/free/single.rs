@@ -1,0 +1,70 @@
+//! The decision about one ray, in f64.
+
+use super::corners_at;
+use crate::rays::Ray;
+use bth_format::layout::{FreeClass, free_bin};
+use bth_format::object::ObjectView;
+
+/// Unit of rounding.
+const U: f64 = f64::EPSILON / 2.0;
+
+/// Whether a ray in object space certainly meets no triangle of the object, because it leaves `triangle` in a free direction. The
+/// triangle may be anything, also none of the object.
+#[inline(never)]
+pub(crate) fn certainly_misses(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> bool {
+    let Some(row) = object.free.get(triangle as usize) else { return false };
+    let direction = ray.direction;
+    // Bins are wider than rounding errors unless directions are so short that they are rounded to few bits.
+    let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+    if !(greatest > super::lanes::LEAST_DIRECTION && greatest < f32::INFINITY) {
+        return false;
+    }
+    let class = row.class(free_bin(direction));
+    if class == FreeClass::Unknown || class == FreeClass::Near && ray.tmax == f32::INFINITY {
+        return false;
+    }
+    let Some(corners) = corners_at(object, row.place) else { return false };
+    let Some(before) = crossing(ray, corners) else { return false };
+    if class == FreeClass::All {
+        return true;
+    }
+    let Some(reach) = object.free_reach.first() else { return false };
+    let length = f64::from(ray.tmax) + f64::from(ray.tmax).abs() * (1.0 / f64::from(1 << 20)) - before;
+    let square: f64 = direction.iter().map(|x| (f64::from(*x) * length).powi(2)).sum();
+    square < f64::from(reach.reach).powi(2) * (1.0 - 1e-6)
+}
+
+/// Lower bound of the t at which the line of a ray crosses a triangle, if it certainly does before the ray's range begins.
+///
+/// With the corners r relative to the origin, the signs of d·(r₁×r₂), d·(r₂×r₀) and d·(r₀×r₁) say on which sides of the edges the line
+/// passes, and t is the quotient of r₀·(r₁×r₂) and their sum. The bounds of the errors follow from the number of roundings: 14 units
+/// of the product of the sizes of a term for the former, 48 for the latter. Products of three f32 neither underflow nor
+/// overflow in f64.
+fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<f64> {
+    let d = ray.direction.map(f64::from);
+    let r = corners.map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(ray.origin[k])));
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let far = r.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let size = d[0].abs() + d[1].abs() + d[2].abs();
+    let normal = cross(r[1], r[2]);
+    let sides = [dot(d, normal), dot(d, cross(r[2], r[0])), dot(d, cross(r[0], r[1]))];
+    let side_error = 20.0 * U * far * far * size;
+    let sign = if sides[0] > 0.0 { 1.0 } else { -1.0 };
+    // Comparisons are false for what is no number.
+    if !sides.iter().all(|side| side * sign > side_error) {
+        return None;
+    }
+    let volume = sign * dot(r[0], normal);
+    let volume_error = 64.0 * U * far * far * far;
+    let sum = sign * (sides[0] + sides[1] + sides[2]);
+    let sum_error = 4.0 * side_error + 8.0 * U * sum;
+    let tmin = f64::from(ray.tmin);
+    let first = tmin - (tmin.abs() * (1.0 / f64::from(1 << 20)) + f64::from(f32::MIN_POSITIVE));
+    if !(volume + volume_error < first * sum - first.abs() * sum_error && sum > sum_error) {
+        return None;
+    }
+    Some((volume - volume_error).min(0.0) / (sum - sum_error))
+}

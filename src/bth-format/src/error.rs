@@ -114,8 +114,8 @@ codes! {
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
     FreeRows "F168" "FREE_DIRECTIONS has as many rows as the object has triangles, or none; FREE_REACH has one row then, else none."
-    FreePlace "F169" "The place of a row of FREE_DIRECTIONS is NONE or that of the row's triangle in a triangle leaf; without a place all classes are 0."
-    FreeClasses "F170" "Bytes of the classes of a row of FREE_DIRECTIONS are below 243, the last one below 3."
+    FreePlace "F169" "The place of a row of FREE_DIRECTIONS is NONE or that of the row's triangle in a triangle leaf; without a place all bits are 0."
+    FreeBins "F170" "Bits 121 to 125 of the bins of a row of FREE_DIRECTIONS are zero."
     FreeReach "F171" "The reach of FREE_REACH is 0 or from 2^-50 to 2^50; its reserved fields are zero."
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
@@ -125,7 +125,8 @@ codes! {
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
     ZeroArea "F207" "Exactly the triangles of zero area are dropped."
     Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
-    FreeMet "F209" "Rays that start on a triangle, in a direction of a bin or its margin, meet no other point of a triangle in a bin of class 2, and none within the reach in one of class 1."
+FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond, or none within the reach."
+    FreeAxes "F210" "A triangle with free bins has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
     NotFinite "S002" "The transform and the world box of an instance that is seen are finite."

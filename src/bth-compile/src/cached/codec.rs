@@ -251,11 +251,11 @@ impl Codec for Marks {
 impl Codec for Free {
     fn write(&self, to: &mut RowWriter) {
         to.add(&[self.reach]);
-        to.add(&self.classes);
+        to.add(&self.bins);
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        Some(Free { reach: from.one()?, classes: from.take()? })
+        Some(Free { reach: from.one()?, bins: from.take()? })
     }
 }
 

@@ -1,13 +1,15 @@
 //! Free directions: what a ray that starts on a triangle certainly cannot meet, by bins of directions.
 //!
 //! For each triangle and bin the *shaft* holds all points that rays reach from any point of the triangle in any direction of the bin. If
-//! no other triangle meets the shaft, the bin is free; if none does within the reach, it is free nearby. A bin whose directions lie on
-//! both sides of the triangle is never free, so that a bin belongs to one side and needs no more than one class.
+//! no other triangle meets the shaft, the bin is free; if none does within the reach, it is free nearby. Bins are those of one side of
+//! the triangle, nearly always its front, and a row tells either what is free or what is free nearby: there are bits for twice as many
+//! directions then.
 //!
-//! A proof for each pair of bin and triangle nearby would take too long: nodes of the BVH are left out by conservative tests of
-//! boxes, and bins that are blocked are not asked again.
+//! A proof for each pair of bin and triangle would take too long: nodes of the BVH are left out by conservative tests of boxes, what is
+//! small for its distance blocks without a proof, and bins that are blocked are not asked again.
 
-mod bins;
+mod boxes;
+mod frame;
 mod places;
 mod search;
 mod shaft;
@@ -15,16 +17,16 @@ mod shaft;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use places::FreeRows;
+
 use crate::bvh::BinaryBvh;
 use crate::error::Result;
 use crate::monitor::Monitor;
-use bth_format::layout::{FREE_BINS, FREE_BYTES, FREE_REACH_RANGE, FreeClass, FreeDirections, NONE};
+use bth_format::layout::{FREE_REACH_RANGE, FreeBins, FreeDirections, NONE};
 use bth_import::Mesh;
+use boxes::Boxes;
 use rayon::prelude::*;
-use search::{Search, Surroundings};
-
-pub(crate) use places::FreeRows;
-
+use search::{Search, Surroundings, share};
 use serde::{Deserialize, Serialize};
 
 /// Whether free directions are decided and kept.
@@ -40,7 +42,7 @@ pub enum KeepFree {
     All,
 }
 
-/// Least share of free directions, all or nearby, for which [`KeepFree::Auto`] keeps them.
+/// Least share of free directions for which [`KeepFree::Auto`] keeps them.
 const LEAST_SHARE: f64 = 0.25;
 
 /// Options of [`find`].
@@ -48,7 +50,7 @@ const LEAST_SHARE: f64 = 0.25;
 pub struct FreeOptions {
     /// Whether and where they are kept.
     pub keep: KeepFree,
-    /// Distance within which [`FreeClass::Near`] promises that nothing is met, relative to the diagonal of the object's box.
+    /// Distance within which nothing is met in directions that are free nearby, relative to the diagonal of the object's box.
     pub reach: f64,
 }
 
@@ -58,13 +60,13 @@ impl Default for FreeOptions {
     }
 }
 
-/// Classes of the bins of all triangles.
+/// The free bins of all triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     /// The reach in object space.
     pub reach: f32,
-    /// For each triangle of the mesh the classes as [`FreeDirections`] stores them; zeros for those without an area.
-    pub classes: Vec<[u8; FREE_BYTES]>,
+    /// For each triangle of the mesh the bins as [`FreeDirections`] stores them; zeros where nothing is known.
+    pub bins: Vec<[u32; 4]>,
 }
 
 /// Report of [`find`].
@@ -72,9 +74,9 @@ pub struct Free {
 pub struct FreeReport {
     /// Triangles that rays may start on.
     pub triangles: u64,
-    /// Share of the cosine-weighted rays from the more open side of each triangle that certainly meet nothing, by area.
+    /// Share of the cosine-weighted rays from triangles that certainly meet nothing, by area.
     pub free: f64,
-    /// The same within the reach.
+    /// Share of those that certainly meet nothing within the reach, where no more is known.
     pub free_nearby: f64,
     /// The reach in object space.
     pub reach: f64,
@@ -84,22 +86,19 @@ pub struct FreeReport {
     pub seconds: f64,
 }
 
-/// Most triangles of a subtree whose bins are decided together.
-const CLUSTER: u32 = 16;
-/// Most triangles of a subtree that one task decides, cluster by cluster. Part of the result: what blocked a bin is remembered within
-/// a task.
-const TASK: u32 = 512;
-
 impl FreeReport {
     /// Whether the directions are worth their bytes.
     pub fn is_worthwhile(&self, keep: KeepFree) -> bool {
         match keep {
             KeepFree::None => false,
-            KeepFree::Auto => self.free.max(self.free_nearby) >= LEAST_SHARE,
+            KeepFree::Auto => self.free + self.free_nearby >= LEAST_SHARE,
             KeepFree::All => true,
         }
     }
 }
+
+/// Rows that one task decides.
+const TASK: usize = 512;
 
 /// Decides the bins of all triangles of a mesh. Only what is certain is called free.
 ///
@@ -113,37 +112,21 @@ pub fn find(
 ) -> Result<(Free, FreeReport)> {
     monitor.stage("free directions", Some(tree.order.len() as u64));
     let reach = reach(tree, options.reach);
-    let around = Surroundings::new(mesh, tree, reach, options.keep == KeepFree::All);
-    let parts = subtrees(tree, 0, TASK).into_par_iter().map(|task| {
+    let around = Surroundings { mesh, tree, boxes: Boxes::new(tree), reach: f64::from(reach) };
+    let parts = tree.order.par_chunks(TASK).map(|triangles| {
         monitor.check()?;
         let mut search = Search::new(&around);
-        let mut classes = Vec::with_capacity(TASK as usize);
-        for cluster in subtrees(tree, task, CLUSTER) {
-            search.decide(cluster, &mut |row, of_row| classes.push((row, FreeDirections::new(NONE, &of_row).classes)));
-        }
-        monitor.advance(classes.len() as u64);
-        Ok(classes)
+        let decided: Vec<FreeBins> = triangles.iter().map(|triangle| search.decide(*triangle)).collect();
+        monitor.advance(decided.len() as u64);
+        Ok(decided)
     });
-    let parts = parts.collect::<Result<Vec<_>>>()?;
-    let mut free = Free { reach, classes: vec![[0; FREE_BYTES]; mesh.triangles.len()] };
-    for (row, classes) in parts.into_iter().flatten() {
-        free.classes[tree.order[row as usize] as usize] = classes;
+    let decided: Vec<FreeBins> = parts.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();
+    let report = report(mesh, tree, &decided, reach);
+    let mut free = Free { reach, bins: vec![[0; 4]; mesh.triangles.len()] };
+    for (triangle, bins) in tree.order.iter().zip(decided) {
+        free.bins[*triangle as usize] = FreeDirections::new(NONE, bins).bins;
     }
-    let report = report(mesh, tree, &free);
     Ok((free, report))
-}
-
-/// The largest subtrees of at most `most` triangles below a node, from left to right.
-fn subtrees(tree: &BinaryBvh, node: u32, most: u32) -> Vec<u32> {
-    let (mut stack, mut found) = (vec![node], Vec::new());
-    while let Some(node) = stack.pop() {
-        match tree.nodes.get(node as usize) {
-            Some(inner) if inner.count > most => stack.extend([inner.right, node + 1]),
-            Some(_) => found.push(node),
-            None => {}
-        }
-    }
-    found
 }
 
 /// The reach in object space; 0, within which nothing lies, where it would not be in the range of the format.
@@ -155,34 +138,19 @@ fn reach(tree: &BinaryBvh, relative: f64) -> f32 {
 }
 
 /// Shares of free directions, by area and cosine.
-fn report(mesh: &Mesh, tree: &BinaryBvh, free: &Free) -> FreeReport {
+fn report(mesh: &Mesh, tree: &BinaryBvh, decided: &[FreeBins], reach: f32) -> FreeReport {
     let (mut area, mut shares) = (0.0, [0.0; 2]);
-    for &triangle in &tree.order {
-        let normal = crate::vectors::double_area(crate::vectors::corners(mesh, triangle));
-        let size = normal.length();
-        let row = FreeDirections { place: NONE, classes: free.classes[triangle as usize] };
-        let mut sides = [[0.0; 2]; 2];
-        for bin in 0..FREE_BINS {
-            let class = row.class(bin);
-            let d = bins::CONES[bin].corners;
-            let d: glam::DVec3 = std::array::from_fn(|k| (d[0][k] + d[2][k]) / 2.0).into();
-            // Bins have nearly the same solid angle.
-            let cosine = crate::vectors::unit(d).dot(normal) / size;
-            let weight = 4.0 / FREE_BINS as f64 * cosine.abs();
-            let side = &mut sides[usize::from(cosine < 0.0)];
-            side[0] += if class == FreeClass::All { weight } else { 0.0 };
-            side[1] += if class == FreeClass::Unknown { 0.0 } else { weight };
-        }
-        let side = if sides[0] >= sides[1] { sides[0] } else { sides[1] };
+    for (&triangle, bins) in tree.order.iter().zip(decided) {
+        let size = crate::vectors::double_area(crate::vectors::corners(mesh, triangle)).length();
         area += size;
-        shares.iter_mut().zip(side).for_each(|(sum, share)| *sum += size * share);
+        shares[usize::from(bins.is_nearby())] += size * share(bins.0 & FreeBins::ALL);
     }
-    let share = |sum: f64| if area > 0.0 { (sum / area).min(1.0) } else { 0.0 };
+    let [free, free_nearby] = shares.map(|sum| if area > 0.0 { (sum / area).min(1.0) } else { 0.0 });
     FreeReport {
         triangles: tree.order.len() as u64,
-        free: share(shares[0]),
-        free_nearby: share(shares[1]),
-        reach: f64::from(free.reach),
+        free,
+        free_nearby,
+        reach: f64::from(reach),
         kept: false,
         seconds: 0.0,
     }

@@ -1,4 +1,4 @@
-//! The rows of the section: where each triangle lies in the wide BVH, with its classes.
+//! The rows of the section: where each triangle lies in the wide BVH, with its bins.
 
 use super::Free;
 use crate::bvh::Wide;
@@ -15,7 +15,7 @@ pub(crate) struct FreeRows {
 impl FreeRows {
     /// The rows of all triangles. Those that lie in no triangle leaf, or beyond what a place can address, know nothing.
     pub(crate) fn new(free: &Free, wide: &Wide, grid: Option<&Grid>) -> Self {
-        let mut directions = vec![FreeDirections::UNKNOWN; free.classes.len()];
+        let mut directions = vec![FreeDirections::UNKNOWN; free.bins.len()];
         for leaf in leaves(wide) {
             let (first, triangles) = match (leaf, grid.map(|grid| grid.bits)) {
                 (Child::Indexed(at), None) => counts(wide, at, 2, |leaf: &IndexedLeaf| (leaf.first, leaf.triangles)),
@@ -37,8 +37,8 @@ impl FreeRows {
             for slot in 0..triangles {
                 let triangle = wide.triangle_ids[(first + slot) as usize] as usize;
                 let place = FreePlace { leaf, slot }.code();
-                if place != NONE {
-                    directions[triangle] = FreeDirections { place, classes: free.classes[triangle] };
+                if place != NONE && free.bins[triangle] != [0; 4] {
+                    directions[triangle] = FreeDirections { place, bins: free.bins[triangle] };
                 }
             }
         }

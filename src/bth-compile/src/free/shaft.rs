@@ -6,8 +6,8 @@
 //! triangle; tried are the triangle's own plane and those that bound the shaft. The margin of bins makes the directions of a bin point
 //! strictly upwards from planes that contain an edge of the bin's cone.
 
-use super::bins::Cone;
-use bth_format::exact::side;
+use super::frame::Cone;
+use bth_format::exact::side as exact_side;
 use std::cmp::Ordering;
 
 /// A triangle with its corners in f32, as traced, and in f64.
@@ -15,38 +15,17 @@ use std::cmp::Ordering;
 pub(super) struct Corners {
     pub(super) stored: [[f32; 3]; 3],
     pub(super) at: [[f64; 3]; 3],
-    /// Lower and upper end of its box.
-    pub(super) bounds: [[f64; 3]; 2],
-    /// A sphere that holds the triangle, but for rounding.
-    pub(super) center: [f64; 3],
-    radius: f64,
 }
 
 impl Corners {
     pub(super) fn new(stored: [[f32; 3]; 3]) -> Self {
         let at = stored.map(|p| p.map(f64::from));
-        let end = |pick: fn(f64, f64) -> f64| {
-            std::array::from_fn(|k| pick(pick(at[0][k], at[1][k]), at[2][k]))
-        };
-        let center = std::array::from_fn(|k| (at[0][k] + at[1][k] + at[2][k]) / 3.0);
-        let square = |p: [f64; 3]| dot(minus(p, center), minus(p, center));
-        let radius = at.into_iter().map(square).fold(0.0, f64::max).sqrt();
-        Corners { stored, at, bounds: [end(f64::min), end(f64::max)], center, radius }
-    }
-
-    /// Lower bound of the distance to another triangle, by the spheres around both.
-    pub(super) fn gap(&self, other: &Corners) -> f64 {
-        let between = minus(self.center, other.center);
-        let rounding = SLACK * (size(self.center) + size(other.center));
-        (dot(between, between).sqrt() - self.radius - other.radius) * (1.0 - SLACK) - rounding
+        Corners { stored, at }
     }
 }
 
 /// Bound of the relative error of sums of products below: more than twice the about 15 roundings of 2^-53.
 const ERROR: f64 = 32.0 / (1u64 << 53) as f64;
-
-/// More than the relative error of a quotient or root, by which bounds are widened.
-const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
 
 #[inline]
 fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -81,10 +60,6 @@ pub(super) struct Start {
     normal: [f64; 3],
     /// Error of the height of a point for each unit of its distance from corner 0, as the sum of components.
     slope: f64,
-    /// Length of the normal, in whose units heights are.
-    length: f64,
-    /// Upper bound of one over the length.
-    per_length: f64,
 }
 
 /// A plane that holds a start triangle on its upper side, and whose upper side all directions of a bin point to.
@@ -108,66 +83,21 @@ impl Start {
         let edges = [minus(b, a), minus(c, b), minus(a, c)];
         let normal = cross(edges[0], minus(c, a));
         let slope = ERROR * greatest(edges[0]) * greatest(minus(c, a));
-        // The error of the length is that of heights.
-        let length = dot(normal, normal).sqrt();
-        let certain = length - 2.0 * slope;
-        let per_length = if certain > 0.0 { (1.0 + SLACK) / certain } else { f64::INFINITY };
-        Start { corners, edges, normal, slope, length: length + 2.0 * slope, per_length }
+        Start { corners, edges, normal, slope }
     }
 
-    /// On which side of the triangle's plane all directions of a cone lie: 1 for the side of the normal, -1 for the other, 0 if
-    /// neither is certain.
-    pub(super) fn side(&self, cone: &Cone) -> i32 {
-        let mut sum = 0;
-        for d in cone.corners {
-            let height = dot(self.normal, d);
-            sum += i32::from(height > 4.0 * self.slope) - i32::from(-height > 4.0 * self.slope);
-        }
-        i32::from(sum == 4) - i32::from(sum == -4)
-    }
-
-    /// Lower bound of the sine of the angle between the plane and the directions of a cone on one side of it. On the arc between two
-    /// directions the sine is concave, so that it is least at a corner.
-    pub(super) fn elevation(&self, cone: &Cone) -> f64 {
-        let sine = |d: [f64; 3]| (dot(self.normal, d).abs() - 4.0 * self.slope) / dot(d, d).sqrt();
-        cone.corners.into_iter().map(sine).fold(f64::INFINITY, f64::min) / self.length * (1.0 - SLACK) - SLACK
-    }
-
-    /// Upper bounds of the heights of points of a box above the plane, and of the depths below it; not positive if no point lies on
-    /// that side. In units of length.
-    #[inline]
-    pub(super) fn heights_of_box(&self, bounds: &[[f64; 3]; 2]) -> [f64; 2] {
-        let (low, high) = (minus(bounds[0], self.corners.at[0]), minus(bounds[1], self.corners.at[0]));
-        let (mut least, mut most) = (0.0, 0.0);
-        for k in 0..3 {
-            let (a, b) = (self.normal[k] * low[k], self.normal[k] * high[k]);
-            least += a.min(b);
-            most += a.max(b);
-        }
-        let error = self.slope * (size(low) + size(high));
-        [(most + error) * self.per_length, (error - least) * self.per_length]
-    }
-
-    /// As [`Self::heights_of_box`], for the corners of a triangle. The signs are exact.
-    pub(super) fn heights_of(&self, other: &Corners) -> [f64; 2] {
-        let mut heights = [0.0f64; 2];
-        for (stored, at) in other.stored.iter().zip(&other.at) {
+    /// Whether the plane has a point of another triangle on a side: 1 for that of the normal, -1 for the other. Exact.
+    pub(super) fn is_below(&self, other: &Corners, side: i32) -> bool {
+        let wanted = if side > 0 { Ordering::Greater } else { Ordering::Less };
+        other.stored.iter().zip(&other.at).any(|(stored, at)| {
             let from = minus(*at, self.corners.at[0]);
             let (height, error) = (dot(self.normal, from), self.slope * size(from));
-            let order = if height.abs() > error {
-                height.total_cmp(&0.0)
-            } else {
-                let [a, b, c] = self.corners.stored;
-                side(a, b, c, *stored)
-            };
-            let side = match order {
-                Ordering::Greater => 0,
-                Ordering::Less => 1,
-                Ordering::Equal => continue,
-            };
-            heights[side] = heights[side].max((height.abs() + error) * self.per_length).max(f64::MIN_POSITIVE);
-        }
-        heights
+            if height.abs() > error {
+                return height.total_cmp(&0.0) == wanted;
+            }
+            let [a, b, c] = self.corners.stored;
+            exact_side(a, b, c, *stored) == wanted
+        })
     }
 }
 
@@ -179,7 +109,7 @@ pub(super) struct Shaft {
 }
 
 impl Shaft {
-    /// `side` is [`Start::side`] of the cone and not 0.
+    /// `side` is 1 for a cone on the side of the normal, -1 on the other.
     pub(super) fn new(start: &Start, cone: &Cone, side: i32) -> Self {
         let none = Plane { normal: [0.0; 3], anchor: [0.0; 3], slope: 0.0, floor: 0.0, lowest: 0 };
         let mut shaft = Shaft { planes: [none; 7], count: 0 };

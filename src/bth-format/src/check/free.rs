@@ -2,7 +2,7 @@
 
 use super::bit_set::BitSet;
 use crate::error::{Code, Error, Result};
-use crate::layout::{Child, FREE_BYTES, FREE_REACH_RANGE, FreeDirections, FreePlace, NONE, kind};
+use crate::layout::{Child, FREE_REACH_RANGE, FreeBins, FreeDirections, FreePlace, NONE, kind};
 use crate::object::ObjectView;
 use std::mem::offset_of;
 
@@ -29,12 +29,11 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         }
     }
     for (triangle, row) in view.free.iter().enumerate() {
-        let wrong = |(k, byte): (usize, &u8)| *byte >= if k + 1 == FREE_BYTES { 3 } else { 243 };
-        if let Some(k) = row.classes.iter().enumerate().position(wrong) {
-            let at = (ROW * triangle + offset_of!(FreeDirections, classes) + k) as u64;
-            let found = row.classes[k].to_string();
-            let expected = "five digits to base 3, in the last byte one";
-            return Err(Error::within(Code::FreeClasses, kind::FREE_DIRECTIONS, at, expected, found));
+        let bits = row.bins().0;
+        if bits & !(FreeBins::ALL | FreeBins::BACK | FreeBins::NEARBY) != 0 {
+            let at = (ROW * triangle + offset_of!(FreeDirections, bins)) as u64;
+            let (expected, found) = ("zero in bits 121 to 125", format!("{bits:#034x}"));
+            return Err(Error::within(Code::FreeBins, kind::FREE_DIRECTIONS, at, expected, found));
         }
     }
     Ok(())
@@ -67,10 +66,10 @@ pub(super) fn mark_placed(view: &ObjectView, leaf: Child, placed: &mut BitSet) {
     }
 }
 
-/// BTH-F169: rows have no place and no classes, or the place of their triangle.
+/// BTH-F169: rows have no place and no bins, or the place of their triangle.
 pub(super) fn check_places(view: &ObjectView, placed: &BitSet) -> Result<()> {
     let wrong = |(triangle, row): (usize, &FreeDirections)| {
-        if row.place == NONE { row.classes != [0; FREE_BYTES] } else { !placed.contains(triangle) }
+        if row.place == NONE { row.bins != [0; 4] } else { !placed.contains(triangle) }
     };
     match view.free.iter().enumerate().position(wrong) {
         None => Ok(()),

@@ -3,62 +3,24 @@
 use super::{Child, NONE, assert_layout::assert_layout};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// Direction bins of a face of the cube in a row.
-pub const FREE_SIDE: usize = 4;
-/// Direction bins: [`FREE_SIDE`]² on each of the six faces of a cube.
-pub const FREE_BINS: usize = 6 * FREE_SIDE * FREE_SIDE;
-/// Bytes that hold the classes of all bins, five in a byte.
-pub const FREE_BYTES: usize = FREE_BINS.div_ceil(FREE_BINS_PER_BYTE);
-/// Bins whose classes share a byte: 3⁵ is below 256.
-pub const FREE_BINS_PER_BYTE: usize = 5;
-
-/// Where bins of a face meet, besides 0 and the edges: tan(π/8), rounded.
-pub const FREE_BORDER: f32 = f32::from_bits(0x3ed4_13cd);
-/// How far the promise of a bin reaches beyond its borders, in the coordinates of the cube's face. A reader may therefore compute
-/// the bin of a direction with rounding errors, and take either bin where the greatest components are equal.
-pub const FREE_MARGIN: f32 = 1.0 / 1024.0;
-
-/// Classes of a byte: entry `b` holds in two bits each the five digits of `b` to base 3, the lowest first. Bytes from 243 on,
-/// which are not assigned, hold zeros.
-pub const FREE_DIGITS: [u16; 256] = digits();
-
-const fn digits() -> [u16; 256] {
-    let mut table = [0; 256];
-    let mut byte = 0;
-    while byte < 243 {
-        let (mut rest, mut k) = (byte, 0);
-        while k < FREE_BINS_PER_BYTE {
-            table[byte] |= ((rest % 3) as u16) << (2 * k);
-            rest /= 3;
-            k += 1;
-        }
-        byte += 1;
-    }
-    table
-}
-
-/// What rays that start on a triangle in the directions of a bin can meet beyond it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum FreeClass {
-    /// Nothing is known.
-    #[default]
-    Unknown = 0,
-    /// Nothing within the object's reach.
-    Near = 1,
-    /// Nothing at all.
-    All = 2,
-}
-
-impl FreeClass {
-    /// The class of a digit.
-    pub const fn from_digit(digit: u32) -> Self {
-        match digit {
-            1 => FreeClass::Near,
-            2 => FreeClass::All,
-            _ => FreeClass::Unknown,
-        }
-    }
-}
+/// Columns, and rows, of direction bins.
+pub const FREE_SIDE: usize = 11;
+/// Direction bins of a triangle.
+pub const FREE_BINS: usize = FREE_SIDE * FREE_SIDE;
+/// Squares of the slopes at which columns meet: k² / (121 - k²) for k = 1, 3, 5, 7, 9. In terms of the sine of the angle that a
+/// direction is tilted by along an axis, columns are equally wide, so that each holds as much of the cosine-weighted rays.
+pub const FREE_BORDERS: [f64; 5] = [1.0 / 120.0, 9.0 / 112.0, 25.0 / 96.0, 49.0 / 72.0, 81.0 / 40.0];
+/// Greatest slope of the directions of bins.
+pub const FREE_STEEPEST: f64 = 16.0;
+/// How far the promise of a bin reaches beyond its borders: slopes s reach to s ± margin (1 + s²), which is that angle. A reader may
+/// therefore compute slopes with rounding errors.
+pub const FREE_MARGIN: f64 = 1.0 / 512.0;
+/// Lengths of the edges at the first corner of a triangle whose directions are known.
+pub const FREE_EDGES: [f64; 2] = [1.0 / (1u64 << 20) as f64, (1u64 << 20) as f64];
+/// Least sine of the angle between these edges: rounding errors in f32 stay below the margin.
+pub const FREE_LEAST_SINE: f64 = 1.0 / 128.0;
+/// The least and greatest reach that is stored: squares of it neither vanish nor overflow.
+pub const FREE_REACH_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) as f32];
 
 /// A row of `FREE_DIRECTIONS`, by triangle id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromBytes, IntoBytes, KnownLayout, Immutable)]
@@ -66,26 +28,115 @@ impl FreeClass {
 pub struct FreeDirections {
     /// Where the triangle lies ([`FreePlace`]); [`NONE`] if nothing is known.
     pub place: u32,
-    /// Classes of the bins: byte k holds bins 5k to 5k + 4 as digits to base 3, the lowest first.
-    pub classes: [u8; FREE_BYTES],
+    /// [`FreeBins`], the lowest bits first.
+    pub bins: [u32; 4],
 }
 
 /// The row of `FREE_REACH`.
 #[derive(Clone, Copy, Debug, PartialEq, FromBytes, IntoBytes, KnownLayout, Immutable)]
 #[repr(C)]
 pub struct FreeReach {
-    /// Distance in object space within which directions of class [`FreeClass::Near`] meet nothing.
+    /// Distance in object space within which rays meet nothing in free directions of rows with [`FreeBins::NEARBY`].
     pub reach: f32,
     /// Zeros.
     pub reserved: [u32; 3],
 }
 
-/// The least and greatest reach that is stored: squares of it neither vanish nor overflow.
-pub const FREE_REACH_RANGE: [f32; 2] = [1.0 / (1u64 << 50) as f32, (1u64 << 50) as f32];
-
 assert_layout! {
-    FreeDirections 24 { classes 4 }
+    FreeDirections 20 { bins 4 }
     FreeReach 16 { reserved 4 }
+}
+
+/// Bit i tells whether bin i is free. Bits from 121 to 125 are zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FreeBins(pub u128);
+
+impl FreeBins {
+    /// The bits of all bins.
+    pub const ALL: u128 = (1 << FREE_BINS) - 1;
+    /// Set where directions are those on the back of the triangle, from which its corners are seen clockwise.
+    pub const BACK: u128 = 1 << 126;
+    /// Set where free directions meet nothing within the reach, and nothing is known of what is beyond.
+    pub const NEARBY: u128 = 1 << 127;
+
+    /// Whether directions are those on the back.
+    pub const fn is_back(self) -> bool {
+        self.0 & Self::BACK != 0
+    }
+
+    /// Whether only what is within the reach is known.
+    pub const fn is_nearby(self) -> bool {
+        self.0 & Self::NEARBY != 0
+    }
+
+    /// Whether a bin is free.
+    pub const fn is_free(self, bin: usize) -> bool {
+        bin < FREE_BINS && self.0 >> bin & 1 == 1
+    }
+}
+
+impl FreeDirections {
+    /// A row that knows nothing.
+    pub const UNKNOWN: Self = FreeDirections { place: NONE, bins: [0; 4] };
+
+    /// The row of a triangle.
+    pub fn new(place: u32, bins: FreeBins) -> Self {
+        FreeDirections { place, bins: std::array::from_fn(|k| (bins.0 >> (32 * k)) as u32) }
+    }
+
+    /// The bins.
+    pub fn bins(&self) -> FreeBins {
+        FreeBins(self.bins.iter().rev().fold(0, |bits, word| bits << 32 | u128::from(*word)))
+    }
+}
+
+/// Axes of the directions of a triangle with corners a, b, c, not normalized: b - a, normal × (b - a), and the normal
+/// (b - a) × (c - a). `None` for a triangle whose rounding errors may exceed the margin.
+pub fn free_axes(corners: [[f32; 3]; 3]) -> Option<[[f64; 3]; 3]> {
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
+    let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    let cross = |p: [f64; 3], q: [f64; 3]| {
+        [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+    };
+    let length = |p: [f64; 3]| (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+    let (first, second) = (minus(b, a), minus(c, a));
+    let normal = cross(first, second);
+    let [least, greatest] = FREE_EDGES;
+    let is_usable = |edge: f64| least <= edge && edge <= greatest;
+    let edges = [length(first), length(second)];
+    let is_wide = length(normal) >= FREE_LEAST_SINE * edges[0] * edges[1];
+    (is_wide && edges.into_iter().all(is_usable)).then(|| [first, cross(normal, first), normal])
+}
+
+/// The bin of a direction that leaves a triangle with these axes on its front, and whether it leaves it on its back; `None` for
+/// directions that are too steep.
+pub fn free_bin(axes: &[[f64; 3]; 3], direction: [f64; 3]) -> Option<(usize, bool)> {
+    let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let [x, y, z] = axes.map(|axis| dot(direction, axis) / dot(axis, axis).sqrt());
+    let column = |tilt: f64| {
+        let slope = tilt / z.abs();
+        let beyond = FREE_BORDERS.iter().filter(|border| slope * slope > **border).count();
+        // False for what is no number.
+        let is_flat = slope.abs() <= FREE_STEEPEST;
+        let middle = FREE_SIDE / 2;
+        is_flat.then_some(if slope < 0.0 { middle - beyond } else { middle + beyond })
+    };
+    Some((FREE_SIDE * column(y)? + column(x)?, z < 0.0))
+}
+
+/// Least and greatest slope of the promise of a column, with the margin.
+pub fn free_column(column: usize) -> [f64; 2] {
+    // The border between columns i and i + 1 is at the sine (2 i - 9) / 11.
+    let border = |k: isize| {
+        let k = 2 * k - FREE_SIDE as isize;
+        match k.unsigned_abs() {
+            FREE_SIDE => FREE_STEEPEST.copysign(k as f64),
+            odd => FREE_BORDERS[odd / 2].sqrt().copysign(k as f64),
+        }
+    };
+    let [least, greatest] = [border(column as isize), border(column as isize + 1)];
+    let margin = |slope: f64| FREE_MARGIN * (1.0 + slope * slope);
+    [least - margin(least), greatest + margin(greatest)]
 }
 
 /// Place of a triangle in the leaves of an object: bit 31 is set for raw leaves, bits 4 to 30 are the index of the leaf's child
@@ -124,111 +175,59 @@ impl FreePlace {
     }
 }
 
-impl FreeDirections {
-    /// A row that knows nothing.
-    pub const UNKNOWN: Self = FreeDirections { place: NONE, classes: [0; FREE_BYTES] };
-
-    /// The class of a bin.
-    ///
-    /// # Panics
-    /// If there is no such bin.
-    #[inline(always)]
-    pub fn class(&self, bin: usize) -> FreeClass {
-        FreeClass::from_digit(self.digit(bin))
-    }
-
-    /// The number of the class of a bin.
-    ///
-    /// # Panics
-    /// If there is no such bin.
-    #[inline(always)]
-    pub fn digit(&self, bin: usize) -> u32 {
-        let digits = FREE_DIGITS[usize::from(self.classes[bin / FREE_BINS_PER_BYTE])];
-        u32::from(digits) >> (2 * (bin % FREE_BINS_PER_BYTE)) & 3
-    }
-
-    /// The row of a triangle with these classes.
-    pub fn new(place: u32, classes: &[FreeClass; FREE_BINS]) -> Self {
-        let byte = |k: usize| {
-            let bins = &classes[FREE_BINS_PER_BYTE * k..FREE_BINS.min(FREE_BINS_PER_BYTE * (k + 1))];
-            bins.iter().rev().fold(0, |byte, class| 3 * byte + *class as u8)
-        };
-        FreeDirections { place, classes: std::array::from_fn(byte) }
-    }
-}
-
-/// The bin of a direction that is not zero and finite. Face 2k + s of the cube is where component k is the greatest in absolute
-/// value, with s = 1 if it is negative; the columns of a face ascend with component k + 1, its rows with component k + 2, both
-/// divided by the absolute value of component k.
-#[inline]
-pub fn free_bin(direction: [f32; 3]) -> usize {
-    let size = direction.map(f32::abs);
-    // Directions are not predictable: there are no branches.
-    let is_x = usize::from((size[0] >= size[1]) & (size[0] >= size[2]));
-    let is_y = usize::from(size[1] >= size[2]) & (1 - is_x);
-    let axis = 2 - 2 * is_x - is_y;
-    let column = |k: usize| {
-        let (negative, outer) =
-            (usize::from(direction[k] < 0.0), usize::from(size[k] > FREE_BORDER * size[axis]));
-        2 * (1 - negative) + (outer ^ negative)
-    };
-    let face = 2 * axis + usize::from(direction[axis] < 0.0);
-    let next = [1, 2, 0];
-    (face * FREE_SIDE + column(next[next[axis]])) * FREE_SIDE + column(next[axis])
-}
-
-/// Ends of a column of bins on a face of the cube, with the margin: a and b of the promise a ≤ component / depth ≤ b.
-pub const fn free_column(column: usize) -> [f64; 2] {
-    let border = FREE_BORDER as f64;
-    let ends = [-1.0, -border, 0.0, border, 1.0];
-    let margin = FREE_MARGIN as f64;
-    [ends[column] - margin, ends[column + 1] + margin]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bth_random::Rng;
 
     #[test]
-    fn rows_keep_the_classes_of_all_bins() {
-        let mut random = bth_random::Rng::new(3);
-        for _ in 0..200 {
-            let classes = std::array::from_fn(|_| FreeClass::from_digit(random.below(3) as u32));
-            let row = FreeDirections::new(7, &classes);
-            assert!((0..FREE_BINS).all(|bin| row.class(bin) == classes[bin]));
-            assert!(row.classes.iter().all(|byte| *byte < 243));
+    fn rows_keep_all_bits() {
+        let mut random = Rng::new(3);
+        for _ in 0..100 {
+            let bits = (0..4).fold(0u128, |bits, _| bits << 32 | u128::from(random.below(1 << 32)));
+            assert_eq!(FreeDirections::new(7, FreeBins(bits)).bins().0, bits);
         }
     }
 
     #[test]
-    fn places_come_back_from_their_numbers() {
-        for leaf in [Child::Indexed(0), Child::Raw(0), Child::Indexed(FreePlace::INDEX_LIMIT - 1), Child::Raw(77)] {
-            for slot in [0, 15] {
-                let place = FreePlace { leaf, slot };
-                assert_eq!(FreePlace::from_code(place.code()), Some(place));
-            }
+    fn places_are_encoded() {
+        for leaf in [Child::Indexed(0), Child::Raw(0), Child::Indexed(77), Child::Raw(FreePlace::INDEX_LIMIT - 1)] {
+            let place = FreePlace { leaf, slot: 9 };
+            assert_eq!(FreePlace::from_code(place.code()), Some(place));
         }
-        assert_eq!(FreePlace::from_code(NONE), None);
-        for leaf in [Child::Node(1), Child::Tets(1), Child::Raw(FreePlace::INDEX_LIMIT)] {
+        for leaf in [Child::Indexed(FreePlace::INDEX_LIMIT), Child::Node(0), Child::Tets(1)] {
             assert_eq!(FreePlace { leaf, slot: 0 }.code(), NONE);
         }
+        assert_eq!(FreePlace::from_code(NONE), None);
     }
 
     #[test]
-    fn directions_lie_between_the_ends_of_their_bin() {
-        let mut random = bth_random::Rng::new(4);
+    fn columns_are_equally_wide_in_sines_and_hold_their_directions() {
+        let axes = free_axes([[0.0; 3], [2.0, 0.0, 0.0], [1.0, 3.0, 0.0]]).unwrap();
+        let mut random = Rng::new(4);
         for _ in 0..20_000 {
-            let d: [f32; 3] = std::array::from_fn(|_| random.between(-1.0, 1.0) as f32);
-            let bin = free_bin(d);
-            let (face, row, column) = (bin / 16, bin / 4 % 4, bin % 4);
-            let (axis, negative) = (face / 2, face % 2 == 1);
-            let depth = f64::from(d[axis]).abs();
-            assert_eq!(d[axis] < 0.0, negative);
-            for (k, at) in [(axis + 1, column), (axis + 2, row)] {
-                let [a, b] = free_column(at);
-                let x = f64::from(d[k % 3]) / depth;
-                assert!(a < x && x < b, "{d:?}: {x} in {a}..{b}");
+            let d: [f64; 3] = random.unit_vector();
+            let Some((bin, back)) = free_bin(&axes, d) else {
+                assert!(d[2].abs() < 0.07, "{d:?}");
+                continue;
+            };
+            assert_eq!(back, d[2] < 0.0);
+            for (k, column) in [bin % FREE_SIDE, bin / FREE_SIDE].into_iter().enumerate() {
+                let slope = d[k] / d[2].abs();
+                let sine = slope / (1.0 + slope * slope).sqrt();
+                assert_eq!(((sine + 1.0) * 5.5) as usize, column);
+                let [least, greatest] = free_column(column);
+                assert!(least < slope && slope < greatest);
             }
         }
+    }
+
+    #[test]
+    fn slivers_and_extreme_sizes_have_no_axes() {
+        assert!(free_axes([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1e-3, 0.0]]).is_none());
+        assert!(free_axes([[0.0; 3], [1e7, 0.0, 0.0], [0.0, 1e7, 0.0]]).is_none());
+        assert!(free_axes([[0.0; 3], [1e-7, 0.0, 0.0], [0.0, 1e-7, 0.0]]).is_none());
+        assert!(free_axes([[0.0; 3]; 3]).is_none());
+        assert!(free_axes([[0.0; 3], [1.0, 0.0, 0.0], [1.0, 0.1, 0.0]]).is_some());
     }
 }

@@ -1,11 +1,11 @@
-//! BTH-F209: rays from some triangles meet nothing where their directions are called free.
+//! BTH-F210: triangles with free bins have axes. BTH-F209: rays from some triangles meet nothing where their directions are called free.
 //!
 //! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to points of all other triangles
-//! are decided, exactly: a wrong class of a bin is found as soon as one of the points lies in the bin.
+//! are decided, exactly: a wrong bin is found as soon as one of the points lies in the bin.
 
 use crate::error::{Code, Error, Result};
 use crate::exact::side;
-use crate::layout::{Child, FREE_SIDE, FreeClass, FreeDirections, FreePlace, free_bin, free_column, kind};
+use crate::layout::{Child, FreeBins, FreeDirections, FreePlace, free_axes, free_bin, kind};
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
@@ -20,20 +20,56 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     let triangles: Vec<Option<Corners>> = view.free.iter().map(placed).collect();
     let reach = view.free_reach.first().map_or(0.0, |row| f64::from(row.reach));
     let step = triangles.len().div_ceil(STARTS).max(1);
+    let at = |triangle: usize| (triangle * size_of::<FreeDirections>()) as u64;
+    for (triangle, corners) in triangles.iter().enumerate() {
+        let Some(corners) = corners else { continue };
+        if free_axes(*corners).is_none() {
+            let expected = "no free bins of a triangle without axes";
+            let found = format!("{corners:?}");
+            return Err(Error::within(Code::FreeAxes, kind::FREE_DIRECTIONS, at(triangle), expected, found));
+        }
+    }
+    let all = if triangles.is_empty() { Vec::new() } else { all_corners(view) };
     for start in (0..triangles.len()).step_by(step) {
-        let Some(corners) = triangles[start] else { continue };
-        let others = triangles.iter().enumerate().filter(|(other, _)| *other != start);
-        for (other, target) in others.filter_map(|(other, target)| Some((other, (*target)?))) {
-            let class = |bin| view.free[start].class(bin);
-            if let Some(corner) = corners.iter().find(|corner| is_met(**corner, target, reach, class)) {
-                let at = (start * size_of::<FreeDirections>()) as u64;
+        let Some(start_corners) = triangles[start] else { continue };
+        let Some(axes) = free_axes(start_corners) else { continue };
+        let of_start = Start { axes, bins: view.free[start].bins(), reach };
+        for &(other, target) in all.iter().filter(|(other, _)| *other != start as u32) {
+            if let Some(corner) = start_corners.iter().find(|corner| of_start.meets(**corner, target)) {
                 let expected = "nothing in free directions".to_owned();
                 let found = format!("triangle {other} from {corner:?}");
-                return Err(Error::within(Code::FreeMet, kind::FREE_DIRECTIONS, at, expected, found));
+                return Err(Error::within(Code::FreeMet, kind::FREE_DIRECTIONS, at(start), expected, found));
             }
         }
     }
     Ok(())
+}
+
+/// The triangles of all triangle leaves, with their ids.
+fn all_corners(view: &ObjectView) -> Vec<(u32, Corners)> {
+    let mut stack = vec![view.header.root];
+    stack.extend(view.tet_leaves.iter().map(|leaf| leaf.subtree));
+    let mut found = Vec::new();
+    while let Some(code) = stack.pop() {
+        let (mut indexed, mut raw) = (None, None);
+        let id = |row: u32| view.triangle_ids[row as usize];
+        match Child::from_code(code) {
+            Some(Child::Indexed(index)) => {
+                let leaf = view.indexed(index, &mut indexed);
+                let slots = 0..leaf.triangles;
+                found.extend(slots.map(|slot| (id(leaf.first + slot), leaf.triangle(slot as usize))));
+            }
+            Some(Child::Raw(index)) => {
+                let leaf = view.raw(index, &mut raw);
+                let slots = 0..leaf.triangles;
+                found.extend(slots.map(|slot| (id(leaf.first + slot), leaf.triangle(slot as usize))));
+            }
+            Some(Child::Node(index)) => stack.extend(view.node(index).child),
+            Some(Child::Packed(index)) => stack.extend(view.packed_node(index).child),
+            Some(Child::Tets(_)) | None => {}
+        }
+    }
+    found
 }
 
 /// The corners of the triangle of a row, if it has a place.
@@ -47,37 +83,36 @@ fn corners(view: &ObjectView, row: &FreeDirections) -> Option<Corners> {
     }
 }
 
-/// Whether the ray from a point through the middle of a triangle meets it though its direction is called free.
-fn is_met(from: [f32; 3], target: Corners, reach: f64, class: impl Fn(usize) -> FreeClass) -> bool {
-    let middle: [f32; 3] = std::array::from_fn(|k| {
-        let sum: f64 = target.iter().map(|p| f64::from(p[k])).sum();
-        (sum / 3.0) as f32
-    });
-    let d: [f64; 3] = std::array::from_fn(|k| f64::from(middle[k]) - f64::from(from[k]));
-    let Some(bin) = bin_of(d) else { return false };
-    let class = class(bin);
-    if class == FreeClass::Unknown || class == FreeClass::Near && beyond(from, target, reach) {
-        return false;
-    }
-    // The triangle is met beyond the start if the line passes its edges on the same side, and the start lies on the side of the
-    // triangle from which that direction comes.
-    let [a, b, c] = target;
-    let sides = [side(from, middle, a, b), side(from, middle, b, c), side(from, middle, c, a)];
-    let before = side(a, b, c, from);
-    before != Ordering::Equal
-        && sides.iter().any(|s| *s != Ordering::Equal)
-        && sides.iter().all(|s| *s != before)
+/// A triangle from which rays are sent.
+struct Start {
+    axes: [[f64; 3]; 3],
+    bins: FreeBins,
+    reach: f64,
 }
 
-/// The bin in which a direction certainly lies, without the margin.
-fn bin_of(d: [f64; 3]) -> Option<usize> {
-    let bin = free_bin(d.map(|x| x as f32));
-    let (axis, depth) = (bin / 32, d[bin / 32].abs());
-    let within = |k: usize, column: usize| {
-        let [low, high] = free_column(column);
-        low * depth < d[k % 3] && d[k % 3] < high * depth
-    };
-    (within(axis + 1, bin % FREE_SIDE) && within(axis + 2, bin / FREE_SIDE % FREE_SIDE)).then_some(bin)
+impl Start {
+    /// Whether the ray from a corner through the middle of another triangle meets it though its direction is called free.
+    fn meets(&self, from: [f32; 3], target: Corners) -> bool {
+        let middle: [f32; 3] = std::array::from_fn(|k| {
+            let sum: f64 = target.iter().map(|p| f64::from(p[k])).sum();
+            (sum / 3.0) as f32
+        });
+        let d: [f64; 3] = std::array::from_fn(|k| f64::from(middle[k]) - f64::from(from[k]));
+        // Rounding errors of the bin are far below its margin.
+        let Some((bin, is_back)) = free_bin(&self.axes, d) else { return false };
+        let is_free = self.bins.is_free(bin) && self.bins.is_back() == is_back;
+        if !is_free || self.bins.is_nearby() && beyond(from, target, self.reach) {
+            return false;
+        }
+        // The triangle is met beyond the start if the line passes its edges on the same side, and the start lies on the side of the
+        // triangle from which that direction comes.
+        let [a, b, c] = target;
+        let sides = [side(from, middle, a, b), side(from, middle, b, c), side(from, middle, c, a)];
+        let before = side(a, b, c, from);
+        before != Ordering::Equal
+            && sides.iter().any(|s| *s != Ordering::Equal)
+            && sides.iter().all(|s| *s != before)
+    }
 }
 
 /// Whether all of a triangle may be farther from a point than the reach.

@@ -4,12 +4,12 @@ use super::corners_at;
 use crate::intersect::prepare::load_rays;
 use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Simd};
-use bth_format::layout::{FREE_BORDER, FREE_SIDE, NONE};
+use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
 use bth_format::object::ObjectView;
 use std::ops::Range;
 
-/// Directions all of whose components are below it in absolute value are not looked up.
-pub(super) const LEAST_DIRECTION: f32 = 1.0 / (1u128 << 100) as f32;
+/// Directions are looked up whose greatest component in absolute value is between these, so that no product underflows or overflows.
+pub(super) const DIRECTIONS: [f32; 2] = [1.0 / (1 << 20) as f32, (1 << 20) as f32];
 /// Unit of rounding.
 const U: f32 = f32::EPSILON / 2.0;
 
@@ -57,6 +57,17 @@ struct Block {
     index: [u32; LANES],
 }
 
+/// What follows from the triangles of sixteen rays.
+struct Crossings<S: Simd> {
+    /// Bits of the rays whose line certainly crosses the triangle before `tmin` to its front, and to its back.
+    front: u32,
+    back: u32,
+    /// Lower bounds of t there.
+    start: S::F,
+    /// The bins of the directions.
+    bins: S::U,
+}
+
 impl Block {
     fn new() -> Self {
         Block { bins: [0; LANES], corners: [[[0.0; LANES]; 3]; 3], index: [0; LANES] }
@@ -72,66 +83,69 @@ impl Block {
         from: &[u32],
         reach: f32,
     ) -> u32 {
-        let &[_, _, _, tmin, dx, dy, dz, tmax] = fields;
-        s.store_u(bins(s, [dx, dy, dz]), &mut self.bins);
-        let short = s.mask_bits(s.lt(tmax, s.splat(f32::INFINITY)));
-        let (mut all, mut near) = (0, 0);
-        let mut places = [NONE; LANES];
+        let rows = object.free;
+        let mut known = 0;
         for lane in 0..LANES {
-            // A triangle that does not exist has no row, nor has NONE. Which lanes are free is not predictable: there are no branches.
-            let exists = (from[lane] as usize) < object.free.len();
-            let row = &object.free[if exists { from[lane] as usize } else { 0 }];
-            let digit = if exists { row.digit(self.bins[lane] as usize) } else { 0 };
-            places[lane] = row.place;
-            all |= (digit >> 1) << lane;
-            near |= (digit & 1) << lane;
-        }
-        near &= short;
-        let mut wanted = all | near;
-        while wanted != 0 {
-            let lane = wanted.trailing_zeros() as usize % LANES;
-            wanted &= wanted - 1;
-            let Some(corners) = corners_at(object, places[lane]) else {
-                (all, near) = (all & !(1 << lane), near & !(1 << lane));
+            // A triangle that does not exist has no row, nor has NONE.
+            let Some(corners) = rows.get(from[lane] as usize).and_then(|row| corners_at(object, row.place)) else {
                 continue;
             };
+            known |= 1 << lane;
             for corner in 0..3 {
                 for axis in 0..3 {
                     self.corners[corner][axis][lane] = corners[corner][axis];
                 }
             }
         }
-        if all | near == 0 {
+        if known == 0 {
             return 0;
         }
-        let (crosses, start) = self.crossings(s, fields, tmin);
-        let mut free = all & crosses;
-        if near & crosses != 0 {
-            // Squares that underflow are less than that of any reach but 0 by more than the slack.
-            let length = s.sub(s.fma(s.abs(tmax), s.splat(1.0 / (1 << 20) as f32), tmax), start);
-            let mut square = s.splat(0.0);
-            for component in [dx, dy, dz] {
-                let part = s.mul(component, length);
-                square = s.fma(part, part, square);
-            }
-            let within = s.lt(square, s.splat(reach * reach * (1.0 - 1e-4)));
-            free |= near & crosses & s.mask_bits(within);
+        let crossings = self.crossings(s, fields);
+        s.store_u(crossings.bins, &mut self.bins);
+        let (mut free, mut back, mut near) = (0, 0, 0);
+        for lane in 0..LANES {
+            let row = &rows[if known >> lane & 1 == 1 { from[lane] as usize } else { 0 }];
+            let bin = self.bins[lane];
+            free |= (row.bins[bin as usize / 32 % 4] >> (bin % 32) & 1) << lane;
+            back |= (row.bins[3] >> 30 & 1) << lane;
+            near |= (row.bins[3] >> 31) << lane;
+        }
+        free &= known & (crossings.front & !back | crossings.back & back);
+        near &= free;
+        if near != 0 {
+            free &= !near | self.ends_within(s, fields, crossings.start, reach);
         }
         free
     }
 
-    /// Bits of the rays whose line certainly crosses the triangle before `tmin`, and lower bounds of t there. Derivation: as in the
-    /// f64 decision about one ray, whose bounds these are with the unit of f32; terms with `MIN_POSITIVE` bound what underflows.
+    /// Bits of the rays that end within the reach of where they cross their triangle, for lower bounds of t there.
     #[inline(always)]
-    fn crossings<S: Simd>(&self, s: S, fields: &[S::F; 8], tmin: S::F) -> (u32, S::F) {
-        let &[ox, oy, oz, _, dx, dy, dz, _] = fields;
+    fn ends_within<S: Simd>(&self, s: S, fields: &[S::F; 8], start: S::F, reach: f32) -> u32 {
+        let &[_, _, _, _, dx, dy, dz, tmax] = fields;
+        // Squares that underflow are less than that of any reach but 0 by more than the slack.
+        let length = s.sub(s.fma(s.abs(tmax), s.splat(1.0 / (1 << 20) as f32), tmax), start);
+        let mut square = s.splat(0.0);
+        for component in [dx, dy, dz] {
+            let part = s.mul(component, length);
+            square = s.fma(part, part, square);
+        }
+        s.mask_bits(s.lt(square, s.splat(reach * reach * (1.0 - 1e-4))))
+    }
+
+    /// Where the lines of the rays cross the triangles. Derivation: as in the f64 decision about one ray, whose bounds these are with
+    /// the unit of f32; terms with `MIN_POSITIVE` bound what underflows.
+    #[inline(always)]
+    fn crossings<S: Simd>(&self, s: S, fields: &[S::F; 8]) -> Crossings<S> {
+        let &[ox, oy, oz, tmin, dx, dy, dz, _] = fields;
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let zero = s.splat(0.0);
+        let mut p = [[zero; 3]; 3];
         let mut r = [[zero; 3]; 3];
         let mut far = zero;
         for corner in 0..3 {
             for k in 0..3 {
-                r[corner][k] = s.sub(s.load(&self.corners[corner][k]), o[k]);
+                p[corner][k] = s.load(&self.corners[corner][k]);
+                r[corner][k] = s.sub(p[corner][k], o[k]);
                 far = s.max_abs(far, r[corner][k]);
             }
         }
@@ -159,8 +173,16 @@ impl Block {
 
         let least_sum = s.sub(sum, sum_error);
         let start = s.div(s.min(s.sub(volume, volume_error), zero), least_sum);
-        let usable = s.and(s.lt(zero, least_sum), s.lt(s.splat(LEAST_DIRECTION), s.max_abs(s.max_abs(dx, dy), dz)));
-        (s.mask_bits(s.and(s.and(s.or(above, below), before), usable)), start)
+        let greatest = s.max_abs(s.max_abs(dx, dy), dz);
+        let is_usual =
+            s.and(s.lt(s.splat(DIRECTIONS[0]), greatest), s.lt(greatest, s.splat(DIRECTIONS[1])));
+        let usable = s.and(s.and(s.lt(zero, least_sum), before), is_usual);
+        Crossings {
+            front: s.mask_bits(s.and(above, usable)),
+            back: s.mask_bits(s.and(below, usable)),
+            start,
+            bins: bins(s, &p, d),
+        }
     }
 }
 
@@ -178,25 +200,54 @@ fn cross<S: Simd>(s: S, a: [S::F; 3], b: [S::F; 3]) -> [S::F; 3] {
     ]
 }
 
-/// The bins of directions ([`bth_format::layout::free_bin`]); some bin for what is no number.
+/// The bins of directions ([`bth_format::layout::free_bin`]), or [`FREE_BINS`], whose bit is never set.
+///
+/// The errors of the axes are 5 units of the lengths of the edges, those of their products with a direction a few more: relative to
+/// the normal, which is at least 1/128 of the product of the edges, less than 2^-13, a sixteenth of the margin. For edges and
+/// directions in their ranges nothing overflows, and what underflows is less than that.
 #[inline(always)]
-fn bins<S: Simd>(s: S, [x, y, z]: [S::F; 3]) -> S::U {
+fn bins<S: Simd>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
     let zero = s.splat(0.0);
-    let (ax, ay, az) = (s.abs(x), s.abs(y), s.abs(z));
-    let along_x = s.and(s.le(ay, ax), s.le(az, ax));
-    let along_y = s.and_not(s.le(az, ay), along_x);
-    let depth = s.select(along_x, x, s.select(along_y, y, z));
-    let u = s.select(along_x, y, s.select(along_y, z, x));
-    let v = s.select(along_x, z, s.select(along_y, x, y));
-    let border = s.mul(s.abs(depth), s.splat(FREE_BORDER));
-    let column = |a: S::F| (s.lt(a, zero), s.lt(border, s.abs(a)));
-    let number = |(negative, outer): (S::M, S::M), unit: u32| {
-        let of = |n: u32| s.splat_u(n * unit);
-        let below = s.select_u(outer, of(0), of(1));
-        s.select_u(negative, below, s.select_u(outer, of(3), of(2)))
+    let (mut e, mut f) = ([zero; 3], [zero; 3]);
+    for k in 0..3 {
+        e[k] = s.sub(corners[1][k], corners[0][k]);
+        f[k] = s.sub(corners[2][k], corners[0][k]);
+    }
+    let normal = cross(s, e, f);
+    let per_height = s.div(s.splat(1.0), dot(s, d, normal));
+    let per_square = s.div(s.splat(1.0), dot(s, e, e));
+    let x = s.mul(dot(s, d, e), per_height);
+    let y = s.mul(dot(s, d, cross(s, normal, e)), per_height);
+    // Squares of the slopes. Signs are those of the components, not of the slopes, which are negated on the back.
+    let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot(s, normal, normal));
+    let y_square = s.mul(s.mul(y, y), per_square);
+    let upwards = s.lt(zero, per_height);
+    let column = |(slope, square): (S::F, S::F), unit: u32| {
+        let mut beyond = s.splat_u(0);
+        for border in FREE_BORDERS {
+            beyond = s.add_where(beyond, s.lt(s.splat(border as f32), square), s.splat_u(unit));
+        }
+        let is_negative = s.or(
+            s.and(upwards, s.lt(slope, zero)),
+            s.and_not(s.lt(zero, slope), upwards),
+        );
+        (is_negative, beyond)
     };
-    let face = s.select_u(along_x, s.splat_u(0), s.select_u(along_y, s.splat_u(32), s.splat_u(64)));
-    let half = s.select_u(s.lt(depth, zero), s.splat_u(16), s.splat_u(0));
-    let (columns, rows) = (number(column(u), 1), number(column(v), FREE_SIDE as u32));
-    s.add_u(s.add_u(face, half), s.add_u(columns, rows))
+    let (x_negative, x_beyond) = column((x, x_square), 1);
+    let (y_negative, y_beyond) = column((y, y_square), FREE_SIDE as u32);
+    let middle = s.splat_u((FREE_BINS / 2) as u32);
+    let flat = s.and(s.lt(x_square, s.splat(STEEPEST)), s.lt(y_square, s.splat(STEEPEST)));
+    let bin = add_signed(s, middle, x_negative, x_beyond);
+    let bin = add_signed(s, bin, y_negative, y_beyond);
+    s.select_u(flat, bin, s.splat_u(FREE_BINS as u32))
+}
+
+/// Square of the greatest slope.
+const STEEPEST: f32 = (FREE_STEEPEST * FREE_STEEPEST) as f32;
+
+/// a ± b, the latter where the mask is set.
+#[inline(always)]
+fn add_signed<S: Simd>(s: S, a: S::U, negative: S::M, b: S::U) -> S::U {
+    let ones = s.select_u(negative, s.splat_u(u32::MAX), s.splat_u(0));
+    s.add_u(a, s.add_where(s.xor_u(b, ones), negative, s.splat_u(1)))
 }

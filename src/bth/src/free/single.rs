@@ -1,8 +1,9 @@
 //! The decision about one ray, in f64.
 
 use super::corners_at;
+use super::lanes::DIRECTIONS;
 use crate::rays::Ray;
-use bth_format::layout::{FreeClass, free_bin};
+use bth_format::layout::{free_axes, free_bin};
 use bth_format::object::ObjectView;
 
 /// Unit of rounding.
@@ -13,19 +14,27 @@ const U: f64 = f64::EPSILON / 2.0;
 #[inline(never)]
 pub(crate) fn certainly_misses(object: &ObjectView<'_>, ray: &Ray, triangle: u32) -> bool {
     let Some(row) = object.free.get(triangle as usize) else { return false };
-    let direction = ray.direction;
-    // Bins are wider than rounding errors unless directions are so short that they are rounded to few bits.
-    let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
-    if !(greatest > super::lanes::LEAST_DIRECTION && greatest < f32::INFINITY) {
-        return false;
-    }
-    let class = row.class(free_bin(direction));
-    if class == FreeClass::Unknown || class == FreeClass::Near && ray.tmax == f32::INFINITY {
-        return false;
-    }
     let Some(corners) = corners_at(object, row.place) else { return false };
-    let Some(before) = crossing(ray, corners) else { return false };
-    if class == FreeClass::All {
+    let direction = ray.direction;
+    let greatest = direction[0].abs().max(direction[1].abs()).max(direction[2].abs());
+    if !(greatest > DIRECTIONS[0] && greatest < DIRECTIONS[1]) {
+        return false;
+    }
+    let bins = row.bins();
+    if bins.is_nearby() && ray.tmax == f32::INFINITY {
+        return false;
+    }
+    // The file may lie about which triangles have axes; then nothing is known.
+    let bin = free_axes(corners).and_then(|axes| free_bin(&axes, direction.map(f64::from)));
+    let Some((bin, is_back)) = bin else { return false };
+    if !bins.is_free(bin) {
+        return false;
+    }
+    let Some((before, leaves_to_back)) = crossing(ray, corners) else { return false };
+    if leaves_to_back != bins.is_back() || is_back != leaves_to_back {
+        return false;
+    }
+    if !bins.is_nearby() {
         return true;
     }
     let Some(reach) = object.free_reach.first() else { return false };
@@ -34,13 +43,14 @@ pub(crate) fn certainly_misses(object: &ObjectView<'_>, ray: &Ray, triangle: u32
     square < f64::from(reach.reach).powi(2) * (1.0 - 1e-6)
 }
 
-/// Lower bound of the t at which the line of a ray crosses a triangle, if it certainly does before the ray's range begins.
+/// Lower bound of the t at which the line of a ray crosses a triangle, if it certainly does before the ray's range begins, and
+/// whether the ray leaves it to the back.
 ///
 /// With the corners r relative to the origin, the signs of d·(r₁×r₂), d·(r₂×r₀) and d·(r₀×r₁) say on which sides of the edges the line
 /// passes, and t is the quotient of r₀·(r₁×r₂) and their sum. The bounds of the errors follow from the number of roundings: 14 units
 /// of the product of the sizes of a term for the former, 48 for the latter. Products of three f32 neither underflow nor
 /// overflow in f64.
-fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<f64> {
+fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f64, bool)> {
     let d = ray.direction.map(f64::from);
     let r = corners.map(|p| [0, 1, 2].map(|k| f64::from(p[k]) - f64::from(ray.origin[k])));
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -66,5 +76,5 @@ fn crossing(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<f64> {
     if !(volume + volume_error < first * sum - first.abs() * sum_error && sum > sum_error) {
         return None;
     }
-    Some((volume - volume_error).min(0.0) / (sum - sum_error))
+    Some(((volume - volume_error).min(0.0) / (sum - sum_error), sign < 0.0))
 }

@@ -131,11 +131,10 @@ fn free_directions() -> Vec<u8> {
         classes[80..96].fill(down);
         classes
     };
-    let row = |slot, classes| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), &classes);
-    let free = [
-        row(1, classes(FreeClass::All, FreeClass::Near)),
-        row(0, classes(FreeClass::Near, FreeClass::All)),
-    ];
+    let row =
+        |slot, classes| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), &classes);
+    let free =
+        [row(1, classes(FreeClass::All, FreeClass::Near)), row(0, classes(FreeClass::Near, FreeClass::All))];
     file(&ObjectParts {
         bounds: Some(bounds(CORNERS.iter().chain(&above))),
         root: Child::Indexed(0).code(),

@@ -5,10 +5,10 @@
 
 use super::codec::MeshSummary;
 use super::rows::HashedRows;
-use crate::{bvh, free};
 use crate::options::{CompileOptions, Structure};
 use crate::source::SourceDigest;
 use crate::write::SceneParts;
+use crate::{bvh, free};
 use bth_cache::Key;
 use bth_files::Digest;
 use bth_import::{AlphaMode, Wanted};

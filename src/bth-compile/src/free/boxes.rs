@@ -67,7 +67,8 @@ fn children(tree: &BinaryBvh, node: u32) -> Vec<u32> {
     let mut found = vec![node];
     while found.len() < WIDTH {
         let inner = |(_, node): &(usize, &u32)| !tree.nodes[**node as usize].is_leaf();
-        let largest = found.iter().enumerate().filter(inner).max_by_key(|(_, node)| tree.nodes[**node as usize].count);
+        let largest =
+            found.iter().enumerate().filter(inner).max_by_key(|(_, node)| tree.nodes[**node as usize].count);
         let Some((at, &node)) = largest else { break };
         found[at] = node + 1;
         found.push(tree.nodes[node as usize].right);
@@ -115,47 +116,119 @@ impl Viewer {
     /// What may be seen of the boxes of a node.
     #[inline]
     pub(super) fn see(&self, node: &Node) -> Seen {
-        let [[m00, m01, m02], [m10, m11, m12], [m20, m21, m22]] = self.axes;
-        let [[x_least, x_most], [y_least, y_most]] = self.extent;
-        let mut seen =
-            Seen { squared_gap: [0.0; WIDTH], squared_size: [0.0; WIDTH], range: [[0; WIDTH]; 4] };
-        let mut slopes = [[0f32; WIDTH]; 4];
-        for l in 0..WIDTH {
-            let v = [0, 1, 2].map(|k| node.center[k][l] - self.origin[k]);
-            let h = [node.half[0][l], node.half[1][l], node.half[2][l]];
-            let sum = v[0].abs() + v[1].abs() + v[2].abs() + h[0] + h[1] + h[2];
-            let slack = self.slack + sum * (1.0 / (1 << 20) as f32);
-            let x = m00 * v[0] + m01 * v[1] + m02 * v[2];
-            let y = m10 * v[0] + m11 * v[1] + m12 * v[2];
-            let z = m20 * v[0] + m21 * v[1] + m22 * v[2];
-            let half_x = m00.abs() * h[0] + m01.abs() * h[1] + m02.abs() * h[2] + slack;
-            let half_y = m10.abs() * h[0] + m11.abs() * h[1] + m12.abs() * h[2] + slack;
-            let half_z = m20.abs() * h[0] + m21.abs() * h[1] + m22.abs() * h[2] + slack;
-            let (x0, x1) = (x - half_x - x_most, x + half_x - x_least);
-            let (y0, y1) = (y - half_y - y_most, y + half_y - y_least);
-            let (z0, z1) = (z - half_z, z + half_z);
-            let gap = [x0.max(-x1).max(0.0), y0.max(-y1).max(0.0), z0.max(-z1).max(0.0)];
-            seen.squared_gap[l] = gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2];
-            seen.squared_size[l] = h[0] * h[0] + h[1] * h[1] + h[2] * h[2];
-            // What is not above the plane has slopes beyond all columns.
-            let near = 1.0 / z0.max(1e-30);
-            let far = 1.0 / z1.max(1e-30);
-            let hidden = if z1 > 0.0 { 0.0 } else { f32::INFINITY };
-            slopes[0][l] = (x0 * near).min(x0 * far).max(-1e6) + hidden;
-            slopes[1][l] = (x1 * near).max(x1 * far).min(1e6);
-            slopes[2][l] = (y0 * near).min(y0 * far).max(-1e6);
-            slopes[3][l] = (y1 * near).max(y1 * far).min(1e6);
-        }
+        let c = node.center.map(Lanes);
+        let h = node.half.map(Lanes);
+        let v = [0, 1, 2].map(|k| c[k] - Lanes::splat(self.origin[k]));
+        let sum = v[0].abs() + v[1].abs() + v[2].abs() + h[0] + h[1] + h[2];
+        let slack = Lanes::splat(self.slack) + sum * Lanes::splat(1.0 / (1 << 20) as f32);
+        // Least and greatest coordinates along an axis, relative to points of the triangle.
+        let along = |k: usize, [least, most]: [f32; 2]| {
+            let m = self.axes[k].map(Lanes::splat);
+            let middle = m[0] * v[0] + m[1] * v[1] + m[2] * v[2];
+            let half = m[0].abs() * h[0] + m[1].abs() * h[1] + m[2].abs() * h[2] + slack;
+            [middle - half - Lanes::splat(most), middle + half - Lanes::splat(least)]
+        };
+        let (x, y, z) = (along(0, self.extent[0]), along(1, self.extent[1]), along(2, [0.0; 2]));
+        let zero = Lanes::splat(0.0);
+        let gap = [x, y, z].map(|[least, most]| least.max(zero - most).max(zero));
+        let near = Lanes::splat(1.0) / z[0].max(Lanes::splat(1e-30));
+        let far = Lanes::splat(1.0) / z[1].max(Lanes::splat(1e-30));
+        let limit = Lanes::splat(1e6);
+        let slopes = [x, y].map(|[least, most]| {
+            [(least * near).min(least * far).max(zero - limit), (most * near).max(most * far).min(limit)]
+        });
+        let mut seen = Seen {
+            squared_gap: (gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2]).0,
+            squared_size: (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]).0,
+            range: [[0; WIDTH]; 4],
+        };
         let borders = &*BORDERS;
-        for pair in 0..2 {
+        for (k, [least, most]) in slopes.into_iter().enumerate() {
             for i in 0..FREE_SIDE {
-                for l in 0..WIDTH {
-                    seen.range[2 * pair][l] += u32::from(slopes[2 * pair][l] > borders.above[i]);
-                    seen.range[2 * pair + 1][l] += u32::from(slopes[2 * pair + 1][l] >= borders.below[i]);
-                }
+                least.count_above(borders.above[i], &mut seen.range[2 * k]);
+                most.count_above(borders.below[i], &mut seen.range[2 * k + 1]);
             }
         }
+        // Nothing is seen of what is not above the plane.
+        for l in 0..WIDTH {
+            seen.range[1][l] &= if z[1].0[l] > 0.0 { u32::MAX } else { 0 };
+        }
         seen
+    }
+}
+
+/// A number for each child. Loops over all of them become vector instructions.
+#[derive(Clone, Copy)]
+struct Lanes([f32; WIDTH]);
+
+impl Lanes {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        Lanes([x; WIDTH])
+    }
+
+    #[inline(always)]
+    fn with(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
+        let mut result = self;
+        for l in 0..WIDTH {
+            result.0[l] = of(self.0[l], other.0[l]);
+        }
+        result
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.with(self, |a, _| a.abs())
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.with(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+
+    /// Adds 1 where the number is greater than a limit.
+    #[inline(always)]
+    fn count_above(self, limit: f32, to: &mut [u32; WIDTH]) {
+        for l in 0..WIDTH {
+            to[l] += u32::from(self.0[l] > limit);
+        }
+    }
+}
+
+impl std::ops::Add for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl std::ops::Sub for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl std::ops::Mul for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+}
+
+impl std::ops::Div for Lanes {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.with(other, |a, b| a / b)
     }
 }
 
@@ -164,6 +237,10 @@ impl Seen {
     #[inline]
     pub(super) fn bins(&self, lane: usize) -> BinSet {
         let [first, end, first_row, end_row] = [0, 1, 2, 3].map(|k| self.range[k][lane]);
-        if first >= end || first_row >= end_row { 0 } else { bins([first, end - 1], [first_row, end_row - 1]) }
+        if first >= end || first_row >= end_row {
+            0
+        } else {
+            bins([first, end - 1], [first_row, end_row - 1])
+        }
     }
 }

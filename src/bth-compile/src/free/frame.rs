@@ -64,6 +64,25 @@ impl Frame {
         self.axes.map(|axis| axis[0] * from[0] + axis[1] * from[1] + axis[2] * from[2])
     }
 
+    /// The bins all of whose directions certainly have a positive product with a vector that has this error.
+    pub(super) fn bins_along(&self, vector: [f64; 3], error: f64) -> BinSet {
+        let [x, y, z] = self.axes.map(|axis| axis[0] * vector[0] + axis[1] * vector[1] + axis[2] * vector[2]);
+        // Least products over columns and rows. Rounding errors are far below the slack.
+        let slack = 1e-9 * (x.abs() + y.abs() + z.abs()) + 64.0 * error;
+        let least = |factor: f64| COLUMNS.map(|[a, b]| (factor * a).min(factor * b));
+        let (columns, rows) = (least(x), least(y));
+        let mut bins = 0;
+        for (row, in_row) in rows.into_iter().enumerate() {
+            let above = slack - z - in_row;
+            let of_row = columns
+                .iter()
+                .enumerate()
+                .fold(0, |bits, (i, in_column)| bits | u32::from(*in_column > above) << i);
+            bins |= BinSet::from(of_row) << (FREE_SIDE * row);
+        }
+        bins
+    }
+
     pub(super) fn cone(&self, bin: usize) -> Cone {
         let [[x0, x1], [y0, y1]] = [COLUMNS[bin % FREE_SIDE], COLUMNS[bin / FREE_SIDE]];
         let vector = |[x, y, z]: [f64; 3]| {

@@ -18,7 +18,9 @@ impl FreeRows {
         let mut directions = vec![FreeDirections::UNKNOWN; free.bins.len()];
         for leaf in leaves(wide) {
             let (first, triangles) = match (leaf, grid.map(|grid| grid.bits)) {
-                (Child::Indexed(at), None) => counts(wide, at, 2, |leaf: &IndexedLeaf| (leaf.first, leaf.triangles)),
+                (Child::Indexed(at), None) => {
+                    counts(wide, at, 2, |leaf: &IndexedLeaf| (leaf.first, leaf.triangles))
+                }
                 (Child::Raw(at), None) => counts(wide, at, 2, |leaf: &RawLeaf| (leaf.first, leaf.triangles)),
                 (Child::Indexed(at), Some(GridBits::B16)) => {
                     counts(wide, at, 1, |leaf: &IndexedLeaf16| (leaf.first, leaf.triangles.into()))

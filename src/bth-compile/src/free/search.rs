@@ -17,8 +17,8 @@ pub(super) struct Surroundings<'a> {
 }
 
 /// Boxes and triangles whose size, relative to their distance, is at most this block the bins in which they may be seen, without proof
-/// that they are met: 3.6 degrees.
-const SMALL: f32 = 1.0 / 16.0;
+/// that they are met: six degrees.
+const SMALL: f32 = 1.0 / 10.0;
 /// Share of the directions of the front from which on the back is not searched.
 const ENOUGH: f64 = 1.0 / 8.0;
 /// What is free at all is kept unless this many times as much is free nearby.
@@ -56,14 +56,15 @@ struct State {
 }
 
 impl State {
-    fn shaft(&mut self, bin: usize) -> &Shaft {
+    /// Whether rays in the directions of a bin certainly miss another triangle.
+    fn certainly_misses(&mut self, bin: usize, other: &Corners) -> bool {
         let mut at = usize::from(self.shaft_of[bin]);
         if at == 0xff {
             at = self.shafts.len();
             self.shaft_of[bin] = at as u8;
             self.shafts.push(Shaft::new(&self.start, &self.frame.cone(bin), self.side));
         }
-        &self.shafts[at]
+        self.shafts[at].certainly_misses(&self.start, other)
     }
 
     fn block(&mut self, bins: BinSet, is_near: bool) {
@@ -188,12 +189,16 @@ impl<'a> Search<'a> {
         }
         let (slopes, squared_gap) = slopes(state, &other);
         let mut bins = of & bins_of_slopes(slopes[0], slopes[1]) & self.blockable(state, squared_gap);
+        if bins != 0
+            && let Some((away, error)) = state.start.plane_of(&other)
+        {
+            bins &= !state.frame.bins_along(away, error);
+        }
         let is_near = self.is_near(squared_gap);
         while bins != 0 {
             let bin = bins.trailing_zeros() as usize;
             bins &= bins - 1;
-            let shaft = *state.shaft(bin);
-            if !shaft.certainly_misses(&state.start, &other) {
+            if !state.certainly_misses(bin, &other) {
                 state.block(1 << bin, is_near);
             }
         }
@@ -207,10 +212,13 @@ fn slopes(state: &State, other: &Corners) -> ([[f32; 2]; 2], f32) {
     const SLACK: f64 = 1.0 / (1 << 20) as f64;
     let corners = state.start.corners.at.map(|p| state.frame.local(p));
     let points = other.at.map(|p| state.frame.local(p));
-    let largest = points.iter().flatten().chain(corners.iter().flatten()).fold(0.0, |m: f64, x| m.max(x.abs()));
+    let largest =
+        points.iter().flatten().chain(corners.iter().flatten()).fold(0.0, |m: f64, x| m.max(x.abs()));
     let slack = SLACK * largest + 1e-12 * state.frame.origin.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
     let range = |k: usize| {
-        let of = |points: &[[f64; 3]; 3], pick: fn(f64, f64) -> f64| pick(pick(points[0][k], points[1][k]), points[2][k]);
+        let of = |points: &[[f64; 3]; 3], pick: fn(f64, f64) -> f64| {
+            pick(pick(points[0][k], points[1][k]), points[2][k])
+        };
         let start = if k == 2 { [0.0; 2] } else { [of(&corners, f64::min), of(&corners, f64::max)] };
         [of(&points, f64::min) - start[1] - slack, of(&points, f64::max) - start[0] + slack]
     };

@@ -86,6 +86,27 @@ impl Start {
         Start { corners, edges, normal, slope }
     }
 
+    /// The normal of another triangle's plane, towards the side on which this triangle lies, with a bound of its error; `None` if it
+    /// lies on both. A ray that leaves this triangle away from that plane does not meet the other one beyond its start.
+    pub(super) fn plane_of(&self, other: &Corners) -> Option<([f64; 3], f64)> {
+        let [a, b, c] = other.stored;
+        let mut sides = [false; 2];
+        for corner in self.corners.stored {
+            match exact_side(a, b, c, corner) {
+                Ordering::Greater => sides[0] = true,
+                Ordering::Less => sides[1] = true,
+                Ordering::Equal => {}
+            }
+        }
+        let (first, second) = (minus(other.at[1], other.at[0]), minus(other.at[2], other.at[0]));
+        let (normal, error) = (cross(first, second), ERROR * size(first) * size(second));
+        match sides {
+            [true, false] => Some((normal, error)),
+            [false, true] => Some((normal.map(|x| -x), error)),
+            _ => None,
+        }
+    }
+
     /// Whether the plane has a point of another triangle on a side: 1 for that of the normal, -1 for the other. Exact.
     pub(super) fn is_below(&self, other: &Corners, side: i32) -> bool {
         let wanted = if side > 0 { Ordering::Greater } else { Ordering::Less };
@@ -169,24 +190,22 @@ fn along_face(start: &Start, normal: [f64; 3]) -> Plane {
     Plane { normal, anchor: at, slope, floor, lowest }
 }
 
-/// The plane through an edge of the start triangle and an edge of the cone, above which all else of both lies.
+/// The plane through an edge of the start triangle and an edge of the cone, above which all else of both lies. Edges of the cone may
+/// lie in the plane, and below it by rounding: directions of the bin are farther inside the cone than that.
 fn through_edge(start: &Start, cone: &Cone, side: i32, edge: usize) -> Option<Plane> {
     // The third corner lies above the plane of the edge and a direction d of the cone if its normal is the cross product of d and
     // the edge, for directions on the side of the triangle's normal.
     let e = start.edges[edge].map(|x| -x * f64::from(side));
-    let mut touched = 0;
     let mut normal = cross(e, cone.corners[0]);
-    for corner in 1..4 {
-        if dot(normal, cone.corners[corner]) < 0.0 {
-            (touched, normal) = (corner, cross(e, cone.corners[corner]));
+    for corner in &cone.corners[1..] {
+        if dot(normal, *corner) < 0.0 {
+            normal = cross(e, *corner);
         }
     }
     let slope = ERROR * greatest(e);
-    let is_above = |corner: usize| {
-        corner == touched || dot(normal, cone.corners[corner]) > slope * size(cone.corners[corner])
-    };
+    let is_above = |corner: &[f64; 3]| dot(normal, *corner) >= -slope * size(*corner);
     let from = minus(start.corners.at[(edge + 2) % 3], start.corners.at[edge]);
-    if !(0..4).all(is_above) || dot(normal, from) < slope * size(from) {
+    if !cone.corners.iter().all(is_above) || dot(normal, from) < slope * size(from) {
         return None;
     }
     let lowest = 1 << edge | 1 << ((edge + 1) % 3);

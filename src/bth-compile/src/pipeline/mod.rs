@@ -116,7 +116,8 @@ pub(crate) fn compile_mesh(
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };
     let (free, free_report) = free_directions(&traced, options, stages, clock, monitor)?;
-    let (object, collapse) = clock.time("collapse", || object::join(traced, leaves, free, options, monitor))?;
+    let (object, collapse) =
+        clock.time("collapse", || object::join(traced, leaves, free, options, monitor))?;
     let coordinates = object.coordinates_report();
     Ok((object, StageReports::new(coordinates, (bvh, free_report), tets, collapse)))
 }

@@ -93,6 +93,19 @@ impl CompileReport {
     ) -> Self {
         let StageReports { coordinates, bvh, free, marks, costs, tets, probe, collapse } = stages;
         let seconds = clock.into_times();
-        Self { source_blake3, seconds, mesh, coordinates, bvh, free, marks, costs, tets, probe, collapse, file }
+        Self {
+            source_blake3,
+            seconds,
+            mesh,
+            coordinates,
+            bvh,
+            free,
+            marks,
+            costs,
+            tets,
+            probe,
+            collapse,
+            file,
+        }
     }
 }

@@ -7,9 +7,10 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub const FREE_SIDE: usize = 11;
 /// Direction bins of a triangle.
 pub const FREE_BINS: usize = FREE_SIDE * FREE_SIDE;
-/// Squares of the slopes at which columns meet: k² / (121 - k²) for k = 1, 3, 5, 7, 9. In terms of the sine of the angle that a
-/// direction is tilted by along an axis, columns are equally wide, so that each holds as much of the cosine-weighted rays.
-pub const FREE_BORDERS: [f64; 5] = [1.0 / 120.0, 9.0 / 112.0, 25.0 / 96.0, 49.0 / 72.0, 81.0 / 40.0];
+/// Squares of the slopes at which columns meet: tan²(k π / 22) for k = 1, 3, 5, 7, 9, rounded. Columns are equally wide in terms of
+/// the angle that a direction is tilted by along an axis.
+pub const FREE_BORDERS: [f64; 5] =
+    [0.020672197824104982, 0.20856091329926152, 0.750830798121458, 2.4212305216220913, 11.598705569133076];
 /// Greatest slope of the directions of bins.
 pub const FREE_STEEPEST: f64 = 16.0;
 /// How far the promise of a bin reaches beyond its borders: slopes s reach to s ± margin (1 + s²), which is that angle. A reader may
@@ -126,7 +127,7 @@ pub fn free_bin(axes: &[[f64; 3]; 3], direction: [f64; 3]) -> Option<(usize, boo
 
 /// Least and greatest slope of the promise of a column, with the margin.
 pub fn free_column(column: usize) -> [f64; 2] {
-    // The border between columns i and i + 1 is at the sine (2 i - 9) / 11.
+    // The border between columns i and i + 1 is at the tilt (2 i - 9) π / 22.
     let border = |k: isize| {
         let k = 2 * k - FREE_SIDE as isize;
         match k.unsigned_abs() {
@@ -191,7 +192,9 @@ mod tests {
 
     #[test]
     fn places_are_encoded() {
-        for leaf in [Child::Indexed(0), Child::Raw(0), Child::Indexed(77), Child::Raw(FreePlace::INDEX_LIMIT - 1)] {
+        for leaf in
+            [Child::Indexed(0), Child::Raw(0), Child::Indexed(77), Child::Raw(FreePlace::INDEX_LIMIT - 1)]
+        {
             let place = FreePlace { leaf, slot: 9 };
             assert_eq!(FreePlace::from_code(place.code()), Some(place));
         }
@@ -202,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_equally_wide_in_sines_and_hold_their_directions() {
+    fn columns_are_equally_wide_and_hold_their_directions() {
         let axes = free_axes([[0.0; 3], [2.0, 0.0, 0.0], [1.0, 3.0, 0.0]]).unwrap();
         let mut random = Rng::new(4);
         for _ in 0..20_000 {
@@ -214,8 +217,7 @@ mod tests {
             assert_eq!(back, d[2] < 0.0);
             for (k, column) in [bin % FREE_SIDE, bin / FREE_SIDE].into_iter().enumerate() {
                 let slope = d[k] / d[2].abs();
-                let sine = slope / (1.0 + slope * slope).sqrt();
-                assert_eq!(((sine + 1.0) * 5.5) as usize, column);
+                assert_eq!((slope.atan() * 11.0 / std::f64::consts::PI + 5.5) as usize, column);
                 let [least, greatest] = free_column(column);
                 assert!(least < slope && slope < greatest);
             }

@@ -4,7 +4,7 @@ use super::corners_at;
 use crate::intersect::prepare::load_rays;
 use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Simd};
-use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST};
+use bth_format::layout::{FREE_BINS, FREE_BORDERS, FREE_SIDE, FREE_STEEPEST, FreePlace, NONE};
 use bth_format::object::ObjectView;
 use std::ops::Range;
 
@@ -32,7 +32,13 @@ impl Kernel for FreeKernel<'_, '_> {
         let mut block = Block::new();
         let mut first = range.start;
         rest.reserve(range.len() + LANES);
+        let hints = &from[..range.end];
+        prefetch_rows(s, object, hints, first);
+        prefetch_rows(s, object, hints, first + LANES);
+        prefetch_leaves(s, object, hints, first);
         while let Some(chunk) = rays[first..range.end].first_chunk() {
+            prefetch_rows(s, object, hints, first + 2 * LANES);
+            prefetch_leaves(s, object, hints, first + LANES);
             let fields = load_rays(s, chunk);
             let free = block.free_lanes(s, object, &fields, &from[first..][..LANES], reach);
             for lane in 0..LANES {
@@ -44,6 +50,32 @@ impl Kernel for FreeKernel<'_, '_> {
             first += LANES;
         }
         rest.extend(first as u32..range.end as u32);
+    }
+}
+
+/// Prefetches the rows of sixteen triangles.
+#[inline(always)]
+fn prefetch_rows<S: Simd>(s: S, object: &ObjectView<'_>, from: &[u32], first: usize) {
+    for &triangle in from[first.min(from.len())..].iter().take(LANES) {
+        s.prefetch(object.free.as_ptr().wrapping_add(triangle as usize));
+    }
+}
+
+/// Prefetches the leaves in which sixteen triangles lie, whose rows are there. Those on a grid, and what is beyond the lines of an
+/// indexed leaf, are not.
+#[inline(always)]
+fn prefetch_leaves<S: Simd>(s: S, object: &ObjectView<'_>, from: &[u32], first: usize) {
+    let mut last = NONE;
+    for &triangle in from[first.min(from.len())..].iter().take(LANES) {
+        let Some(row) = object.free.get(triangle as usize) else { continue };
+        let line = row.place >> 4 & FreePlace::INDEX_LIMIT;
+        if line != last {
+            last = line;
+            let leaf = object.lines.as_ptr().wrapping_add(line as usize);
+            for k in 0..4 {
+                s.prefetch(leaf.wrapping_add(k));
+            }
+        }
     }
 }
 
@@ -87,7 +119,8 @@ impl Block {
         let mut known = 0;
         for lane in 0..LANES {
             // A triangle that does not exist has no row, nor has NONE.
-            let Some(corners) = rows.get(from[lane] as usize).and_then(|row| corners_at(object, row.place)) else {
+            let Some(corners) = rows.get(from[lane] as usize).and_then(|row| corners_at(object, row.place))
+            else {
                 continue;
             };
             known |= 1 << lane;
@@ -174,8 +207,7 @@ impl Block {
         let least_sum = s.sub(sum, sum_error);
         let start = s.div(s.min(s.sub(volume, volume_error), zero), least_sum);
         let greatest = s.max_abs(s.max_abs(dx, dy), dz);
-        let is_usual =
-            s.and(s.lt(s.splat(DIRECTIONS[0]), greatest), s.lt(greatest, s.splat(DIRECTIONS[1])));
+        let is_usual = s.and(s.lt(s.splat(DIRECTIONS[0]), greatest), s.lt(greatest, s.splat(DIRECTIONS[1])));
         let usable = s.and(s.and(s.lt(zero, least_sum), before), is_usual);
         Crossings {
             front: s.mask_bits(s.and(above, usable)),
@@ -222,24 +254,25 @@ fn bins<S: Simd>(s: S, corners: &[[S::F; 3]; 3], d: [S::F; 3]) -> S::U {
     let x_square = s.mul(s.mul(s.mul(x, x), per_square), dot(s, normal, normal));
     let y_square = s.mul(s.mul(y, y), per_square);
     let upwards = s.lt(zero, per_height);
-    let column = |(slope, square): (S::F, S::F), unit: u32| {
-        let mut beyond = s.splat_u(0);
-        for border in FREE_BORDERS {
-            beyond = s.add_where(beyond, s.lt(s.splat(border as f32), square), s.splat_u(unit));
-        }
-        let is_negative = s.or(
-            s.and(upwards, s.lt(slope, zero)),
-            s.and_not(s.lt(zero, slope), upwards),
-        );
-        (is_negative, beyond)
-    };
-    let (x_negative, x_beyond) = column((x, x_square), 1);
-    let (y_negative, y_beyond) = column((y, y_square), FREE_SIDE as u32);
+    let (x_negative, x_beyond) = column(s, (x, x_square), upwards, 1);
+    let (y_negative, y_beyond) = column(s, (y, y_square), upwards, FREE_SIDE as u32);
     let middle = s.splat_u((FREE_BINS / 2) as u32);
     let flat = s.and(s.lt(x_square, s.splat(STEEPEST)), s.lt(y_square, s.splat(STEEPEST)));
     let bin = add_signed(s, middle, x_negative, x_beyond);
     let bin = add_signed(s, bin, y_negative, y_beyond);
     s.select_u(flat, bin, s.splat_u(FREE_BINS as u32))
+}
+
+/// Whether a component is negative, given the slope and its square, and its columns beyond the middle times a unit.
+#[inline(always)]
+fn column<S: Simd>(s: S, (slope, square): (S::F, S::F), upwards: S::M, unit: u32) -> (S::M, S::U) {
+    let zero = s.splat(0.0);
+    let mut beyond = s.splat_u(0);
+    for border in FREE_BORDERS {
+        beyond = s.add_where(beyond, s.lt(s.splat(border as f32), square), s.splat_u(unit));
+    }
+    let negative = s.or(s.and(upwards, s.lt(slope, zero)), s.and_not(s.lt(zero, slope), upwards));
+    (negative, beyond)
 }
 
 /// Square of the greatest slope.

@@ -234,23 +234,16 @@ fn trace_visits<Q: Query>(
     scratch: &mut Scratch,
     answers: &mut [Q::Answer],
 ) {
-    let mut all = |visits: &[Visit], rays: &ObjectRays, scratch: &mut Scratch| {
-        let scene = SceneRays { rays: batch.rays, visits, t_scale: &rays.t_scale };
-        let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
-        object::trace_batch(object, &rays.rays, rays.hints(), scratch, &mut sink);
+    let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
+    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
+    let (rays, hints) = (&object_rays.rays, object_rays.hints());
+    let Some(from) = hints.filter(|_| free::is_known(object)) else {
+        return object::trace_batch(object, rays, hints, scratch, &mut sink);
     };
-    match object_rays.hints().filter(|_| free::is_known(object)) {
-        None => all(visits, object_rays, scratch),
-        Some(from) => {
-            object::without_free::<Q>(object, &object_rays.rays, from, scratch, |rest, scratch| match rest {
-                None => all(visits, object_rays, scratch),
-                Some(rest) => {
-                    let (rest_rays, rest_visits) = object_rays.part(visits, rest);
-                    all(&rest_visits, &rest_rays, scratch);
-                }
-            });
-        }
-    }
+    object::without_free::<Q>(object, rays, from, scratch, |rest, scratch| match rest {
+        None => object::trace_batch(object, rays, hints, scratch, &mut sink),
+        Some(rest) => object::trace_rest(object, rays, rest, scratch, &mut sink),
+    });
 }
 
 struct SceneNearest<'a> {

@@ -42,18 +42,6 @@ impl ObjectRays {
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });
     }
 
-    /// Some of the rays, by their indices, and their visits.
-    pub(super) fn part(&self, visits: &[Visit], rays: &[u32]) -> (ObjectRays, Vec<Visit>) {
-        let index = |ray: &u32| *ray as usize;
-        let part = ObjectRays {
-            rays: rays.iter().map(|ray| self.rays[index(ray)]).collect(),
-            t_scale: rays.iter().map(|ray| self.t_scale[index(ray)]).collect(),
-            from: rays.iter().map(|ray| self.from[index(ray)]).collect(),
-            tmax: Vec::new(),
-        };
-        (part, rays.iter().map(|ray| visits[index(ray)]).collect())
-    }
-
     /// The triangles on which rays start, if there are any.
     pub(super) fn hints(&self) -> Option<&[u32]> {
         self.from.iter().any(|from| *from != NONE).then_some(&self.from)

@@ -64,21 +64,38 @@ fn trace_from<Q: Query>(
         return trace_batch(object, rays, from, scratch, &mut sink);
     };
     without_free::<Q>(object, rays, hints, scratch, |rest, scratch| {
-        let Some(rest) = rest else {
-            let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-            return trace_batch(object, rays, from, scratch, &mut sink);
-        };
-        // The rest is traced like a batch of its own, so that its rays can go in packets.
-        let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
-        let rest_from: Vec<u32> = rest.iter().map(|ray| hints[*ray as usize]).collect();
-        let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
-        let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
-        let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
-        trace_batch(object, &rest_rays, Some(&rest_from), scratch, &mut sink);
-        for (ray, found) in rest.iter().zip(found) {
-            answers[*ray as usize] = found;
+        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+        match rest {
+            None => trace_batch(object, rays, from, scratch, &mut sink),
+            // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
+            Some(rest) if Q::ANY => {
+                let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
+                let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
+                let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
+                let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
+                trace_batch(object, &rest_rays, None, scratch, &mut sink);
+                for (ray, found) in rest.iter().zip(found) {
+                    answers[*ray as usize] = found;
+                }
+            }
+            Some(rest) => trace_rest(object, rays, rest, scratch, &mut sink),
         }
     });
+}
+
+/// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
+pub(crate) fn trace_rest<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    rest: &[u32],
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_, Q>,
+) {
+    if object.header.root != NONE && !rest.is_empty() {
+        // Too few rays are left of most packets.
+        let remaining = RemainingRays { order: Some(rest), queries: None, walked: None };
+        through_bvh(object, rays, remaining, scratch, sink);
+    }
 }
 
 /// Calls `trace` with the indices of the rays that may hit something, by what is known of free directions at the triangles

@@ -6,7 +6,9 @@ mod scratch;
 pub(crate) mod single;
 mod strategy;
 
-pub(crate) use batch::{MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_batch, without_free};
+pub(crate) use batch::{
+    MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_batch, trace_rest, without_free,
+};
 pub use hints::Hinted;
 pub(crate) use scratch::{Scratch, with_scratch};
 

@@ -3,9 +3,9 @@
 use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
+use crate::free;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Query};
-use crate::free;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::{TetStart, enter_tets, start_in_tets};

@@ -197,7 +197,10 @@ impl Compile {
             alpha: self.alpha.into(),
             record: if self.compact { Record::Tet16 } else { self.tets }.into(),
             coordinates: self.coordinates(),
-            free: bth_compile::free::FreeOptions { keep: self.free_directions.into(), reach: self.free_reach },
+            free: bth_compile::free::FreeOptions {
+                keep: self.free_directions.into(),
+                reach: self.free_reach,
+            },
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
                 None => self.structure == Structure::Bth && !self.compact,

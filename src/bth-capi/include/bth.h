@@ -354,7 +354,7 @@ int32_t bth_builder_remove_subscene(bth_builder *builder, uint32_t subscene);
 int32_t bth_builder_set_instance_mask(bth_builder *builder, uint32_t instance, uint32_t mask);
 int32_t bth_builder_set_group_mask(bth_builder *builder, uint32_t object, uint32_t group, uint32_t mask);
 
-/* What a commit has done. 48 bytes. */
+/* What a commit or bth_set_positions has done. 64 bytes. */
 typedef struct {
     uint64_t nodes;           /* nodes of subscenes that moved, were hidden or became visible */
     uint64_t placed;          /* instances that were placed again */
@@ -362,8 +362,25 @@ typedef struct {
     double cost_ratio;        /* expected cost of rays through the top level relative to when it was last built */
     double top_level_seconds; /* time to rebuild or refit the top level */
     uint32_t rebuilt;         /* 1 if the top level was built anew, 0 if its boxes were computed again or nothing changed */
-    uint32_t reserved;        /* 0 */
+    uint32_t deformed;        /* objects that got new positions */
+    double deformed_cost_ratio; /* expected cost of rays through a deformed object relative to that in the pose for which it was
+                                   compiled, the greatest of several; 1 if no object got new positions */
+    double refit_seconds;     /* time to refit these objects */
 } bth_update;
+
+/* Number of vertices for which bth_set_positions expects positions; 0 if there is no such object or it was not compiled with
+ * --deformable (BTH_COMPILE_DEFORMABLE). */
+size_t bth_vertex_count(const bth_scene *scene, uint32_t object);
+
+/* Gives an object new positions, three floats for each of the `count` vertices of its source, in the source's order, in object space.
+ * All queries then answer for them as exactly as for a file that is compiled with them; the file is not touched. `update` may be
+ * null. No query may run on the scene meanwhile. Returns BTH_ERROR_MISSING if the object was not compiled for it, BTH_ERROR_ARGUMENT
+ * if the number of positions is wrong or one is not finite, BTH_ERROR_SCENE if an instance could not be placed, and the scene is then
+ * unchanged. */
+int32_t bth_set_positions(bth_scene *scene, uint32_t object, const float *positions, size_t count, bth_update *update);
+
+/* As bth_set_positions, for an object of a builder. The next commit makes the positions visible. */
+int32_t bth_builder_set_positions(bth_builder *builder, uint32_t object, const float *positions, size_t count);
 
 /* Makes all changes since the last commit visible. `update` may be null. If a visible instance cannot be placed, returns
  * BTH_ERROR_SCENE, and the text of the error gives the instance. The scene is then unchanged, and the changes still wait: correct the

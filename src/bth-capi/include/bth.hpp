@@ -106,6 +106,15 @@ public:
     void set_seconds(double seconds) { check(bth_set_seconds(get(), seconds)); }
     void set_frame(std::int32_t frame) { check(bth_set_frame(get(), frame)); }
 
+    /* Gives an object new positions, three floats for each vertex of its source; see bth_set_positions. */
+    bth_update set_positions(std::uint32_t object, const float *positions, std::size_t count) {
+        bth_update update;
+        check(bth_set_positions(get(), object, positions, count, &update));
+        return update;
+    }
+
+    std::size_t vertex_count(std::uint32_t object) const noexcept { return bth_vertex_count(get(), object); }
+
     double seconds() const noexcept { return bth_seconds(get()); }
 
     frame_range frames() const noexcept {

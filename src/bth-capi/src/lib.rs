@@ -5,6 +5,7 @@ pub mod builder;
 pub mod closest;
 pub mod hits;
 pub mod inside;
+pub mod materials;
 pub mod memory;
 pub mod motion;
 pub mod surface;

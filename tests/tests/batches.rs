@@ -3,8 +3,9 @@
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
 use bth_compile::Silent;
+use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
-use bth_format::layout::RecordKind;
+use bth_format::layout::{GridBits, RecordKind};
 use bth_random::Rng;
 use bth_scenes::{Model, gyroid::gyroid, knot::torus_knot};
 use bth_tests::rays::{assorted, onward};
@@ -118,6 +119,87 @@ fn check(model: &Model, structure: Structure, rays: usize, seed: u64) {
         }
     }
     Isa::best().choose().expect("the best is available");
+}
+
+/// Compiled with all free directions, on a grid or not.
+fn with_free_directions(model: &Model, options: CompileOptions) -> Scene {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("model.ply");
+    bth_scenes::write::file(model, &path).expect("a model file");
+    let free = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
+    let options = CompileOptions { structure: Structure::Bvh, free, ..options };
+    let (compiled, report) = compile(&path, &options, &Silent).expect("a model that compiles");
+    assert!(report.free.is_some_and(|free| free.kept && free.free + free.free_nearby > 0.1));
+    bth::from_bytes(&compiled.bytes).expect("a file that opens")
+}
+
+/// Rays from points just above or below triangles, from their edges and corners, in all directions, some of which end early.
+fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+    let mut rng = Rng::new(seed);
+    let of_ray = |i: usize, rng: &mut Rng| {
+        let triangle = rng.below(corners.len() as u64) as usize;
+        let [a, b, c] = corners[triangle];
+        let (u, v) = match i % 4 {
+            0 => (0.0, 0.0),
+            1 => (rng.unit_f64() as f32, 0.0),
+            _ => (0.5 * rng.unit_f64() as f32, 0.5 * rng.unit_f64() as f32),
+        };
+        let d = rng.unit_vector().map(|x| x as f32);
+        let length = |p: [f32; 3]| p.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let edge = length([0, 1, 2].map(|k| b[k] - a[k]));
+        let off = edge * [1e-2, 1e-4, 1e-6, 0.0][i / 4 % 4];
+        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + off * d[k]);
+        // Lengths of directions and ranges vary.
+        let scale = [1.0, 1e-3, 3e5, 1e-30][i / 16 % 4];
+        let tmax = [f32::INFINITY, 10.0 * edge / scale, 0.5 * edge / scale][i % 3];
+        let ray = Ray { origin, tmin: 0.0, direction: d.map(|x| x * scale), tmax };
+        let triangle = if rng.below(8) == 0 { rng.below(2 * corners.len() as u64) } else { triangle as u64 };
+        (ray, PrimitiveRef { instance: 0, triangle: triangle as u32 })
+    };
+    (0..count).map(|i| of_ray(i, &mut rng)).collect()
+}
+
+/// Free directions change no bit.
+fn check_free_directions(model: &Model, options: CompileOptions) {
+    let _turn = turn();
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let scene = with_free_directions(model, options);
+    let mut all = hinted_rays(&scene, &corners, 3000, 11);
+    all.extend(rays_off_the_surface(&corners, 30_000, 12));
+    let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = all.into_iter().unzip();
+    let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
+    let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
+    for (isa, hinted) in ways.filter(|(isa, _)| isa.is_available()) {
+        isa.choose().expect("an instruction set that is available");
+        hinted.choose();
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let mut any = vec![false; rays.len()];
+        for first in (0..rays.len()).step_by(1000) {
+            let part = first..rays.len().min(first + 1000);
+            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
+            scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
+        }
+        for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
+            assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {hinted:?}: {ray:?} from {from:?}");
+            assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {hinted:?}: {ray:?} from {from:?}");
+        }
+    }
+    Isa::best().choose().expect("the best is available");
+}
+
+#[test]
+fn free_directions_change_no_answer() {
+    check_free_directions(&torus_knot(2000), CompileOptions::default());
+    check_free_directions(&gyroid(3000), CompileOptions::default());
+}
+
+#[test]
+fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
+    let mut on_grid = CompileOptions::default();
+    on_grid.coordinates.bits = Some(GridBits::B16);
+    check_free_directions(&torus_knot(800), on_grid);
+    let far = scaled(torus_knot(800), 1.0, [300.0, -700.0, 1100.0]);
+    check_free_directions(&far, CompileOptions::default());
 }
 
 fn scaled(mut model: Model, scale: f32, offset: [f32; 3]) -> Model {

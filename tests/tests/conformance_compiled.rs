@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 use bth_compile::Silent;
+use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use std::path::{Path, PathBuf};
@@ -30,6 +31,10 @@ fn kinds() -> impl Iterator<Item = CompileOptions> {
                 record,
                 keep_subtrees,
                 // At this cost of a step the tetrahedra of the knot are chosen.
+                free: FreeOptions {
+                    keep: if keep_subtrees { KeepFree::All } else { KeepFree::None },
+                    ..FreeOptions::default()
+                },
                 costs: bth_compile::costs::CostOptions { c_tet: Some(1e-3), ..Default::default() },
                 ..CompileOptions::default()
             })

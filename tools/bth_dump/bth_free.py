@@ -7,8 +7,15 @@ import bth_leaves
 from bth_container import NONE
 from bth_leaves import INDEXED, RAW
 
-ROW = 24
-BORDERS = (-1.0, -0.41421356797218323, 0.0, 0.41421356797218323, 1.0)
+ROW = 20
+SIDE, BINS = 11, 121
+BACK, NEARBY = 1 << 126, 1 << 127
+# Squares of the slopes at which columns meet, and of the greatest slope.
+BORDERS = tuple(
+    Fraction(x)
+    for x in (0.020672197824104982, 0.20856091329926152, 0.750830798121458, 2.4212305216220913, 11.598705569133076)
+)
+STEEPEST = 256
 # Triangles from which rays are sent.
 STARTS = 64
 
@@ -16,16 +23,21 @@ STARTS = 64
 def check(view):
     """F168, F170 and F171."""
     rows, reach = view.free, view.free_reach
-    if len(rows) not in (0, view.triangles):
+    if len(rows) not in (0, 0 if view.leaf_vertices else view.triangles):
         raise view.invalid("F168", f"{len(rows)} rows", c.FREE_DIRECTIONS)
     if len(reach) != (1 if rows else 0):
         raise view.invalid("F168", f"{len(reach)} rows", c.FREE_REACH)
     for distance, *reserved in reach:
         if any(reserved) or not (distance == 0 or 2.0**-50 <= distance <= 2.0**50):
             raise view.invalid("F171", f"reach {distance}, {reserved}", c.FREE_REACH)
-    for triangle, (_, classes) in enumerate(rows):
-        if any(byte >= 243 for byte in classes) or classes[19] >= 3:
-            raise view.invalid("F170", classes.hex(), c.FREE_DIRECTIONS, ROW * triangle + 4)
+    for triangle, row in enumerate(rows):
+        if bits(row) & ~((1 << BINS) - 1 | BACK | NEARBY):
+            raise view.invalid("F170", f"{bits(row):#034x}", c.FREE_DIRECTIONS, ROW * triangle + 4)
+
+
+def bits(row):
+    """The 128 bits of a row."""
+    return sum(word << 32 * k for k, word in enumerate(row[1:]))
 
 
 def _code(kind, index, slot):
@@ -45,49 +57,83 @@ def placed(view, kind, index):
 
 def check_places(view, found):
     """F169; `found` holds the triangles that lie where their rows say."""
-    for triangle, (place, classes) in enumerate(view.free):
-        if any(classes) if place == NONE else triangle not in found:
-            raise view.invalid("F169", f"place {place:#x}", c.FREE_DIRECTIONS, ROW * triangle)
+    for triangle, row in enumerate(view.free):
+        if bits(row) if row[0] == NONE else triangle not in found:
+            raise view.invalid("F169", f"place {row[0]:#x}", c.FREE_DIRECTIONS, ROW * triangle)
 
 
-def bin_of(direction):
-    """The bin of a direction of Fractions."""
-    size = [abs(x) for x in direction]
-    axis = size.index(max(size))
-    row, column = (
-        sum(direction[k % 3] >= Fraction(border) * size[axis] for border in BORDERS[1:4]) for k in (axis + 2, axis + 1)
-    )
-    return (2 * axis + (direction[axis] < 0)) * 16 + 4 * row + column
+def _minus(p, q):
+    return [x - y for x, y in zip(p, q)]
 
 
-def class_of(classes, number):
-    """The class of a bin: a digit to base 3."""
-    return classes[number // 5] // 3 ** (number % 5) % 3
+def _dot(p, q):
+    return sum(x * y for x, y in zip(p, q))
 
 
-def check_met(view, side):
-    """F209, for rays from corners of some triangles to the middles of all others; `side` is the sign of a volume."""
-    corners = {}
-    for triangle, (place, _) in enumerate(view.free):
-        if place != NONE:
-            kind = RAW if place >> 31 else INDEXED
-            of_leaf = [points for _, points in bth_leaves.triangles(view, kind, place >> 4 & (1 << 27) - 1)]
-            corners[triangle] = of_leaf[place & 15]
-    reach = Fraction(view.free_reach[0][0]) if view.free else 0
+def _cross(p, q):
+    return [p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3] for k in range(3)]
+
+
+def axes(corners):
+    """The axes of a triangle, exactly; None if it has none."""
+    a, b, last = ([Fraction(x) for x in p] for p in corners)
+    first, second = _minus(b, a), _minus(last, a)
+    normal, edges = _cross(first, second), [_dot(e, e) for e in (first, second)]
+    if not all(Fraction(1, 1 << 40) <= e <= 1 << 40 for e in edges):
+        return None
+    if _dot(normal, normal) * (1 << 14) < edges[0] * edges[1]:
+        return None
+    return first, _cross(normal, first), normal
+
+
+def bin_of(axes_, direction):
+    """The bin of a direction and whether it points to the back; None if it is too steep."""
+    x, y, z = (_dot(direction, axis) for axis in axes_)
+    if z == 0:
+        return None
+    height = z * z / _dot(axes_[2], axes_[2])
+    columns = []
+    for part, axis in ((x, axes_[0]), (y, axes_[1])):
+        square = part * part / _dot(axis, axis) / height
+        if square > STEEPEST:
+            return None
+        beyond = sum(square > border for border in BORDERS)
+        columns.append(SIDE // 2 - beyond if part < 0 else SIDE // 2 + beyond)
+    return SIDE * columns[1] + columns[0], z < 0
+
+
+def check_met(view, corners, side):
+    """F210; F209 for rays from corners of some triangles to the middles of all others.
+
+    `corners` are those of all triangles in leaves, `side` is the sign of a volume.
+    """
+    if not view.free:
+        return
+    starts = {}
+    for triangle, row in enumerate(view.free):
+        if row[0] != NONE:
+            starts[triangle] = axes(corners[triangle])
+            if starts[triangle] is None:
+                raise view.invalid("F210", f"{corners[triangle]}", c.FREE_DIRECTIONS, ROW * triangle)
+    reach = Fraction(view.free_reach[0][0])
     for start in range(0, len(view.free), max(1, -(-len(view.free) // STARTS))):
-        for other, target in corners.items() if start in corners else ():
-            if other != start and any(_is_met(view, start, p, target, reach, side) for p in corners[start]):
+        if start not in starts:
+            continue
+        known = starts[start], bits(view.free[start]), reach
+        for other, target in corners.items():
+            if other != start and any(_is_met(known, p, target, side) for p in corners[start]):
                 raise view.invalid("F209", f"triangle {start} meets {other}", c.FREE_DIRECTIONS, ROW * start)
 
 
-def _is_met(view, start, origin, target, reach, side):
+def _is_met(known, origin, target, side):
     """Whether the ray from a point through the middle of a triangle meets it in a direction that is called free."""
+    axes_, free, reach = known
     middle = [sum(Fraction(p[k]) for p in target) / 3 for k in range(3)]
     direction = [m - Fraction(x) for m, x in zip(middle, origin)]
-    if not any(direction):
+    found = bin_of(axes_, direction) if any(direction) else None
+    if found is None or not free >> found[0] & 1 or found[1] != bool(free & BACK):
         return False
-    found = class_of(view.free[start][1], bin_of(direction))
-    if found == 0 or found == 1 and sum(x * x for x in direction) > reach * reach:
+    if free & NEARBY and _dot(direction, direction) > reach * reach:
         return False
     # The middle is met, unless the ray lies in the plane.
     return side(*target, origin) != 0

@@ -1,4 +1,4 @@
-"""Geometry (format-spec/README.md, "Verifying"): F201 to F209, with exact rational arithmetic."""
+"""Geometry (format-spec/README.md, "Verifying"): F201 to F210, with exact rational arithmetic."""
 
 import struct
 from fractions import Fraction
@@ -52,7 +52,7 @@ def check_geometry(view, tets):
     for t in missing:
         if view.source and not is_zero_area(_source(view, t)):
             raise view.invalid("F207", f"triangle {t} has an area but no leaf", c.TRIANGLES, 12 * t)
-    bth_free.check_met(view, side)
+    bth_free.check_met(view, placed, side)
 
 
 def _source(view, t):
@@ -69,21 +69,21 @@ def _displacement(view):
 
 
 def _tree(view):
-    """F201 to F204 and F207; returns the triangles that are in a triangle leaf of the tree or are a constrained face."""
-    placed, in_subtree = set(), [set() for _ in view.tet_leaves]
+    """F201 to F204 and F207; returns the corners of the triangles that are in a triangle leaf of the tree or are a constrained face."""
+    placed, in_subtree = {}, [set() for _ in view.tet_leaves]
 
     def triangle(t, corners, number, section, at):
         if view.source:
             source = _source(view, t)
             if bits(source) != bits(corners):
                 raise view.invalid(number, f"triangle {t} is {source} in the source, {corners} here", section, at)
-            if is_zero_area(source):
+            if not view.leaf_vertices and is_zero_area(source):
                 raise view.invalid("F207", f"triangle {t} has no area", section, at)
 
-    def place(t, section, at):
+    def place(t, corners, section, at):
         if t in placed:
             raise view.invalid("F203", f"triangle {t} again", section, at)
-        placed.add(t)
+        placed[t] = corners
 
     # A reference, the boxes around it, and the tet leaf whose subtree it lies in.
     stack = [(view.root, [(view.lower, view.upper)], None)]
@@ -103,7 +103,7 @@ def _tree(view):
             for row in range(leaf.first_face, leaf.first_face + leaf.faces):
                 face = view.tet_faces[row]
                 corners = [view.tet_vertices[v][:3] for v in face.vertex]
-                place(face.triangle, c.TET_FACES, 32 * row)
+                place(face.triangle, corners, c.TET_FACES, 32 * row)
                 triangle(face.triangle, corners, "F202", c.TET_FACES, 32 * row)
                 points += corners
             stack.append((leaf.subtree, [], index))
@@ -111,7 +111,7 @@ def _tree(view):
             for row, corners in bth_leaves.triangles(view, kind, index):
                 t = view.triangle_ids[row]
                 if leaf_row is None:
-                    place(t, c.TRIANGLE_IDS, 4 * row)
+                    place(t, corners, c.TRIANGLE_IDS, 4 * row)
                 else:
                     leaf = view.tet_leaves[leaf_row]
                     here = leaf.first_face <= view.triangle_faces[t] < leaf.first_face + leaf.faces

@@ -113,19 +113,25 @@ codes! {
     Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
-    FreeRows "F168" "FREE_DIRECTIONS has as many rows as the object has triangles, or none; FREE_REACH has one row then, else none."
+    Deformable "F163" "LEAF_VERTICES is empty, or the object has POSITIONS and TRIANGLES, coordinates of f32, WideNodes and no tet leaves, and drops no triangle."
+    BlockOrder "F164" "In a deformable object LINES holds the nodes in depth-first order, then the leaves in depth-first order."
+    LeafRows "F165" "In a deformable object LEAF_VERTICES has one row for each indexed leaf and three for each raw leaf."
+    LeafVertexRows "F166" "Elements of LEAF_VERTICES are rows of POSITIONS; those of unused slots repeat that of slot 0."
+    LeafTriangles "F167" "In a deformable object the corners of a leaf's triangle have the rows of POSITIONS that TRIANGLES gives."
+    FreeRows "F168" "FREE_DIRECTIONS has as many rows as the object has triangles, or none; a deformable object has none. FREE_REACH has one row beside them, else none."
     FreePlace "F169" "The place of a row of FREE_DIRECTIONS is NONE or that of the row's triangle in a triangle leaf; without a place all bits are 0."
     FreeBins "F170" "Bits 121 to 125 of the bins of a row of FREE_DIRECTIONS are zero."
     FreeReach "F171" "The reach of FREE_REACH is 0 or from 2^-50 to 2^50; its reserved fields are zero."
+
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
     Containment "F204" "The object's bounds and each child box contain the triangles below."
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
-    ZeroArea "F207" "Exactly the triangles of zero area are dropped."
+    ZeroArea "F207" "Exactly the triangles of zero area are dropped; of a deformable object none is."
     Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
-FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond, or none within the reach."
+    FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or its margin, meet no point of a triangle beyond, or none within the reach."
     FreeAxes "F210" "A triangle with free bins has axes: edges from 2^-20 to 2^20 long at its first corner, and a sine of at least 1/128 between them."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
@@ -133,6 +139,8 @@ FreeMet "F209" "Rays that start on a triangle, in a direction of a free bin or i
     NoSuchInstance "S003" "The instance or subscene that the caller named exists."
     PlacedByFile "S004" "An instance of a subscene is moved and removed only with the subscene."
     TooManyInstances "S005" "A scene has at most 2^30 instances."
+    NotDeformable "S006" "An object that is given new positions was compiled for them."
+    NewPositions "S007" "New positions are finite, and as many as the object has vertices."
 }
 
 impl Code {
@@ -160,6 +168,8 @@ impl Code {
             Code::TooManyInstances => {
                 "remove instances that are not seen, or join objects that move together"
             }
+            Code::NotDeformable => "compile the model with --deformable",
+            Code::NewPositions => "give one position for each vertex of the source, in its order",
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }
@@ -321,6 +331,9 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::TET_FACES => "TET_FACES",
         kind::HULL_FACES => "HULL_FACES",
         kind::TRIANGLE_FACES => "TRIANGLE_FACES",
+        kind::LEAF_VERTICES => "LEAF_VERTICES",
+        kind::FREE_DIRECTIONS => "FREE_DIRECTIONS",
+        kind::FREE_REACH => "FREE_REACH",
         kind::POSITIONS => "POSITIONS",
         kind::TRIANGLES => "TRIANGLES",
         kind::CORNERS => "CORNERS",

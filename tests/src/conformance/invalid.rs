@@ -12,6 +12,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(free_directions());
     cases.extend(tets());
     cases.extend(geometry());
+    cases.extend(super::deformable::invalid());
     cases.extend(groups());
     cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());
@@ -20,7 +21,7 @@ pub fn invalid() -> Vec<Case> {
 }
 
 /// A case made by changing a valid file and recomputing the hashes that `seal` names.
-fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
+pub(super) fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
     let base = valid().into_iter().find(|c| c.name == base).expect("a valid file of that name");
     let mut editor = Editor::new(&base.bytes);
     change(&mut editor);
@@ -28,7 +29,7 @@ fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) 
 }
 
 /// Changes a 32-bit field of a section of object 0.
-fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
+pub(super) fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
     broken(name, base, Seal::Sections, |e| {
         e.put_u32(kind, at, value);
     })
@@ -312,29 +313,28 @@ fn free_directions() -> Vec<Case> {
             e.put(at + offset_of!(SectionEntry, count), &(count as u64).to_le_bytes());
         })
     };
-    let byte = |name: &str, at: usize, value: u8| {
-        broken(name, base, Seal::Sections, |e| {
-            e.put(e.section_at(directions) + at, &[value]);
-        })
-    };
     let place = |leaf, slot| FreePlace { leaf, slot }.code();
     vec![
-        rows("F168-rows", directions, [24, 2, 1]),
-        rows("F168-no-reach", reach, [16, 1, 0]),
-        rows("F168-reach-alone", directions, [24, 2, 0]),
+        rows("F168-rows", directions, [20, 2, 1]),
+        rows("F168-reach-alone", directions, [20, 2, 0]),
         field("F169-place-of-another", base, directions, 0, place(Child::Indexed(0), 0)),
         field("F169-other-leaf", base, directions, 0, place(Child::Raw(0), 1)),
-        field("F169-beyond", base, directions, 24, place(Child::Indexed(1 << 20), 0)),
-        field("F169-classes-without-a-place", base, directions, 0, NONE),
-        byte("F170-byte", 4 + 13, 243),
-        byte("F170-last-byte", 4 + 19, 3),
+        field("F169-beyond", base, directions, 20, place(Child::Indexed(1 << 20), 0)),
+        field("F169-bins-without-a-place", base, directions, 0, NONE),
+        field("F170-reserved", base, directions, 16, (FreeBins::NEARBY >> 96) as u32 | 1 << 25),
         field("F171-infinite", base, reach, 0, f32::INFINITY.to_bits()),
         field("F171-negative", base, reach, 0, (-1f32).to_bits()),
         field("F171-reserved", base, reach, 12, 1),
-        // All digits of bins 65 to 69, which lead up, are 2.
-        byte("F209-met", 4 + 13, 242),
+        // Without the bit of NEARBY, nothing is met at all straight up.
+        field("F209-met", base, directions, 16, 0),
         // With a longer reach the triangle above is met.
         field("F209-met-within-the-reach", base, reach, 0, 20f32.to_bits()),
+        broken("F210-sliver", base, Seal::Sections, |e| {
+            // The third corner of the first triangle, vertex 5, comes close to the first edge.
+            let lines = e.section_at(kind::LINES);
+            e.put(lines + size_of::<f32>() * 5, &1f32.to_le_bytes());
+            e.put(lines + size_of::<f32>() * (WIDTH + 5), &1e-3f32.to_le_bytes());
+        }),
     ]
 }
 

@@ -23,6 +23,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("free-directions", free_directions()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
+        Case::new("deformable", super::deformable::deformable()),
         Case::new("materials", super::materials::materials()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
@@ -50,7 +51,7 @@ pub(super) fn indexed(corners: &[[[f32; 3]; 3]], first: u32) -> IndexedLeaf {
 }
 
 /// A raw leaf of these triangles.
-fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
+pub(super) fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
     let row = |k: usize, axis: usize| std::array::from_fn(|i| corners.get(i).unwrap_or(&corners[0])[k][axis]);
     let corner = [0, 1, 2].map(|k| [0, 1, 2].map(|axis| row(k, axis)));
     RawLeaf { corner, first, triangles: corners.len() as u32, reserved: [0; 14] }
@@ -65,7 +66,7 @@ pub(super) fn bounds<'a>(points: impl IntoIterator<Item = &'a [f32; 3]>) -> Boun
         .fold(start, |(l, u), p| ([0, 1, 2].map(|a| l[a].min(p[a])), [0, 1, 2].map(|a| u[a].max(p[a]))))
 }
 
-fn node(children: &[(Child, Bounds)]) -> WideNode {
+pub(super) fn node(children: &[(Child, Bounds)]) -> WideNode {
     let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
     for (i, (child, (lower, upper))) in children.iter().enumerate() {
         node.child[i] = child.code();
@@ -82,7 +83,7 @@ pub(super) fn lines(block: &[u8]) -> Vec<CacheLine> {
     block.chunks_exact(64).map(|b| CacheLine(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
 }
 
-fn file(parts: &ObjectParts) -> Vec<u8> {
+pub(super) fn file(parts: &ObjectParts) -> Vec<u8> {
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, parts).expect("the parts fit together");
     builder.finish()
@@ -120,28 +121,21 @@ fn triangle() -> Vec<u8> {
     builder.finish()
 }
 
-/// Two parallel triangles, one high above the other. Straight up and down there is nothing within the reach between them and
-/// nothing at all on the other side.
+/// Two parallel triangles, one high above the other. Straight up from the lower one there is nothing within the reach, and from the
+/// upper one nothing at all.
 fn free_directions() -> Vec<u8> {
     let above = CORNERS.map(|[x, y, _]| [x, y, 10.0]);
     let lines = lines(indexed(&[above, CORNERS], 0).as_bytes());
-    let classes = |down, up| {
-        let mut classes = [FreeClass::Unknown; FREE_BINS];
-        classes[64..80].fill(up);
-        classes[80..96].fill(down);
-        classes
-    };
     let row =
-        |slot, classes| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), &classes);
-    let free =
-        [row(1, classes(FreeClass::All, FreeClass::Near)), row(0, classes(FreeClass::Near, FreeClass::All))];
+        |slot, bits| FreeDirections::new(FreePlace { leaf: Child::Indexed(0), slot }.code(), FreeBins(bits));
+    let middle = 1u128 << (FREE_BINS / 2);
     file(&ObjectParts {
         bounds: Some(bounds(CORNERS.iter().chain(&above))),
         root: Child::Indexed(0).code(),
         triangles: 2,
         lines: &lines,
         triangle_ids: &[1, 0],
-        free: &free,
+        free: &[row(1, middle | FreeBins::NEARBY), row(0, FreeBins::ALL)],
         free_reach: &[FreeReach { reach: 1.0, reserved: [0; 3] }],
         ..ObjectParts::default()
     })
@@ -234,6 +228,7 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
         root: Child::Node(0).code(),
         depth: 2,
         subtrees: Vec::new(),
+        leaf_vertices: Vec::new(),
     };
     let bounds = bounds(&positions);
     let grid = bits.map(|bits| {

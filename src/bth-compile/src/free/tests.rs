@@ -1,1 +1,203 @@
-//! .
+//! What is called free against every triangle of a mesh, exactly.
+
+use super::*;
+use crate::bvh::{self, BvhOptions};
+use crate::marks::testing::{patch, sphere, weld};
+use bth::rays::Ray;
+use bth_format::layout::{FREE_MARGIN, FreeBins, free_axes, free_bin};
+use bth_import::Silent;
+use bth_oracle::{intersection, to_f64};
+use bth_random::Rng;
+
+fn free_of(mesh: &Mesh) -> Free {
+    let (tree, _) = bvh::build(mesh, &BvhOptions::default(), &Silent).unwrap();
+    find(mesh, &tree, &FreeOptions::default(), &Silent).unwrap().0
+}
+
+impl Free {
+    fn bins(&self, triangle: usize) -> FreeBins {
+        FreeDirections { place: NONE, bins: self.bins[triangle] }.bins()
+    }
+}
+
+/// A height field of integer steps, with flat parts.
+fn terraces(side: usize, seed: u64) -> Mesh {
+    let mut random = Rng::new(seed);
+    let heights: Vec<f32> = (0..(side + 1) * (side + 1)).map(|_| (random.below(9) / 6) as f32).collect();
+    let at = |x: usize, y: usize| [x as f32, y as f32, heights[y * (side + 1) + x]];
+    let mut corners = Vec::new();
+    for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+        corners.push([at(x, y), at(x + 1, y), at(x, y + 1)]);
+        corners.push([at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]);
+    }
+    weld(&corners)
+}
+
+fn soup(count: usize, seed: u64) -> Mesh {
+    let mut random = Rng::new(seed);
+    let mut corners = Vec::new();
+    for _ in 0..count {
+        let at: [f64; 3] = std::array::from_fn(|_| random.between(-3.0, 3.0));
+        corners.push(std::array::from_fn(|_| {
+            let d = random.unit_vector();
+            std::array::from_fn(|k| (at[k] + d[k]) as f32)
+        }));
+    }
+    weld(&corners)
+}
+
+/// A start on a triangle: a corner, a point of an edge, or one inside, moved a little along the direction or not at all.
+fn start(random: &mut Rng, corners: [[f32; 3]; 3], direction: [f32; 3]) -> [f32; 3] {
+    let mut weights = match random.below(3) {
+        0 => [1.0, 0.0, 0.0],
+        1 => [random.unit_f64(), 0.0, 0.0],
+        _ => [random.unit_f64(), random.unit_f64(), 0.0],
+    };
+    if weights[0] + weights[1] > 1.0 {
+        weights = [1.0 - weights[0], 1.0 - weights[1], 0.0];
+    }
+    weights[2] = 1.0 - weights[0] - weights[1];
+    weights.rotate_left(random.below(3) as usize);
+    let along = [0.0, 1e-6, 1e-3, -1e-3][random.below(4) as usize];
+    std::array::from_fn(|k| {
+        let p: f64 = (0..3).map(|c| weights[c] * f64::from(corners[c][k])).sum();
+        (p + along * f64::from(direction[k])) as f32
+    })
+}
+
+/// Traces rays through the triangles of a mesh in directions that are called free, and returns how many were.
+fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
+    let free = free_of(mesh);
+    let reach = f64::from(free.reach);
+    let mut random = Rng::new(seed);
+    let mut used = 0;
+    for _ in 0..rays {
+        let triangle = random.below(mesh.triangles.len() as u64) as usize;
+        let bins = free.bins(triangle);
+        let corners = mesh.corners(triangle as u32);
+        let Some(axes) = free_axes(corners) else {
+            assert_eq!(bins.0, 0);
+            continue;
+        };
+        let direction: [f64; 3] = match random.below(4) {
+            // Along axes, edges and diagonals.
+            0 => std::array::from_fn(|_| random.below(3) as f64 - 1.0),
+            1 => {
+                let to = mesh.corners(random.below(mesh.triangles.len() as u64) as u32)[0];
+                std::array::from_fn(|k| f64::from(to[k]) - f64::from(corners[0][k]))
+            }
+            _ => random.unit_vector(),
+        };
+        let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length == 0.0 {
+            continue;
+        }
+        // The bin may be that of another direction within the margin.
+        let jitter = random.unit_vector();
+        let within = 0.9 * FREE_MARGIN * random.unit_f64();
+        let other = std::array::from_fn(|k| direction[k] / length + within * jitter[k]);
+        let is_free = free_bin(&axes, other)
+            .is_some_and(|(bin, is_back)| bins.is_free(bin) && bins.is_back() == is_back);
+        let direction = direction.map(|x| (x / length) as f32);
+        let ray = Ray::new(start(&mut random, corners, direction), direction);
+        let Some(from) = intersection(&ray, corners).filter(|_| is_free) else { continue };
+        used += 1;
+        for other in 0..mesh.triangles.len() as u32 {
+            let Some(hit) = intersection(&ray, mesh.corners(other)).filter(|hit| hit.t > from.t) else {
+                continue;
+            };
+            let distance = to_f64(&(hit.t - &from.t));
+            let found = format!("{triangle} {corners:?} to {other} {:?}: {ray:?}", mesh.corners(other));
+            assert!(bins.is_nearby(), "{found}");
+            assert!(distance > reach * (1.0 - 1e-6), "{distance} below {reach}: {found}");
+        }
+    }
+    used
+}
+
+#[test]
+fn rays_in_free_directions_meet_nothing() {
+    let mut used = 0;
+    for seed in 0..12 {
+        used += check(&terraces(6, seed), 3000, seed);
+        used += check(&soup(60, seed), 3000, seed);
+        used += check(&patch(seed, 12), 3000, seed);
+    }
+    used += check(&sphere(10, [0.0; 3]), 4000, 1);
+    used += check(&sphere(9, [1000.0, -50.0, 3.0]), 4000, 2);
+    assert!(used > 10_000, "{used}");
+}
+
+#[test]
+fn a_convex_solid_is_free_outside() {
+    for (triangle, bins) in free_of(&sphere(12, [0.0; 3])).bins.iter().enumerate() {
+        let bins = FreeDirections { place: NONE, bins: *bins }.bins();
+        // Boxes reach beyond the solid, and block what is close to the horizon.
+        assert!((bins.0 & FreeBins::ALL).count_ones() >= 100 && bins.0 & !FreeBins::ALL == 0, "{triangle}");
+    }
+}
+
+#[test]
+fn a_solid_that_is_inside_out_is_free_on_the_back() {
+    let mut mesh = sphere(8, [0.0; 3]);
+    mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    let free = free_of(&mesh);
+    // Before the front there is nothing within the reach of most triangles, but on the back nothing at all.
+    let back = (0..free.bins.len()).filter(|t| free.bins(*t).is_back()).count();
+    let near = (0..free.bins.len()).filter(|t| free.bins(*t).is_nearby()).count();
+    assert_eq!(back + near, free.bins.len());
+}
+
+#[test]
+fn a_plane_is_free_though_its_triangles_touch() {
+    let mut mesh = terraces(5, 1);
+    mesh.positions.iter_mut().for_each(|p| p[2] = 0.1);
+    let free = free_of(&mesh);
+    assert!((0..free.bins.len()).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
+}
+
+#[test]
+fn duplicates_and_triangles_without_area_block_nothing() {
+    let [a, b, c] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.25], [0.0, 1.0, 0.5]];
+    let mesh =
+        weld(&[[a, b, c], [c, b, a], [a, b, c], [a, a, [0.2, 0.2, 9.0]], [[0.25; 3], [0.5; 3], [0.75; 3]]]);
+    let free = free_of(&mesh);
+    assert!((0..3).all(|triangle| free.bins(triangle).0 == FreeBins::ALL));
+    assert!((3..5).all(|triangle| free.bins(triangle).0 == 0));
+}
+
+#[test]
+fn distant_triangles_block_beyond_the_reach_only() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let above = |height: f32, half: f32| [[-half, -half, height], [half, -half, height], [0.0, half, height]];
+    let (up, is_back) = free_bin(&free_axes(corners).unwrap(), [0.1, 0.1, 1.0]).unwrap();
+    assert!(!is_back);
+    let bins = |height: f32, half: f32| free_of(&weld(&[corners, above(height, half)])).bins(0);
+    let distant = bins(10.0, 40.0);
+    assert!(distant.is_nearby() && distant.is_free(up) && !distant.is_back(), "{distant:?}");
+    let close = bins(1.0, 40.0);
+    assert!(close.is_back() && !close.is_nearby(), "{close:?}");
+}
+
+#[test]
+fn results_do_not_depend_on_threads() {
+    let mesh = soup(700, 3);
+    let in_pool = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| free_of(&mesh))
+    };
+    assert_eq!(in_pool(1), in_pool(3));
+}
+
+#[test]
+fn huge_and_tiny_meshes_have_no_free_directions() {
+    for scale in [1e-30f32, 1e30] {
+        let mut mesh = soup(20, 5);
+        mesh.positions.iter_mut().flatten().for_each(|x| *x *= scale);
+        let free = free_of(&mesh);
+        assert_eq!(free.reach, 0.0);
+        assert!(free.bins.iter().all(|bins| *bins == [0; 4]));
+    }
+    let free = free_of(&Mesh::default());
+    assert_eq!((free.reach, free.bins.len()), (0.0, 0));
+}

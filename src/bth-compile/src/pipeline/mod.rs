@@ -25,7 +25,7 @@ pub(crate) use stages::{Direct, Stages};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest, changed};
-use crate::{coordinates, free, tets};
+use crate::{bvh, coordinates, free, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::collections::BTreeSet;
@@ -105,13 +105,15 @@ pub(crate) fn compile_mesh(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Object, StageReports)> {
+    options.check()?;
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
-    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &options.bvh, monitor))?;
+    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
+    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
     let traced = TracedMesh { mesh, on_grid, tree };
-    let (leaves, tets) = match options.structure {
+    let (leaves, tets) = match options.built_structure() {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };
@@ -123,7 +125,7 @@ pub(crate) fn compile_mesh(
 }
 
 /// Decides in which directions rays from a triangle meet nothing, and whether that is kept. A tetrahedralization of the whole model
-/// has no leaves in which its triangles could be found.
+/// has no leaves in which its triangles could be found, and of an object that deforms nothing is known.
 fn free_directions(
     traced: &TracedMesh,
     options: &CompileOptions,
@@ -131,7 +133,8 @@ fn free_directions(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Option<free::Free>, Option<free::FreeReport>)> {
-    if options.free.keep == free::KeepFree::None || options.structure == Structure::Tets {
+    let is_wanted = options.free.keep != free::KeepFree::None && !options.deformable;
+    if !is_wanted || options.structure == Structure::Tets {
         return Ok((None, None));
     }
     let TracedMesh { mesh, tree, .. } = traced;

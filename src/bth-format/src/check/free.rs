@@ -12,9 +12,10 @@ const ROW: usize = size_of::<FreeDirections>();
 /// Checks everything but the places of triangles.
 pub(super) fn check(view: &ObjectView) -> Result<()> {
     let (rows, reach) = (view.free.len(), view.free_reach);
-    let triangles = view.header.triangles as usize;
+    let triangles = if view.is_deformable() { 0 } else { view.header.triangles as usize };
     if rows != 0 && rows != triangles {
-        let expected = format!("{triangles} rows or none");
+        let expected =
+            if view.is_deformable() { "none".to_owned() } else { format!("{triangles} rows or none") };
         return Err(Error::within(Code::FreeRows, kind::FREE_DIRECTIONS, 0, expected, rows.to_string()));
     }
     if reach.len() != usize::from(rows != 0) {

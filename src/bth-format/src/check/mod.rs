@@ -7,6 +7,7 @@
 mod adjacency;
 mod bit_set;
 mod boxes;
+mod deformable;
 mod free;
 mod groups;
 mod header;
@@ -32,7 +33,7 @@ use crate::object::ObjectView;
 /// Checks every index of an object.
 ///
 /// # Errors
-/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F168` to `BTH-F171`, with an offset from the start of its section;
+/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F171`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
 pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
@@ -43,5 +44,6 @@ pub(crate) fn object(view: &ObjectView) -> Result<()> {
     tet_leaves::check(view)?;
     tree::check(view)?;
     leaves::check_ids(view)?;
-    tet_faces::check(view)
+    tet_faces::check(view)?;
+    deformable::check(view)
 }

@@ -9,6 +9,7 @@ use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, Triangle
 use crate::query::Nearest;
 use crate::rays::PrimitiveRef;
 use crate::simd::{Isa, Kernel, LANES, Simd};
+use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, RawLeaf, TetLeaf, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -144,8 +145,10 @@ impl ObjectWalk<'_> {
             return 0;
         }
         let bounds = TriangleLanes::new(s, &block.relative(s, point));
-        // In object space, the least upper bound says nothing about which triangle is closest in world space.
-        let least = if self.placed.is_none() { bounds.least_upper_bound(s, valid) } else { limit };
+        // In object space, the least upper bound says nothing about which triangle is closest in world space; nor does that of a
+        // triangle of zero area, which is not offered.
+        let is_offered = self.placed.is_none() && !self.object.is_deformable();
+        let least = if is_offered { bounds.least_upper_bound(s, valid) } else { limit };
         bounds.candidates(s, valid, least.min(limit))
     }
 
@@ -196,6 +199,10 @@ impl ObjectWalk<'_> {
     /// Offers a triangle, given its corners in object space and a function that returns its id.
     #[inline(always)]
     fn offer(&self, corners: [[f32; 3]; 3], id: impl FnOnce() -> u32, search: &mut Search) {
+        // Triangles of zero area are no part of the surface; only the leaves of deformable objects hold some.
+        if self.object.is_deformable() && is_zero_area(corners) {
+            return;
+        }
         let corners = match self.placed {
             None => corners,
             Some((placed, _)) => placed.corners_in_world(corners),

@@ -8,11 +8,13 @@
 //! Why the range must begin behind the crossing: the file speaks of points beyond the triangle, not of the triangle itself and what
 //! lies before it. Since t is rounded to f32 before it is compared with the range, the crossing must lie before `tmin` by more than
 //! that.
+//!
+//! Only batches look directions up: for a single ray that takes as long as tracing it (docs/notes/free-directions.md).
 
 mod lanes;
 mod single;
 
-pub(crate) use single::certainly_misses;
+use single::certainly_misses;
 
 use crate::rays::Ray;
 use crate::simd::{Isa, LANES};

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// Environment variable with the default: `measured`, `bvh` or `tets`.
 const HINTS_VARIABLE: &str = "BTH_HINTS";
 
-/// How batches use hints where a file has tetrahedra and a BVH over the same triangles, or knows of free directions. Answers have the same bits in all cases;
-/// the setting serves measurements and tests.
+/// How batches use hints where a file has tetrahedra and a BVH over the same triangles, or knows of free directions. Answers have the
+/// same bits in all cases; the setting serves measurements and tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Hinted {
     /// Rays take the strategy that was measured to be faster for such rays through the object on this thread.

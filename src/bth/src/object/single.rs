@@ -3,7 +3,6 @@
 use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
-use crate::free;
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Query};
 use crate::rays::Ray;
@@ -23,7 +22,7 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    if from == NONE || object.tet_leaves.is_empty() && !free::is_known(object) {
+    if from == NONE || object.tet_leaves.is_empty() {
         let mut query = Q::new(ray);
         through_bvh(object, ray, &mut query, NONE, count);
         *answer = query.answer(object.triangle_ids, instance);
@@ -32,7 +31,7 @@ pub(crate) fn trace<Q: Query, C: Count>(
     trace_from::<Q, C>(object, ray, from, instance, count, answer);
 }
 
-/// As [`trace`], from a triangle whose directions may be free and which may be a face of tetrahedra.
+/// As [`trace`], from a triangle that may be a face of tetrahedra.
 #[inline(never)]
 fn trace_from<Q: Query, C: Count>(
     object: &ObjectView<'_>,
@@ -43,10 +42,6 @@ fn trace_from<Q: Query, C: Count>(
     answer: &mut Q::Answer,
 ) {
     let mut query = Q::new(ray);
-    if free::is_known(object) && free::certainly_misses(object, ray, from) {
-        *answer = query.answer(object.triangle_ids, instance);
-        return;
-    }
     match start_in_tets(object, ray, from, &mut query, count) {
         TetStart::Done => {}
         TetStart::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}

@@ -50,10 +50,11 @@ pub(crate) struct Compile {
     #[arg(long, value_name = "DISTANCE", value_parser = str::parse::<bth_compile::coordinates::MaxError>)]
     pub(crate) max_error: Option<bth_compile::coordinates::MaxError>,
     /// Directions in which rays that start on a triangle meet nothing, so that they end at once where a caller says on which triangle
-    /// they start: 24 bytes a triangle. With `auto` where enough directions are free.
-    #[arg(long, value_enum, default_value_t = Free::None, value_name = "WHERE")]
+    /// they start: 20 bytes a triangle. With `auto` where enough directions are free.
+    #[arg(long, value_enum, default_value_t = Free::None, value_name = "WHERE", conflicts_with = "deformable")]
     pub(crate) free_directions: Free,
-    /// Distance within which free directions are told for rays that end there, as a share of the diagonal of the object's box.
+    /// Distance within which free directions tell what is nearby, where too few are free altogether, as a share of the diagonal of
+    /// the object's box.
     #[arg(long, value_name = "SHARE", value_parser = positive, default_value_t = 0.0625)]
     pub(crate) free_reach: f64,
     /// Shading attributes to keep.
@@ -77,6 +78,10 @@ pub(crate) struct Compile {
     /// triangles are in tetrahedra, in place of 180 to 200.
     #[arg(long, conflicts_with_all = ["tets", "subtrees"])]
     pub(crate) compact: bool,
+    /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
+    /// source, and the object is a BVH.
+    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
+    pub(crate) deformable: bool,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long)]
     pub(crate) no_geometry: bool,
@@ -190,7 +195,11 @@ impl Compile {
     /// If the profile cannot be used.
     pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
         let mut options = bth_compile::pipeline::CompileOptions {
-            structure: self.structure.into(),
+            structure: match self.structure {
+                // A tetrahedralization would not stay one.
+                Structure::Bth if self.deformable => bth_compile::pipeline::Structure::Bvh,
+                structure => structure.into(),
+            },
             attributes: if self.materials { Keep::All } else { self.attributes.into() },
             names: self.names || self.materials,
             materials: self.materials,
@@ -206,6 +215,7 @@ impl Compile {
                 None => self.structure == Structure::Bth && !self.compact,
             },
             geometry: !self.no_geometry,
+            deformable: self.deformable,
             ..Default::default()
         };
         self.selection.apply(&mut options)?;

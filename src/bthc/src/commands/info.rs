@@ -8,7 +8,7 @@ use crate::table::{Table, bytes, count};
 use bth::Isa;
 use bth_format::File;
 use bth_format::error::kind_name;
-use bth_format::layout::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
+use bth_format::layout::{FREE_BINS, FreeBins, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
 use bth_format::object::ObjectView;
 use serde_json::{Value, json};
 
@@ -58,6 +58,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
+            "free_directions": free_directions(&view),
             "name": file.object_name(i), "groups": groups(&view),
             "materials": (0..view.materials.len() as u32).map(|m| view.material_name(m)).collect::<Vec<_>>(),
             "parameters": materials(file, i),
@@ -75,6 +76,25 @@ fn describe(file: &File) -> Result<Value, Failure> {
         "sections": file.sections().map(section).collect::<Vec<_>>(),
         "provenance": provenance(file),
     }))
+}
+
+/// Shares of the triangles of an object with free directions, and of these directions among their bins; null where none are known.
+fn free_directions(view: &ObjectView<'_>) -> Value {
+    if view.free.is_empty() {
+        return Value::Null;
+    }
+    let (mut known, mut nearby, mut bins) = (0u64, 0u64, 0u64);
+    for row in view.free {
+        let of_row = row.bins();
+        let free = (of_row.0 & FreeBins::ALL).count_ones();
+        known += u64::from(free != 0);
+        nearby += u64::from(free != 0 && of_row.is_nearby());
+        bins += u64::from(free);
+    }
+    let rows = view.free.len() as f64;
+    json!({"triangles": known as f64 / rows, "nearby_only": nearby as f64 / rows,
+        "bins": bins as f64 / (rows * FREE_BINS as f64),
+        "reach": view.free_reach.first().map(|row| row.reach), "bytes": size_of_val(view.free)})
 }
 
 /// The groups of an object with their numbers of triangles; empty where the file keeps none.

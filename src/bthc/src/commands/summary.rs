@@ -29,7 +29,8 @@ pub(super) fn summary(report: &CompileReport) -> String {
     if let Some(free) = &report.free {
         let [all, near] = [free.free, free.free_nearby].map(|share| 100.0 * share);
         let kept = if free.kept { "kept" } else { "not worth their bytes" };
-        facts.row(["free directions", &format!("{all:.0} %, {near:.0} % nearby, {kept}")]);
+        let seconds = free.seconds;
+        facts.row(["free directions", &format!("{all:.0} %, {near:.0} % nearby, {kept}, {seconds:.1} s")]);
     }
     if let Some(found) = &report.coordinates {
         facts.row(["coordinates", &format!("{} bits", found.bits)]);

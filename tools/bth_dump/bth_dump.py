@@ -12,6 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bth_container import Container, Invalid, NONE, kind_name  # noqa: E402
+from bth_deformation import DeformationView  # noqa: E402
 from bth_geometry import check_geometry  # noqa: E402
 from bth_groups import GroupsView, object_names  # noqa: E402
 from bth_indices import check_indices  # noqa: E402
@@ -94,6 +95,7 @@ def check(data, level):
             GroupsView(view).check()
             materials.append(MaterialsView(view))
             materials[-1].check()
+            DeformationView(view).check()
             tets = check_indices(view)
             if level == "verify":
                 check_geometry(view, tets)

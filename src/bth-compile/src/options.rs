@@ -91,6 +91,18 @@ impl CompileOptions {
         }
     }
 
+    /// The options of an object whose vertices move: a BVH over coordinates that stay as they are, which keeps the source's
+    /// positions and triangles.
+    pub fn of_deforming(&self) -> Self {
+        Self {
+            structure: Structure::Bvh,
+            deformable: true,
+            coordinates: coordinates::CoordinateOptions::default(),
+            geometry: true,
+            ..self.clone()
+        }
+    }
+
     /// What of the looks of models is read, for which files besides the models are needed.
     pub fn looks(&self) -> mesh::Looks {
         mesh::Looks { alpha: self.alpha, materials: self.materials }

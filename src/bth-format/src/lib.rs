@@ -19,6 +19,7 @@
 #![warn(missing_docs)]
 
 mod check;
+mod deformation_view;
 pub mod error;
 pub mod exact;
 pub mod file;
@@ -31,6 +32,7 @@ mod scene_view;
 mod unpack;
 pub mod verify;
 
+pub use deformation_view::{DeformationView, MorphDeltas};
 pub use error::{Code, Error};
 pub use file::File;
 pub use materials_view::{ImagesView, MaterialsView};

@@ -8,6 +8,7 @@
 
 mod attributes;
 mod cutout;
+mod deformation;
 pub mod error;
 pub mod gltf;
 mod groups;
@@ -30,10 +31,12 @@ mod weld;
 mod zero_area;
 
 pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTriangle, Cutouts, Wrap};
+pub use deformation::Deformation;
 pub use error::{Error, Place, Result};
+pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{
-    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_meshes,
+    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
     import_images, source_files,
 };
 pub use materials::{ImageFile, Looks, Materials};

@@ -1,5 +1,6 @@
 //! The triangle mesh that importers make, and their report about it.
 
+use crate::deformation::Deformation;
 use crate::groups::Groups;
 use crate::materials::Materials;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,9 @@ pub struct Mesh {
     pub groups: Option<Groups>,
     /// How the materials of the groups look, if the caller wants them.
     pub materials: Option<Materials>,
+    /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions are then distinct together with what
+    /// moves them.
+    pub deformation: Option<Deformation>,
 }
 
 /// Opacity of each triangle, as the sections OPACITY and OPACITY_MICRO of a compiled file have it.

@@ -10,6 +10,7 @@ pub mod limits;
 mod model;
 mod names;
 mod read;
+mod read_deformers;
 mod read_tracks;
 mod read_transform;
 mod table;
@@ -27,6 +28,8 @@ pub const KEYS: &[(&str, &[&str])] = &[
     ("node", read::NODE_KEYS),
     ("camera", read::CAMERA_KEYS),
     ("light", read::LIGHT_KEYS),
+    ("skin", read_deformers::SKIN_KEYS),
+    ("deformer", read_deformers::DEFORMER_KEYS),
     ("track", read_tracks::TRACK_KEYS),
     ("turn", read_transform::TURN_KEYS),
     ("look", read_transform::LOOK_KEYS),

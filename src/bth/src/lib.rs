@@ -20,6 +20,7 @@ mod bvh;
 mod closest;
 mod crossing;
 mod deform;
+mod deformers;
 mod enumerate;
 mod hits;
 mod instances;

@@ -48,7 +48,7 @@ impl Scene {
     /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
     /// finite in `f32`. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
-        let (objects, world) = self.objects_and_world_mut();
+        let (objects, world) = self.parts_mut();
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }
 

@@ -3,6 +3,7 @@
 
 mod built;
 mod deform;
+mod deformers;
 mod flattened;
 mod import;
 mod motion;

@@ -114,6 +114,7 @@ impl ObjectKeys {
             .with_all(
                 mesh.materials.iter().map(|materials| ("surface materials".to_owned(), materials.hex())),
             )
+            .with_all(mesh.deformation.iter().map(|rows| ("deformation".to_owned(), rows.hex())))
             .with_all(self.0.iter().cloned())
     }
 }
@@ -140,6 +141,13 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOpt
     hasher.add(&parts.cameras);
     hasher.add(&parts.lights);
     hasher.add(&parts.names);
+    // Without deformers nothing is added, so that the keys of such scenes are what they were before there were any.
+    if !parts.deformers.deformers.is_empty() {
+        hasher.add(&parts.deformers.deformers);
+        hasher.add(&parts.deformers.skins);
+        hasher.add(&parts.deformers.joints);
+        hasher.add(&parts.deformers.weights);
+    }
     let mut objects = HashedRows::new("objects");
     sources.iter().for_each(|source| objects.add(source.as_bytes()));
     Key::new("scene")

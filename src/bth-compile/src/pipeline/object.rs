@@ -177,6 +177,7 @@ impl Object {
             packed_nodes: self.packed_nodes,
             groups: self.groups.as_ref(),
             materials: mesh.materials.as_ref(),
+            deformation: mesh.deformation.as_ref(),
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };

@@ -5,6 +5,7 @@
 
 mod compile;
 mod context;
+mod deformers;
 mod encode;
 mod file_index;
 mod images;

@@ -45,8 +45,13 @@ pub(super) fn build(
     number: usize,
     clock: &mut Clock,
 ) -> Result<BuiltObject> {
-    let part = file.name_of(mesh.number);
+    let part = file.name_of(mesh.part);
     let rays = context.weights.as_ref().and_then(|weights| weights.get(number));
+    if mesh.summary.deformation.is_some() {
+        let options = context.options.of_deforming();
+        let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary));
+        return build_or_fetch(file, mesh, (key, &part), &options, context, clock);
+    }
     let Some(rays) = rays else {
         let key = context.keys.as_ref().map(|keys| keys.of(&mesh.summary));
         return build_or_fetch(file, mesh, (key, &part), context.options, context, clock);

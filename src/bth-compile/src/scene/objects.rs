@@ -8,7 +8,7 @@ use super::parallel::run_parallel;
 use super::previous::Previous;
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
-use super::sources::File;
+use super::sources::{File, SourcePart};
 use crate::error::{Error, Place, Result};
 use crate::pipeline::Clock;
 use crate::tets;
@@ -16,7 +16,7 @@ use crate::write::FileBuilder;
 use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
@@ -65,6 +65,9 @@ pub(super) fn build(
     // Copied objects are filled in at once, the others when they are built.
     let mut places: Vec<Option<(ObjectSections, ObjectReport)>> = Vec::new();
     let mut tasks = Vec::new();
+    // Objects that deform, whose geometry is that of an object before: numbers of both.
+    let mut copies: Vec<(usize, u32)> = Vec::new();
+    let mut deforming = HashSet::new();
     let mut taken = 0;
     for (file, parts) in sources.iter().zip(read(sources, context, clock)?) {
         if file.compiled {
@@ -105,7 +108,16 @@ pub(super) fn build(
                 }
             };
             objects.parts.push((part_hash(file, *part), format.clone(), number));
-            rows.iter().for_each(|row| objects.number[*row] = Some(number));
+            for row in rows {
+                let mut own = number;
+                // Each deformer moves an object of its own.
+                if part.deforms() && !deforming.insert(number) {
+                    own = places.len() as u32;
+                    copies.push((places.len(), number));
+                    places.push(None);
+                }
+                objects.number[*row] = Some(own);
+            }
         }
     }
     context.cache.hits("object", taken);
@@ -116,6 +128,9 @@ pub(super) fn build(
             ObjectSections::InFile { file: Arc::new(built.file), object: 0, made },
             built.record.object,
         ));
+    }
+    for (copy, of) in copies {
+        places[copy] = places[of as usize].clone();
     }
     (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
@@ -156,12 +171,12 @@ pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> O
         return Some(Vec::new());
     }
     let previous = context.previous.as_ref()?;
-    let part = |number: Option<u32>| {
-        let row = previous.index.part(&part_hash(file, number))?;
+    let part = |part: SourcePart| {
+        let row = previous.index.part(&part_hash(file, part))?;
         let format = previous.index.formats[row.format as usize].clone();
         previous.has(row.object).then_some(Part::InPrevious(format, row.object))
     };
-    file.parts.iter().map(|(number, _)| part(*number)).collect()
+    file.parts.iter().map(|(source, _)| part(*source)).collect()
 }
 
 /// The object in the previous file, if it has it, and the hash by which equal objects are found.
@@ -181,7 +196,7 @@ fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>
 }
 
 /// The hash that identifies a part of a source.
-fn part_hash(file: &File<'_>, part: Option<u32>) -> Hash {
+fn part_hash(file: &File<'_>, part: SourcePart) -> Hash {
     *blake3::hash(file.content(part).as_bytes()).as_bytes()
 }
 
@@ -230,7 +245,7 @@ fn copy(
     };
     let read = Arc::new(bth_format::File::read(path).map_err(|e| unusable(&e))?);
     for (part, rows) in &file.parts {
-        let object = part.unwrap_or(0);
+        let SourcePart::Object(object) = *part else { continue };
         let view = read.check(object).map_err(|e| {
             let names: Vec<_> = rows.iter().map(|row| manifest.objects[*row].name.as_str()).collect();
             unusable(&format!("object \"{}\": {e}", names.join("\", \"")))
@@ -285,6 +300,14 @@ impl Objects {
             names.extend(stored.image_names()?);
         }
         Ok(names)
+    }
+
+    /// The DEFORMATION row of an object, if its vertices can be moved.
+    ///
+    /// # Errors
+    /// When the previous file cannot be read.
+    pub(super) fn deformation(&self, object: u32) -> Result<Option<layout::Deformation>> {
+        self.stored[object as usize].deformation()
     }
 
     /// Adds the OBJECT rows only, which suffice to place instances.

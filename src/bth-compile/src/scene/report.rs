@@ -47,6 +47,8 @@ pub struct SceneReport {
     pub cameras: u64,
     /// Lights.
     pub lights: u64,
+    /// Objects that deform.
+    pub deformers: u64,
     /// First frame.
     pub first_frame: i32,
     /// Last frame.

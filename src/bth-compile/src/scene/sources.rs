@@ -4,11 +4,51 @@ use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
-use bth_import::{AlphaMode, Looks};
+use bth_import::{AlphaMode, GltfPart, Looks};
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+/// The part of a source file that an object is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum SourcePart {
+    /// The whole model.
+    Whole,
+    /// A part of a glTF file.
+    Gltf(GltfPart),
+    /// An object of a compiled file.
+    Object(u32),
+}
+
+impl SourcePart {
+    /// The part that a source of a manifest names.
+    fn of(source: &Source) -> SourcePart {
+        match *source {
+            Source::Model { mesh: None, .. } => SourcePart::Whole,
+            Source::Model { mesh: Some(mesh), .. } => SourcePart::Gltf(GltfPart::Mesh(mesh)),
+            Source::Deforming { mesh, .. } => SourcePart::Gltf(GltfPart::Deforming(mesh)),
+            Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
+            Source::Compiled { object, .. } => SourcePart::Object(object),
+        }
+    }
+
+    /// Its name in keys.
+    pub(super) fn name(self) -> String {
+        match self {
+            SourcePart::Whole => "flat".to_owned(),
+            SourcePart::Gltf(GltfPart::Mesh(mesh)) => format!("mesh {mesh}"),
+            SourcePart::Gltf(GltfPart::Deforming(mesh)) => format!("deforming mesh {mesh}"),
+            SourcePart::Gltf(GltfPart::AtRest(node)) => format!("node {node} at rest"),
+            SourcePart::Object(object) => format!("object {object}"),
+        }
+    }
+
+    /// Whether its vertices can be moved, so that each deformer needs an object of its own.
+    pub(super) fn deforms(self) -> bool {
+        matches!(self, SourcePart::Gltf(GltfPart::Deforming(_)))
+    }
+}
 
 /// A source file and its parts that are used, or a mesh in memory in the place of one.
 pub(super) struct File<'a> {
@@ -17,38 +57,27 @@ pub(super) struct File<'a> {
     /// Full path.
     pub(super) full: PathBuf,
     pub(super) compiled: bool,
-    /// Number of a mesh or object in the file (`None` for the whole file), and the manifest's objects that refer to it.
-    pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
+    /// Parts of the file, each with the manifest's objects that refer to it.
+    pub(super) parts: Vec<(SourcePart, Vec<usize>)>,
     pub(super) digest: SourceDigest,
     /// What takes the place of the file's content.
     pub(super) in_memory: Option<TriangleMesh<'a>>,
 }
 
 impl File<'_> {
-    /// The name of a part in keys.
-    pub(super) fn part(&self, part: Option<u32>) -> String {
-        let kind = if self.compiled { "object" } else { "mesh" };
-        part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
-    }
-
     /// Identity of a part by content, which does not depend on the path of the file.
-    pub(super) fn content(&self, part: Option<u32>) -> String {
+    pub(super) fn content(&self, part: SourcePart) -> String {
         let alpha = match self.digest.looks.alpha {
             AlphaMode::None => String::new(),
             mode => format!(" {mode:?}"),
         };
         let materials = if self.digest.looks.materials { " materials" } else { "" };
-        format!(
-            "{} {} {}{alpha}{materials}",
-            self.digest.text(),
-            self.part(part),
-            cached::extension(&self.full)
-        )
+        format!("{} {} {}{alpha}{materials}", self.digest.text(), part.name(), cached::extension(&self.full))
     }
 
     /// The name of a part in explanations of misses.
-    pub(super) fn name_of(&self, part: Option<u32>) -> String {
-        format!("{} {}", self.path, self.part(part))
+    pub(super) fn name_of(&self, part: SourcePart) -> String {
+        format!("{} {}", self.path, part.name())
     }
 }
 
@@ -77,15 +106,13 @@ pub(super) fn files<'a>(
     let mut files: Vec<File<'a>> = Vec::new();
     let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), looks };
     let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
-    let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
+    let mut row_of_part: HashMap<(usize, SourcePart), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
-        let (compiled, part) = match &object.source {
-            Source::Model { mesh, .. } => (false, *mesh),
-            Source::Compiled { object, .. } => (true, Some(*object)),
-        };
+        let part = SourcePart::of(&object.source);
+        let compiled = matches!(part, SourcePart::Object(_));
         let path = object.source.path();
         // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
-        let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
+        let file = *row_of_file.entry((path, compiled, part != SourcePart::Whole)).or_insert_with(|| {
             let full = folder.join(path);
             files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing(), in_memory: None });
             files.len() - 1

@@ -18,7 +18,7 @@ pub use groups::{GroupParts, object_names};
 pub use images::images;
 pub(crate) use images::named_images;
 pub use object::{ObjectParts, Source, object};
-pub use scene::{SceneParts, scene};
+pub use scene::{DeformerParts, SceneParts, scene};
 pub use whole::name_if_whole;
 pub(crate) use whole::{HEADER, are_zeros, name};
 

@@ -4,7 +4,7 @@ use super::builder::defect;
 use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
-use bth_import::Materials;
+use bth_import::{Deformation, Materials};
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -51,6 +51,8 @@ pub struct ObjectParts<'a> {
     pub groups: Option<&'a GroupParts>,
     /// How the materials of the groups look, and vertex colours.
     pub materials: Option<&'a Materials>,
+    /// What moves the vertices.
+    pub deformation: Option<&'a Deformation>,
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -131,6 +133,14 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::TEXTURES, index, &materials.textures)?;
         builder.rows(kind::COLOR_CORNERS, index, &materials.color_corners)?;
         builder.rows(kind::COLORS, index, &materials.colors)?;
+    }
+    if let Some(deformation) = parts.deformation {
+        builder.rows(kind::DEFORMATION, index, std::slice::from_ref(&deformation.counts))?;
+        builder.rows(kind::JOINTS, index, &deformation.joints)?;
+        builder.rows(kind::JOINT_WEIGHTS, index, &deformation.weights)?;
+        builder.rows(kind::MORPHS, index, &deformation.morphs)?;
+        builder.rows(kind::MORPH_ROWS, index, &deformation.morph_rows)?;
+        builder.rows(kind::MORPH_DELTAS, index, &deformation.deltas)?;
     }
     Ok(())
 }

@@ -8,6 +8,8 @@ mod adjacency;
 mod bit_set;
 mod boxes;
 mod deformable;
+mod deformation;
+mod deformers;
 mod groups;
 mod header;
 mod leaves;
@@ -23,6 +25,7 @@ mod tracks;
 mod tree;
 
 pub(crate) use adjacency::TetAdjacency;
+pub(crate) use deformation::check as deformation;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
 

@@ -6,6 +6,7 @@
 mod assert_layout;
 mod bvh;
 mod container;
+mod deformation;
 mod grid;
 mod grid_leaves;
 mod groups;
@@ -18,6 +19,7 @@ mod tets;
 
 pub use bvh::*;
 pub use container::*;
+pub use deformation::*;
 pub use grid::*;
 pub use grid_leaves::*;
 pub use groups::*;

@@ -114,7 +114,7 @@ fn joint_transforms(accessors: &Accessors<'_>, skin: usize) -> Result<Vec<DAffin
 }
 
 /// For each node its parent, or `None` for roots.
-fn parents(document: &GltfDocument) -> Vec<Option<usize>> {
+pub(super) fn parents(document: &GltfDocument) -> Vec<Option<usize>> {
     let mut parents = vec![None; document.nodes.len()];
     for (index, node) in document.nodes.iter().enumerate() {
         for &child in &node.children {

@@ -17,6 +17,15 @@ pub(super) fn local(node: &GltfNode) -> DAffine3 {
     }
 }
 
+/// The rows of a transform, applied to columns (x, y, z, 1).
+pub(super) fn rows(transform: &DAffine3) -> [[f64; 4]; 3] {
+    let (linear, moved) = (transform.matrix3, transform.translation.to_array());
+    [0, 1, 2].map(|k| {
+        let [x, y, z] = linear.row(k).to_array();
+        [x, y, z, moved[k]]
+    })
+}
+
 /// A transformed position, computed in f64 and rounded to f32 once.
 #[inline]
 pub(super) fn point(transform: &DAffine3, p: [f32; 3]) -> [f32; 3] {

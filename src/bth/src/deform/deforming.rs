@@ -65,6 +65,20 @@ impl Deforming {
         Ok(())
     }
 
+    /// Memory for new positions, which are staged when all of it has been filled and [`Self::check_staged`] has been called. The
+    /// positions before the last refit, which it holds until then, are lost.
+    pub(crate) fn staged_mut(&mut self) -> &mut [[f32; 3]] {
+        &mut self.staged
+    }
+
+    /// Checks positions that were written to [`Self::staged_mut`], in which no zero is negative.
+    ///
+    /// # Errors
+    /// `BTH-S007` if one is not finite.
+    pub(crate) fn check_staged(&self) -> Result<(), Error> {
+        check_finite(&self.staged)
+    }
+
     /// Makes positions that [`Self::stage`] has staged those of the object.
     pub(crate) fn refit_staged(&mut self) {
         let plan = &self.plan;

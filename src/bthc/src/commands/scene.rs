@@ -148,6 +148,7 @@ fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     let used = (manifest.objects.len() - report.unused.len()) as u64;
     row_unless_zero(&mut facts, "objects of equal geometry, stored once", used - report.objects.len() as u64);
     row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
+    row_unless_zero(&mut facts, "objects that deform", report.deformers);
     row_unless_zero(&mut facts, "tracks", report.tracks);
     row_unless_zero(&mut facts, "cameras", report.cameras);
     row_unless_zero(&mut facts, "lights", report.lights);

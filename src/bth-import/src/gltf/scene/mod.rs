@@ -1,6 +1,7 @@
 //! A manifest from a glTF scene: nodes, animations, cameras, lights, instancing.
 
 mod cameras;
+mod deformers;
 mod importer;
 mod lights;
 mod nodes;
@@ -12,6 +13,7 @@ use std::path::Path;
 
 use bth_scene::{Frames, Manifest};
 
+use self::deformers::Animated;
 use self::importer::Importer;
 pub use self::options::{ImportOptions, ImportReport};
 use crate::error::Result;
@@ -19,6 +21,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
+use crate::gltf::rest_pose::parents;
 use crate::monitor::Monitor;
 use crate::source::{Source, read_file};
 
@@ -56,9 +59,17 @@ pub fn import(
         node_names: HashSet::new(),
         object_names: HashSet::new(),
         objects: HashMap::new(),
+        skin_names: HashSet::new(),
+        parents: parents(&document),
+        animated: Animated::default(),
+        deform: options.deform,
+        deforming: Vec::new(),
     };
+    let animations = importer.animations(&options.animation)?;
+    importer.animated = Animated::of(&animations, document.nodes.len());
     importer.nodes(options)?;
-    let (tracks, last) = importer.tracks(&options.animation)?;
+    importer.deformers()?;
+    let (tracks, last) = importer.tracks(&animations)?;
     importer.manifest.tracks = tracks;
     let last = (last * options.rate).ceil().clamp(0.0, f64::from(MAX_FRAMES)) as i32;
     importer.manifest.frames = Frames { first: 0, last, rate: options.rate };
@@ -74,6 +85,7 @@ fn finish(importer: Importer<'_>) -> (Manifest, ImportReport) {
         instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
         objects: manifest.objects.len() as u64,
         tracks: manifest.tracks.len() as u64,
+        deformers: manifest.deformers.len() as u64,
         cameras: manifest.cameras.len() as u64,
         lights: manifest.lights.len() as u64,
         ..importer.report

@@ -1,8 +1,8 @@
 //! Motion blur: the times within an open shutter at which a frame is sampled, and which pixels are sampled at which of them.
 //!
 //! A frame is the mean of its samples, and each sample sees the scene at a time of its own. The scene is set to one of these
-//! times after the other; at each of them the tracks are evaluated, deformed surfaces are refitted, and the boxes of the top
-//! level bound what is there at that time. So every sample is exact for its time, and rays cost as much as without a shutter.
+//! times after the other; at each of them the tracks are evaluated, and the boxes of the top level bound what is there at that
+//! time. So every sample is exact for its time.
 //! The times of a pixel are stratified; pixels next to each other take different ones, so that motion becomes fine noise rather
 //! than a row of copies.
 

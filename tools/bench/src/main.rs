@@ -3,8 +3,8 @@
 use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
-    accuracy, animation, compare, costs, inside, instances, load, output, paper, quality, records, refit, scenes, speed,
-    stress,
+    accuracy, animation, compare, costs, inside, instances, load, output, paper, quality, records, refit,
+    scenes, speed, stress,
 };
 use clap::Parser;
 use std::process::ExitCode;

@@ -61,9 +61,8 @@ impl Trees {
     /// The trees of a scene at its first frame.
     pub(super) fn new(shown: Scene) -> Result<Trees> {
         let mesh = FrameMesh::of(&shown);
-        let built = |variant| {
-            embree::build(embree::padded(&mesh.positions), mesh.triangles.clone(), variant, 1)
-        };
+        let built =
+            |variant| embree::build(embree::padded(&mesh.positions), mesh.triangles.clone(), variant, 1);
         let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
         let same_triangles = (0..shown.instance_count()).all(|row| shown.instance(row).to_world == identity);
         let (refit, rebuilt) = (built(&embree::REFIT)?, built(&embree::DEFAULT)?);

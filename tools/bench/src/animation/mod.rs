@@ -13,7 +13,7 @@ use crate::isa;
 use crate::output::{Head, Record as Page};
 use crate::progress::Progress;
 use crate::rounds::median;
-use crate::scenes::{FrameRays, SETS, Source};
+use crate::scenes::{FrameRays, Source};
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
 use contenders::{NAMES, Trees};
@@ -126,16 +126,18 @@ fn scene(source: &Source, arguments: &Animation, progress: &Progress) -> Result<
         ns_per_ray: [0, 1, 2].map(|k| 1e9 * sets[k] / rays[k].max(1) as f64),
         differ,
     });
-    Ok(AnimationTimes { name: source.name.clone(), triangles, rows: rows.collect(), frames, updates, cost_ratio })
+    Ok(AnimationTimes {
+        name: source.name.clone(),
+        triangles,
+        rows: rows.collect(),
+        frames,
+        updates,
+        cost_ratio,
+    })
 }
 
 /// Adds the seconds that each contender takes for the rays of a frame, medians of interleaved rounds, and the answers that differ.
-fn trace(
-    trees: &Trees,
-    frame_rays: &FrameRays,
-    rounds: usize,
-    sums: &mut [(f64, [f64; 3], u64)],
-) {
+fn trace(trees: &Trees, frame_rays: &FrameRays, rounds: usize, sums: &mut [(f64, [f64; 3], u64)]) {
     let contenders = trees.contenders();
     for (k, set) in frame_rays.sets.iter().enumerate() {
         let mut times = vec![Vec::new(); contenders.len()];

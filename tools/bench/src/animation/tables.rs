@@ -68,4 +68,3 @@ fn updates(scenes: &[AnimationTimes]) -> String {
         table(&head, &rows)
     )
 }
-

@@ -8,8 +8,8 @@ mod record;
 mod source;
 mod tables;
 
-pub use record::{ContenderRow, SceneTimes, ScenesRecord};
 pub(crate) use frame_rays::FrameRays;
+pub use record::{ContenderRow, SceneTimes, ScenesRecord};
 pub(crate) use source::Source;
 pub use tables::markdown;
 

@@ -94,6 +94,7 @@ impl Deformers {
             let base = file.object(deformer.object)?.positions;
             let vertices = Vertices { base, deformation: file.deformation(deformer.object) };
             evaluate::positions(vertices, &pose, deforming.staged_mut());
+            deforming.stage_normals_of_file();
             deforming.check_staged().map_err(|_| {
                 let at = size_of::<Deformer>() as u64 * row as u64;
                 let name = view.node_name(deformer.node).escape_debug();

@@ -27,6 +27,8 @@ const OPACITY: &str = "1";
 const NAMES: &str = "1";
 const MATERIALS: &str = "1";
 const DEFORMABLE: &str = "1";
+/// Version of how objects are compiled whose vertices move by themselves.
+pub(crate) const MOTION: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
@@ -97,11 +99,11 @@ pub(crate) fn tets_of_node(
 }
 
 /// The keys of a scene's objects; the components that all of them share are made once.
-pub(crate) struct ObjectKeys(Vec<(String, String)>);
+pub(crate) struct ObjectKeys(Vec<(String, String)>, String);
 
 impl ObjectKeys {
     pub(crate) fn new(options: &CompileOptions, tetgen: &str) -> Self {
-        Self(components(options, tetgen))
+        Self(components(options, tetgen), text(&options.motion))
     }
 
     /// The key of an object.
@@ -114,8 +116,21 @@ impl ObjectKeys {
             .with_all(
                 mesh.materials.iter().map(|materials| ("surface materials".to_owned(), materials.hex())),
             )
+            .with_all(self.of_motion(mesh))
             .with_all(mesh.deformation.iter().map(|rows| ("deformation".to_owned(), rows.hex())))
             .with_all(self.0.iter().cloned())
+    }
+
+    /// What only objects depend on whose vertices move.
+    fn of_motion(&self, mesh: &MeshSummary) -> Vec<(String, String)> {
+        let Some(sequence) = &mesh.sequence else { return Vec::new() };
+        let named = |name: &str, value: String| (name.to_owned(), value);
+        vec![
+            named("sequence", sequence.hex()),
+            named("motion", self.1.clone()),
+            named("motion version", MOTION.to_owned()),
+            named("deformable version", DEFORMABLE.to_owned()),
+        ]
     }
 }
 
@@ -185,6 +200,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     }
     if options.deformable {
         all.extend([("deformable", "true".to_owned()), ("deformable version", DEFORMABLE.to_owned())]);
+    }
+    if options.motion != Default::default() {
+        all.push(("motion", text(&options.motion)));
     }
     if options.names {
         all.extend([("names", "true".to_owned()), ("names version", NAMES.to_owned())]);

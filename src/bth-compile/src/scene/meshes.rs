@@ -62,7 +62,7 @@ impl SourceMesh {
 }
 
 fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
-    cached::mesh(&file.digest, &file.full, &part.name(), context.options.wanted())
+    cached::mesh(&file.digest, &file.full, &file.part(part), context.options.wanted())
 }
 
 /// The summary of a mesh that the cache has.
@@ -108,8 +108,9 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let materials = materials.map_or_else(String::new, |materials| format!(" materials {}", materials.hex()));
     let deformation =
         mesh.deformation.as_ref().map_or_else(String::new, |d| format!(" deformation {}", d.hex()));
+    let sequence = mesh.sequence.as_ref().map_or_else(String::new, |s| format!(" sequence {}", s.hex()));
     let geometry = mesh.geometry.hex();
-    let text = format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}");
+    let text = format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}{sequence}");
     blake3::hash(text.as_bytes())
 }
 
@@ -140,10 +141,14 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     if parts.is_empty() {
         return Ok(Vec::new());
     }
-    let Context { options, cache, monitor, .. } = context;
+    let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
         let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         return Ok(vec![MeshSummary::of(read)]);
+    }
+    if let Some(moving) = &file.moving {
+        let read = moving.import(file, context)?;
+        return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context)]);
     }
     let gltf = |part: &SourcePart| match part {
         SourcePart::Gltf(part) => Some(*part),
@@ -157,14 +162,23 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
-    let keep = |(part, read): (&SourcePart, (Mesh, mesh::Report))| {
-        let (mesh, summary) = MeshSummary::of(read);
-        if cache.store().is_some() {
-            let name = file.name_of(*part);
-            cache.miss(&key(file, *part, context), &name);
-            cache.put(&key(file, *part, context), &name, &cached::encode(&mesh), &summary, *monitor);
-        }
-        (mesh, summary)
-    };
-    Ok(parts.iter().zip(meshes).map(keep).collect())
+    let keep = |(part, read)| keep_mesh(file, part, read, context);
+    Ok(parts.iter().copied().zip(meshes).map(keep).collect())
+}
+
+/// Keeps a mesh in the cache.
+fn keep_mesh(
+    file: &File<'_>,
+    part: SourcePart,
+    read: (Mesh, mesh::Report),
+    context: &Context<'_>,
+) -> (Mesh, MeshSummary) {
+    let (mesh, summary) = MeshSummary::of(read);
+    let Context { cache, monitor, .. } = context;
+    if cache.store().is_some() {
+        let name = file.name_of(part);
+        cache.miss(&key(file, part, context), &name);
+        cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, *monitor);
+    }
+    (mesh, summary)
 }

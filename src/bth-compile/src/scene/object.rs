@@ -86,6 +86,7 @@ fn build_or_fetch(
         tet_leaves: built.tet_leaves,
         tet_triangles: built.tet_triangles,
         opacity: mesh.summary.report.opacity,
+        motion: built.motion.clone(),
         ..ObjectReport::default()
     };
     let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
@@ -93,6 +94,9 @@ fn build_or_fetch(
     let bytes = clock.time("file", || {
         let mut builder = FileBuilder::new();
         object(&mut builder, 0, &built.parts(options))?;
+        for (number, segment) in (1..).zip(&built.segment_objects) {
+            object(&mut builder, number, &segment.parts(options))?;
+        }
         Ok::<_, Error>(builder.finish())
     })?;
     drop(built);
@@ -106,7 +110,7 @@ fn build_or_fetch(
 /// An object from the cache.
 fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<BuiltObject> {
     let record = context.cache.find(key, context.monitor)?;
-    let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() == 1)?;
+    let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() >= 1)?;
     let report = serde_json::from_value(record.report).ok()?;
     context.cache.hit(key, part);
     Some(BuiltObject { file, record: report })

@@ -1,9 +1,9 @@
 //! The source files of a scene's objects.
 
+use super::moving::{Moving, unhashed};
 use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
-use bth_files::Digest;
 use bth_import::{AlphaMode, GltfPart, Looks};
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
@@ -30,6 +30,7 @@ impl SourcePart {
             Source::Deforming { mesh, .. } => SourcePart::Gltf(GltfPart::Deforming(mesh)),
             Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
             Source::Compiled { object, .. } => SourcePart::Object(object),
+            Source::Sequence { .. } | Source::Cached { .. } => SourcePart::Whole,
         }
     }
 
@@ -60,11 +61,18 @@ pub(super) struct File<'a> {
     /// Parts of the file, each with the manifest's objects that refer to it.
     pub(super) parts: Vec<(SourcePart, Vec<usize>)>,
     pub(super) digest: SourceDigest,
+    /// What moves the vertices; the file is the first of several then.
+    pub(super) moving: Option<Moving>,
     /// What takes the place of the file's content.
     pub(super) in_memory: Option<TriangleMesh<'a>>,
 }
 
 impl File<'_> {
+    /// The name of a part in keys.
+    pub(super) fn part(&self, part: SourcePart) -> String {
+        self.moving.as_ref().map_or_else(|| part.name(), Moving::part)
+    }
+
     /// Identity of a part by content, which does not depend on the path of the file.
     pub(super) fn content(&self, part: SourcePart) -> String {
         let alpha = match self.digest.looks.alpha {
@@ -72,12 +80,17 @@ impl File<'_> {
             mode => format!(" {mode:?}"),
         };
         let materials = if self.digest.looks.materials { " materials" } else { "" };
-        format!("{} {} {}{alpha}{materials}", self.digest.text(), part.name(), cached::extension(&self.full))
+        format!(
+            "{} {} {}{alpha}{materials}",
+            self.digest.text(),
+            self.part(part),
+            cached::extension(&self.full)
+        )
     }
 
     /// The name of a part in explanations of misses.
     pub(super) fn name_of(&self, part: SourcePart) -> String {
-        format!("{} {}", self.path, part.name())
+        format!("{} {}", self.path, self.part(part))
     }
 }
 
@@ -104,17 +117,20 @@ pub(super) fn files<'a>(
     looks: Looks,
 ) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), looks };
-    let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
+    let mut row_of_file: HashMap<(&str, bool, bool, Option<usize>), usize> = HashMap::new();
     let mut row_of_part: HashMap<(usize, SourcePart), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
         let part = SourcePart::of(&object.source);
         let compiled = matches!(part, SourcePart::Object(_));
         let path = object.source.path();
         // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
-        let file = *row_of_file.entry((path, compiled, part != SourcePart::Whole)).or_insert_with(|| {
-            let full = folder.join(path);
-            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing(), in_memory: None });
+        let moving = Moving::of(manifest, &object.source, folder)?;
+        let own = moving.is_some().then_some(row);
+        let whole = part == SourcePart::Whole;
+        let file = *row_of_file.entry((path, compiled, !whole, own)).or_insert_with(|| {
+            let full = moving.as_ref().map_or_else(|| folder.join(path), |moving| moving.first().to_owned());
+            let digest = unhashed(looks);
+            files.push(File { path, full, compiled, parts: Vec::new(), digest, moving, in_memory: None });
             files.len() - 1
         });
         let parts = &mut files[file].parts;
@@ -125,7 +141,11 @@ pub(super) fn files<'a>(
         parts[place].1.push(row);
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
-    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, looks)).collect();
+    let digest = |file: &File<'_>| match &file.moving {
+        Some(moving) => moving.digest(looks),
+        None => SourceDigest::of(&file.full, looks),
+    };
+    let digests: Vec<_> = files.par_iter().map(digest).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;
     }

@@ -106,8 +106,8 @@ impl ObjectKeys {
         Self(components(options, tetgen), text(&options.motion))
     }
 
-    /// The key of an object.
-    pub(crate) fn of(&self, mesh: &MeshSummary) -> Key {
+    /// The key of an object, which is posed by a clip of the scene or by none.
+    pub(crate) fn of(&self, mesh: &MeshSummary, clip: Option<&Digest>) -> Key {
         Key::new("object")
             .with("geometry", mesh.geometry.hex())
             .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
@@ -116,17 +116,21 @@ impl ObjectKeys {
             .with_all(
                 mesh.materials.iter().map(|materials| ("surface materials".to_owned(), materials.hex())),
             )
-            .with_all(self.of_motion(mesh))
+            .with_all(self.of_motion(mesh, clip))
             .with_all(mesh.deformation.iter().map(|rows| ("deformation".to_owned(), rows.hex())))
             .with_all(self.0.iter().cloned())
     }
 
     /// What only objects depend on whose vertices move.
-    fn of_motion(&self, mesh: &MeshSummary) -> Vec<(String, String)> {
-        let Some(sequence) = &mesh.sequence else { return Vec::new() };
+    fn of_motion(&self, mesh: &MeshSummary, clip: Option<&Digest>) -> Vec<(String, String)> {
+        let (name, moved_by) = match (&mesh.sequence, clip) {
+            (Some(sequence), _) => ("sequence", sequence),
+            (None, Some(clip)) => ("clip", clip),
+            (None, None) => return Vec::new(),
+        };
         let named = |name: &str, value: String| (name.to_owned(), value);
         vec![
-            named("sequence", sequence.hex()),
+            named(name, moved_by.hex()),
             named("motion", self.1.clone()),
             named("motion version", MOTION.to_owned()),
             named("deformable version", DEFORMABLE.to_owned()),

@@ -18,6 +18,7 @@ pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
 pub use moving::{MotionOptions, MotionReport, SegmentReport};
+pub(crate) use moving::{PoseSource, compile_moving};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
 pub(crate) use report::StageReports;
@@ -113,7 +114,7 @@ pub(crate) fn compile_mesh(
         if moving.coordinates != options.coordinates {
             monitor.warn(&format!("{}: coordinates stay f32, since vertices move", source.display()));
         }
-        return moving::compile_moving(mesh, &sequence, &moving, clock, monitor);
+        return compile_moving(mesh, &sequence, &moving, clock, monitor);
     }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),

@@ -172,6 +172,12 @@ impl Compiler<'_> {
         Costs { line: 0.0, ..self.options.collapse.costs }
     }
 
+    /// The positions at those of some times at which all are finite.
+    fn finite(&self, times: impl IntoIterator<Item = f64>) -> Vec<(f64, Vec<[f32; 3]>)> {
+        let posed = times.into_iter().map(|seconds| (seconds, self.source.positions_at(seconds)));
+        posed.filter(|(_, rows)| rows.as_flattened().iter().all(|x| x.is_finite())).collect()
+    }
+
     /// The tree of a mesh over some poses, and what its nodes are worth on average.
     fn tree(&self, mesh: &Mesh, positions: &[Vec<[f32; 3]>]) -> Result<(TreeOfPoses, bvh::BvhReport)> {
         let poses = Poses::new(mesh, positions)?;
@@ -193,8 +199,8 @@ impl Compiler<'_> {
     /// Times of comparison, and the costs of trees that are built for these poses alone.
     fn alone(&self, mesh: &Mesh) -> Result<Vec<(f64, f64)>> {
         let count = TIMES_PER_SEGMENT * self.options.motion.segments.max(1) as usize;
-        let one = |seconds: f64| {
-            let positions = vec![self.source.positions_at(seconds)];
+        let one = |(seconds, positions): (f64, Vec<[f32; 3]>)| {
+            let positions = vec![positions];
             let posed = Mesh {
                 positions: positions[0].clone(),
                 triangles: mesh.triangles.clone(),
@@ -203,18 +209,21 @@ impl Compiler<'_> {
             let (tree, _) = self.tree(&posed, &positions)?;
             Ok((seconds, self.cost(&posed, &tree, &positions)?[0]))
         };
-        middles(self.source.range(), count).into_iter().map(one).collect()
+        self.finite(middles(self.source.range(), count)).into_iter().map(one).collect()
     }
 
     /// The tree for a range of time.
     fn range(&self, mesh: Mesh, (first, last): (f64, f64)) -> Result<Range> {
-        let positions: Vec<_> = match self.options.motion.poses {
-            0 | 1 => vec![mesh.positions.clone()],
+        let mut positions: Vec<_> = match self.options.motion.poses {
+            0 | 1 => Vec::new(),
             poses => {
                 let times = middles((first, last), (poses as usize).min(bvh::MAX_POSES));
-                times.into_iter().map(|seconds| self.source.positions_at(seconds)).collect()
+                self.finite(times).into_iter().map(|(_, rows)| rows).collect()
             }
         };
+        if positions.is_empty() {
+            positions.push(mesh.positions.clone());
+        }
         let (tree, bvh) = self.tree(&mesh, &positions)?;
         let within: Vec<_> = self.alone.iter().filter(|(t, _)| first <= *t && *t <= last).collect();
         let mut ratios = Vec::with_capacity(within.len());

@@ -107,6 +107,7 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
             parts: vec![(SourcePart::Whole, vec![row])],
             digest,
             moving: None,
+            clips: Default::default(),
             in_memory,
         }
     };

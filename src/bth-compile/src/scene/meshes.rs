@@ -1,6 +1,7 @@
 //! The meshes of a source file, from the cache or imported.
 
 use super::context::Context;
+use super::object;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
@@ -76,18 +77,19 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |source_part: SourcePart| {
         let part = file.name_of(source_part);
         let mesh = key(file, source_part, context);
-        let (Some(summary), Some(keys)) = (known(&mesh, context), &context.keys) else {
+        let summary = known(&mesh, context);
+        let object = summary.as_ref().and_then(|summary| object::key(summary, source_part, context));
+        let (Some(summary), Some(object)) = (summary, object) else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
         let old = context
             .previous
             .as_ref()
-            .and_then(|p| Some((p, p.index.object_of(content(&summary).as_bytes())?)));
+            .and_then(|p| Some((p, p.index.object_of(content(&summary, source_part).as_bytes())?)));
         if old.is_some_and(|(previous, object)| previous.has(object)) {
             return None;
         }
-        let object = keys.of(&summary);
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {
             return None;
@@ -98,8 +100,9 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     file.parts.iter().filter_map(|(part, _)| one(*part)).collect()
 }
 
-/// A hash of a mesh's content, which does not depend on the file of the mesh.
-pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
+/// A hash of the content of a mesh and of what poses it, which does not depend on the file of the mesh.
+pub(super) fn content(mesh: &MeshSummary, part: SourcePart) -> blake3::Hash {
+    let clip = part.clip().map_or_else(String::new, |clip| format!(" clip {}", clip.hex()));
     let shading = mesh.shading.as_ref().map(Digest::hex);
     let opacity =
         mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
@@ -110,7 +113,8 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
         mesh.deformation.as_ref().map_or_else(String::new, |d| format!(" deformation {}", d.hex()));
     let sequence = mesh.sequence.as_ref().map_or_else(String::new, |s| format!(" sequence {}", s.hex()));
     let geometry = mesh.geometry.hex();
-    let text = format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}{sequence}");
+    let text =
+        format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}{sequence}{clip}");
     blake3::hash(text.as_bytes())
 }
 
@@ -150,11 +154,7 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
         let read = moving.import(file, context)?;
         return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context)]);
     }
-    let gltf = |part: &SourcePart| match part {
-        SourcePart::Gltf(part) => Some(*part),
-        SourcePart::Whole | SourcePart::Object(_) => None,
-    };
-    let single: Vec<GltfPart> = parts.iter().filter_map(gltf).collect();
+    let single: Vec<GltfPart> = parts.iter().filter_map(|part| part.gltf()).collect();
     let meshes = if single.is_empty() {
         vec![mesh::import(&file.full, options.wanted(), *monitor)?]
     } else {

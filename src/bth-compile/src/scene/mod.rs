@@ -1,8 +1,10 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files; `clips` gives the
+//! poses of objects that skins and morph targets deform;
 //! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
+mod clips;
 mod compile;
 mod context;
 mod deformers;

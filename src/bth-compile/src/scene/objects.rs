@@ -188,7 +188,7 @@ fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>
             (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
         }
         Part::Mesh(mesh) => {
-            let content = content(&mesh.summary);
+            let content = content(&mesh.summary, mesh.part);
             let old = previous.and_then(|p| Some((p, p.index.object_of(content.as_bytes())?)));
             (old.filter(|(p, object)| p.has(*object)), content)
         }

@@ -9,12 +9,14 @@
 pub(crate) mod evaluate;
 pub(crate) mod normals;
 pub(crate) mod pose;
+mod poses;
 mod scene;
 mod sequences;
 #[cfg(test)]
 mod tests;
 mod update;
 
+pub use poses::DeformerPoses;
 pub(crate) use update::{Deformers, Posed};
 
 /// The matrix of a joint from the space of the object to world space: columns, each with a fourth number of zero, so that four lanes

@@ -5,9 +5,9 @@ use super::pose::Pose;
 use super::sequences::{Moved, Sequences};
 use crate::instances::NodeHierarchy;
 use crate::objects::Objects;
+use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
-use bth_format::File;
 use std::collections::{HashMap, HashSet};
 use std::time::{Duration, Instant};
 

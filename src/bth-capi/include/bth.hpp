@@ -205,6 +205,20 @@ public:
         return point;
     }
 
+    /* How a material of an object looks. */
+    bth_material_look material(std::uint32_t object, std::uint32_t material) const {
+        bth_material_look look;
+        check(bth_material(get(), object, material, &look));
+        return look;
+    }
+
+    /* A texture of an object; its bytes are those of the scene. */
+    bth_texture_image texture(std::uint32_t object, std::uint32_t texture) const {
+        bth_texture_image image;
+        check(bth_texture(get(), object, texture, &image));
+        return image;
+    }
+
     std::string object_name(std::uint32_t object) const {
         return name([&](char *to, std::size_t size) { return bth_object_name(get(), object, to, size); });
     }

@@ -6,6 +6,7 @@ pub mod closest;
 pub mod deform;
 pub mod hits;
 pub mod inside;
+pub mod materials;
 pub mod memory;
 pub mod motion;
 pub mod surface;

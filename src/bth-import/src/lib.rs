@@ -45,7 +45,8 @@ pub use memory::{MEMORY_FORMAT, import_triangles};
 pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, Sequence, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};
 pub use sequence::{
-    MAX_FRAMES, Timing, VertexCache, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files,
+    MAX_FRAMES, Timing, VertexCache, import_sequence, import_sequence_bytes, import_vertex_cache,
+    import_vertex_cache_bytes, read_vertex_cache, sequence_files,
 };
 pub use source::read_file;
 pub use zero_area::is_zero_area;

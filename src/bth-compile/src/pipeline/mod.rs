@@ -18,7 +18,7 @@ pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
 pub use moving::{MotionOptions, MotionReport, SegmentReport};
-pub(crate) use moving::{PoseSource, compile_moving};
+pub(crate) use moving::{PoseSource, compile_moving, warn_of_options};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
 pub(crate) use report::StageReports;
@@ -110,11 +110,8 @@ pub(crate) fn compile_mesh(
 ) -> Result<(Object, StageReports)> {
     options.check()?;
     if let Some(sequence) = mesh.sequence.clone() {
-        let moving = options.of_deforming();
-        if moving.coordinates != options.coordinates {
-            monitor.warn(&format!("{}: coordinates stay f32, since vertices move", source.display()));
-        }
-        return compile_moving(mesh, &sequence, &moving, clock, monitor);
+        warn_of_options(&source.display().to_string(), options, monitor);
+        return compile_moving(mesh, &sequence, &options.of_deforming(), clock, monitor);
     }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),

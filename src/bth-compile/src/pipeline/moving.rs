@@ -7,7 +7,7 @@ use super::{Clock, StageReports};
 use crate::bvh::{self, Costs, PoseOptions, Poses};
 use crate::error::Result;
 use crate::monitor::Monitor;
-use crate::options::CompileOptions;
+use crate::options::{CompileOptions, Structure};
 use bth_format::SequenceView;
 use bth_format::layout::Segment;
 use bth_import::{Mesh, Sequence};
@@ -80,6 +80,20 @@ impl PoseSource for Sequence {
         let mut positions = vec![[0.0; 3]; rows];
         view.positions_at(view.locate(seconds), (rows, 0), &mut positions);
         positions
+    }
+}
+
+/// Warns of options that have no effect on an object whose vertices move.
+pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dyn Monitor) {
+    let without_effect = [
+        (options.structure == Structure::Tets, "nothing is tetrahedralized"),
+        (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
+        (!options.geometry, "the geometry of the source stays"),
+    ];
+    let set_aside: Vec<_> =
+        without_effect.into_iter().filter_map(|(differs, what)| differs.then_some(what)).collect();
+    if !set_aside.is_empty() {
+        monitor.warn(&format!("{name}: {}, since its vertices move", set_aside.join(", ")));
     }
 }
 

@@ -175,7 +175,8 @@ mod tests {
     use bth_scene::Transform;
 
     /// A node "arm" under a node "body", which deforms an object by two targets, with a track of their weights.
-    const TEXT: &str = "frames = { first = 0, last = 8, rate = 4 }\n\
+    const TEXT: &str = "version = 1\n\
+        frames = { first = 0, last = 8, rate = 4 }\n\
         objects = [{ name = \"face\", model = \"face.gltf\", mesh = 0, deforms = true }]\n\
         nodes = [{ name = \"body\" }, { name = \"arm\", parent = \"body\", object = \"face\" }, { name = \"other\" }]\n\
         skins = [{ name = \"s\", joints = [\"arm\"] }]\n\

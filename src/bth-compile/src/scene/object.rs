@@ -86,6 +86,9 @@ fn build_or_fetch(
         return Ok(found);
     }
     let triangles = clock.time("mesh", || mesh.take(file, context))?;
+    if mesh.summary.deformation.is_some() {
+        pipeline::warn_of_options(part, context.options, *monitor);
+    }
     let poses = mesh.part.clip().and_then(|clip| file.clips.poses(&clip, &triangles));
     let (built, reports) = match poses {
         Some(poses) => pipeline::compile_moving(triangles, &poses, options, clock, *monitor)?,

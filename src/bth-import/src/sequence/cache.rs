@@ -64,8 +64,22 @@ pub fn import_vertex_cache(
     monitor: &dyn Monitor,
 ) -> Result<(Mesh, Report)> {
     let (model_data, cache_data) = (read_file(model)?, read_file(cache)?);
+    import_vertex_cache_bytes((model, &model_data), (cache, &cache_data), timing, wanted, monitor)
+}
+
+/// As [`import_vertex_cache`], from the names and the bytes of both files.
+///
+/// # Errors
+/// As [`import_vertex_cache`].
+pub fn import_vertex_cache_bytes(
+    (model, model_data): (&Path, &[u8]),
+    (cache, cache_data): (&Path, &[u8]),
+    timing: &Timing,
+    wanted: Wanted,
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
     monitor.stage("import", Some((model_data.len() + cache_data.len()) as u64));
-    let source = Source::new(model, &model_data, monitor);
+    let source = Source::new(model, model_data, monitor);
     if format(&source)? == Format::Gltf {
         let message = "expected an OBJ, PLY, STL or OFF file as the model of a vertex cache, found glTF";
         return Err(source.error(
@@ -76,7 +90,7 @@ pub fn import_vertex_cache(
     }
     let raw = read_raw(&source, wanted)?;
     source.progress(model_data.len())?;
-    let found = read_vertex_cache(cache, &cache_data, timing, monitor)?;
+    let found = read_vertex_cache(cache, cache_data, timing, monitor)?;
     if found.points != raw.positions.len() {
         let message = format!(
             "expected the {} vertices of {}, found {}",
@@ -85,7 +99,7 @@ pub fn import_vertex_cache(
             found.points
         );
         let hint = "export model and cache together, without modifiers that change the number of vertices";
-        return Err(Source::new(cache, &cache_data, monitor).error(MISMATCH, message, hint));
+        return Err(Source::new(cache, cache_data, monitor).error(MISMATCH, message, hint));
     }
     let frames = found.positions.chunks(found.points.max(1)).map(<[_]>::to_vec).collect();
     let format = format!("{} and {}", raw.format, found.format);

@@ -25,18 +25,44 @@ pub fn import_sequence(
     wanted: Wanted,
     monitor: &dyn Monitor,
 ) -> Result<(Mesh, Report)> {
+    let bytes = |file: &PathBuf| std::fs::metadata(file).map_or(0, |metadata| metadata.len());
+    monitor.stage("import", Some(files.iter().map(bytes).sum()));
+    import_frames(files, &|frame| read_file(&files[frame]), timing, wanted, monitor)
+}
+
+/// As [`import_sequence`], from the names and the bytes of all files.
+///
+/// # Errors
+/// As [`import_sequence`].
+pub fn import_sequence_bytes(
+    files: &[(PathBuf, Vec<u8>)],
+    timing: &Timing,
+    wanted: Wanted,
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
+    let names: Vec<_> = files.iter().map(|(name, _)| name.clone()).collect();
+    monitor.stage("import", Some(files.iter().map(|(_, bytes)| bytes.len() as u64).sum()));
+    import_frames(&names, &|frame| Ok(files[frame].1.clone()), timing, wanted, monitor)
+}
+
+/// Reads the frames of a sequence, one after the other; `read` gives the bytes of each file.
+fn import_frames(
+    files: &[PathBuf],
+    read: &dyn Fn(usize) -> Result<Vec<u8>>,
+    timing: &Timing,
+    wanted: Wanted,
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
     let Some((first, others)) = files.split_first() else {
         let message = "expected at least one frame".to_owned();
         return Err(Error::Internal { code: "BTH-X004", message });
     };
-    let bytes = |file: &PathBuf| std::fs::metadata(file).map_or(0, |metadata| metadata.len());
-    monitor.stage("import", Some(files.iter().map(bytes).sum()));
-    let data = read_file(first)?;
+    let data = read(0)?;
     let source = Source::new(first, &data, monitor);
     let raw = read_frame(&source, wanted)?;
     let mut frames = vec![raw.positions.clone()];
-    for file in others {
-        let data = read_file(file)?;
+    for (file, frame) in others.iter().zip(1..) {
+        let data = read(frame)?;
         let source = Source::new(file, &data, monitor);
         let plain = Wanted::from(Keep::None);
         let frame = read_frame(&source, plain)?;

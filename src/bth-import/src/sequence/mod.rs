@@ -10,9 +10,9 @@ mod mdd;
 mod pc2;
 mod weld;
 
-pub use cache::{VertexCache, import_vertex_cache, read_vertex_cache};
+pub use cache::{VertexCache, import_vertex_cache, import_vertex_cache_bytes, read_vertex_cache};
 pub use files::sequence_files;
-pub use frames::import_sequence;
+pub use frames::{import_sequence, import_sequence_bytes};
 
 use crate::error::Result;
 use crate::source::Source;

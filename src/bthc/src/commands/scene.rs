@@ -141,7 +141,7 @@ fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result
     Ok(files)
 }
 
-/// What is known about objects whose vertices move by themselves.
+/// What is known about the trees of objects whose vertices move.
 fn motion(facts: &mut Table, report: &SceneReport) {
     let moving = report.objects.iter().filter_map(|object| Some((object, object.motion.as_ref()?)));
     for (object, motion) in moving {
@@ -150,14 +150,17 @@ fn motion(facts: &mut Table, report: &SceneReport) {
             let frames = format!("{}, {}", motion.frames, bytes(motion.position_bytes));
             facts.row([format!("frames of {name}, positions"), frames].each_ref().map(String::as_str));
         }
-        let cost = format!("{:.2}, at most {:.2}", motion.cost_ratio, motion.worst_cost_ratio);
-        facts.row([format!("cost of its tree, over one for each pose"), cost].each_ref().map(String::as_str));
+        if motion.poses > 1 {
+            let label = format!("cost of rays to {name}, over trees for each pose");
+            let cost = format!("{:.2}, at most {:.2}", motion.cost_ratio, motion.worst_cost_ratio);
+            facts.row([label, cost].each_ref().map(String::as_str));
+        }
         if let [_, later @ ..] = &motion.segments[..]
             && !later.is_empty()
         {
             let times: Vec<_> = later.iter().map(|segment| format!("{:.3} s", segment.first)).collect();
             let text = format!("{}, from {}", motion.segments.len(), times.join(", "));
-            facts.row(["trees for ranges of time", &text]);
+            facts.row([format!("trees of {name} for ranges of time"), text].each_ref().map(String::as_str));
         }
     }
 }

@@ -75,10 +75,23 @@ pub fn import_gltf_parts(
     wanted: impl Into<Wanted>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<(Mesh, Report)>> {
+    import_gltf_parts_bytes(path, &read_file(path)?, parts, wanted, monitor)
+}
+
+/// As [`import_gltf_parts`], from the bytes of a file, as [`import_bytes`] reads it.
+///
+/// # Errors
+/// As [`import_gltf_parts`].
+pub fn import_gltf_parts_bytes(
+    name: &Path,
+    data: &[u8],
+    parts: &[GltfPart],
+    wanted: impl Into<Wanted>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Mesh, Report)>> {
     let wanted = wanted.into();
-    let data = read_file(path)?;
     monitor.stage("import", Some(data.len() as u64));
-    let source = Source::new(path, &data, monitor);
+    let source = Source::new(name, data, monitor);
     if format(&source)? != Format::Gltf {
         let message = "expected a glTF or GLB file, of which single meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));

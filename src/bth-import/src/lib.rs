@@ -38,7 +38,7 @@ pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{
     import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
-    import_images, source_files,
+    import_gltf_parts_bytes, import_images, source_files,
 };
 pub use materials::{ImageFile, Looks, Materials};
 pub use memory::{MEMORY_FORMAT, import_triangles};

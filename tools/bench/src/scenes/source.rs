@@ -1,26 +1,28 @@
-//! Scenes to measure: our own animations by name, and manifests.
+//! Scenes to measure: our own animations by name, manifests, and glTF files.
 
 use anyhow::{Context, Result};
+use bth_compile::Silent;
+use bth_import::gltf::scene::ImportOptions;
 use bth_scene::Manifest;
 use std::path::PathBuf;
 
 /// A manifest, and the folder of its models.
-pub(super) struct Source {
+pub(crate) struct Source {
     /// Name without folder and extension.
-    pub(super) name: String,
-    pub(super) manifest: Manifest,
+    pub(crate) name: String,
+    pub(crate) manifest: Manifest,
     /// What paths of the manifest are relative to.
-    pub(super) folder: PathBuf,
+    pub(crate) folder: PathBuf,
     /// Keeps the files of a generated scene until the end.
     _models: Option<tempfile::TempDir>,
 }
 
 impl Source {
-    /// Makes a scene of `bth-scenes list`, or reads a manifest.
+    /// Makes a scene of `bth-scenes list`, or reads a manifest or glTF file.
     ///
     /// # Errors
-    /// If there is no such scene or manifest, or the files of a generated one cannot be written.
-    pub(super) fn load(name: &str) -> Result<Source> {
+    /// If there is no such scene or file, or the files of a generated one cannot be written.
+    pub(crate) fn load(name: &str) -> Result<Source> {
         if let Some(animation) = bth_scenes::animations::find(name) {
             let scene = (animation.make)();
             let folder = tempfile::tempdir()?;
@@ -33,14 +35,20 @@ impl Source {
             return Ok(Source { name, manifest, folder: folder.path().into(), _models: Some(folder) });
         }
         let path = PathBuf::from(name);
-        let manifest = bth_scene::read(&path).with_context(|| format!("no scene or manifest `{name}`"))?;
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        let manifest = if extension.is_some_and(|extension| extension == "glb" || extension == "gltf") {
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            bth_import::gltf::scene::import(&path, &file, &ImportOptions::default(), &Silent)?.0
+        } else {
+            bth_scene::read(&path).with_context(|| format!("no scene or manifest `{name}`"))?
+        };
         let folder = path.parent().map_or_else(|| PathBuf::from("."), PathBuf::from);
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         Ok(Source { name, manifest, folder, _models: None })
     }
 
     /// At most so many frames, evenly spread over the range of the manifest.
-    pub(super) fn frames(&self, count: usize) -> Vec<i32> {
+    pub(crate) fn frames(&self, count: usize) -> Vec<i32> {
         let range = &self.manifest.frames;
         let (first, last) = (i64::from(range.first), i64::from(range.last));
         let count = (count as i64).min(last - first + 1);

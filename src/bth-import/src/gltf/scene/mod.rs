@@ -39,9 +39,22 @@ pub fn import(
     options: &ImportOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Manifest, ImportReport)> {
-    let data = read_file(path)?;
+    import_bytes(path, &read_file(path)?, name, options, monitor)
+}
+
+/// As [`import`], from the bytes of a file, whose external buffers are in the folder of `path`.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_bytes(
+    path: &Path,
+    data: &[u8],
+    name: &str,
+    options: &ImportOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Manifest, ImportReport)> {
     monitor.stage("import", Some(data.len() as u64));
-    let source = Source::new(path, &data, monitor);
+    let source = Source::new(path, data, monitor);
     // Animation pointers move what tracks cannot, so a document that requires them cannot be read.
     let known = SUPPORTED.iter().filter(|s| **s != "KHR_animation_pointer");
     let known: Vec<&str> = known.chain(&SCENE_EXTENSIONS).copied().collect();

@@ -6,8 +6,8 @@ use bth_compile::Silent;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
 use bth_import::{
-    AlphaMode, GltfPart, Keep, Mesh, Timing, Wanted, import_bytes, import_cutouts_bytes, import_gltf_parts_bytes,
-    import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
+    AlphaMode, GltfPart, Keep, Mesh, Timing, Wanted, import_bytes, import_cutouts_bytes,
+    import_gltf_parts_bytes, import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
 };
 use bth_random::Rng;
 use bth_scene::Source;
@@ -65,8 +65,11 @@ fn trace(scene: &Scene, rng: &mut Rng) {
             if let Some(material) = surface.material {
                 scene.material_name(surface.object, material);
                 let look = scene.material(surface.object, material);
-                for texture in look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture]) {
-                    let texture = texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
+                for texture in
+                    look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture])
+                {
+                    let texture =
+                        texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
                     assert!(texture.is_none_or(|texture| !texture.bytes.is_empty()));
                 }
             }
@@ -161,7 +164,9 @@ fn check(mesh: &Mesh) {
     assert!(groups.groups.iter().all(material));
     let materials = mesh.materials.as_ref().expect("materials, which are wanted");
     assert!([0, groups.materials.len()].contains(&materials.parameters.len()));
-    assert!(materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len()));
+    assert!(
+        materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len())
+    );
     assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());

@@ -5,8 +5,8 @@
 
 Each file is compiled by the program BTHC; `bthc positions` says where its vertices are at 16 times. This script computes the same
 from the glTF 2.0 specification alone (§3.7.2.2, §3.7.3, §3.11 and appendix C), in float64: morph targets first, then the skin,
-whose joints take all their ancestors, whatever the transform of the skinned node is. The first animation plays. Positions of all
-triangles' corners have to be equal to 1e-5 of the model's size. Needs numpy.
+whose joints take all their ancestors, whatever the transform of the skinned node is. The first animation plays; then all is
+compared once more at rest. Positions of all triangles' corners have to be equal to 1e-5 of the model's size. Needs numpy.
 """
 
 import json
@@ -27,12 +27,12 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 class Model:
     """A glTF document with its binary chunk."""
 
-    def __init__(self, path):
+    def __init__(self, path, animated):
         self.document, self.binary = load(path)
         self.nodes = self.document.get("nodes", [])
         self.parents = {c: i for i, node in enumerate(self.nodes) for c in node.get("children", [])}
         self.channels = {}
-        for animation in self.document.get("animations", [])[:1]:
+        for animation in self.document.get("animations", [])[:1] if animated else []:
             for channel in animation["channels"]:
                 target = channel["target"]
                 key = (target.get("node"), target["path"])
@@ -134,25 +134,27 @@ class Model:
         return found
 
 
-def compiled(bthc, path, times):
+def compiled(bthc, path, animated, times):
     """What `bthc positions` says of a file."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "scene.bth"
-        subprocess.run([bthc, "compile", path, "-o", out, "--structure", "bvh", "--no-cache", "-q"], check=True)
+        command = [bthc, "compile", path, "-o", out, "--structure", "bvh", "--no-cache", "-q"]
+        subprocess.run(command + ([] if animated else ["--animation", "none"]), check=True)
         command = [bthc, "positions", out, "--seconds", *map(str, times)]
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
-def check(bthc, path):
-    """Compares a file; returns whether it agrees."""
-    model = Model(path)
+def check(bthc, path, animated):
+    """Compares a file, with its first animation or at rest; returns whether it agrees."""
+    model = Model(path, animated)
     if "EXT_mesh_gpu_instancing" in model.document.get("extensionsUsed", []):
         print(f"skipped {path.name}: its instances are of an extension")
         return True
     last = max([channel[0][-1] for channel in model.channels.values()], default=1.0)
     # Before the first key and behind the last too.
-    times = [(i + 0.37) / (TIMES - 2) * last - 0.06 * last for i in range(TIMES)]
-    said = compiled(bthc, path, times)
+    count = TIMES if animated else 1
+    times = [(i + 0.37) / (TIMES - 2) * last - 0.06 * last for i in range(count)]
+    said = compiled(bthc, path, animated, times)
     placed, worst, corners = model.placed_nodes(), 0.0, 0
     for time, at in zip(times, said["times"]):
         moved = model.moved(time)
@@ -175,7 +177,8 @@ def check(bthc, path):
             worst = max(worst, np.abs(found - expected).max(initial=0.0) / size)
             corners += len(expected)
     agrees = worst <= TOLERANCE
-    print(f"{path.name}: {corners} corners at {TIMES} times, worst {worst:.1e} of the size{'' if agrees else ': TOO FAR'}")
+    when = f"at {count} times" if animated else "at rest"
+    print(f"{path.name}: {corners} corners {when}, worst {worst:.1e} of the size{'' if agrees else ': TOO FAR'}")
     return agrees
 
 
@@ -193,7 +196,7 @@ def is_moved(model, index):
 
 
 def main():
-    results = [check(sys.argv[1], Path(name)) for name in sys.argv[2:]]
+    results = [check(sys.argv[1], Path(name), animated) for name in sys.argv[2:] for animated in (True, False)]
     sys.exit(0 if all(results) else 1)
 
 

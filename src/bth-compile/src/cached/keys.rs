@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Versions of the results of the stages.
-const MESH: &str = "2";
+const MESH: &str = "3";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
 const MARKS: &str = "1";

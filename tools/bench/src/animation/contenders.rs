@@ -73,7 +73,9 @@ impl Trees {
     pub(super) fn bring_to(&mut self, frame: i32, mesh: &FrameMesh) -> Result<[f64; 4]> {
         self.shown.set_seconds(-1e3)?;
         let mut done = Ok(());
-        let updating = Clock::ThreadCpu.time(|| done = self.shown.set_frame(frame).map(drop));
+        let shown = &mut self.shown;
+        let update = || Clock::ThreadCpu.time(|| done = shown.set_frame(frame).map(drop));
+        let updating = rayon::ThreadPoolBuilder::new().num_threads(1).build()?.install(update);
         done?;
         let mut done = Ok(());
         let compiling = Clock::Wall.time(|| done = anew(mesh).map(|scene| self.anew = scene));

@@ -16,11 +16,13 @@ struct Bin<E> {
     count: u32,
 }
 
-/// The bins of each axis, or of each order of several poses.
-type Bins<E> = <E as Extent>::Orders<[Bin<E>; MAX_BINS]>;
+/// The bins of each axis, or of each order of several poses. On the heap: those of 16 poses take 150 KiB, and a thread that waits for others
+/// splits further nodes on top of its stack.
+type Bins<E> = Vec<[Bin<E>; MAX_BINS]>;
 
 fn empty<E: Extent>() -> Bins<E> {
-    E::orders(|_| [Bin { bounds: E::EMPTY, count: 0 }; MAX_BINS])
+    let orders = E::orders(|_| ()).as_ref().len();
+    vec![[Bin { bounds: E::EMPTY, count: 0 }; MAX_BINS]; orders]
 }
 
 /// The range of the centres of triangles, halved (see [`Extent::half_center`]), per axis or order.
@@ -85,7 +87,7 @@ impl<E: Extent> Grid<E> {
         let mut bins = empty::<E>();
         for reference in references {
             let center = reference.bounds.half_center();
-            for (k, (bins, center)) in bins.as_mut().iter_mut().zip(center.as_ref()).enumerate() {
+            for (k, (bins, center)) in bins.iter_mut().zip(center.as_ref()).enumerate() {
                 let bin = &mut bins[self.bin(*center, k)];
                 bin.bounds.grow(&reference.bounds);
                 bin.count += 1;
@@ -96,7 +98,7 @@ impl<E: Extent> Grid<E> {
 }
 
 fn merge<E: Extent>(mut a: Bins<E>, b: Bins<E>) -> Bins<E> {
-    for (a, b) in a.as_mut().iter_mut().flatten().zip(b.as_ref().iter().flatten()) {
+    for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
         a.bounds.grow(&b.bounds);
         a.count += b.count;
     }
@@ -127,6 +129,8 @@ pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>)
 
 /// Partitions the references at the best of the boundaries between `bins` equal slabs per axis and
 /// returns the size of the left side; `None`, with nothing changed, when no boundary separates them.
+// Its frame must not become part of that of the recursion.
+#[inline(never)]
 pub(super) fn split<E: Extent>(
     references: &mut [Reference<E>],
     centers: &Centers<E>,
@@ -140,7 +144,7 @@ pub(super) fn split<E: Extent>(
     };
     let total = references.len();
     let mut best = Split::NONE;
-    for (axis, row) in filled.as_ref().iter().enumerate() {
+    for (axis, row) in filled.iter().enumerate() {
         if centers.lower.as_ref()[axis] >= centers.upper.as_ref()[axis] {
             continue;
         }

@@ -264,3 +264,18 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn large_meshes_of_many_poses_need_little_stack() {
+    // More triangles than are binned in one piece, and threads with half of the usual stack.
+    let mesh = grid(140);
+    assert!(mesh.triangles.len() > 1 << 15);
+    let positions = twisted(&mesh, MAX_POSES);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).stack_size(1 << 20).build().unwrap();
+    let built = pool.install(|| {
+        let poses = Poses::new(&mesh, &positions).unwrap();
+        let effort = Effort { sweep_count: 64, reinsertion: Vec::new(), ..Quality::Fast.effort() };
+        build_poses(&mesh, &poses, &PoseOptions { effort, keep_zero_area: true }, &Silent).unwrap()
+    });
+    assert_eq!(built.1.triangles, mesh.triangles.len() as u64);
+}

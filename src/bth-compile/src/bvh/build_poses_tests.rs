@@ -268,7 +268,7 @@ proptest! {
 #[test]
 fn large_meshes_of_many_poses_need_little_stack() {
     // More triangles than are binned in one piece, and threads with half of the usual stack.
-    let mesh = grid(140);
+    let mesh = grid(140, 0.2, 3);
     assert!(mesh.triangles.len() > 1 << 15);
     let positions = twisted(&mesh, MAX_POSES);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).stack_size(1 << 20).build().unwrap();

@@ -43,9 +43,9 @@ pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
 pub const DYNAMIC: Variant =
     Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, packets: false };
-/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call. The quality of
-/// the scene has to be low: the library builds scenes of medium quality as one BVH over all geometries, which it never refits. The
-/// first build of the geometry itself is of medium quality.
+/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call. Only
+/// scenes of low quality heed the quality of their geometries; others build anew. The first build of a geometry that is
+/// refitted is one of medium quality.
 pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, ..DYNAMIC };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant =

@@ -214,7 +214,8 @@ fn joints_take_all_their_ancestors_and_the_transform_of_the_skinned_node_has_no_
 
 #[test]
 fn rays_hit_the_vertices_of_the_time_and_normals_turn_with_them() {
-    let normals = [[0.0f32, 0.0, 1.0]; 4];
+    // Tilted, so that they are not those of the triangles.
+    let normals = [[0.0f32, 0.6, 0.8]; 4];
     let quarter = 0.5f32.sqrt();
     let mut document = Document::new().skinned([[1, 0, 0, 0]; 4], [[1.0, 0.0, 0.0, 0.0]; 4]).animate(
         (3, "rotation", "LINEAR"),
@@ -231,16 +232,28 @@ fn rays_hit_the_vertices_of_the_time_and_normals_turn_with_them() {
     let mut scene = bth::from_bytes(&bytes.unwrap().0.bytes).unwrap();
     let ray = Ray::new([0.5, 11.0, 20.0], [0.0, 0.0, -1.0]);
     let (hit, surface) = hit(&scene, &ray);
-    assert!((hit - 15.0).abs() < 1e-5 && (surface.normal[2] - 1.0).abs() < 1e-6, "{surface:?}");
+    assert!((hit - 15.0).abs() < 1e-5 && (surface.normal[2] - 0.8).abs() < 1e-6, "{surface:?}");
     // Half of a quarter turn about y: the square leans back.
     let update = scene.set_seconds(1.0).unwrap();
     assert_eq!((update.deformed, update.placed, scene.instance_count()), (1, 1, 1));
     let (distance, surface) = self::hit(&scene, &ray);
     assert!((distance - 15.5).abs() < 1e-5, "{distance}");
-    assert!(
-        (surface.normal[0] - 0.5f64.sqrt()).abs() < 1e-6 && (surface.normal[2] - 0.5f64.sqrt()).abs() < 1e-6
-    );
+    let is_turned = |normal: [f64; 3], angle: f64| {
+        let expected = [0.8 * angle.sin(), 0.6, 0.8 * angle.cos()];
+        normal.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-6)
+    };
+    assert!(is_turned(surface.normal, std::f64::consts::FRAC_PI_4), "{surface:?}");
     assert_eq!(scene.set_seconds(1.0).unwrap().deformed, 0, "nothing has moved since");
+    for seconds in [0.5, 0.25, 1.25, 0.0, 0.75] {
+        scene.set_seconds(seconds).unwrap();
+        let (_, surface) = self::hit(&scene, &ray);
+        assert!(is_turned(surface.normal, seconds * std::f64::consts::FRAC_PI_4), "{seconds}: {surface:?}");
+    }
+    // Positions that a program gives have the normals of the triangles.
+    let positions = scene.positions(0).to_vec();
+    scene.set_positions(0, &positions).unwrap();
+    let (_, surface) = self::hit(&scene, &ray);
+    assert_eq!(surface.normal, surface.geometric_normal);
 }
 
 fn hit(scene: &bth::Scene, ray: &Ray) -> (f64, bth::SurfacePoint) {

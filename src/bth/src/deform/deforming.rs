@@ -74,9 +74,16 @@ impl Deforming {
     }
 
     /// Memory for new positions, which are staged when all of it has been filled and [`Self::check_staged`] has been called. The
-    /// positions before the last refit, which it holds until then, are lost.
+    /// positions before the last refit, which it holds until then, are lost. Without [`Self::stage_normals_of_file`] they have the normals
+    /// of the triangles.
     pub(crate) fn staged_mut(&mut self) -> &mut [[f32; 3]] {
+        self.staged_normals = Some(Vec::new());
         &mut self.staged
+    }
+
+    /// Stages the normals of the file with the positions that are staged, for what turns them where it needs them.
+    pub(crate) fn stage_normals_of_file(&mut self) {
+        self.staged_normals = None;
     }
 
     /// Checks positions that were written to [`Self::staged_mut`], in which no zero is negative.

@@ -173,6 +173,7 @@ fn stage_pose(objects: &mut Objects, (file, row): (&File, u32), object: u32, pos
     let deforming = objects.deforming(object)?;
     let vertices = Vertices { base: file.object(row)?.positions, deformation: file.deformation(row) };
     evaluate::positions(vertices, pose, deforming.staged_mut());
+    deforming.stage_normals_of_file();
     deforming.check_staged()
 }
 

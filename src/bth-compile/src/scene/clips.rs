@@ -196,9 +196,9 @@ mod tests {
         let clip_of = clip(|_| {});
         assert!(clip_of.is_some());
         let moved = Transform::Matrix([[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
-        assert_eq!(clip(|m| m.nodes[2].transform = moved.clone()), clip_of);
+        assert_eq!(clip(|m| m.nodes[2].transform = moved), clip_of);
         assert_eq!(clip(|m| m.nodes[0].name = "torso".to_owned()), clip_of);
-        assert_ne!(clip(|m| m.nodes[0].transform = moved.clone()), clip_of);
+        assert_ne!(clip(|m| m.nodes[0].transform = moved), clip_of);
         assert_ne!(clip(|m| m.nodes[1].transform = moved), clip_of);
         assert_ne!(clip(|m| m.frames.last = 9), clip_of);
         assert_ne!(clip(|m| m.deformers[0].weights[1] = 0.5), clip_of);

@@ -6,11 +6,12 @@ use bth_compile::Silent;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
 use bth_import::{
-    AlphaMode, GltfPart, Keep, Mesh, Wanted, import_bytes, import_cutouts_bytes, import_gltf_parts_bytes,
+    AlphaMode, GltfPart, Keep, Mesh, Timing, Wanted, import_bytes, import_cutouts_bytes,
+    import_gltf_parts_bytes, import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
 };
 use bth_random::Rng;
 use bth_scene::Source;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A generator seeded by the input (FNV-1a), so that an input always does the same.
 fn seeded_by(bytes: &[u8]) -> Rng {
@@ -64,8 +65,11 @@ fn trace(scene: &Scene, rng: &mut Rng) {
             if let Some(material) = surface.material {
                 scene.material_name(surface.object, material);
                 let look = scene.material(surface.object, material);
-                for texture in look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture]) {
-                    let texture = texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
+                for texture in
+                    look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture])
+                {
+                    let texture =
+                        texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
                     assert!(texture.is_none_or(|texture| !texture.bytes.is_empty()));
                 }
             }
@@ -160,7 +164,9 @@ fn check(mesh: &Mesh) {
     assert!(groups.groups.iter().all(material));
     let materials = mesh.materials.as_ref().expect("materials, which are wanted");
     assert!([0, groups.materials.len()].contains(&materials.parameters.len()));
-    assert!(materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len()));
+    assert!(
+        materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len())
+    );
     assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
@@ -188,4 +194,55 @@ fn check(mesh: &Mesh) {
         }
         assert!(morph.first_delta as usize + morph.deltas as usize <= moved.deltas.len());
     }
+}
+
+/// Between two frames of a sequence in an input.
+const FRAME_END: &[u8] = b"\0FRAME\0";
+
+/// Imports the frames of a sequence, which the input has one after the other behind a byte that chooses their format.
+pub fn import_frames(bytes: &[u8]) {
+    let Some((choice, mut rest)) = bytes.split_first() else { return };
+    let name = PathBuf::from("frame").with_extension(["obj", "ply", "stl", "off"][usize::from(*choice % 4)]);
+    let mut files = Vec::new();
+    while let Some(end) = rest.windows(FRAME_END.len()).position(|part| part == FRAME_END) {
+        files.push((name.clone(), rest[..end].to_vec()));
+        rest = &rest[end + FRAME_END.len()..];
+    }
+    files.push((name, rest.to_vec()));
+    let timing = Timing { rate: Some(f64::from(*choice)), usual_rate: 24.0, start: 0.0 };
+    let wanted = |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, vertices };
+    for vertices in [false, true] {
+        if let Ok((mesh, _)) = import_sequence_bytes(&files, &timing, wanted(vertices), &Silent) {
+            assert_eq!(mesh.sequence.as_ref().expect("frames").times.len(), files.len());
+            check_moving(&mesh);
+        }
+    }
+}
+
+/// Reads a vertex cache, and imports it with a model of four vertices.
+pub fn import_cache(bytes: &[u8]) {
+    let (name, model) = (Path::new("cache"), Path::new("model.obj"));
+    let square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    for rate in [None, Some(25.0)] {
+        let timing = Timing { rate, usual_rate: 24.0, start: 0.5 };
+        if let Ok(cache) = read_vertex_cache(name, bytes, &timing, &Silent) {
+            assert_eq!(cache.positions.len(), cache.points * cache.times.len());
+        }
+        let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+        let read = import_vertex_cache_bytes((model, square), (name, bytes), &timing, wanted, &Silent);
+        if let Ok((mesh, _)) = read {
+            check_moving(&mesh);
+        }
+    }
+}
+
+/// A mesh with frames keeps the promises of its type.
+fn check_moving(mesh: &Mesh) {
+    let sequence = mesh.sequence.as_ref().expect("frames");
+    assert!(sequence.times.iter().all(|time| time.is_finite()));
+    assert!(sequence.times.windows(2).all(|pair| pair[0] < pair[1]));
+    assert_eq!(sequence.positions.len(), sequence.times.len() * mesh.positions.len());
+    assert!(sequence.positions.as_flattened().iter().all(|x| x.is_finite()));
+    assert!(sequence.positions.starts_with(&mesh.positions));
+    assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
 }

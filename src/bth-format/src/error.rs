@@ -133,6 +133,12 @@ codes! {
     WeightTrack "F185" "A track of weights belongs to the node of a deformer that has weights."
     DeformerObject "F186" "The object of a deformer has LEAF_VERTICES, or nothing that can be hit."
 
+    SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
+    SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
+    SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
+    Segments "F193" "SEGMENTS is empty or has at least two rows; their times are finite and ascend strictly, the first row and no other is of the object itself, and reserved fields are zero."
+    SegmentObjects "F194" "The objects of SEGMENTS exist; each but the first is in one row of one object, has neither SEGMENTS nor SEQUENCE_TIMES and no instance; all are deformable and have equal POSITIONS and TRIANGLES, bit for bit."
+
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
@@ -349,6 +355,9 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::GROUP_RUNS => "GROUP_RUNS",
         kind::MATERIALS => "MATERIALS",
         kind::LABELS => "LABELS",
+        kind::SEQUENCE_TIMES => "SEQUENCE_TIMES",
+        kind::SEQUENCE_POSITIONS => "SEQUENCE_POSITIONS",
+        kind::SEGMENTS => "SEGMENTS",
         kind::OPACITY => "OPACITY",
         kind::OPACITY_MICRO => "OPACITY_MICRO",
         kind::PROVENANCE => "PROVENANCE",

@@ -29,6 +29,7 @@ mod materials_view;
 mod names;
 pub mod object;
 mod scene_view;
+mod sequence_view;
 mod unpack;
 pub mod verify;
 
@@ -38,3 +39,4 @@ pub use file::File;
 pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
 pub use scene_view::SceneView;
+pub use sequence_view::{FramePosition, SequenceView};

@@ -16,7 +16,7 @@ use crate::{attributes, gltf, mtl, obj, off, ply, stl, topology, weld};
 
 /// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+pub(crate) enum Format {
     Obj,
     Gltf,
     Ply,
@@ -49,15 +49,20 @@ pub fn import_bytes(
     let wanted = wanted.into();
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(name, data, monitor);
-    let raw = match format(&source)? {
-        Format::Obj => obj::read(&source, wanted)?,
-        Format::Gltf => gltf::flatten::read(&source, wanted)?,
-        Format::Ply => ply::read(&source, wanted)?,
-        Format::Stl => stl::read(&source)?,
-        Format::Off => off::read(&source)?,
-    };
+    let raw = read_raw(&source, wanted)?;
     source.progress(data.len())?;
     finish(raw, wanted, monitor)
+}
+
+/// Reads a source with its own rows.
+pub(crate) fn read_raw<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+    match format(source)? {
+        Format::Obj => obj::read(source, wanted),
+        Format::Gltf => gltf::flatten::read(source, wanted),
+        Format::Ply => ply::read(source, wanted),
+        Format::Stl => stl::read(source),
+        Format::Off => off::read(source),
+    }
 }
 
 /// Reads parts of a glTF or GLB file, each as a model of its own, without the transforms of nodes.
@@ -276,7 +281,7 @@ fn kept_vertex(position: &[f32; 3]) -> [f32; 3] {
 }
 
 /// The format of a source by its extension, or else by its content.
-fn format(source: &Source<'_>) -> Result<Format> {
+pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
     source.fetched()?;
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let by_name = match extension.as_deref() {

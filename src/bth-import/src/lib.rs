@@ -1,6 +1,6 @@
 //! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
 //!
-//! [`import()`] is the entry point. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
+//! [`import()`] is the entry point; [`import_sequence`] and [`import_vertex_cache`] are those for meshes whose vertices move. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
 //! turns the file into a `raw` mesh with the source's own rows. Then `weld` merges bit-equal positions, `attributes`
 //! merges shading rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations, cameras
 //! and lights into a manifest instead.
@@ -24,6 +24,7 @@ mod obj;
 mod off;
 mod ply;
 mod raw;
+mod sequence;
 mod source;
 mod stl;
 mod topology;
@@ -41,7 +42,11 @@ pub use import::{
 };
 pub use materials::{ImageFile, Looks, Materials};
 pub use memory::{MEMORY_FORMAT, import_triangles};
-pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};
+pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, Sequence, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};
+pub use sequence::{
+    MAX_FRAMES, Timing, VertexCache, import_sequence, import_sequence_bytes, import_vertex_cache,
+    import_vertex_cache_bytes, read_vertex_cache, sequence_files,
+};
 pub use source::read_file;
 pub use zero_area::is_zero_area;

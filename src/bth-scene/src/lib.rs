@@ -11,6 +11,7 @@ mod model;
 mod names;
 mod read;
 mod read_deformers;
+mod read_sequence;
 mod read_tracks;
 mod read_transform;
 mod table;
@@ -24,7 +25,7 @@ pub use read::{parse, read};
 pub const KEYS: &[(&str, &[&str])] = &[
     ("scene", read::SCENE_KEYS),
     ("frames", read::FRAMES_KEYS),
-    ("object", read::OBJECT_KEYS),
+    ("object", read_sequence::OBJECT_KEYS),
     ("node", read::NODE_KEYS),
     ("camera", read::CAMERA_KEYS),
     ("light", read::LIGHT_KEYS),

@@ -54,7 +54,7 @@ pub struct Object {
 
 /// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it; their
 /// separator is `/`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// A model that is to be compiled.
     Model {
@@ -69,6 +69,22 @@ pub enum Source {
         path: String,
         /// Object of that file.
         object: u32,
+    },
+    /// Models of equal topology, one for each frame.
+    Sequence {
+        /// The models.
+        frames: SequenceFrames,
+        /// When they are shown.
+        timing: SequenceTiming,
+    },
+    /// A model whose vertices are moved by a vertex cache.
+    Cached {
+        /// OBJ, PLY, STL or OFF file.
+        path: String,
+        /// PC2 or MDD file.
+        cache: String,
+        /// When its frames are shown.
+        timing: SequenceTiming,
     },
     /// A mesh that is to be compiled so that a deformer can move its vertices.
     Deforming {
@@ -86,14 +102,38 @@ pub enum Source {
     },
 }
 
+/// The models of a sequence: OBJ, PLY, STL or OFF files.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SequenceFrames {
+    /// All files whose names have a number in the place of the one run of `#`, by number.
+    Numbered(String),
+    /// These files, at least one.
+    Listed(Vec<String>),
+}
+
+/// When the frames of a sequence or of a vertex cache are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SequenceTiming {
+    /// Frames a second, above 0; `None` for the rate of the scene's frames, or where the file states the times.
+    pub rate: Option<f64>,
+    /// Seconds at which the first frame of a sequence, or frame 0 of a vertex cache, is shown.
+    pub start: f64,
+}
+
 impl Source {
-    /// The file, relative to the manifest's folder.
+    /// The file, relative to the manifest's folder. Of a sequence its pattern or its first file, of a model with a vertex cache
+    /// the model.
     pub fn path(&self) -> &str {
         match self {
             Source::Model { path, .. }
             | Source::Compiled { path, .. }
+            | Source::Cached { path, .. }
             | Source::Deforming { path, .. }
             | Source::AtRest { path, .. } => path,
+            Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => pattern,
+            Source::Sequence { frames: SequenceFrames::Listed(files), .. } => {
+                files.first().map_or("", String::as_str)
+            }
         }
     }
 }

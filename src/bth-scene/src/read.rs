@@ -5,6 +5,7 @@ use crate::limits::{MAX_MANIFEST, MAX_PATH};
 use crate::model::*;
 use crate::names::Names;
 use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
+use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
 use crate::table::{Document, Table, Value};
@@ -15,7 +16,6 @@ use toml::de::DeTable;
 pub(crate) const SCENE_KEYS: &[&str] =
     &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "skins", "deformers", "tracks"];
 pub(crate) const FRAMES_KEYS: &[&str] = &["first", "last", "rate"];
-pub(crate) const OBJECT_KEYS: &[&str] = &["name", "model", "mesh", "deforms", "node", "file", "object"];
 pub(crate) const NODE_KEYS: &[&str] =
     &["name", "parent", "object", "visible", "translation", "rotation", "scale", "matrix", "look"];
 pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspect", "near", "far"];
@@ -131,6 +131,12 @@ fn object(table: &Table<'_>) -> Result<Object> {
     ] {
         table.exclude(a, b)?;
     }
+    if let Some(source) = sequence(table)? {
+        return Ok(Object { name: name(table)?, source });
+    }
+    if let Some(source) = vertex_cache(table)? {
+        return Ok(Object { name: name(table)?, source });
+    }
     let index = |key| -> Result<Option<u32>> {
         table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
     };
@@ -157,7 +163,7 @@ fn missing_mesh(table: &Table<'_>) -> Result<Error> {
 }
 
 /// A path that stays within the manifest's folder on every system.
-fn path(value: &Value<'_>) -> Result<String> {
+pub(crate) fn path(value: &Value<'_>) -> Result<String> {
     let text = value.string()?;
     if text.len() > MAX_PATH {
         let message = format!("expected a path of at most {MAX_PATH} bytes, found {}", text.len());

@@ -145,6 +145,10 @@ impl<'a> Value<'a> {
         self.value.get_ref().is_table()
     }
 
+    pub(crate) fn is_array(&self) -> bool {
+        self.value.get_ref().is_array()
+    }
+
     pub(crate) fn string(&self) -> Result<&'a str> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a string"))
     }

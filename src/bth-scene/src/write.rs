@@ -31,6 +31,11 @@ impl Manifest {
                 Source::Compiled { path, object } => {
                     writeln!(out, "file = {}\nobject = {object}", text(path))?;
                 }
+                Source::Sequence { frames, timing } => write_sequence(out, frames, timing)?,
+                Source::Cached { path, cache, timing } => {
+                    writeln!(out, "model = {}\nvertex_cache = {}", text(path), text(cache))?;
+                    write_timing(out, timing)?;
+                }
                 Source::Deforming { path, mesh } => {
                     writeln!(out, "model = {}\nmesh = {mesh}\ndeforms = true", text(path))?;
                 }
@@ -148,6 +153,19 @@ impl Manifest {
             }),
         )
     }
+}
+
+fn write_sequence(out: &mut String, frames: &SequenceFrames, timing: &SequenceTiming) -> std::fmt::Result {
+    match frames {
+        SequenceFrames::Numbered(pattern) => writeln!(out, "sequence = {}", text(pattern))?,
+        SequenceFrames::Listed(files) => list(out, "sequence", files.iter().map(|file| text(file)))?,
+    }
+    write_timing(out, timing)
+}
+
+fn write_timing(out: &mut String, timing: &SequenceTiming) -> std::fmt::Result {
+    timing.rate.map_or(Ok(()), |rate| writeln!(out, "rate = {rate:?}"))?;
+    writeln!(out, "start = {:?}", timing.start)
 }
 
 /// An array, over several lines if it is long.

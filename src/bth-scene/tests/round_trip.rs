@@ -36,6 +36,28 @@ prop_compose! {
             Object { name: "file".into(), source: Source::Compiled { path: "x.bth".into(), object: 1 } },
             Object { name: "deforms".into(), source: Source::Deforming { path: "x.glb".into(), mesh: 2 } },
             Object { name: "rests".into(), source: Source::AtRest { path: "x.glb".into(), node: 3 } },
+            Object {
+                name: "walk".into(),
+                source: Source::Sequence {
+                    frames: SequenceFrames::Numbered("w/a_##.ply".into()),
+                    timing: SequenceTiming { rate: Some(frames.2), start: -0.5 },
+                },
+            },
+            Object {
+                name: "list".into(),
+                source: Source::Sequence {
+                    frames: SequenceFrames::Listed((0..11).map(|i| format!("{i} \"#.obj")).collect()),
+                    timing: SequenceTiming::default(),
+                },
+            },
+            Object {
+                name: "cloth".into(),
+                source: Source::Cached {
+                    path: "c.obj".into(),
+                    cache: "c.pc2".into(),
+                    timing: SequenceTiming { rate: None, start: frames.2 },
+                },
+            },
         ];
         let row = |i: usize, (name, transform, flags, object): &(String, Transform, [bool; 3], usize)| Node {
             name: format!("{name}{i}"),

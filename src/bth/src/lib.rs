@@ -45,6 +45,7 @@ pub use bth_format::{Code, Error};
 pub use builder::SceneBuilder;
 pub use closest::{Closest, Feature};
 pub use crossing::Crossings;
+pub use deformers::DeformerPoses;
 pub use hits::{Accept, Cull, Filter};
 pub use instances::Update;
 pub use materials::{Alpha, Material, Texture, Wrap};

@@ -95,6 +95,7 @@ impl Scene {
         }
         file.check_object_names()?;
         file.check_images()?;
+        file.check_segments()?;
         Scene::with_world(file)
     }
 
@@ -123,8 +124,8 @@ impl Scene {
             world.add_objects(self.objects.count());
             for object in first..self.objects.count() {
                 let file = self.objects.locate(object).filter(|(_, row)| *row == 0);
-                if let Some(view) = file.and_then(|(file, _)| file.scene()) {
-                    world.deformers.add(&view, object);
+                if let Some((file, _)) = file {
+                    world.deformers.add(file, object);
                 }
             }
         }

@@ -8,5 +8,6 @@ mod flattened;
 mod import;
 mod motion;
 mod poses;
+mod sequences;
 mod sources;
 mod support;

@@ -36,3 +36,4 @@ pub mod stress;
 pub mod structures;
 pub mod tracer;
 pub mod triangle_tests;
+mod twist;

@@ -5,7 +5,9 @@ use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
 use bth_format::layout::{MaterialParameters, NONE, Texture};
-use bth_import::{self as mesh, Attributes, Deformation, Group, Groups, Materials, Mesh, TriangleOpacities};
+use bth_import::{
+    self as mesh, Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities,
+};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -75,6 +77,15 @@ fn materials(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of the frames of a mesh that is a sequence.
+fn sequence(mesh: &Mesh) -> Option<Digest> {
+    let sequence = mesh.sequence.as_ref()?;
+    let mut hasher = HashedRows::new("sequence");
+    hasher.add(&sequence.times);
+    hasher.add(&sequence.positions);
+    Some(hasher.finish())
+}
+
 /// Hash of what moves a mesh's vertices, if that is wanted.
 fn deformation(mesh: &Mesh) -> Option<Digest> {
     let mut rows = RowWriter::default();
@@ -102,6 +113,9 @@ pub(crate) struct MeshSummary {
     /// Hash of how materials look.
     #[serde(default)]
     pub(crate) materials: Option<Digest>,
+    /// Hash of the frames of a sequence.
+    #[serde(default)]
+    pub(crate) sequence: Option<Digest>,
     /// Hash of what moves the vertices.
     #[serde(default)]
     pub(crate) deformation: Option<Digest>,
@@ -117,6 +131,7 @@ impl MeshSummary {
             opacity: opacity(&mesh),
             groups: groups(&mesh),
             materials: materials(&mesh),
+            sequence: sequence(&mesh),
             deformation: deformation(&mesh),
         };
         (mesh, summary)
@@ -129,8 +144,10 @@ impl Codec for Mesh {
         to.add(&self.triangles);
         let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
         let has_materials = if self.materials.is_some() { HAS_MATERIALS } else { 0 };
+        let has_sequence = if self.sequence.is_some() { HAS_SEQUENCE } else { 0 };
         let has_deformation = if self.deformation.is_some() { HAS_DEFORMATION } else { 0 };
-        to.add(&[u8::from(self.attributes.is_some()) | has_groups | has_materials | has_deformation]);
+        let has_attributes = u8::from(self.attributes.is_some());
+        to.add(&[has_attributes | has_groups | has_materials | has_sequence | has_deformation]);
         if let Some(attributes) = &self.attributes {
             to.add(&attributes.corners);
             to.add(&attributes.normals);
@@ -141,6 +158,10 @@ impl Codec for Mesh {
         }
         if let Some(materials) = &self.materials {
             materials.write(to);
+        }
+        if let Some(sequence) = &self.sequence {
+            to.add(&sequence.times);
+            to.add(&sequence.positions);
         }
         if let Some(deformation) = &self.deformation {
             deformation.write(to);
@@ -167,6 +188,10 @@ impl Codec for Mesh {
             0 => None,
             _ => Some(Materials::read(from)?),
         };
+        let sequence = match parts & HAS_SEQUENCE {
+            0 => None,
+            _ => Some(Sequence { times: from.take()?, positions: from.take()? }),
+        };
         let deformation = match parts & HAS_DEFORMATION {
             0 => None,
             _ => Some(Deformation::read(from)?),
@@ -191,12 +216,25 @@ impl Codec for Mesh {
                 && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
                 && within(&m.color_corners, m.colors.len())
         });
+        let sequence_fits = sequence.as_ref().is_none_or(|s: &Sequence| {
+            !s.times.is_empty() && s.times.len().checked_mul(positions.len()) == Some(s.positions.len())
+        });
         let fits = attributes_fit
+            && sequence_fits
             && opacity_fits
             && groups_fit
             && materials_fit
             && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups, materials, deformation })
+        fits.then_some(Mesh {
+            positions,
+            triangles,
+            attributes,
+            opacity,
+            groups,
+            materials,
+            sequence,
+            deformation,
+        })
     }
 }
 
@@ -204,6 +242,8 @@ impl Codec for Mesh {
 const HAS_GROUPS: u8 = 2;
 /// As [`HAS_GROUPS`], for how materials look.
 const HAS_MATERIALS: u8 = 4;
+/// As [`HAS_GROUPS`], for the frames of a sequence.
+const HAS_SEQUENCE: u8 = 16;
 
 /// As [`HAS_GROUPS`], for what moves the vertices.
 const HAS_DEFORMATION: u8 = 8;
@@ -386,6 +426,7 @@ mod tests {
                 color_corners: vec![[0, 1, 1]],
                 colors: vec![[65535; 4], [0, 1, 2, 3]],
             }),
+            sequence: Some(Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 6] }),
             deformation: Some(Deformation {
                 counts: bth_format::layout::Deformation {
                     joints: 4,
@@ -401,11 +442,15 @@ mod tests {
             }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
+        let short = Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 5] };
+        let short = Mesh { sequence: Some(short), ..mesh.clone() };
+        assert_eq!(decode::<Mesh>(&encode(&short)), None);
         let plain = Mesh {
             attributes: None,
             opacity: None,
             groups: None,
             materials: None,
+            sequence: None,
             deformation: None,
             ..mesh.clone()
         };

@@ -36,7 +36,7 @@ pub fn compile(
     let cache = Cache::none();
     let context = Context::of(options, &cache, None, monitor);
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, folder, options.looks(), &mut clock)?;
+    let plan = ScenePlan::of(manifest, folder, options, &mut clock)?;
     let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
     warn_over_limit(&report.objects, options, monitor);
     Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
@@ -78,7 +78,7 @@ pub fn compile_cached(
 ) -> Result<CachedCompilation<SceneReport>> {
     let mut context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut clock)?;
+    let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
     let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, || {
         context.previous = previous(policy.target, &context);
@@ -124,7 +124,7 @@ pub fn compile_objects(
 ) -> Result<u64> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let mut plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut clock)?;
+    let mut plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let mut row = 0;
     for file in &mut plan.sources {
         file.parts.retain(|_| {
@@ -151,7 +151,7 @@ pub fn dry_run(
 ) -> Result<DryRun> {
     let mut context = Context::new(options, cache, monitor)?;
     context.previous = previous(target, &context);
-    let plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut Clock::default())?;
+    let plan = ScenePlan::of(manifest, source.folder, options, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {

@@ -106,6 +106,8 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
             compiled: false,
             parts: vec![(SourcePart::Whole, vec![row])],
             digest,
+            moving: None,
+            clips: Default::default(),
             in_memory,
         }
     };

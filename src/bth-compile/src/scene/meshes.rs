@@ -1,6 +1,7 @@
 //! The meshes of a source file, from the cache or imported.
 
 use super::context::Context;
+use super::object;
 use super::sources::{File, SourcePart};
 use crate::cached::{self, MeshSummary, Miss};
 use crate::error::Result;
@@ -62,7 +63,7 @@ impl SourceMesh {
 }
 
 fn key(file: &File<'_>, part: SourcePart, context: &Context<'_>) -> Key {
-    cached::mesh(&file.digest, &file.full, &part.name(), context.options.wanted())
+    cached::mesh(&file.digest, &file.full, &file.part(part), context.options.wanted())
 }
 
 /// The summary of a mesh that the cache has.
@@ -76,18 +77,19 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     let one = |source_part: SourcePart| {
         let part = file.name_of(source_part);
         let mesh = key(file, source_part, context);
-        let (Some(summary), Some(keys)) = (known(&mesh, context), &context.keys) else {
+        let summary = known(&mesh, context);
+        let object = summary.as_ref().and_then(|summary| object::key(summary, source_part, context));
+        let (Some(summary), Some(object)) = (summary, object) else {
             let because = context.cache.reasons(&mesh, &part);
             return Some(Miss { stage: mesh.stage().to_owned(), part, because });
         };
         let old = context
             .previous
             .as_ref()
-            .and_then(|p| Some((p, p.index.object_of(content(&summary).as_bytes())?)));
+            .and_then(|p| Some((p, p.index.object_of(content(&summary, source_part).as_bytes())?)));
         if old.is_some_and(|(previous, object)| previous.has(object)) {
             return None;
         }
-        let object = keys.of(&summary);
         let found = context.cache.find(&object, context.monitor);
         if found.is_some_and(|record| context.cache.holds(&record)) {
             return None;
@@ -98,8 +100,9 @@ pub(super) fn missing(file: &File<'_>, context: &Context<'_>) -> Vec<Miss> {
     file.parts.iter().filter_map(|(part, _)| one(*part)).collect()
 }
 
-/// A hash of a mesh's content, which does not depend on the file of the mesh.
-pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
+/// A hash of the content of a mesh and of what poses it, which does not depend on the file of the mesh.
+pub(super) fn content(mesh: &MeshSummary, part: SourcePart) -> blake3::Hash {
+    let clip = part.clip().map_or_else(String::new, |clip| format!(" clip {}", clip.hex()));
     let shading = mesh.shading.as_ref().map(Digest::hex);
     let opacity =
         mesh.opacity.as_ref().map_or_else(String::new, |opacity| format!(" opacity {}", opacity.hex()));
@@ -108,8 +111,10 @@ pub(super) fn content(mesh: &MeshSummary) -> blake3::Hash {
     let materials = materials.map_or_else(String::new, |materials| format!(" materials {}", materials.hex()));
     let deformation =
         mesh.deformation.as_ref().map_or_else(String::new, |d| format!(" deformation {}", d.hex()));
+    let sequence = mesh.sequence.as_ref().map_or_else(String::new, |s| format!(" sequence {}", s.hex()));
     let geometry = mesh.geometry.hex();
-    let text = format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}");
+    let text =
+        format!("mesh {geometry} {shading:?}{opacity}{groups}{materials}{deformation}{sequence}{clip}");
     blake3::hash(text.as_bytes())
 }
 
@@ -140,16 +145,16 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     if parts.is_empty() {
         return Ok(Vec::new());
     }
-    let Context { options, cache, monitor, .. } = context;
+    let Context { options, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
         let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         return Ok(vec![MeshSummary::of(read)]);
     }
-    let gltf = |part: &SourcePart| match part {
-        SourcePart::Gltf(part) => Some(*part),
-        SourcePart::Whole | SourcePart::Object(_) => None,
-    };
-    let single: Vec<GltfPart> = parts.iter().filter_map(gltf).collect();
+    if let Some(moving) = &file.moving {
+        let read = moving.import(file, context)?;
+        return Ok(vec![keep_mesh(file, SourcePart::Whole, read, context)]);
+    }
+    let single: Vec<GltfPart> = parts.iter().filter_map(|part| part.gltf()).collect();
     let meshes = if single.is_empty() {
         vec![mesh::import(&file.full, options.wanted(), *monitor)?]
     } else {
@@ -157,14 +162,23 @@ fn import(file: &File<'_>, parts: &[SourcePart], context: &Context<'_>) -> Resul
     };
     let meshes = with_opacity(file, &single, meshes, context)?;
     let meshes = file.digest.unchanged(&file.full, meshes)?;
-    let keep = |(part, read): (&SourcePart, (Mesh, mesh::Report))| {
-        let (mesh, summary) = MeshSummary::of(read);
-        if cache.store().is_some() {
-            let name = file.name_of(*part);
-            cache.miss(&key(file, *part, context), &name);
-            cache.put(&key(file, *part, context), &name, &cached::encode(&mesh), &summary, *monitor);
-        }
-        (mesh, summary)
-    };
-    Ok(parts.iter().zip(meshes).map(keep).collect())
+    let keep = |(part, read)| keep_mesh(file, part, read, context);
+    Ok(parts.iter().copied().zip(meshes).map(keep).collect())
+}
+
+/// Keeps a mesh in the cache.
+fn keep_mesh(
+    file: &File<'_>,
+    part: SourcePart,
+    read: (Mesh, mesh::Report),
+    context: &Context<'_>,
+) -> (Mesh, MeshSummary) {
+    let (mesh, summary) = MeshSummary::of(read);
+    let Context { cache, monitor, .. } = context;
+    if cache.store().is_some() {
+        let name = file.name_of(part);
+        cache.miss(&key(file, part, context), &name);
+        cache.put(&key(file, part, context), &name, &cached::encode(&mesh), &summary, *monitor);
+    }
+    (mesh, summary)
 }

@@ -1,8 +1,10 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files; `clips` gives the
+//! poses of objects that skins and morph targets deform;
 //! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
+mod clips;
 mod compile;
 mod context;
 mod deformers;
@@ -11,6 +13,7 @@ mod file_index;
 mod images;
 mod in_memory;
 mod meshes;
+mod moving;
 mod object;
 mod objects;
 mod parallel;
@@ -25,4 +28,5 @@ mod weights;
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use in_memory::Instance;
 pub(crate) use in_memory::compile_meshes;
+pub use moving::moving_files;
 pub use report::{ObjectReport, SceneReport};

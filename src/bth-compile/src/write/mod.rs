@@ -33,6 +33,7 @@ pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
     file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
+    file.check_segments().map_err(defect)?;
     Ok(file)
 }
 

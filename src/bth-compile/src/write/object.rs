@@ -51,6 +51,12 @@ pub struct ObjectParts<'a> {
     pub groups: Option<&'a GroupParts>,
     /// How the materials of the groups look, and vertex colours.
     pub materials: Option<&'a Materials>,
+    /// Seconds of the frames of a sequence; empty where the vertices do not move by themselves.
+    pub sequence_times: &'a [f64],
+    /// Positions of the frames of a sequence.
+    pub sequence_positions: &'a [[f32; 3]],
+    /// Hierarchies for ranges of time.
+    pub segments: &'a [Segment],
     /// What moves the vertices.
     pub deformation: Option<&'a Deformation>,
     /// Positions and attributes to keep.
@@ -126,6 +132,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     if let Some(groups) = parts.groups {
         groups.write(builder, index)?;
     }
+    builder.rows(kind::SEQUENCE_TIMES, index, parts.sequence_times)?;
+    builder.rows(kind::SEQUENCE_POSITIONS, index, parts.sequence_positions)?;
+    builder.rows(kind::SEGMENTS, index, parts.segments)?;
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     if let Some(materials) = parts.materials {

@@ -18,6 +18,7 @@ mod nodes;
 mod opacity;
 mod rows;
 mod scene;
+mod sequence;
 mod sources;
 mod tet_faces;
 mod tet_leaves;
@@ -28,6 +29,7 @@ pub(crate) use adjacency::TetAdjacency;
 pub(crate) use deformation::check as deformation;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
+pub(crate) use sequence::{Segmented, segments, sequence};
 
 use crate::error::Result;
 use crate::object::ObjectView;

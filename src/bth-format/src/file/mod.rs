@@ -18,6 +18,7 @@ use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
+use crate::sequence_view::SequenceView;
 use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -284,6 +285,7 @@ impl File {
         let materials = self.materials(object);
         check::materials(&materials, view.materials.len(), view.header.triangles)
             .map_err(|e| self.locate(e, object))?;
+        check::sequence(&view, &self.sequence(object)).map_err(|e| self.locate(e, object))?;
         check::deformation(&self.deformation(object), &view).map_err(|e| self.locate(e, object))?;
         Ok(view)
     }
@@ -310,6 +312,32 @@ impl File {
             color_corners: self.slice(object, kind::COLOR_CORNERS),
             colors: self.slice(object, kind::COLORS),
         }
+    }
+
+    /// How the vertices of an object move by themselves, whose **indices are not checked**; empty where they do not or there is no
+    /// such object.
+    pub fn sequence(&self, object: u32) -> SequenceView<'_> {
+        SequenceView {
+            times: self.slice(object, kind::SEQUENCE_TIMES),
+            positions: self.slice(object, kind::SEQUENCE_POSITIONS),
+            segments: self.slice(object, kind::SEGMENTS),
+        }
+    }
+
+    /// Checks the segments of all objects. Costs O(bytes of the objects with segments).
+    ///
+    /// # Errors
+    /// `BTH-F193` and `BTH-F194`.
+    pub fn check_segments(&self) -> Result<()> {
+        let object =
+            |object: u32| Ok(check::Segmented { view: self.view(object)?, sequence: self.sequence(object) });
+        check::segments(self.object_count(), self.instances(), object, |object| {
+            self.slice(object, kind::SEGMENTS)
+        })
+        .map_err(|e| match e.section() {
+            Some(section) => self.locate(e, section.object),
+            None => e,
+        })
     }
 
     /// The images of all textures, whose **indices are not checked**.

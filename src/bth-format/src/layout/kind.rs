@@ -40,6 +40,12 @@ pub const GROUP_RUNS: u32 = 22;
 pub const MATERIALS: u32 = 23;
 /// UTF-8 bytes of the names of groups and materials.
 pub const LABELS: u32 = 24;
+/// `f64` seconds of the frames of a sequence.
+pub const SEQUENCE_TIMES: u32 = 25;
+/// `[f32; 3]`: the positions of a sequence, by frame, then by row of `POSITIONS`.
+pub const SEQUENCE_POSITIONS: u32 = 26;
+/// [`super::Segment`]s: hierarchies of the object for ranges of time.
+pub const SEGMENTS: u32 = 27;
 /// `u32` per source triangle: a [`super::TriangleOpacity`].
 pub const OPACITY: u32 = 28;
 /// `u32`: states of micro-triangles, two bits each.
@@ -109,11 +115,19 @@ pub const fn is_scene(kind: u32) -> bool {
 pub const fn is_of_file(kind: u32) -> bool {
     (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
 }
+/// Whether sections of this kind say how an object's vertices move by themselves.
+pub const fn is_sequence(kind: u32) -> bool {
+    SEQUENCE_TIMES <= kind && kind <= SEGMENTS
+}
 /// Whether tracing reads sections of this kind of an object.
 pub const fn is_traced(kind: u32) -> bool {
-    is_required(kind) && kind != LEAF_VERTICES && !is_of_file(kind)
+    is_required(kind) && kind != LEAF_VERTICES && !is_sequence(kind) && !is_of_file(kind)
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
-    (OBJECT <= kind && kind <= LEAF_VERTICES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
+    (OBJECT <= kind && kind <= LEAF_VERTICES)
+        || kind == OPACITY
+        || kind == OPACITY_MICRO
+        || is_sequence(kind)
+        || is_scene(kind)
 }

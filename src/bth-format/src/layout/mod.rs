@@ -15,6 +15,7 @@ mod materials;
 mod object;
 mod opacity;
 mod scene;
+mod sequence;
 mod tets;
 
 pub use bvh::*;
@@ -27,6 +28,7 @@ pub use materials::*;
 pub use object::*;
 pub use opacity::*;
 pub use scene::*;
+pub use sequence::*;
 pub use tets::*;
 
 /// No index: the reference leads nowhere.

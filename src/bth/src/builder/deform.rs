@@ -24,8 +24,9 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Stages the positions that the skins and morph targets of files give their objects at the times of the subscenes, but for objects
-    /// to which the caller gives others. Of several subscenes of one file, which have the same objects, the one of least id decides.
+    /// Stages the positions that sequences, skins and morph targets of files give their objects at the times of the subscenes, but for
+    /// objects to which the caller gives others. Of several subscenes of one file, which have the same objects, the one of least id
+    /// decides.
     ///
     /// # Errors
     /// As [`Self::commit`]. Nothing is staged then.
@@ -44,17 +45,22 @@ impl SceneBuilder {
             let file = objects.locate(subscene.first_object).map(|(file, _)| file.clone());
             let (Some(world), Some(file)) = (world, file) else { continue };
             let skips = |object: u32| by_caller.contains(&object);
-            let Posed(more) =
-                world.deformers.stage(objects, (&file, subscene.first_object), evaluated, &skips)?;
-            posed.0.extend(more);
+            match world.deformers.stage(objects, (&file, subscene.first_object), evaluated, &skips) {
+                Ok(more) => posed.extend(more),
+                Err(error) => {
+                    posed.put_back(objects);
+                    return Err(error);
+                }
+            }
         }
-        self.deformed.extend(posed.0.iter().map(|(object, _)| *object));
+        self.deformed.extend(&posed.objects);
         Ok(posed)
     }
 
     /// Forgets what [`Self::stage_poses`] has staged.
-    pub(super) fn unstage_poses(&mut self, Posed(posed): &Posed) {
-        self.deformed.retain(|object| posed.iter().all(|(other, _)| other != object));
+    pub(super) fn unstage_poses(&mut self, mut posed: Posed) {
+        self.deformed.retain(|object| !posed.objects.contains(object));
+        posed.put_back(self.scene.objects_mut());
     }
 
     /// Refits the objects that get new positions, and notes that their instances have changed.

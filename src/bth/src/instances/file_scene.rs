@@ -28,13 +28,13 @@ impl World {
         let seconds = f64::from(scene.first_frame) / scene.rate;
         let source = TransformSource::File(NodeHierarchy::new(&view));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
-        world.deformers.add(&view, 0);
+        world.deformers.add(file, 0);
         world.evaluate_nodes(objects, seconds, true);
         world.place_moved(objects, (seconds, &[]), true)?;
         Ok(Some(world))
     }
 
-    /// Deforms the objects as at the first frame and places their instances again. Does nothing for a scene without deformers.
+    /// Deforms the objects as at the first frame and places their instances again. Does nothing for a scene whose objects keep their shape.
     ///
     /// # Errors
     /// As [`Self::update`], and `BTH-S006` if an object cannot be given new positions.
@@ -71,7 +71,7 @@ impl World {
         let nodes = self.evaluate_nodes(objects, seconds, false);
         let TransformSource::File(hierarchy) = &self.source else { return Ok(Update::default()) };
         let deformed = self.deformers.update(objects, hierarchy, seconds)?;
-        let placed = self.place_moved(objects, (seconds, &deformed.objects), false);
+        let placed = self.place_moved(objects, (seconds, &deformed.posed.objects), false);
         let update = match placed {
             Ok(update) => update,
             Err(error) => {
@@ -80,8 +80,8 @@ impl World {
             }
         };
         let (count, deformed_cost_ratio, refit) =
-            (deformed.objects.len(), deformed.cost_ratio, deformed.time);
-        self.deformers.keep(deformed.into_posed());
+            (deformed.posed.objects.len(), deformed.cost_ratio, deformed.time);
+        self.deformers.keep(deformed.posed);
         Ok(Update { nodes, deformed: count, deformed_cost_ratio, refit, ..update })
     }
 

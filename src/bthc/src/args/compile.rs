@@ -74,6 +74,13 @@ pub(crate) struct Compile {
     /// source, and the object is a BVH.
     #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
     pub(crate) deformable: bool,
+    /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
+    /// the first pose.
+    #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) poses: u32,
+    /// Most ranges of time that get a tree of their own, where one tree for all poses would cost rays too much; each takes memory.
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub(crate) segments: u32,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long)]
     pub(crate) no_geometry: bool,
@@ -210,6 +217,7 @@ impl Compile {
             },
             geometry: !self.no_geometry,
             deformable: self.deformable,
+            motion: bth_compile::pipeline::MotionOptions { poses: self.poses, segments: self.segments },
             ..Default::default()
         };
         self.selection.apply(&mut options)?;

@@ -11,7 +11,7 @@ use bth::rays::Hit;
 use bth::{Scene, SceneBuilder};
 use bth_compile::Silent;
 use bth_compile::memory::{TriangleMesh, open};
-use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
 use std::path::Path;
 
 /// Names of the contenders.
@@ -49,8 +49,8 @@ pub(super) struct Trees {
 }
 
 /// Compiles a scene without tetrahedra.
-pub(super) fn compiled(source: &Source) -> Result<Scene> {
-    let options = CompileOptions { structure: Structure::Bvh, ..CompileOptions::default() };
+pub(super) fn compiled(source: &Source, motion: MotionOptions) -> Result<Scene> {
+    let options = CompileOptions { structure: Structure::Bvh, motion, ..CompileOptions::default() };
     let name = Path::new(&source.name);
     let (compiled, _) =
         bth_compile::scene::compile(&source.manifest, &source.folder, name, &options, &Silent)?;

@@ -16,6 +16,7 @@ use crate::rounds::median;
 use crate::scenes::{FrameRays, Source};
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
+use bth_compile::pipeline::MotionOptions;
 use contenders::{NAMES, Trees};
 use frame_mesh::FrameMesh;
 use serde::Serialize;
@@ -75,6 +76,7 @@ pub fn run(arguments: &Animation) -> Result<()> {
     let progress = Progress::new();
     let options = json!({
         "pixels": arguments.size(), "frames": arguments.frames, "rounds": arguments.rounds, "quick": arguments.run.quick,
+        "poses": arguments.poses, "segments": arguments.segments,
     });
     let head = Head::now("animation", isa, options);
     let mut scenes = Vec::new();
@@ -93,7 +95,8 @@ pub fn run(arguments: &Animation) -> Result<()> {
 
 fn scene(source: &Source, arguments: &Animation, progress: &Progress) -> Result<AnimationTimes> {
     progress.show(format!("{}: compiling", source.name));
-    let mut shown = contenders::compiled(source)?;
+    let mut shown =
+        contenders::compiled(source, MotionOptions { poses: arguments.poses, segments: arguments.segments })?;
     let frames = source.frames(arguments.frames);
     let rounds = if arguments.run.quick { 1 } else { arguments.rounds };
     let mut updates = Vec::new();

@@ -7,7 +7,7 @@ use clap::Args;
 /// `animation`.
 #[derive(Debug, Args)]
 pub struct Animation {
-    /// glTF files, manifests, or scenes of `bth-scenes list`.
+    /// glTF files, manifests, scenes of `bth-scenes list`, or `twist:MODEL` for a model that is twisted.
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<String>,
     /// Frames to measure, evenly over the range.
@@ -22,6 +22,12 @@ pub struct Animation {
     /// Numbers of threads for updates; rays are traced by one.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 2], value_parser = at_least_one)]
     pub threads: Vec<usize>,
+    /// As `bthc compile --poses`.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub poses: u32,
+    /// As `bthc compile --segments`.
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub segments: u32,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub run: RunOptions,

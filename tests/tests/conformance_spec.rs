@@ -79,6 +79,12 @@ fn byte_tables_are_those_of_the_structures() {
         Image { name first length }
         FreeDirections { place bins }
         FreeReach { reach reserved }
+        Deformation { joints influence_sets targets reserved }
+        Morph { deltas first_delta first_row reserved }
+        Deformer { node object skin weights first_weight reserved }
+        Skin { first_joint joints reserved }
+        SkinJoint { inverse_bind node reserved }
+        Segment { first object reserved }
         TetLeaf { lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags }
         TetVertex { position reserved }
         TetFace { vertex triangle tet opposite }

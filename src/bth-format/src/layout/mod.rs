@@ -6,6 +6,7 @@
 mod assert_layout;
 mod bvh;
 mod container;
+mod deformation;
 mod free;
 mod grid;
 mod grid_leaves;
@@ -15,10 +16,12 @@ mod materials;
 mod object;
 mod opacity;
 mod scene;
+mod sequence;
 mod tets;
 
 pub use bvh::*;
 pub use container::*;
+pub use deformation::*;
 pub use free::*;
 pub use grid::*;
 pub use grid_leaves::*;
@@ -27,6 +30,7 @@ pub use materials::*;
 pub use object::*;
 pub use opacity::*;
 pub use scene::*;
+pub use sequence::*;
 pub use tets::*;
 
 /// No index: the reference leads nowhere.

@@ -43,7 +43,7 @@ pub enum KeepFree {
 }
 
 /// Least share of free directions for which [`KeepFree::Auto`] keeps them.
-const LEAST_SHARE: f64 = 0.25;
+const LEAST_SHARE: f64 = 0.5;
 
 /// Options of [`find`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

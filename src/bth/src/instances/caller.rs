@@ -156,7 +156,7 @@ impl World {
         new: &impl Fn(u32) -> NewInstance,
         placed: &mut [Result<Option<Placement>, PlacementError>],
     ) {
-        // Its loops are of four f64, so AVX-512 would not make it faster.
+        // Its loops are of four f64, so AVX-512 would not make it faster, and registers of 128 bits hardly.
         Isa::chosen().min(Isa::Avx2).run(PlaceKernel { world: self, objects, changed, new, placed });
     }
 
@@ -211,7 +211,7 @@ impl<N: Fn(u32) -> NewInstance> Kernel for PlaceKernel<'_, N> {
     fn run<S: Simd>(self, _: S) {
         // The loops of a placement are vectorized with the registers of the instruction set.
         for (&instance, placed) in self.changed.iter().zip(self.placed) {
-            *placed = self.world.place(self.objects, &(self.new)(instance), S::HAS_VECTORS);
+            *placed = self.world.place(self.objects, &(self.new)(instance), S::INLINES_PARTS);
         }
     }
 }

@@ -205,7 +205,7 @@ fn trace_hinted<Q: Query>(
 
 /// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
 ///
-/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not; for other rays [`strategy`]
+/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled; for other rays [`strategy`]
 /// chooses by measured time. No answer depends on this.
 fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     /// Greatest length of an any-hit ray that may gain, relative to the longest side of the object's box.
@@ -213,7 +213,7 @@ fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     if !has_subtrees(object) {
         return true;
     }
-    if Isa::chosen() == Isa::Scalar {
+    if !Isa::chosen().walks_tets() {
         return false;
     }
     if !Q::ANY {
@@ -240,7 +240,7 @@ fn walk_tets<Q: Query>(
         let leaves = vec![sole_leaf; rays.len()];
         let mut batch =
             WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
-        // In scalar code no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
+        // Where no walks are compiled, no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
         let _ = Isa::chosen().run_wide(&mut batch);
     }
 }

@@ -21,6 +21,8 @@ pub struct Variant {
     quality: c_int,
     flags: c_int,
     packets: bool,
+    /// The instruction set that the library may use; the best of the machine if absent.
+    isa: Option<&'static str>,
 }
 
 const QUALITY_LOW: c_int = 0;
@@ -31,15 +33,17 @@ const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
 /// The library's defaults; one ray a call.
-pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false };
+pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false, isa: None };
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
-pub const DYNAMIC: Variant = Variant { quality: QUALITY_LOW, flags: FLAG_DYNAMIC, packets: false };
+pub const DYNAMIC: Variant = Variant { quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
 /// High quality (spatial splits); 16 rays a call.
-pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, flags: 0, packets: true };
+pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, packets: true, ..DEFAULT };
+/// The defaults on a machine without AVX; one ray a call.
+pub const SSE4: Variant = Variant { isa: Some("sse4.2"), ..DEFAULT };
 
 /// Loads the library, so that the time of a build does not include loading it.
 ///

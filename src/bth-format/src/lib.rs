@@ -32,7 +32,7 @@ mod unpack;
 pub mod verify;
 
 pub use error::{Code, Error};
-pub use file::File;
+pub use file::{File, FileMemory};
 pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
 pub use scene_view::SceneView;

@@ -40,7 +40,7 @@ const LARGE_PAGE: usize = 2 << 20;
 
 impl Owned {
     /// Zero bytes. `None` when there is not enough memory: the length comes from a file, so allocation must not abort.
-    fn zeroed(length: usize) -> Option<Self> {
+    pub(super) fn zeroed(length: usize) -> Option<Self> {
         if length >= 2 * LARGE_PAGE
             && let Some(memory) = large_pages(length)
         {
@@ -60,7 +60,7 @@ impl Owned {
         }
     }
 
-    fn bytes_mut(&mut self) -> &mut [u8] {
+    pub(super) fn bytes_mut(&mut self) -> &mut [u8] {
         match &mut self.memory {
             Memory::Lines(lines) => &mut lines.as_mut_bytes()[..self.length],
             Memory::Pages(pages, first) => &mut pages[*first..][..self.length],
@@ -149,6 +149,6 @@ fn open(path: &Path) -> Result<(std::fs::File, u64)> {
     Ok((file, length))
 }
 
-fn no_memory(length: u64) -> Error {
+pub(super) fn no_memory(length: u64) -> Error {
     Error::at(Code::Read, 0, format!("{length} bytes of memory"), "less")
 }

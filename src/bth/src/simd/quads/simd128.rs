@@ -93,7 +93,6 @@ impl Quad for Simd128 {
         floats(a: v128) -> v128 = a;
         // Numbers are below 2^24; the conversion of signed numbers is one instruction on all machines.
         numbers(a: v128) -> v128 = f32x4_convert_i32x4(a);
-        bytes(a: v128, at: &[u8; LANES]) -> v128 = i8x16_swizzle(a, self.load_all(at));
         mask_bits(m: v128) -> u32 = u32::from(i32x4_bitmask(m));
         // Masks keep their value when signed words and halves are saturated.
         mask_bits_of_all(m: [v128; QUADS]) -> u32 = {
@@ -127,14 +126,10 @@ impl Quad for Simd128 {
         unsafe { v128_store(to.as_mut_ptr().cast(), a) }
     }
     #[inline(always)]
-    fn prefetch<T>(self, _address: *const T) {}
-}
-
-impl Simd128 {
-    /// Loads sixteen bytes.
-    #[inline(always)]
-    fn load_all(self, from: &[u8; LANES]) -> v128 {
+    fn bytes(self, a: v128, at: &[u8; LANES]) -> v128 {
         // SAFETY: sixteen readable bytes; unaligned load.
-        unsafe { v128_load(from.as_ptr().cast()) }
+        i8x16_swizzle(a, unsafe { v128_load(at.as_ptr().cast()) })
     }
+    #[inline(always)]
+    fn prefetch<T>(self, _address: *const T) {}
 }

@@ -3,11 +3,12 @@ from ._hits import (
     NONE as NONE, AllHits as AllHits, Closest as Closest, Hits as Hits, Opacity as Opacity, Overlaps as Overlaps,
     SurfacePoints as SurfacePoints,
 )
+from ._materials import Material as Material, Texture as Texture
 from ._native import Candidate as Candidate, Error as Error, __version__ as __version__, isa as isa
 from ._scene import Scene as Scene, load as load, open as open
 from ._threads import set_threads as set_threads
 
 __all__ = [
-    "AllHits", "Candidate", "Closest", "Error", "Hits", "NONE", "Opacity", "Overlaps", "Scene", "SurfacePoints", "__version__", "compile",
-    "compile_scene", "isa", "load", "open", "set_threads",
+    "AllHits", "Candidate", "Closest", "Error", "Hits", "Material", "NONE", "Opacity", "Overlaps", "Scene", "SurfacePoints", "Texture",
+    "__version__", "compile", "compile_scene", "isa", "load", "open", "set_threads",
 ]

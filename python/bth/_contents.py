@@ -4,7 +4,7 @@ import operator
 
 import numpy as np
 
-from . import _arrays, _native, _threads
+from . import _arrays, _materials, _native, _threads
 from ._hits import FIELDS, NONE, SurfacePoints
 from ._ray_queries import mask_bits
 
@@ -145,6 +145,16 @@ class Contents:
     def group_materials(self, obj=0):
         """For each group of an object's triangles the index of its material, or None."""
         return _native.groups(self._native, _index(obj, "obj"))[1]
+
+    # How surfaces look.
+
+    def materials(self, obj=0):
+        """For each material of an object how it looks, as Material; None where the file keeps no more than its name (see the option `materials`)."""
+        return [_materials.material(row) for row in _native.materials(self._native, _index(obj, "obj"))]
+
+    def textures(self, obj=0):
+        """For each texture of an object its image file and how it lies on the surface, as Texture."""
+        return [_materials.texture(row) for row in _native.textures(self._native, _index(obj, "obj"))]
 
     # Masks.
 

@@ -22,6 +22,7 @@ mod compile;
 mod conditions;
 mod errors;
 mod many;
+mod materials;
 mod options;
 mod output;
 mod overlaps;
@@ -64,6 +65,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(overlaps::triangles_in, module)?)?;
     module.add_function(wrap_pyfunction!(surface::surface, module)?)?;
     module.add_function(wrap_pyfunction!(surface::triangle_positions, module)?)?;
+    module.add_function(wrap_pyfunction!(materials::materials, module)?)?;
+    module.add_function(wrap_pyfunction!(materials::textures, module)?)?;
     module.add_function(wrap_pyfunction!(parts::object_names, module)?)?;
     module.add_function(wrap_pyfunction!(parts::instance_names, module)?)?;
     module.add_function(wrap_pyfunction!(parts::groups, module)?)?;

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-_Static_assert(sizeof(bth_update) == 48, "update");
+_Static_assert(sizeof(bth_update) == 64, "update");
 
 static bth_ray ray[64];
 static size_t rays;

@@ -54,6 +54,41 @@ int main(int argc, char **argv) {
     CHECK(bth::is_miss(scene.nearest_accepted(down, {1, BTH_CULL_NONE, nullptr, nullptr})));
     CHECK(scene.winding({9, 9, 9}) == 0);
 
+    bth_compile_options options{};
+    options.flags = BTH_COMPILE_DEFORMABLE;
+    CHECK(bth_compile_mesh(&mesh, &options, &bytes) == BTH_COMPILE_OK);
+    bth::scene elastic = bth::scene::from_bytes(bytes.data, bytes.length);
+    bth_free_bytes(&bytes);
+    CHECK(elastic.vertex_count(0) == 4 && elastic.vertex_count(1) == 0 && scene.vertex_count(0) == 0);
+    std::array<float, 12> moved = positions;
+    for (int i = 0; i < 4; i++) moved[3 * i + 2] = -1;
+    const bth_update update = elastic.set_positions(0, moved.data(), 4);
+    CHECK(update.deformed == 1 && update.deformed_cost_ratio == 1 && update.visible == 1 && elastic.nearest(down).t == 3);
+    moved[5] = NAN;
+    CHECK(bth_set_positions(elastic.get(), 0, moved.data(), 4, nullptr) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_set_positions(elastic.get(), 0, positions.data(), 3, nullptr) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_set_positions(elastic.get(), 1, positions.data(), 4, nullptr) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_set_positions(elastic.get(), 0, nullptr, 4, nullptr) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_set_positions(scene.get(), 0, positions.data(), 4, nullptr) == BTH_ERROR_MISSING);
+    CHECK(elastic.nearest(down).t == 3 && elastic.surface(elastic.nearest(down)).position[2] == -1);
+    bth_builder *builder = bth_builder_new();
+    const float place[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    std::uint32_t object = 9, id = 9;
+    CHECK(bth_builder_add(builder, elastic.get(), &object) == BTH_OK);
+    CHECK(bth_builder_instance(builder, object, place, &id) == BTH_OK && bth_builder_commit(builder, nullptr) == BTH_OK);
+    // The positions of another scene are not taken over.
+    bth_hit placed;
+    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
+    CHECK(placed.t == 2);
+    moved[5] = -1;
+    bth_update commit;
+    CHECK(bth_builder_set_positions(builder, object, moved.data(), 4) == BTH_OK);
+    CHECK(bth_builder_commit(builder, &commit) == BTH_OK && commit.deformed == 1 && commit.placed == 1);
+    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
+    CHECK(placed.t == 3 && bth_builder_set_positions(builder, 5, moved.data(), 4) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_positions(builder, object, nullptr, 4) == BTH_ERROR_ARGUMENT);
+    bth_builder_free(builder);
+
     int caught = 0;
     try {
         scene.instance(1);

@@ -65,4 +65,5 @@ pub fn worker() -> Option<&'static Path> {
 #[doc = include_str!("../../README.md")]
 #[doc = include_str!("../../docs/queries.md")]
 #[doc = include_str!("../../docs/rust.md")]
+#[doc = include_str!("../../docs/deforming.md")]
 pub struct Pages;

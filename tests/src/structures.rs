@@ -60,6 +60,32 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     wanted.into_iter().map(|(name, options)| Traced { scene: compiled(model, &options), name }).collect()
 }
 
+/// The model as a deformable object that was compiled in another shape and then given the positions of the model: each point
+/// is turned about the last axis by an angle that grows along it, and moved by up to a sixteenth of the size of the model.
+/// Its tree is that of the other shape, so its boxes overlap much more.
+///
+/// # Panics
+/// If it does not compile or open, or a position is not finite.
+pub fn deformed(model: &Model, seed: u64) -> Traced {
+    let bounds = |fold: fn(f32, f32) -> f32| {
+        [0, 1, 2].map(|k| model.positions.iter().map(|p| p[k]).reduce(fold).expect("a vertex"))
+    };
+    let (least, most) = (bounds(f32::min), bounds(f32::max));
+    let size = [0, 1, 2].map(|k| most[k] - least[k]).into_iter().fold(0.0, f32::max);
+    let rng = &mut bth_random::Rng::new(seed);
+    let other = |p: &[f32; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|k| p[k] - (least[k] * 0.5 + most[k] * 0.5));
+        let (sin, cos) = (3.0 * z / size).sin_cos();
+        [x * cos - y * sin, x * sin + y * cos, z].map(|x| x + size / 16.0 * (rng.unit_f32() * 2.0 - 1.0))
+    };
+    let shape =
+        Model { positions: model.positions.iter().map(other).collect(), triangles: model.triangles.clone() };
+    let options = CompileOptions { deformable: true, ..options(Structure::Bvh, RecordKind::Link32, false) };
+    let mut scene = compiled(&shape, &options);
+    scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
+    Traced { name: "deformed bvh".into(), scene }
+}
+
 /// All bits of a hit.
 pub fn bits(hit: &bth::rays::Hit) -> [u32; 5] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]

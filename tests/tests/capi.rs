@@ -126,6 +126,51 @@ fn a_c_program_opens_traces_and_reads_errors() {
 }
 
 #[test]
+fn a_c_program_reads_how_surfaces_look() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let Some(program) = c_program(folder.path(), "materials") else { return };
+    let model = folder.path().join("colored.obj");
+    let text = "mtllib colored.mtl\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+                usemtl lamp\nf 1/1 2/2 3/3\nusemtl glass\nf 1/1 3/3 2/2\n";
+    std::fs::write(&model, text).expect("a model");
+    let materials = "newmtl lamp\nKd 0.5 0.25 1\nKe 2 1 0\nmap_Kd grey.png\nnewmtl glass\nKd 1 1 1\nd 0.5\n";
+    std::fs::write(folder.path().join("colored.mtl"), materials).expect("materials");
+    let mut grey = Vec::new();
+    let mut encoder = png::Encoder::new(&mut grey, 1, 1);
+    encoder.set_color(png::ColorType::Rgba);
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(&[188, 188, 188, 255]).expect("a texel");
+    drop(writer);
+    std::fs::write(folder.path().join("grey.png"), &grey).expect("an image");
+    let file = folder.path().join("colored.bth");
+    let shown = |options: CompileOptions| {
+        let (compiled, _) = compile(&model, &options, &Silent).expect("it compiles");
+        std::fs::write(&file, &compiled.bytes).expect("a file");
+        let output = run(&program, &[file.to_str().expect("UTF-8")], "");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let attributes = bth_import::Keep::All;
+    let kept =
+        shown(CompileOptions { attributes, names: true, materials: true, ..CompileOptions::default() });
+    // The rows of OBJ's images go up, those of the transform down.
+    let expected = format!(
+        "material 0.5 0.25 1 1 emissive 2 1 0 alpha 0 0 flags 1 textures 0 -1\n\
+        material 1 1 1 0.5 emissive 0 0 0 alpha 2 0 flags 1 textures -1 -1\n\
+        texture of image 0: {} bytes, 0, wrap 0 0 nearest 0 transform 1 0 0 0 -1 1\ncolor 1 0 0 1\n",
+        grey.len()
+    );
+    assert_eq!(kept, expected);
+    let names = shown(CompileOptions { names: true, ..CompileOptions::default() });
+    let error =
+        "error -7 bth_material: the file keeps only the names of materials; compile it with --materials\n";
+    assert_eq!(
+        names,
+        format!("{error}{error}error -7 bth_vertex_color: the file keeps no vertex colors of the triangle\n")
+    );
+}
+
+#[test]
 fn a_c_program_reads_what_hits_lead_to() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(program) = c_program(folder.path(), "surface") else { return };

@@ -1,4 +1,4 @@
-"""The index check (format-spec/README.md, "Index check"): F101 to F147."""
+"""The index check (format-spec/README.md, "Index check"): F101 to F147 and F163 to F167."""
 
 import math
 import struct
@@ -33,6 +33,7 @@ def check_indices(view):
     _tet_ranges(view)
     _triangle_faces(view)
     _tree(view)
+    _deformable(view)
     return [derive(view, leaf) for leaf in view.tet_leaves]
 
 
@@ -194,3 +195,50 @@ def _slots(view, line):
         elif codes[i] != NONE or lower[i] != (F32_MAX,) * 3 or upper[i] != (-F32_MAX,) * 3:
             raise view.invalid("F111", f"slot {i} is neither used nor empty", c.LINES, 64 * line + 4 * i)
     return codes
+
+
+def _deformable(view):
+    """F163 to F167."""
+    rows = view.leaf_vertices
+    if not rows:
+        return
+    if not view.positions or not view.source or view.grid or view.packed_nodes or view.tet_leaves or view.dropped:
+        raise view.invalid("F163", "LEAF_VERTICES in an object that cannot be deformable", c.LEAF_VERTICES)
+    nodes, leaves = _depth_first(view)
+    next_line = 0
+    for kind, line in nodes + leaves:
+        if line != next_line:
+            raise view.invalid("F164", f"{kind} at line {line}, not {next_line}", c.LINES, 64 * line)
+        next_line += {NODE: 7, INDEXED: 4, RAW: 10}[kind]
+    if len(rows) != sum(1 if kind == INDEXED else 3 for kind, _ in leaves):
+        raise view.invalid("F165", f"{len(rows)} rows", c.LEAF_VERTICES)
+    row = 0
+    for kind, line in leaves:
+        found = bth_leaves.leaf(view, kind, line)
+        slots = rows[row : row + 1] if kind == INDEXED else rows[row : row + 3]
+        for k, elements in enumerate(slots):
+            unused = elements[found.vertices :]
+            if max(elements) >= len(view.positions) or any(e != elements[0] for e in unused):
+                raise view.invalid("F166", f"rows {elements}", c.LEAF_VERTICES, 64 * (row + k))
+        row += len(slots)
+        for t in range(found.triangles):
+            if kind == INDEXED:
+                corners = tuple(slots[0][found.corners[16 * k + t]] for k in range(3))
+            else:
+                corners = tuple(slots[k][t] for k in range(3))
+            triangle = view.triangle_ids[found.first + t]
+            if corners != view.source[triangle]:
+                raise view.invalid("F167", f"triangle {triangle} of positions {corners}", c.LINES, 64 * line)
+
+
+def _depth_first(view):
+    """The nodes and the leaves of a tree without tet leaves, depth first."""
+    nodes, leaves, stack = [], [], [view.root]
+    while stack:
+        found = child(stack.pop())
+        if found is None:
+            continue
+        (nodes if found[0] == NODE else leaves).append(found)
+        if found[0] == NODE:
+            stack.extend(code for code in reversed(view.node(found[1])[2]) if code != NONE)
+    return nodes, leaves

@@ -42,6 +42,7 @@ class ObjectView:
         self.tet_vertices = self.rows(c.TET_VERTICES, "<3fI")
         self.tet_faces = [TetFace(r[:3], r[3], r[4:6], r[6:]) for r in self.rows(c.TET_FACES, "<8I")]
         self.hull_faces = [HullFace(r[:3], r[3], r[4]) for r in self.rows(c.HULL_FACES, "<5I")]
+        self.leaf_vertices = self.rows(c.LEAF_VERTICES, "<16I")
         self.positions = self.rows(c.POSITIONS, "<3f")
         self.source = self.rows(c.TRIANGLES, "<3I")
         self.corners = self.rows(c.CORNERS, "<3I")

@@ -294,6 +294,58 @@ size_t bth_object_name(const bth_scene *scene, uint32_t object, char *name, size
 size_t bth_group_name(const bth_scene *scene, uint32_t object, uint32_t group, char *name, size_t capacity);
 size_t bth_material_name(const bth_scene *scene, uint32_t object, uint32_t material, char *name, size_t capacity);
 
+/* How surfaces look, in files compiled with `bthc compile --materials`. Colors are linear, with the primaries of sRGB. */
+
+/* What the alpha of a material means: the fourth component of its base color, times that of the texture and of the vertex color. */
+#define BTH_ALPHA_OPAQUE 0u /* nothing */
+#define BTH_ALPHA_MASK 1u   /* there is a surface where alpha is at least the cutoff */
+#define BTH_ALPHA_BLEND 2u  /* it is the share of light that the surface stops */
+/* Flags of materials. */
+#define BTH_DOUBLE_SIDED 1u /* the back of triangles is seen too */
+#define BTH_UNLIT 2u        /* the base color is shown as it is, without light */
+
+/* How a material looks. 48 bytes. */
+typedef struct {
+    float base_color[4];         /* red, green, blue and alpha; to be multiplied by the texel of the texture and the vertex color */
+    float emissive[3];           /* emitted radiance; to be multiplied by the texel of the texture */
+    float alpha_cutoff;          /* of BTH_ALPHA_MASK; 0 otherwise */
+    uint32_t alpha_mode;         /* BTH_ALPHA_... */
+    uint32_t flags;              /* BTH_DOUBLE_SIDED and BTH_UNLIT, or 0 */
+    uint32_t base_color_texture; /* index of a texture of the object, or BTH_NONE */
+    uint32_t emissive_texture;   /* the same for the emission */
+} bth_material_look;
+
+/* How texture coordinates beyond 0 and 1 find texels. */
+#define BTH_WRAP_REPEAT 0u
+#define BTH_WRAP_MIRROR 1u /* every second time mirrored */
+#define BTH_WRAP_CLAMP 2u  /* the texels at the edge go on */
+
+/* A texture of an object: an image file and how it lies on the surface. */
+typedef struct {
+    const uint8_t *bytes;  /* the image file: PNG, JPEG or WebP; valid until the scene is closed. Red, green and blue of its texels are
+                              sRGB, alpha is linear. */
+    size_t length;         /* number of bytes */
+    float transform[2][3]; /* rows of the transform from (u, v, 1), where u and v are those of bth_surface_point, to coordinates of the
+                              image: (0, 0) is its upper left corner, (1, 1) its lower right one */
+    uint32_t image;        /* equal for textures of the same image of a file */
+    uint32_t wrap[2];      /* BTH_WRAP_... for u and for v */
+    uint32_t nearest;      /* 1: the nearest texel is taken; 0: four are interpolated, after they have been made linear */
+} bth_texture_image;
+
+/* Stores how a material of an object looks in *look. Returns BTH_OK; BTH_ERROR_MISSING if the file keeps no more of it than its name;
+ * BTH_ERROR_ARGUMENT if there is no such object or material. */
+int32_t bth_material(const bth_scene *scene, uint32_t object, uint32_t material, bth_material_look *look);
+
+/* Number of textures of an object; 0 if the scene is null or has no such object. */
+uint32_t bth_texture_count(const bth_scene *scene, uint32_t object);
+
+/* Stores a texture of an object in *image. Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such object or texture. */
+int32_t bth_texture(const bth_scene *scene, uint32_t object, uint32_t texture, bth_texture_image *image);
+
+/* Stores the vertex color at a hit of this scene, interpolated: linear red, green, blue and alpha. Returns BTH_OK; BTH_ERROR_MISSING if
+ * the file keeps none for the triangle; BTH_ERROR_ARGUMENT for a miss. */
+int32_t bth_vertex_color(const bth_scene *scene, const bth_hit *hit, float color[4]);
+
 /* Scenes of the objects of several files, whose instances the caller places and moves at run time. A builder holds a scene, which
  * answers all queries above. Calls note what is to be, and bth_builder_commit makes all of it visible. Functions that take a
  * bth_builder without const must not run at the same time as any other function on the builder or its scene. Functions that return a
@@ -354,7 +406,7 @@ int32_t bth_builder_remove_subscene(bth_builder *builder, uint32_t subscene);
 int32_t bth_builder_set_instance_mask(bth_builder *builder, uint32_t instance, uint32_t mask);
 int32_t bth_builder_set_group_mask(bth_builder *builder, uint32_t object, uint32_t group, uint32_t mask);
 
-/* What a commit has done. 48 bytes. */
+/* What a commit or bth_set_positions has done. 64 bytes. */
 typedef struct {
     uint64_t nodes;           /* nodes of subscenes that moved, were hidden or became visible */
     uint64_t placed;          /* instances that were placed again */
@@ -362,8 +414,25 @@ typedef struct {
     double cost_ratio;        /* expected cost of rays through the top level relative to when it was last built */
     double top_level_seconds; /* time to rebuild or refit the top level */
     uint32_t rebuilt;         /* 1 if the top level was built anew, 0 if its boxes were computed again or nothing changed */
-    uint32_t reserved;        /* 0 */
+    uint32_t deformed;        /* objects that got new positions */
+    double deformed_cost_ratio; /* expected cost of rays through a deformed object relative to that in the pose for which it was
+                                   compiled, the greatest of several; 1 if no object got new positions */
+    double refit_seconds;     /* time to refit these objects */
 } bth_update;
+
+/* Number of vertices for which bth_set_positions expects positions; 0 if there is no such object or it was not compiled with
+ * --deformable (BTH_COMPILE_DEFORMABLE). */
+size_t bth_vertex_count(const bth_scene *scene, uint32_t object);
+
+/* Gives an object new positions, three floats for each of the `count` vertices of its source, in the source's order, in object space.
+ * All queries then answer for them as exactly as for a file that is compiled with them; the file is not touched. `update` may be
+ * null. No query may run on the scene meanwhile. Returns BTH_ERROR_MISSING if the object was not compiled for it, BTH_ERROR_ARGUMENT
+ * if the number of positions is wrong or one is not finite, BTH_ERROR_SCENE if an instance could not be placed, and the scene is then
+ * unchanged. */
+int32_t bth_set_positions(bth_scene *scene, uint32_t object, const float *positions, size_t count, bth_update *update);
+
+/* As bth_set_positions, for an object of a builder. The next commit makes the positions visible. */
+int32_t bth_builder_set_positions(bth_builder *builder, uint32_t object, const float *positions, size_t count);
 
 /* Makes all changes since the last commit visible. `update` may be null. If a visible instance cannot be placed, returns
  * BTH_ERROR_SCENE, and the text of the error gives the instance. The scene is then unchanged, and the changes still wait: correct the

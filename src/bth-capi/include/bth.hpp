@@ -106,6 +106,15 @@ public:
     void set_seconds(double seconds) { check(bth_set_seconds(get(), seconds)); }
     void set_frame(std::int32_t frame) { check(bth_set_frame(get(), frame)); }
 
+    /* Gives an object new positions, three floats for each vertex of its source; see bth_set_positions. */
+    bth_update set_positions(std::uint32_t object, const float *positions, std::size_t count) {
+        bth_update update;
+        check(bth_set_positions(get(), object, positions, count, &update));
+        return update;
+    }
+
+    std::size_t vertex_count(std::uint32_t object) const noexcept { return bth_vertex_count(get(), object); }
+
     double seconds() const noexcept { return bth_seconds(get()); }
 
     frame_range frames() const noexcept {
@@ -194,6 +203,20 @@ public:
         bth_surface_point point;
         check(bth_surface_at(get(), &hit, &point));
         return point;
+    }
+
+    /* How a material of an object looks. */
+    bth_material_look material(std::uint32_t object, std::uint32_t material) const {
+        bth_material_look look;
+        check(bth_material(get(), object, material, &look));
+        return look;
+    }
+
+    /* A texture of an object; its bytes are those of the scene. */
+    bth_texture_image texture(std::uint32_t object, std::uint32_t texture) const {
+        bth_texture_image image;
+        check(bth_texture(get(), object, texture, &image));
+        return image;
     }
 
     std::string object_name(std::uint32_t object) const {

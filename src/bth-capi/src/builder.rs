@@ -14,13 +14,15 @@ pub struct UpdateC {
     cost_ratio: f64,
     top_level_seconds: f64,
     rebuilt: u32,
-    reserved: u32,
+    deformed: u32,
+    deformed_cost_ratio: f64,
+    refit_seconds: f64,
 }
 
-const _: () = assert!(size_of::<UpdateC>() == 48);
+const _: () = assert!(size_of::<UpdateC>() == 64);
 
 impl UpdateC {
-    fn new(update: &Update) -> UpdateC {
+    pub(crate) fn new(update: &Update) -> UpdateC {
         UpdateC {
             nodes: update.nodes as u64,
             placed: update.placed as u64,
@@ -28,7 +30,9 @@ impl UpdateC {
             cost_ratio: update.cost_ratio,
             top_level_seconds: update.top_level.as_secs_f64(),
             rebuilt: update.rebuilt.into(),
-            reserved: 0,
+            deformed: update.deformed as u32,
+            deformed_cost_ratio: update.deformed_cost_ratio,
+            refit_seconds: update.refit.as_secs_f64(),
         }
     }
 }
@@ -38,7 +42,7 @@ impl UpdateC {
 ///
 /// # Safety
 /// `builder` is null or was not freed, and no other call uses it or its scene at the same time.
-unsafe fn with(
+pub(crate) unsafe fn with(
     builder: *mut SceneBuilder,
     name: &str,
     call: impl FnOnce(&mut SceneBuilder) -> Result<(), Error>,

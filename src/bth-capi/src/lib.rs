@@ -3,8 +3,10 @@
 
 pub mod builder;
 pub mod closest;
+pub mod deform;
 pub mod hits;
 pub mod inside;
+pub mod materials;
 pub mod memory;
 pub mod motion;
 pub mod surface;
@@ -48,9 +50,12 @@ fn code_of(error: &Error) -> i32 {
         Code::Read => ERROR_FILE,
         Code::Host | Code::Version | Code::Features | Code::UnknownKind => ERROR_VERSION,
         Code::Singular | Code::NotFinite => ERROR_SCENE,
-        Code::NoSuchObject | Code::NoSuchInstance | Code::PlacedByFile | Code::TooManyInstances => {
-            ERROR_ARGUMENT
-        }
+        Code::NoSuchObject
+        | Code::NoSuchInstance
+        | Code::PlacedByFile
+        | Code::TooManyInstances
+        | Code::NewPositions => ERROR_ARGUMENT,
+        Code::NotDeformable => ERROR_MISSING,
         _ => ERROR_FORMAT,
     }
 }

@@ -31,7 +31,7 @@ const _: () = assert!(size_of::<SurfacePointC>() == 96);
 ///
 /// # Safety
 /// `scene` is null or open; `out` is null or valid for writes.
-unsafe fn store<T>(
+pub(crate) unsafe fn store<T>(
     name: &str,
     scene: *const Scene,
     out: *mut T,

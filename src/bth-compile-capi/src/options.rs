@@ -52,6 +52,7 @@ impl Default for Options {
 
 const NO_GEOMETRY: u32 = 1;
 const BYTE_BOXES: u32 = 2;
+const DEFORMABLE: u32 = 4;
 /// Greatest number of threads; more are a mistake.
 const MOST_THREADS: u32 = 1 << 12;
 
@@ -73,6 +74,7 @@ impl Options {
             // As the program does by default.
             keep_subtrees: structure == Structure::Bth,
             geometry: self.flags & NO_GEOMETRY == 0,
+            deformable: self.flags & DEFORMABLE != 0,
             ..CompileOptions::default()
         };
         options.bvh.quality = match self.quality {
@@ -95,7 +97,7 @@ impl Options {
         if self.flags & BYTE_BOXES != 0 {
             options.coordinates.boxes = Boxes::Bytes;
         }
-        if self.flags & !(NO_GEOMETRY | BYTE_BOXES) != 0 || self.reserved != 0 {
+        if self.flags & !(NO_GEOMETRY | BYTE_BOXES | DEFORMABLE) != 0 || self.reserved != 0 {
             return unknown("flags", self.flags);
         }
         if self.threads > MOST_THREADS {

@@ -109,7 +109,7 @@ fn compile_checked(
     let mut clock = Clock::default();
     let digest = clock.time("hash", || SourceDigest::of_triangles(mesh));
     let model = Model { path: Path::new(MESH_NAME), digest: &digest };
-    let import = || import_triangles(model.path, mesh.positions, mesh.triangles, monitor);
+    let import = || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
     let imported = clock.time("mesh", import)?;
     let (checked, report) = compile_imported(&model, imported, options, &mut Direct, clock, monitor)?;
     warn_over_limit(&report.file, options, monitor);

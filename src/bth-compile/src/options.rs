@@ -47,6 +47,10 @@ pub struct CompileOptions {
     pub keep_subtrees: bool,
     /// Whether to store the positions and triangles of the source.
     pub geometry: bool,
+    /// Whether to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices of the source are kept in its
+    /// order, triangles of zero area are not dropped, and nothing is tetrahedralized, whatever `structure` says. Excludes
+    /// `Structure::Tets`, `coordinates` other than f32, and leaving out the geometry.
+    pub deformable: bool,
     /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
     /// may exceed it.
     /// The result does not depend on it.
@@ -69,6 +73,7 @@ impl Default for CompileOptions {
             record: RecordKind::Link32,
             keep_subtrees: true,
             geometry: true,
+            deformable: false,
             objects_memory: u64::MAX,
         }
     }
@@ -78,12 +83,42 @@ impl CompileOptions {
     /// What to read of models.
     pub fn wanted(&self) -> mesh::Wanted {
         let attributes = if self.materials { mesh::Keep::All } else { self.attributes };
-        mesh::Wanted { attributes, groups: self.names || self.materials, materials: self.materials }
+        mesh::Wanted {
+            attributes,
+            groups: self.names || self.materials,
+            materials: self.materials,
+            vertices: self.deformable,
+        }
     }
 
     /// What of the looks of models is read, for which files besides the models are needed.
     pub fn looks(&self) -> mesh::Looks {
         mesh::Looks { alpha: self.alpha, materials: self.materials }
+    }
+
+    /// What is built: a BVH only for deformable objects.
+    pub(crate) fn built_structure(&self) -> Structure {
+        if self.deformable { Structure::Bvh } else { self.structure }
+    }
+
+    /// Checks that the options do not exclude each other.
+    ///
+    /// # Errors
+    /// `BTH-L033`.
+    pub(crate) fn check(&self) -> bth_import::Result<()> {
+        let excluded = if !self.deformable {
+            return Ok(());
+        } else if self.coordinates != coordinates::CoordinateOptions::default() {
+            "coordinates or boxes of fewer bits"
+        } else if !self.geometry {
+            "leaving out the geometry of the source"
+        } else if self.structure == Structure::Tets {
+            "tetrahedralizations"
+        } else {
+            return Ok(());
+        };
+        let message = format!("an object can be deformable or be compiled with {excluded}, not both");
+        Err(bth_import::Error::Limit { code: "BTH-L033", message })
     }
 
     /// How tetrahedra will be stored; the size of the object without them is not set.

@@ -111,6 +111,8 @@ fn create(folder: &Path, prefix: &OsString, mode: u32) -> std::io::Result<(File,
     options.write(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
+    #[cfg(not(unix))]
+    let _ = mode;
     #[cfg(target_os = "linux")]
     {
         use std::os::unix::fs::OpenOptionsExt;

@@ -113,13 +113,19 @@ codes! {
     Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
+    Deformable "F163" "LEAF_VERTICES is empty, or the object has POSITIONS and TRIANGLES, coordinates of f32, WideNodes and no tet leaves, and drops no triangle."
+    BlockOrder "F164" "In a deformable object LINES holds the nodes in depth-first order, then the leaves in depth-first order."
+    LeafRows "F165" "In a deformable object LEAF_VERTICES has one row for each indexed leaf and three for each raw leaf."
+    LeafVertexRows "F166" "Elements of LEAF_VERTICES are rows of POSITIONS; those of unused slots repeat that of slot 0."
+    LeafTriangles "F167" "In a deformable object the corners of a leaf's triangle have the rows of POSITIONS that TRIANGLES gives."
+
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     Coverage "F203" "Every triangle that is not dropped lies in exactly one triangle leaf or constrained face; a kept subtree holds the triangles of its tet leaf; as many are dropped as the object says."
     Containment "F204" "The object's bounds and each child box contain the triangles below."
     TetContainment "F205" "The box of a tet leaf contains its vertices."
     Orientation "F206" "Tetrahedra have volume, neighbours lie on either side of their common face, hull faces point inwards and constrained faces to their first tetrahedron."
-    ZeroArea "F207" "Exactly the triangles of zero area are dropped."
+    ZeroArea "F207" "Exactly the triangles of zero area are dropped; of a deformable object none is."
     Displacement "F208" "No vertex of a triangle is farther from that of the source than the displacement of the object."
 
     Singular "S001" "The transform of an instance that is seen can be inverted."
@@ -127,6 +133,8 @@ codes! {
     NoSuchInstance "S003" "The instance or subscene that the caller named exists."
     PlacedByFile "S004" "An instance of a subscene is moved and removed only with the subscene."
     TooManyInstances "S005" "A scene has at most 2^30 instances."
+    NotDeformable "S006" "An object that is given new positions was compiled for them."
+    NewPositions "S007" "New positions are finite, and as many as the object has vertices."
 }
 
 impl Code {
@@ -154,6 +162,8 @@ impl Code {
             Code::TooManyInstances => {
                 "remove instances that are not seen, or join objects that move together"
             }
+            Code::NotDeformable => "compile the model with --deformable",
+            Code::NewPositions => "give one position for each vertex of the source, in its order",
             _ => "the program that wrote the file has a defect; compile it again with bthc",
         }
     }
@@ -315,6 +325,7 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::TET_FACES => "TET_FACES",
         kind::HULL_FACES => "HULL_FACES",
         kind::TRIANGLE_FACES => "TRIANGLE_FACES",
+        kind::LEAF_VERTICES => "LEAF_VERTICES",
         kind::POSITIONS => "POSITIONS",
         kind::TRIANGLES => "TRIANGLES",
         kind::CORNERS => "CORNERS",

@@ -11,5 +11,7 @@ pub const MAX_TRIANGLES: u32 = 1 << 30;
 pub const MAX_TETS: u32 = 1 << 30;
 /// Words of an object that hold states of micro-triangles (BTH-F022).
 pub const MAX_OPACITY_WORDS: u32 = 1 << 28;
+/// Rows of LEAF_VERTICES of an object (BTH-F022): more than the leaves of all lines have.
+pub const MAX_LEAF_VERTICES: u32 = 1 << 28;
 /// Bytes of the name of a group or material (BTH-F144), of an object (BTH-F148), or of a node, camera or light (BTH-F153).
 pub const MAX_NAME: u32 = 4096;

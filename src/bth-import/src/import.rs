@@ -170,7 +170,8 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
     let of = |(_, kept): &(Groups, Vec<u32>)| recorder.finish(kept, triangles.len());
     let materials = groups.as_ref().filter(|_| wanted.materials).map(of);
     let groups = groups.map(|(groups, _)| groups);
-    let (mesh, counted) = weld_and_count(&raw.positions, triangles, attributes, monitor, |row| {
+    let rows = (raw.positions.as_slice(), triangles);
+    let (mesh, counted) = weld_and_count(rows, attributes, wanted, monitor, |row| {
         input_error(
             NON_FINITE,
             (raw.locate)(RowKind::Position, row),
@@ -188,19 +189,21 @@ fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Me
 /// # Errors
 /// `not_finite` of the row of the first used position that is not finite; cancellation.
 pub(crate) fn weld_and_count(
-    positions: &[[f32; 3]],
-    mut triangles: Vec<[u32; 3]>,
+    (positions, mut triangles): (&[[f32; 3]], Vec<[u32; 3]>),
     attributes: Option<Attributes>,
+    wanted: Wanted,
     monitor: &dyn Monitor,
     not_finite: impl FnOnce(usize) -> Error,
 ) -> Result<(Mesh, Report)> {
+    let unwelded = wanted.vertices.then(|| triangles.clone());
     let welded = weld::weld(positions, &mut triangles).map_err(not_finite)?;
     if welded.non_finite_unused > 0 {
         let count = welded.non_finite_unused;
-        monitor.warn(&format!("{count} positions are not finite; no face uses them, they are left out"));
+        let fate = if wanted.vertices { "are kept as zeros" } else { "are left out" };
+        monitor.warn(&format!("{count} positions are not finite; no face uses them, they {fate}"));
     }
     monitor.check()?;
-    let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
+    let mut mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {
@@ -215,7 +218,16 @@ pub(crate) fn weld_and_count(
         non_finite_unused: welded.non_finite_unused,
         ..Report::default()
     };
+    if let Some(triangles) = unwelded {
+        (mesh.positions, mesh.triangles) = (positions.iter().map(kept_vertex).collect(), triangles);
+    }
     Ok((mesh, report))
+}
+
+/// A vertex of the source as it is kept without welding: without negative zeros, and zeros where it is not finite, so that no face
+/// uses it.
+fn kept_vertex(position: &[f32; 3]) -> [f32; 3] {
+    if position.iter().all(|x| x.is_finite()) { position.map(|x| x + 0.0) } else { [0.0; 3] }
 }
 
 /// The format of a source by its extension, or else by its content.

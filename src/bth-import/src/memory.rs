@@ -2,7 +2,7 @@
 
 use crate::error::{Place, Result};
 use crate::import::weld_and_count;
-use crate::mesh::{Mesh, Report};
+use crate::mesh::{Mesh, Report, Wanted};
 use crate::monitor::Monitor;
 use crate::raw::{check_rows, check_triangles};
 use crate::source::{INDEX, NON_FINITE, input_error};
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Name of the format in reports about triangles from memory.
 pub const MEMORY_FORMAT: &str = "memory";
 
-/// A mesh of triangles in memory, welded and counted as the faces of a file are. Row i of `triangles` has the id i.
+/// A mesh of triangles in memory, welded (but with [`Wanted::vertices`]) and counted as the faces of a file are. Row i of `triangles` has the id i.
 /// `name` names the mesh in messages.
 ///
 /// # Errors
@@ -21,13 +21,15 @@ pub fn import_triangles(
     name: &Path,
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
+    wanted: impl Into<Wanted>,
     monitor: &dyn Monitor,
 ) -> Result<(Mesh, Report)> {
     monitor.stage("import", Some(triangles.len() as u64));
     check_triangles(triangles.len() as u64)?;
     check_rows(positions.len() as u64)?;
     check_indices(name, positions.len(), triangles)?;
-    let (mesh, counted) = weld_and_count(positions, triangles.to_vec(), None, monitor, |row| {
+    let rows = (positions, triangles.to_vec());
+    let (mesh, counted) = weld_and_count(rows, None, wanted.into(), monitor, |row| {
         let triangle = triangles.iter().position(|corners| corners.contains(&(row as u32)));
         let message = format!("expected finite coordinates, found {:?} at position {row}", positions[row]);
         let hint = "leave out the triangles with positions that are not finite";
@@ -61,7 +63,7 @@ mod tests {
     use crate::monitor::Silent;
 
     fn import(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<(Mesh, Report)> {
-        import_triangles(Path::new("mesh"), positions, triangles, &Silent)
+        import_triangles(Path::new("mesh"), positions, triangles, Wanted::default(), &Silent)
     }
 
     const CORNERS: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, -0.0]];

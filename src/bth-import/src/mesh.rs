@@ -4,10 +4,10 @@ use crate::groups::Groups;
 use crate::materials::Materials;
 use serde::{Deserialize, Serialize};
 
-/// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0).
+/// A triangle mesh in object space, with bit-equal positions welded (-0 counts as +0) unless all vertices of the source are wanted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Distinct finite positions, in order of first use by the faces.
+    /// Distinct finite positions, in order of first use by the faces; with [`Wanted::vertices`] those of the source in its order.
     pub positions: Vec<[f32; 3]>,
     /// Rows of `positions`, in the source's face order after fan triangulation. The index of a triangle here is its id
     /// in the compiled file and in hits. Degenerate triangles are kept.
@@ -83,11 +83,13 @@ pub struct Wanted {
     pub groups: bool,
     /// How materials look, and vertex colours (`--materials`). Needs groups.
     pub materials: bool,
+    /// All vertices of the source, in its order, those at equal positions and unused ones too (`--deformable`).
+    pub vertices: bool,
 }
 
 impl From<Keep> for Wanted {
     fn from(attributes: Keep) -> Self {
-        Self { attributes, groups: false, materials: false }
+        Self { attributes, ..Self::default() }
     }
 }
 

@@ -17,11 +17,11 @@ Exit codes:
 pub(crate) struct Args {
     /// The compiled file; or a scene manifest (.manifest, .toml) or model, which is compiled first with the bthc beside this
     /// program and mapped from the cache.
-    #[arg(required_unless_present = "completions")]
+    #[arg(required_unless_present_any = ["completions", "man"])]
     file: Option<PathBuf>,
     /// A picture (.png); numbered pictures (such as frames/####.png); an animation (.apng, .gif or .y4m); or `-` for
     /// YUV4MPEG2 on standard output.
-    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["completions", "window"])]
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["completions", "man", "window"])]
     output: Option<PathBuf>,
     /// Show the file in a window: orbit, fly, play, scrub, change the mode; the picture is refined to --spp samples while
     /// nothing moves. H prints the keys.
@@ -113,6 +113,9 @@ pub(crate) struct Args {
     /// Print a completion script for this shell and end.
     #[arg(long, value_name = "SHELL", exclusive = true)]
     pub(crate) completions: Option<clap_complete::Shell>,
+    /// Print the manual page (roff) and end.
+    #[arg(long, exclusive = true)]
+    pub(crate) man: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -35,6 +35,11 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         clap_complete::generate(shell, &mut args::Args::command(), "bth-play", &mut script);
         return messages::print(&String::from_utf8_lossy(&script));
     }
+    if args.man {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(args::Args::command()).render(&mut page)?;
+        return messages::print(&String::from_utf8_lossy(&page));
+    }
     let isa = match args.isa {
         Some(isa) => isa.choose(),
         None => bth::Isa::from_environment().map(|_| ()),

@@ -19,6 +19,7 @@ mod builder;
 mod bvh;
 mod closest;
 mod crossing;
+mod deform;
 mod enumerate;
 mod hits;
 mod instances;

@@ -1,6 +1,7 @@
 //! The part of [`Scene`] that sets the time and returns the transforms of instances and nodes at that time.
 
 use crate::instances::{Update, World};
+use crate::objects::Objects;
 use crate::scene::Scene;
 use bth_format::{Error, File, SceneView};
 
@@ -25,7 +26,7 @@ pub struct InstanceView {
 /// # Errors
 /// Those of [`File::check_scene`], and `BTH-S001` or `BTH-S002` as for [`Scene::set_seconds`].
 pub fn check_first_frame(file: &File) -> Result<(), Error> {
-    World::new(file).map(drop)
+    World::new(&Objects::of_file(file.clone())).map(drop)
 }
 
 impl Scene {

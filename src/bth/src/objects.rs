@@ -1,21 +1,31 @@
-//! The objects of a scene: all of one file, or those of several.
+//! The objects of a scene: all of one file, or those of several. Some may have been given new positions.
 
-use bth_format::File;
+use crate::deform::Deforming;
 use bth_format::layout::Object;
 use bth_format::object::ObjectView;
+use bth_format::{Code, Error, File};
 
 /// The objects of a scene, by their index.
 #[derive(Debug)]
-pub(crate) enum Objects {
+pub(crate) struct Objects {
+    files: Files,
+    /// For each object its own positions, boxes and leaves, if it was given new positions; shorter than the number of objects, or
+    /// empty, where the others have none.
+    deforming: Vec<Option<Box<Deforming>>>,
+}
+
+/// Where objects come from.
+#[derive(Debug)]
+enum Files {
     /// All objects of a file, with the same indices.
-    File(File),
+    One(File),
     /// The objects of any number of files, in the order in which they were added.
     Several(ObjectTable),
 }
 
 /// The objects of several files.
 #[derive(Debug, Default)]
-pub(crate) struct ObjectTable {
+struct ObjectTable {
     files: Vec<File>,
     /// For each object its file, as an index of `files`, and its index there.
     rows: Vec<(u32, u32)>,
@@ -23,13 +33,13 @@ pub(crate) struct ObjectTable {
 
 impl ObjectTable {
     /// Adds the objects of another scene. Their files are shared.
-    pub(crate) fn add(&mut self, objects: &Objects) {
+    fn add(&mut self, objects: &Files) {
         match objects {
-            Objects::File(file) => {
+            Files::One(file) => {
                 let row = self.file_row(file);
                 self.rows.extend((0..file.object_count()).map(|object| (row, object)));
             }
-            Objects::Several(table) => {
+            Files::Several(table) => {
                 let rows: Vec<u32> = table.files.iter().map(|file| self.file_row(file)).collect();
                 self.rows.extend(table.rows.iter().map(|(file, object)| (rows[*file as usize], *object)));
             }
@@ -52,57 +62,120 @@ impl ObjectTable {
 }
 
 impl Objects {
+    /// All objects of a file.
+    pub(crate) fn of_file(file: File) -> Objects {
+        Objects { files: Files::One(file), deforming: Vec::new() }
+    }
+
+    /// No objects yet; those of several files can be added.
+    pub(crate) fn of_several_files() -> Objects {
+        Objects { files: Files::Several(ObjectTable::default()), deforming: Vec::new() }
+    }
+
+    /// Adds the objects of another scene, as their files have them, to those of several files.
+    pub(crate) fn add(&mut self, other: &Objects) {
+        if let Files::Several(table) = &mut self.files {
+            table.add(&other.files);
+        }
+    }
+
     /// Number of objects.
     #[inline]
     pub(crate) fn count(&self) -> u32 {
-        match self {
-            Objects::File(file) => file.object_count(),
-            Objects::Several(table) => table.rows.len() as u32,
+        match &self.files {
+            Files::One(file) => file.object_count(),
+            Files::Several(table) => table.rows.len() as u32,
         }
     }
 
     /// The file of an object and the object's index there; `None` if there is no such object.
     pub(crate) fn locate(&self, object: u32) -> Option<(&File, u32)> {
-        match self {
-            Objects::File(file) => (object < file.object_count()).then_some((file, object)),
-            Objects::Several(table) => table.locate(object),
+        match &self.files {
+            Files::One(file) => (object < file.object_count()).then_some((file, object)),
+            Files::Several(table) => table.locate(object),
         }
     }
 
-    /// The sections of an object.
+    /// The sections of an object, those that new positions have replaced among them.
     #[inline]
     pub(crate) fn view(&self, object: u32) -> &ObjectView<'_> {
         const CHECKED: &str = "an object below object_count, checked when opened";
-        match self {
-            Objects::File(file) => file.view(object).expect(CHECKED),
-            Objects::Several(table) => {
+        if let Some(Some(deforming)) = self.deforming.get(object as usize) {
+            return deforming.view();
+        }
+        match &self.files {
+            Files::One(file) => file.view(object).expect(CHECKED),
+            Files::Several(table) => {
                 let (file, object) = table.locate(object).expect(CHECKED);
                 file.view(object).expect(CHECKED)
             }
         }
     }
 
+    /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do not fit each other.
+    pub(crate) fn unchecked_view(&self, object: u32) -> Option<&ObjectView<'_>> {
+        if self.is_deforming(object) {
+            return Some(self.view(object));
+        }
+        let (file, object) = self.locate(object)?;
+        file.view(object).ok()
+    }
+
+    /// Whether the object has positions of its own.
+    fn is_deforming(&self, object: u32) -> bool {
+        self.deforming.get(object as usize).is_some_and(Option::is_some)
+    }
+
     /// The `OBJECT` row of an object. Other sections of the object are not read.
     pub(crate) fn header(&self, object: u32) -> &Object {
+        if let Some(Some(deforming)) = self.deforming.get(object as usize) {
+            return deforming.view().header;
+        }
         let (file, object) = self.locate(object).expect("an object below object_count");
         file.object_header(object)
     }
 
+    /// Whether reading the nodes of an object may wait for the disk: they are in a mapped file.
+    pub(crate) fn is_mapped(&self, object: u32) -> bool {
+        !self.is_deforming(object) && self.locate(object).is_some_and(|(file, _)| file.is_mapped())
+    }
+
     /// The file, if the scene is one.
     pub(crate) fn sole_file(&self) -> Option<&File> {
-        match self {
-            Objects::File(file) => Some(file),
-            Objects::Several(_) => None,
+        match &self.files {
+            Files::One(file) => Some(file),
+            Files::Several(_) => None,
         }
     }
 
     /// Size in bytes of the sections that traversal reads.
     pub(crate) fn resident_bytes(&self) -> u64 {
-        match self {
-            Objects::File(file) => file.resident_bytes(),
-            Objects::Several(table) => {
+        match &self.files {
+            Files::One(file) => file.resident_bytes(),
+            Files::Several(table) => {
                 table.files.iter().map(File::resident_bytes).fold(0, u64::saturating_add)
             }
         }
+    }
+
+    /// The own positions, boxes and leaves of an object, which are made if it has none yet.
+    ///
+    /// # Errors
+    /// `BTH-O003` if there is no such object, `BTH-S006` if it is not deformable, `BTH-O001` if there is not enough memory.
+    pub(crate) fn deforming(&mut self, object: u32) -> Result<&mut Deforming, Error> {
+        let count = self.count();
+        let Some((file, row)) = self.locate(object) else {
+            let expected = format!("an object below {count}");
+            return Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()));
+        };
+        let index = object as usize;
+        if !self.is_deforming(object) {
+            let new = Box::new(Deforming::new(file, row)?);
+            if self.deforming.len() <= index {
+                self.deforming.resize_with(index + 1, || None);
+            }
+            self.deforming[index] = Some(new);
+        }
+        Ok(self.deforming[index].as_mut().expect("just made"))
     }
 }

@@ -3,7 +3,7 @@
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::object;
-use crate::objects::{ObjectTable, Objects};
+use crate::objects::Objects;
 use crate::query::Steps;
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::error::Error;
@@ -100,23 +100,22 @@ impl Scene {
 
     /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
-        let world = World::new(&file)?;
         let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
-        Ok(Scene { objects: Objects::File(file), world, has_opacity, masks: Masks::default() })
+        let objects = Objects::of_file(file);
+        let world = World::new(&objects)?;
+        Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
     }
 
     /// A scene of the objects of several files, without objects and instances yet.
     pub(crate) fn of_several_files() -> Scene {
-        let (objects, world) = (Objects::Several(ObjectTable::default()), Some(World::empty()));
+        let (objects, world) = (Objects::of_several_files(), Some(World::empty()));
         Scene { objects, world, has_opacity: false, masks: Masks::default() }
     }
 
     /// Adds the objects of another scene to a scene of several files; returns the index of the first.
     pub(crate) fn add_objects(&mut self, other: &Scene) -> u32 {
         let first = self.object_count();
-        if let Objects::Several(table) = &mut self.objects {
-            table.add(&other.objects);
-        }
+        self.objects.add(&other.objects);
         if let Some(world) = &mut self.world {
             world.add_objects(self.objects.count());
         }
@@ -142,6 +141,11 @@ impl Scene {
     /// The objects, and mutable access to the instances.
     pub(crate) fn objects_and_world_mut(&mut self) -> (&Objects, &mut Option<World>) {
         (&self.objects, &mut self.world)
+    }
+
+    /// Mutable access to the objects.
+    pub(crate) fn objects_mut(&mut self) -> &mut Objects {
+        &mut self.objects
     }
 
     /// The objects.
@@ -189,7 +193,7 @@ impl Scene {
     #[cfg(test)]
     pub(crate) fn with_instances(file: File, world: World) -> Scene {
         Scene {
-            objects: Objects::File(file),
+            objects: Objects::of_file(file),
             world: Some(world),
             has_opacity: false,
             masks: Masks::default(),

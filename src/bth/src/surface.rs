@@ -26,7 +26,8 @@ pub struct SurfacePoint {
     /// As [`Self::geometric_normal`], in the space of the object.
     pub object_geometric_normal: [f64; 3],
     /// The normals of the source at the vertices, interpolated, on whatever side the source has them. The geometric normal where
-    /// the file keeps none, where those of the vertices cancel out, and in place of a vertex's normal of zeros.
+    /// the file keeps none, where the object has got new positions, where those of the vertices cancel out, and in place of a
+    /// vertex's normal of zeros.
     pub normal: [f64; 3],
     /// As [`Self::normal`], in the space of the object.
     pub object_normal: [f64; 3],

@@ -9,7 +9,8 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 21] = files![
+const VALID: [(&str, &[u8]); 22] = files![
+    "deformable",
     "grid-16",
     "grid-21",
     "groups",
@@ -163,4 +164,31 @@ fn materials_and_textures_are_those_of_the_file() {
     assert_eq!((r, g, a), (1.0, 0.5, 1.0));
     assert!((b - 0.75).abs() < 1e-5, "{b}");
     assert_eq!((scene.vertex_color(&hit(1, 0.0, 0.0)), scene.vertex_color(&hit(9, 0.0, 0.0))), (None, None));
+}
+
+#[test]
+fn new_positions_move_what_is_hit() {
+    let mut scene =
+        bth::from_bytes(include_bytes!("../../../format-spec/conformance/valid/deformable.bth")).unwrap();
+    let rest = scene.object(0).positions.to_vec();
+    let ray = Ray::new([0.25, 0.5, 9.0], [0.0, 0.0, -1.0]);
+    let mut builder = bth::SceneBuilder::new();
+    let object = builder.add(&scene);
+    builder.instance(object, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]).unwrap();
+    for z in [0.0, 2.0, -3.0, 0.0] {
+        let moved: Vec<_> = rest.iter().map(|p| [p[0], p[1], p[2] + z]).collect();
+        assert_eq!(scene.set_positions(0, &moved).unwrap().deformed_cost_ratio, 1.0);
+        builder.set_positions(object, &moved).unwrap();
+        builder.commit().unwrap();
+        for scene in [&scene, builder.scene()] {
+            assert_eq!(scene.nearest(&ray).map(|hit| (hit.t, hit.primitive.triangle)), Some((9.0 - z, 0)));
+            assert_eq!(scene.object_bounds(0).unwrap().1[2], z);
+        }
+    }
+    // The last two squares are folded away: their triangles have no area.
+    let folded: Vec<_> = rest.iter().map(|p| [p[0].min(1.0), p[1], p[2]]).collect();
+    scene.set_positions(0, &folded).unwrap();
+    assert_eq!(scene.nearest(&Ray::new([1.0, 0.5, 9.0], [0.0, 0.0, -1.0])).unwrap().primitive.triangle, 1);
+    assert_eq!(scene.closest([2.0, 0.5, 0.0], 9.0).map(|found| found.primitive.triangle), Some(1));
+    assert!(scene.nearest(&Ray::new([1.5, 0.5, 9.0], [0.0, 0.0, -1.0])).is_none());
 }

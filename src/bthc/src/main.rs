@@ -10,6 +10,7 @@ mod output;
 mod progress;
 mod ray_files;
 mod table;
+mod version;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -20,9 +21,21 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => return failure::usage(&error, wants_json),
     };
-    match choose_isa(args.isa).and_then(|()| commands::run(args.command)) {
+    match run(args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(wants_json),
+    }
+}
+
+fn run(args: args::Args) -> Result<(), failure::Failure> {
+    choose_isa(args.isa)?;
+    match args.command {
+        _ if args.version => version::show(args.verbose),
+        Some(command) => commands::run(command),
+        None => Err(failure::Failure::Usage {
+            message: "expected a command".to_owned(),
+            hint: "see `bthc --help`",
+        }),
     }
 }
 

@@ -11,6 +11,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(opacity());
     cases.extend(tets());
     cases.extend(geometry());
+    cases.extend(super::deformable::invalid());
     cases.extend(groups());
     cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());
@@ -19,7 +20,7 @@ pub fn invalid() -> Vec<Case> {
 }
 
 /// A case made by changing a valid file and recomputing the hashes that `seal` names.
-fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
+pub(super) fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) -> Case {
     let base = valid().into_iter().find(|c| c.name == base).expect("a valid file of that name");
     let mut editor = Editor::new(&base.bytes);
     change(&mut editor);
@@ -27,7 +28,7 @@ fn broken(name: &str, base: &str, seal: Seal, change: impl FnOnce(&mut Editor)) 
 }
 
 /// Changes a 32-bit field of a section of object 0.
-fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
+pub(super) fn field(name: &str, base: &str, kind: u32, at: usize, value: u32) -> Case {
     broken(name, base, Seal::Sections, |e| {
         e.put_u32(kind, at, value);
     })

@@ -3,6 +3,7 @@
 //! `BTH_BLESS=1 cargo test -p bth-tests --test conformance` writes them; without it the test
 //! compares the committed files with what is made here.
 
+mod deformable;
 mod edit;
 mod invalid;
 mod materials;

@@ -22,6 +22,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("opacity", opacity()),
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
+        Case::new("deformable", super::deformable::deformable()),
         Case::new("materials", super::materials::materials()),
         Case::new("unknown-optional-section", unknown_section()),
     ];
@@ -49,7 +50,7 @@ pub(super) fn indexed(corners: &[[[f32; 3]; 3]], first: u32) -> IndexedLeaf {
 }
 
 /// A raw leaf of these triangles.
-fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
+pub(super) fn raw(corners: &[[[f32; 3]; 3]], first: u32) -> RawLeaf {
     let row = |k: usize, axis: usize| std::array::from_fn(|i| corners.get(i).unwrap_or(&corners[0])[k][axis]);
     let corner = [0, 1, 2].map(|k| [0, 1, 2].map(|axis| row(k, axis)));
     RawLeaf { corner, first, triangles: corners.len() as u32, reserved: [0; 14] }
@@ -64,7 +65,7 @@ pub(super) fn bounds<'a>(points: impl IntoIterator<Item = &'a [f32; 3]>) -> Boun
         .fold(start, |(l, u), p| ([0, 1, 2].map(|a| l[a].min(p[a])), [0, 1, 2].map(|a| u[a].max(p[a]))))
 }
 
-fn node(children: &[(Child, Bounds)]) -> WideNode {
+pub(super) fn node(children: &[(Child, Bounds)]) -> WideNode {
     let mut node = WideNode { bounds: [[[f32::MAX; WIDTH], [-f32::MAX; WIDTH]]; 3], child: [NONE; WIDTH] };
     for (i, (child, (lower, upper))) in children.iter().enumerate() {
         node.child[i] = child.code();
@@ -81,7 +82,7 @@ pub(super) fn lines(block: &[u8]) -> Vec<CacheLine> {
     block.chunks_exact(64).map(|b| CacheLine(std::array::from_fn(|i| word(&b[4 * i..4 * i + 4])))).collect()
 }
 
-fn file(parts: &ObjectParts) -> Vec<u8> {
+pub(super) fn file(parts: &ObjectParts) -> Vec<u8> {
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, parts).expect("the parts fit together");
     builder.finish()
@@ -206,6 +207,7 @@ fn two_levels(bits: Option<GridBits>, packed_nodes: bool) -> Vec<u8> {
         root: Child::Node(0).code(),
         depth: 2,
         subtrees: Vec::new(),
+        leaf_vertices: Vec::new(),
     };
     let bounds = bounds(&positions);
     let grid = bits.map(|bits| {

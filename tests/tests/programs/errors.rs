@@ -34,7 +34,16 @@ fn help_and_version_exit_0_and_help_lists_the_exit_codes() {
         let run = bthc(folder.path(), args).expect(0);
         assert!(run.stdout.contains("130  cancelled"), "{run:?}");
     }
-    bthc(folder.path(), &["--version"]).expect(0);
+    let version = bthc(folder.path(), &["--version"]).expect(0).stdout;
+    assert_eq!(version, format!("bthc {}\n", env!("CARGO_PKG_VERSION")));
+    assert_eq!(bthc(folder.path(), &["-V"]).expect(0).stdout, version);
+    let told = bthc(folder.path(), &["--version", "--verbose"]).expect(0).stdout;
+    for what in [version.as_str(), "files:", "instruction set:", "features:", "TetGen:"] {
+        assert!(told.contains(what), "{what} in {told}");
+    }
+    bthc(folder.path(), &["--verbose"]).expect(2);
+    bthc(folder.path(), &["--isa", "scalar"]).expect(2);
+    bthc(folder.path(), &[]).expect(2);
     run("bth-play", folder.path(), &["--help"]).expect(0);
 }
 

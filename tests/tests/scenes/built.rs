@@ -12,12 +12,12 @@ use std::path::Path;
 use std::sync::Mutex;
 
 /// The chosen instruction set is that of the process.
-static CHOICE: Mutex<()> = Mutex::new(());
+pub(crate) static CHOICE: Mutex<()> = Mutex::new(());
 
-const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+pub(crate) const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// A random transform, sheared and in half of the cases mirrored, of any of several sizes.
-fn transform(rng: &mut Rng) -> [f32; 12] {
+pub(crate) fn transform(rng: &mut Rng) -> [f32; 12] {
     let size = [1.0, 0.1, 3.0, 1e-3][rng.below(4) as usize];
     let mut m = [0.0; 12];
     for (i, x) in m.iter_mut().enumerate() {
@@ -31,7 +31,7 @@ fn transform(rng: &mut Rng) -> [f32; 12] {
     m
 }
 
-fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
+pub(crate) fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
     let boxes: Vec<_> = (0..scene.instance_count()).filter_map(|i| scene.instance_bounds(i)).collect();
     (0..count)
         .map(|i| {
@@ -46,7 +46,7 @@ fn rays(scene: &Scene, rng: &mut Rng, count: usize) -> Vec<Ray> {
 
 /// Compares all queries of two scenes, of which the second has the object indices of the first plus `objects`, and the same instance
 /// ids. Returns how many rays hit.
-fn compare(a: &Scene, b: &Scene, objects: u32, rng: &mut Rng) -> usize {
+pub(crate) fn compare(a: &Scene, b: &Scene, objects: u32, rng: &mut Rng) -> usize {
     let rays = rays(a, rng, 1500);
     let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
     a.batch(&rays).nearest(&mut hits);

@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout)] // Tests that cannot run print why.
 
 mod built;
+mod deform;
 mod flattened;
 mod import;
 mod motion;

@@ -4,12 +4,13 @@ use bth::rays::{Hit, PrimitiveRef};
 use bth_compile::pipeline::Structure;
 use bth_format::layout::RecordKind;
 use bth_tests::stress::{Kind, Statistics, rays, run, shapes};
-use bth_tests::structures::{Traced, compiled, every_structure, options};
+use bth_tests::structures::{Traced, compiled, deformed, every_structure, options};
 
 #[test]
 fn no_ray_leaks_misses_or_hits_a_ghost_on_any_closed_surface() {
     for (i, shape) in shapes(1).iter().enumerate() {
-        let structures = every_structure(&shape.grid.model(), shape.whole);
+        let mut structures = every_structure(&shape.grid.model(), shape.whole);
+        structures.push(deformed(&shape.grid.model(), i as u64));
         let mut tally = Statistics::default();
         run(shape, &structures, 2048, 32, i as u64, &mut tally);
         assert_eq!(tally.defects(), 0, "{}: {tally:#?}", shape.name);

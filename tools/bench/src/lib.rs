@@ -1,7 +1,7 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes` and `instances` are the measurements; `output` writes their records as Markdown, JSON and
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `instances` and `refit` are the measurements; `output` writes their records as Markdown, JSON and
 //! SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
@@ -25,6 +25,7 @@ pub mod progress;
 pub mod quality;
 pub mod rays;
 pub mod records;
+pub mod refit;
 pub mod rivals;
 pub mod rounds;
 pub mod scatter;

@@ -3,7 +3,8 @@
 use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
-    accuracy, compare, costs, inside, instances, load, output, paper, quality, records, scenes, speed, stress,
+    accuracy, compare, costs, inside, instances, load, output, paper, quality, records, refit, scenes, speed,
+    stress,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         Command::Quality(arguments) => quality::run(&arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Instances(arguments) => instances::run(&arguments),
+        Command::Refit(arguments) => refit::run(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
     };
     match done {

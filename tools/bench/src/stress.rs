@@ -6,7 +6,7 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
-use bth_tests::structures::{Traced, every_structure};
+use bth_tests::structures::{Traced, deformed, every_structure};
 use serde_json::{Value, json};
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
@@ -31,7 +31,9 @@ pub fn run(arguments: &Stress) -> Result<()> {
     let share = arguments.millions.saturating_mul(1_000_000).div_ceil(shapes.len() as u64);
     let compiled = shapes.into_iter().map(|shape| {
         progress.show(format!("{}: compiling", shape.name));
-        let structures = every_structure(&shape.grid.model(), shape.whole);
+        let model = shape.grid.model();
+        let mut structures = every_structure(&model, shape.whole);
+        structures.push(deformed(&model, arguments.seed));
         ShapeRun { shape, structures, statistics: Statistics::default() }
     });
     let mut runs: Vec<ShapeRun> = compiled.collect();
@@ -112,7 +114,8 @@ fn body(rows: &[Vec<String>]) -> String {
     ];
     format!(
         "Every ray goes through every structure (BVH; BTH with each record; where the shape has one, one \
-         tetrahedralization with each record), as nearest and any hit, a part also with hints and alone: *traced* \
+         tetrahedralization with each record; a deformable object that was compiled in another shape and given these \
+         positions), as nearest and any hit, a part also with hints and alone: *traced* \
          counts all of these. Each tenth of the rays is of a kind: exactly at vertices; at middles of edges; along \
          edges; in planes of faces; along axes with zeros of either sign; with directions of 2^±60 and 2^-149; with \
          ranges that end at, just before and just behind a vertex; from the surface; from inside; from anywhere. \

@@ -58,6 +58,8 @@ impl Quality {
 pub struct BvhOptions {
     /// How much time to spend on the tree.
     pub quality: Quality,
+    /// Whether triangles of zero area are kept in the tree: deformable objects may give them an area.
+    pub keep_zero_area: bool,
 }
 
 /// BvhReport of [`build`].
@@ -80,14 +82,14 @@ pub struct BvhReport {
     pub seconds: f64,
 }
 
-/// Builds the binary BVH of all triangles of non-zero area, down to single triangles. The result
+/// Builds the binary BVH of all triangles, those of zero area only if the options say so, down to single triangles. The result
 /// depends on mesh and options alone, not on the number of threads.
 ///
 /// # Errors
 /// [`Error::Internal`] when the mesh breaks its own contract (indices in range, positions finite),
 /// [`Error::Limit`] beyond `bth_format::limits::MAX_TRIANGLES`, [`Error::Cancelled`].
 pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
-    build_with(mesh, &options.quality.effort(), monitor)
+    build_tree(mesh, &options.quality.effort(), options.keep_zero_area, monitor)
 }
 
 /// As [`build`], with any effort.
@@ -95,12 +97,22 @@ pub fn build(mesh: &Mesh, options: &BvhOptions, monitor: &dyn Monitor) -> Result
 /// # Errors
 /// As [`build`].
 pub fn build_with(mesh: &Mesh, effort: &Effort, monitor: &dyn Monitor) -> Result<(BinaryBvh, BvhReport)> {
+    build_tree(mesh, effort, false, monitor)
+}
+
+fn build_tree(
+    mesh: &Mesh,
+    effort: &Effort,
+    keep_zero_area: bool,
+    monitor: &dyn Monitor,
+) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
     let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
         .into_par_iter()
         .filter_map(|id| {
             let corners = mesh.corners(id);
-            (!is_zero_area(corners)).then(|| Reference { bounds: Bounds::of_points(&corners), id })
+            (keep_zero_area || !is_zero_area(corners))
+                .then(|| Reference { bounds: Bounds::of_points(&corners), id })
         })
         .collect();
     let mut report = BvhReport {
@@ -292,7 +304,9 @@ fn split_by_id(references: &mut [Reference]) -> usize {
 /// Nodes that a random line through the root's box meets on average; see [`BvhReport::visits`].
 pub fn visits(bvh: &BinaryBvh) -> f64 {
     let area = |node: &Node| Bounds::of_node(node).half_area();
-    bvh.nodes.iter().map(area).sum::<f64>() / area(&bvh.nodes[0])
+    let root = area(&bvh.nodes[0]);
+    // A deformable mesh may lie on one line.
+    if root > 0.0 { bvh.nodes.iter().map(area).sum::<f64>() / root } else { 0.0 }
 }
 
 /// Edges on the longest path.

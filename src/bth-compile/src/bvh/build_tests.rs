@@ -8,7 +8,7 @@ use proptest::prelude::*;
 const ALL: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Best];
 
 fn built(mesh: &Mesh, quality: Quality) -> (BinaryBvh, BvhReport) {
-    build(mesh, &BvhOptions { quality }, &Silent).expect("builds")
+    build(mesh, &BvhOptions { quality, ..BvhOptions::default() }, &Silent).expect("builds")
 }
 
 fn check(mesh: &Mesh) {
@@ -124,7 +124,11 @@ impl Monitor for Stop {
 fn a_build_can_be_cancelled_anywhere() {
     let mesh = soup(20_000, 31);
     for looks in [0, 1, 5, 20] {
-        let result = build(&mesh, &BvhOptions { quality: Quality::Best }, &Stop(looks.into()));
+        let result = build(
+            &mesh,
+            &BvhOptions { quality: Quality::Best, ..BvhOptions::default() },
+            &Stop(looks.into()),
+        );
         assert!(matches!(result, Err(Error::Cancelled)), "after {looks}");
     }
 }

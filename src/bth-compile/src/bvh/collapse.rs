@@ -6,7 +6,7 @@ use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
 use crate::monitor::Monitor;
-use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES};
+use bth_format::layout::{CacheLine, Child, INDEXED_LINES, NODE_LINES, NONE, RAW_LINES, WIDTH};
 use bth_import::Mesh;
 use serde::Serialize;
 
@@ -15,6 +15,8 @@ use serde::Serialize;
 pub struct CollapseOptions {
     /// Whether the BVH below each tet leaf is kept beside it.
     pub keep_subtrees: bool,
+    /// Whether the vertices of leaves are recorded. Excludes cut nodes.
+    pub leaf_vertices: bool,
     /// Costs by which the tree is chosen.
     pub costs: Costs,
     /// Limits on the tree.
@@ -28,6 +30,9 @@ pub struct Wide {
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
+    /// For each leaf, in order of the leaves' lines, the rows of the mesh's positions in its slots: one array for an indexed leaf, one
+    /// for each corner of a raw one. Empty if they are not recorded.
+    pub leaf_vertices: Vec<[u32; WIDTH]>,
     /// [`Child`] code of the root, `NONE` when no triangle can be hit.
     pub root: u32,
     /// Wide nodes on the longest path from the root; subtrees count as below their tet leaf.
@@ -125,6 +130,7 @@ pub fn collapse_by(
         cut,
         decisions: &decisions,
         plan: options.plan,
+        leaf_vertices: options.leaf_vertices,
         monitor,
         wide: &mut wide,
         report: &mut report,
@@ -141,8 +147,10 @@ pub fn collapse_by(
     check_depth(wide.depth)?;
 
     report.depth = wide.depth;
-    report.node_visits /= root_area;
-    report.leaf_visits /= root_area;
+    if root_area > 0.0 {
+        report.node_visits /= root_area;
+        report.leaf_visits /= root_area;
+    }
     report.measure(&wide);
     Ok((wide, report))
 }
@@ -209,6 +217,7 @@ struct Writer<'a> {
     cut: &'a [u32],
     decisions: &'a [Decision],
     plan: Plan,
+    leaf_vertices: bool,
     monitor: &'a dyn Monitor,
     wide: &'a mut Wide,
     report: &'a mut CollapseReport,
@@ -293,12 +302,16 @@ impl Writer<'_> {
         self.wide.triangle_ids.extend_from_slice(ids);
         match Child::from_code(slot.code) {
             Some(Child::Raw(line)) => {
-                put(&mut self.wide.lines, line as usize, &raw_leaf(self.mesh, ids, first));
+                let (leaf, rows) = raw_leaf(self.mesh, ids, first);
+                put(&mut self.wide.lines, line as usize, &leaf);
+                self.record(&rows);
                 self.report.raw_leaves += 1;
                 self.report.raw_triangles += u64::from(node.count);
             }
             Some(Child::Indexed(line)) => {
-                put(&mut self.wide.lines, line as usize, &indexed_leaf(self.mesh, ids, first));
+                let (leaf, rows) = indexed_leaf(self.mesh, ids, first);
+                put(&mut self.wide.lines, line as usize, &leaf);
+                self.record(&[rows]);
                 self.report.indexed_leaves += 1;
                 self.report.indexed_triangles += u64::from(node.count);
             }
@@ -306,6 +319,13 @@ impl Writer<'_> {
         }
         if outer {
             self.report.leaf_visits += self.area(slot.node);
+        }
+    }
+
+    /// Records the rows of a leaf's vertices, if they are wanted.
+    fn record(&mut self, rows: &[[u32; WIDTH]]) {
+        if self.leaf_vertices {
+            self.wide.leaf_vertices.extend_from_slice(rows);
         }
     }
 

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use zerocopy::{FromBytes, IntoBytes};
 
 fn built(mesh: &Mesh, quality: Quality) -> BinaryBvh {
-    build(mesh, &BvhOptions { quality }, &Silent).expect("builds").0
+    build(mesh, &BvhOptions { quality, ..BvhOptions::default() }, &Silent).expect("builds").0
 }
 
 fn collapsed(mesh: &Mesh, bvh: &BinaryBvh, cut: &[u32], keep_subtrees: bool) -> (Wide, CollapseReport) {

@@ -182,7 +182,9 @@ impl<'a> Planner<'a> {
         below_cut: bool,
         monitor: &'a dyn Monitor,
     ) -> Self {
-        let inverse_area = 1.0 / Bounds::of_node(&bvh.nodes[0]).half_area();
+        let area = Bounds::of_node(&bvh.nodes[0]).half_area();
+        // A deformable mesh may lie on one line: then all trees cost the same.
+        let inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
         let visits = bvh.nodes.iter().map(|n| Bounds::of_node(n).half_area()).sum::<f64>() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
         Planner { mesh, bvh, costs, plan, below_cut, monitor, inverse_area, line }

@@ -25,8 +25,8 @@ pub(super) fn wide_node<'a>(children: impl Iterator<Item = (&'a Node, u32)>) -> 
     wide
 }
 
-/// A leaf over 1 to 16 triangles of at most 16 distinct vertices.
-pub(super) fn indexed_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> IndexedLeaf {
+/// A leaf over 1 to 16 triangles of at most 16 distinct vertices, and the rows of these vertices.
+pub(super) fn indexed_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> (IndexedLeaf, [u32; WIDTH]) {
     let mut rows = [0u32; WIDTH];
     let mut vertices = 0;
     let mut corner = [[0u8; WIDTH]; 3];
@@ -44,12 +44,16 @@ pub(super) fn indexed_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> IndexedLeaf 
     rows[vertices..].fill(unused);
     let positions = rows.map(|row| mesh.positions[row as usize]);
     let vertex = std::array::from_fn(|k| positions.map(|p| p[k]));
-    IndexedLeaf { vertex, corner, first, triangles: ids.len() as u32, vertices: vertices as u32, reserved: 0 }
+    let (triangles, vertices) = (ids.len() as u32, vertices as u32);
+    (IndexedLeaf { vertex, corner, first, triangles, vertices, reserved: 0 }, rows)
 }
 
-/// A leaf over 1 to 16 triangles.
-pub(super) fn raw_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> RawLeaf {
-    let corners: [_; WIDTH] = std::array::from_fn(|slot| mesh.corners(*ids.get(slot).unwrap_or(&ids[0])));
+/// A leaf over 1 to 16 triangles, and the rows of the vertices of each corner.
+pub(super) fn raw_leaf(mesh: &Mesh, ids: &[u32], first: u32) -> (RawLeaf, [[u32; WIDTH]; 3]) {
+    let triangles: [_; WIDTH] =
+        std::array::from_fn(|slot| mesh.triangles[*ids.get(slot).unwrap_or(&ids[0]) as usize]);
+    let rows = std::array::from_fn(|c| triangles.map(|rows| rows[c]));
+    let corners = triangles.map(|rows| rows.map(|row| mesh.positions[row as usize]));
     let corner = std::array::from_fn(|c| std::array::from_fn(|k| corners.map(|triangle| triangle[c][k])));
-    RawLeaf { corner, first, triangles: ids.len() as u32, reserved: [0; 14] }
+    (RawLeaf { corner, first, triangles: ids.len() as u32, reserved: [0; 14] }, rows)
 }

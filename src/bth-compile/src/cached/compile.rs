@@ -109,7 +109,8 @@ pub(crate) fn compile_triangles(
     let tetgen = tetgen_in_keys(options, cache, monitor)?;
     let key = tetgen.map(|tetgen| keys::file(&digest, model.path, options, &tetgen));
     let outcome = compile_or_fetch(cache, key.as_ref(), needed, monitor, || {
-        let import = || import_triangles(model.path, mesh.positions, mesh.triangles, monitor);
+        let import =
+            || import_triangles(model.path, mesh.positions, mesh.triangles, options.wanted(), monitor);
         let imported = clock.time("mesh", import)?;
         let stages = &mut CachedStages::of_model(cache);
         let (checked, report) = compile_imported(&model, imported, options, stages, clock, monitor)?;
@@ -155,7 +156,7 @@ pub(crate) fn tetgen_in_keys(
     if cache.store().is_none() || options.tets.planted.is_some() {
         return Ok(None);
     }
-    match options.structure {
+    match options.built_structure() {
         Structure::Bvh => Ok(Some(String::new())),
         _ => Ok(cache.tetgen(&options.tets, monitor)?.map(str::to_owned)),
     }

@@ -26,6 +26,7 @@ const COLLAPSE: &str = "1";
 const OPACITY: &str = "1";
 const NAMES: &str = "1";
 const MATERIALS: &str = "1";
+const DEFORMABLE: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
@@ -39,6 +40,9 @@ pub(crate) fn mesh(source: &SourceDigest, path: &Path, part: &str, wanted: Wante
         .with("mesh version", MESH);
     if wanted.groups {
         key = key.with("names", "true").with("names version", NAMES);
+    }
+    if wanted.vertices {
+        key = key.with("vertices", "all").with("deformable version", DEFORMABLE);
     }
     if wanted.materials {
         key = key.with("materials", "true").with("materials version", MATERIALS);
@@ -58,10 +62,11 @@ pub(crate) fn extension(path: &Path) -> String {
 
 /// The binary BVH of a mesh.
 pub(crate) fn bvh(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
-    Key::new("bvh")
+    let key = Key::new("bvh")
         .with("geometry", geometry.hex())
         .with("quality", text(&options.quality))
-        .with("bvh version", BVH)
+        .with("bvh version", BVH);
+    if options.keep_zero_area { key.with("zero area", "kept") } else { key }
 }
 
 /// The marks of its nodes.
@@ -158,7 +163,7 @@ pub(crate) fn file_index(named: &Digest, options: &CompileOptions, tetgen: &str)
 /// All options that a compiled object depends on, in canonical form, under the names that explanations of misses show. The cost profile is among them by the hash of its content.
 fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     let mut all = vec![
-        ("structure", text(&options.structure)),
+        ("structure", text(&options.built_structure())),
         ("quality", text(&options.bvh.quality)),
         ("attributes", text(&options.attributes)),
         ("source geometry", options.geometry.to_string()),
@@ -169,6 +174,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     ];
     if options.alpha != AlphaMode::None {
         all.extend([("alpha", text(&options.alpha)), ("opacity version", OPACITY.to_owned())]);
+    }
+    if options.deformable {
+        all.extend([("deformable", "true".to_owned()), ("deformable version", DEFORMABLE.to_owned())]);
     }
     if options.names {
         all.extend([("names", "true".to_owned()), ("names version", NAMES.to_owned())]);
@@ -185,7 +193,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
             ("coordinates version", COORDINATES.to_owned()),
         ]);
     }
-    if options.structure != Structure::Bvh {
+    if options.built_structure() != Structure::Bvh {
         all.extend([
             ("tets", options.record.name().to_owned()),
             ("subtrees", options.keep_subtrees.to_string()),
@@ -198,7 +206,7 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
         ]);
     }
     let mut all: Vec<_> = all.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
-    if options.structure != Structure::Bvh {
+    if options.built_structure() != Structure::Bvh {
         // CompileOptions are components of their own, so that an explanation names the one that differs.
         let fields = json(&options.costs);
         let fields = fields.as_object().into_iter().flatten();

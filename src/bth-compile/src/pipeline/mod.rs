@@ -25,7 +25,7 @@ pub(crate) use stages::{Direct, Stages};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::source::{Model, SourceDigest, changed};
-use crate::{coordinates, tets};
+use crate::{bvh, coordinates, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
 use std::collections::BTreeSet;
@@ -105,13 +105,15 @@ pub(crate) fn compile_mesh(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Object, StageReports)> {
+    options.check()?;
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
-    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &options.bvh, monitor))?;
+    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
+    let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
     let traced = TracedMesh { mesh, on_grid, tree };
-    let (leaves, tets) = match options.structure {
+    let (leaves, tets) = match options.built_structure() {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };

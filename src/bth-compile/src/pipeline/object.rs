@@ -93,7 +93,11 @@ pub(super) fn collapse(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(PackedWide, bvh::CollapseReport)> {
-    let collapse_options = bvh::CollapseOptions { keep_subtrees: options.keep_subtrees, ..options.collapse };
+    let collapse_options = bvh::CollapseOptions {
+        keep_subtrees: options.keep_subtrees,
+        leaf_vertices: options.deformable,
+        ..options.collapse
+    };
     let collapse = || bvh::collapse(traced.mesh, traced.tree, cut, &collapse_options, monitor);
     let (mut wide, mut report) = timed(collapse)?;
     let grid = traced.on_grid.map(|on_grid| &on_grid.grid);
@@ -168,6 +172,7 @@ impl Object {
             dropped: (mesh.triangles.len() - tree.order.len()) as u32,
             lines: &self.wide.lines,
             triangle_ids: &self.wide.triangle_ids,
+            leaf_vertices: &self.wide.leaf_vertices,
             grid: on_grid.as_ref().map(|on| (on.grid, on.displacement)),
             packed_nodes: self.packed_nodes,
             groups: self.groups.as_ref(),

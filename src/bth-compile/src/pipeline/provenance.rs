@@ -56,6 +56,9 @@ fn options_json(options: &CompileOptions) -> serde_json::Value {
         "keep_subtrees": options.keep_subtrees,
         "geometry": options.geometry,
     });
+    if options.deformable {
+        json["deformable"] = json!(true);
+    }
     if options.names {
         json["names"] = json!(true);
     }

@@ -142,7 +142,7 @@ fn import(
     }
     let Context { options, cache, monitor, .. } = context;
     if let Some(TriangleMesh { positions, triangles }) = file.in_memory {
-        let read = mesh::import_triangles(&file.full, positions, triangles, *monitor)?;
+        let read = mesh::import_triangles(&file.full, positions, triangles, options.wanted(), *monitor)?;
         return Ok(vec![MeshSummary::of(read)]);
     }
     let single: Vec<u32> = numbers.iter().filter_map(|number| *number).collect();

@@ -27,6 +27,7 @@ pub(crate) use gather::NodeInput;
 pub(crate) use node::{NodeJob, NodeResult, NodeRunner, TimedNodes};
 pub use options::TetOptions;
 pub(crate) use pool::version;
+pub use pool::worker;
 pub use report::{NodeReport, Outcome, TetReport, WorkerStatus};
 
 /// A tet leaf: the node of the binary BVH, and its tetrahedralization.

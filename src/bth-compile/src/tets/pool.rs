@@ -42,6 +42,23 @@ pub(super) fn find(options: &TetOptions) -> std::result::Result<PathBuf, String>
     })
 }
 
+/// The worker program that compilations will use, and the version of TetGen in it; or a sentence that says why there is none.
+///
+/// # Errors
+/// Cancelled.
+pub fn worker(
+    options: &TetOptions,
+    monitor: &dyn Monitor,
+) -> Result<std::result::Result<(PathBuf, String), String>> {
+    let program = match find(options) {
+        Ok(program) => program,
+        Err(why) => return Ok(Err(why)),
+    };
+    let setup = Setup { program: program.clone(), memory: options.memory };
+    let started = WorkerSlot::new(&setup).tetgen(monitor)?.map(str::to_owned);
+    Ok(started.map(|version| (program, version)).map_err(|error| error.to_string()))
+}
+
 /// The tetrahedralizer that a compilation will use: the version of TetGen, or `none` without a worker; `None` when the worker
 /// fails.
 ///

@@ -27,6 +27,8 @@ pub struct ObjectParts<'a> {
     pub lines: &'a [CacheLine],
     /// Source id of each triangle in leaf order.
     pub triangle_ids: &'a [u32],
+    /// Vertices of the source in each leaf; empty but in deformable objects.
+    pub leaf_vertices: &'a [[u32; WIDTH]],
     /// Record of the tetrahedra; `None` without tet leaves.
     pub record: Option<RecordKind>,
     /// Tet leaves.
@@ -56,7 +58,7 @@ pub struct ObjectParts<'a> {
 /// Positions and attributes of the source; empty slices are left out.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Source<'a> {
-    /// Welded positions.
+    /// Welded positions; those of all vertices in deformable objects.
     pub positions: &'a [[f32; 3]],
     /// Rows of `positions` per triangle.
     pub triangles: &'a [[u32; 3]],
@@ -101,6 +103,7 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     builder.section(kind::OBJECT, index, size_of::<Object>() as u32, row)?;
     builder.rows(kind::LINES, index, parts.lines)?;
     builder.rows(kind::TRIANGLE_IDS, index, parts.triangle_ids)?;
+    builder.rows(kind::LEAF_VERTICES, index, parts.leaf_vertices)?;
     builder.rows(kind::TET_LEAVES, index, parts.tet_leaves)?;
     if let Some(record) = record {
         builder.section(kind::TETS, index, record.stride() as u32, parts.tets)?;

@@ -7,6 +7,7 @@
 mod adjacency;
 mod bit_set;
 mod boxes;
+mod deformable;
 mod groups;
 mod header;
 mod leaves;
@@ -31,7 +32,7 @@ use crate::object::ObjectView;
 /// Checks every index of an object.
 ///
 /// # Errors
-/// The first violation of `BTH-F101` to `BTH-F147`, with an offset from the start of its section;
+/// The first violation of `BTH-F101` to `BTH-F147` and `BTH-F163` to `BTH-F167`, with an offset from the start of its section;
 /// [`crate::file::File::check`] gives offsets from the start of the file.
 pub(crate) fn object(view: &ObjectView) -> Result<()> {
     header::check(view)?;
@@ -41,5 +42,6 @@ pub(crate) fn object(view: &ObjectView) -> Result<()> {
     tet_leaves::check(view)?;
     tree::check(view)?;
     leaves::check_ids(view)?;
-    tet_faces::check(view)
+    tet_faces::check(view)?;
+    deformable::check(view)
 }

@@ -25,6 +25,11 @@ pub fn side(a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3]) -> Ordering {
 pub fn is_zero_area(corners: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
     [[0, 1], [1, 2], [2, 0]].into_iter().all(|[i, j]| {
+        let (p, q) = ((b[i] - a[i]) * (c[j] - a[j]), (b[j] - a[j]) * (c[i] - a[i]));
+        // Each product has three roundings, the difference one more.
+        if (p - q).abs() > 8.0 * f64::EPSILON * (p.abs() + q.abs()) {
+            return false;
+        }
         let mut sum = Expansion::<12>::new();
         for [p, q] in [[a, b], [b, c], [c, a]] {
             sum.add_product(p[i], q[j], 1.0);

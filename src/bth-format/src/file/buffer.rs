@@ -53,7 +53,7 @@ impl Owned {
         Some(Owned { memory: Memory::Lines(lines), length })
     }
 
-    fn bytes(&self) -> &[u8] {
+    pub(super) fn bytes(&self) -> &[u8] {
         match &self.memory {
             Memory::Lines(lines) => &lines.as_bytes()[..self.length],
             Memory::Pages(pages, first) => &pages[*first..][..self.length],

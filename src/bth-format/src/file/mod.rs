@@ -4,8 +4,10 @@
 //! indices of an object, [`File::check_scene`] those of the scene, [`crate::verify`] everything.
 
 mod buffer;
+mod deformed;
 mod table;
 
+pub use deformed::{DeformedObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
@@ -15,7 +17,7 @@ use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
-use buffer::Buffer;
+use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
@@ -179,7 +181,7 @@ impl File {
 
     /// Bytes of the sections that tracing reads; attributes, positions and provenance are not among them.
     pub fn resident_bytes(&self) -> u64 {
-        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_required(e.kind);
+        let traced = |e: &&SectionEntry| e.object != NONE && kind::is_traced(e.kind);
         self.table().iter().filter(traced).map(|e| e.length).sum()
     }
 
@@ -262,6 +264,7 @@ impl File {
             tet_faces: self.slice(object, kind::TET_FACES),
             hull_faces: self.slice(object, kind::HULL_FACES),
             triangle_faces: self.slice(object, kind::TRIANGLE_FACES),
+            leaf_vertices: self.slice(object, kind::LEAF_VERTICES),
             positions: self.slice(object, kind::POSITIONS),
             triangles: self.slice(object, kind::TRIANGLES),
             corners: self.slice(object, kind::CORNERS),
@@ -299,7 +302,7 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160` and `BTH-F161`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161` and `BTH-F163` to `BTH-F167`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;

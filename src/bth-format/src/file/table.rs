@@ -44,6 +44,7 @@ pub fn kind_stride(kind: u32) -> Option<usize> {
         kind::LINES => size_of::<CacheLine>(),
         kind::TRIANGLE_IDS | kind::TRIANGLE_FACES | kind::OPACITY | kind::OPACITY_MICRO => 4,
         kind::TET_LEAVES => size_of::<TetLeaf>(),
+        kind::LEAF_VERTICES => size_of::<[u32; WIDTH]>(),
         kind::TETS => 0,
         kind::TET_VERTICES => size_of::<TetVertex>(),
         kind::TET_FACES => size_of::<TetFace>(),
@@ -81,6 +82,7 @@ fn max_count(kind: u32) -> u64 {
             limits::MAX_TRIANGLES as u64
         }
         kind::OPACITY_MICRO => limits::MAX_OPACITY_WORDS as u64,
+        kind::LEAF_VERTICES => limits::MAX_LEAF_VERTICES as u64,
         kind::TET_LEAVES => Child::INDEX_LIMIT as u64,
         // Links hold rows in 31 bits, other references in 32; NONE is no row.
         kind::TET_FACES | kind::HULL_FACES | kind::TET_VERTICES | kind::INSTANCES => (FACE_BIT - 1) as u64,

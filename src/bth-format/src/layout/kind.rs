@@ -19,7 +19,10 @@ pub const TET_FACES: u32 = 7;
 pub const HULL_FACES: u32 = 8;
 /// `u32` per source triangle: its row in `TET_FACES`, or `NONE`.
 pub const TRIANGLE_FACES: u32 = 9;
-/// `[f32; 3]`: distinct positions of the source, object space.
+/// `[u32; 16]` per indexed leaf and three of them per raw leaf, in the order of the leaves: rows of `POSITIONS`. Objects that
+/// have it can be given new positions ("Deformable objects").
+pub const LEAF_VERTICES: u32 = 10;
+/// `[f32; 3]`: positions of the source, object space; distinct ones but in deformable objects.
 pub const POSITIONS: u32 = 16;
 /// `[u32; 3]` per source triangle: rows of `POSITIONS`.
 pub const TRIANGLES: u32 = 17;
@@ -86,7 +89,11 @@ pub const fn is_scene(kind: u32) -> bool {
 pub const fn is_of_file(kind: u32) -> bool {
     (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
 }
+/// Whether tracing reads sections of this kind of an object.
+pub const fn is_traced(kind: u32) -> bool {
+    is_required(kind) && kind != LEAF_VERTICES && !is_of_file(kind)
+}
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
-    (OBJECT <= kind && kind <= TRIANGLE_FACES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
+    (OBJECT <= kind && kind <= LEAF_VERTICES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
 }

@@ -29,7 +29,10 @@ pub struct ObjectView<'a> {
     pub hull_faces: &'a [HullFace],
     /// Per source triangle its row of `tet_faces`, or [`NONE`]; empty when there are no tet leaves.
     pub triangle_faces: &'a [u32],
-    /// Distinct positions of the source, object space, if kept.
+    /// Per leaf its rows of `positions`, in the order of the leaves: one row for an indexed leaf, one for each corner of a raw
+    /// one. Empty but in deformable objects.
+    pub leaf_vertices: &'a [[u32; WIDTH]],
+    /// Positions of the source, object space, if kept; distinct ones but in deformable objects.
     pub positions: &'a [[f32; 3]],
     /// Per source triangle its rows of `positions`, if kept.
     pub triangles: &'a [[u32; 3]],
@@ -54,6 +57,11 @@ pub struct ObjectView<'a> {
 }
 
 impl ObjectView<'_> {
+    /// Whether the object can be given new positions.
+    #[inline(always)]
+    pub fn is_deformable(&self) -> bool {
+        !self.leaf_vertices.is_empty()
+    }
     /// Whether all nodes are packed; else none is.
     #[inline(always)]
     pub fn has_packed_nodes(&self) -> bool {

@@ -17,7 +17,8 @@ pub(super) struct Stored {
     pub(super) at: u64,
 }
 
-/// BTH-F201 or BTH-F202, and BTH-F207: a stored triangle has the corners of its source triangle, bit for bit, and an area.
+/// BTH-F201 or BTH-F202, and BTH-F207: a stored triangle has the corners of its source triangle, bit for bit, and an area
+/// unless the object is deformable.
 pub(super) fn check_corners(
     view: &ObjectView,
     id: u32,
@@ -30,7 +31,7 @@ pub(super) fn check_corners(
         let expected = format!("triangle {id}: {source:?}");
         return Err(Error::within(code, section, at, expected, format!("{corners:?}")));
     }
-    if is_zero_area(source) {
+    if !view.is_deformable() && is_zero_area(source) {
         let found = format!("triangle {id} of zero area");
         return Err(Error::within(Code::ZeroArea, section, at, "triangles that can be hit", found));
     }

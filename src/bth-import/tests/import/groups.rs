@@ -12,7 +12,9 @@ fn groups(name: &str, bytes: &[u8]) -> (Mesh, Groups) {
     let path = folder.path().join(name);
     std::fs::write(&path, bytes).unwrap();
     let read = |groups| {
-        import(&path, Wanted { attributes: Keep::None, groups, materials: false }, &Silent).unwrap().0
+        import(&path, Wanted { attributes: Keep::None, groups, materials: false, vertices: false }, &Silent)
+            .unwrap()
+            .0
     };
     let (mut mesh, plain) = (read(true), read(false));
     let groups = mesh.groups.take().expect("wanted groups");
@@ -109,7 +111,7 @@ fn primitives_of_gltf_are_groups() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
     std::fs::write(&path, &bytes).unwrap();
-    let wanted = Wanted { attributes: Keep::None, groups: true, materials: false };
+    let wanted = Wanted { attributes: Keep::None, groups: true, materials: false, vertices: false };
     let meshes = bth_import::import_gltf_meshes(&path, &[0, 1], wanted, &Silent).unwrap();
     let of = |row: usize| shown(meshes[row].0.groups.as_ref().unwrap());
     assert_eq!(

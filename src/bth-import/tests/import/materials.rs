@@ -7,7 +7,7 @@ use bth_import::{Materials, Wanted, import_images};
 use serde_json::{Value, json};
 use std::path::Path;
 
-const WANTED: Wanted = Wanted { attributes: Keep::All, groups: true, materials: true };
+const WANTED: Wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
 
 /// The smallest file that begins as a PNG image of one texel.
 fn image(seed: u8) -> Vec<u8> {

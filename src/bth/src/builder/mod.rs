@@ -4,6 +4,7 @@
 //! [`subscenes`] of whole files); the committed one is that of the [`Scene`], so that rays meet instances of callers and of files in
 //! the same way.
 
+mod deform;
 mod ids;
 mod instances;
 mod subscene;
@@ -57,6 +58,8 @@ pub struct SceneBuilder {
     /// For each id the subscene; `None` if it was removed.
     subscenes: Vec<Option<Subscene>>,
     subscene_ids: FreeIds,
+    /// The objects that get new positions.
+    deformed: Vec<u32>,
 }
 
 impl Default for SceneBuilder {
@@ -75,6 +78,7 @@ impl SceneBuilder {
             instance_ids: FreeIds::default(),
             subscenes: Vec::new(),
             subscene_ids: FreeIds::default(),
+            deformed: Vec::new(),
         }
     }
 
@@ -121,7 +125,7 @@ impl SceneBuilder {
         Ok(())
     }
 
-    /// Makes all changes since the last commit visible: places the instances that changed, and updates the top level. If instances
+    /// Makes all changes since the last commit visible: gives objects their new positions, places the instances that changed, and updates the top level. If instances
     /// only moved, the boxes of the top level are computed again; if instances came, went, were hidden or became visible, or
     /// [`Update::cost_ratio`] would exceed its bound, it is built anew. With the feature `rayon`, the threads of the current pool
     /// share the work of some thousand instances or more. The answers of queries depend on none of this.
@@ -131,6 +135,7 @@ impl SceneBuilder {
     /// finite in `f32`. The error gives the instance. The scene is then unchanged, and so are the changes that wait for a commit:
     /// correct the transform, or hide or remove the instance, and commit again.
     pub fn commit(&mut self) -> Result<Update, Error> {
+        let refitted = self.refit_objects();
         let mut nodes = 0;
         for subscene in self.subscenes.iter_mut().flatten() {
             let (instances, changed) = (&mut self.instances, &mut self.changed);
@@ -142,8 +147,15 @@ impl SceneBuilder {
         let Some(world) = world else { return Ok(Update::default()) };
         let new = |id: u32| instances[id as usize].placed_in(objects, subscenes);
         let update = match world.change(objects, instances.len(), &self.changed, &new) {
-            Ok(update) => Update { nodes, ..update },
+            Ok(update) => Update {
+                nodes,
+                deformed: refitted.deformed,
+                deformed_cost_ratio: refitted.deformed_cost_ratio,
+                refit: refitted.refit,
+                ..update
+            },
             Err(failed) => {
+                self.undo_refit();
                 let (code, expected, found) = failed.error.words();
                 let found = format!("{found}: {}", self.describe(failed.instance));
                 return Err(Error::of_call(code, expected, found));
@@ -156,6 +168,7 @@ impl SceneBuilder {
             self.scene.masks_mut().set_instance(id, u32::MAX);
         }
         self.subscene_ids.commit();
+        self.deformed.clear();
         Ok(update)
     }
 

@@ -10,6 +10,7 @@ use crate::intersect::point_triangle::squared_distance;
 use crate::intersect::triangle_box;
 use crate::rays::PrimitiveRef;
 use crate::scene::Scene;
+use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, TetLeaf, WIDTH, WideNode};
 use bth_format::object::ObjectView;
 use std::ops::ControlFlow;
@@ -237,8 +238,9 @@ impl RegionWalk<'_> {
         id: impl Fn() -> u32,
         visit: &mut Visitor<'_>,
     ) -> ControlFlow<()> {
-        let corners = self.placed.map_or(corners, |placed| placed.corners_in_world(corners));
-        if !self.region.overlaps(corners) {
+        let world = self.placed.map_or(corners, |placed| placed.corners_in_world(corners));
+        // Triangles of zero area are no part of the surface; only the leaves of deformable objects hold some.
+        if !self.region.overlaps(world) || (self.object.is_deformable() && is_zero_area(corners)) {
             return ControlFlow::Continue(());
         }
         visit(PrimitiveRef { instance: self.instance, triangle: id() })

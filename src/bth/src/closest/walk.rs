@@ -9,6 +9,7 @@ use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, Triangle
 use crate::query::Nearest;
 use crate::rays::PrimitiveRef;
 use crate::simd::{Isa, Kernel, LANES, Part, Simd};
+use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, RawLeaf, TetLeaf, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -118,25 +119,25 @@ impl Kernel for WalkKernel<'_> {
     }
 }
 
-/// The triangles of `valid` that may be closer than `limit` and, `in_world`, than the others.
+/// The triangles of `valid` that may be closer than `limit` and, if all that may be closest `is_offered`, than the others.
 struct Candidates<'a, S: Simd, B> {
     point: &'a PointLanes<S>,
     block: &'a B,
     valid: u32,
     limit: f32,
-    in_world: bool,
+    is_offered: bool,
 }
 
 impl<S: Simd, B: CornerLanes> Part<S> for Candidates<'_, S, B> {
     type Output = u32;
     #[inline(always)]
     fn run(self, s: S) -> u32 {
-        let Candidates { point, block, valid, limit, in_world } = self;
+        let Candidates { point, block, valid, limit, is_offered } = self;
         if block.is_beyond(s, point, limit) {
             return 0;
         }
         let bounds = TriangleLanes::new(s, &block.relative(s, point));
-        let least = if in_world { bounds.least_upper_bound(s, valid) } else { limit };
+        let least = if is_offered { bounds.least_upper_bound(s, valid) } else { limit };
         bounds.candidates(s, valid, least.min(limit))
     }
 }
@@ -165,8 +166,10 @@ impl ObjectWalk<'_> {
         if !S::HAS_VECTORS {
             return if is_beyond_called(s, point, block, limit) { 0 } else { valid };
         }
-        // In object space, the least upper bound says nothing about which triangle is closest in world space.
-        Candidates { point, block, valid, limit, in_world: self.placed.is_none() }.inline_or_call(s)
+        // In object space, the least upper bound says nothing about which triangle is closest in world space; nor does that of a
+        // triangle of zero area, which is not offered.
+        let is_offered = self.placed.is_none() && !self.object.is_deformable();
+        Candidates { point, block, valid, limit, is_offered }.inline_or_call(s)
     }
 
     /// Offers the triangles of a leaf.
@@ -216,6 +219,10 @@ impl ObjectWalk<'_> {
     /// Offers a triangle, given its corners in object space and a function that returns its id.
     #[inline(always)]
     fn offer(&self, corners: [[f32; 3]; 3], id: impl FnOnce() -> u32, search: &mut Search) {
+        // Triangles of zero area are no part of the surface; only the leaves of deformable objects hold some.
+        if self.object.is_deformable() && is_zero_area(corners) {
+            return;
+        }
         let corners = match self.placed {
             None => corners,
             Some((placed, _)) => placed.corners_in_world(corners),

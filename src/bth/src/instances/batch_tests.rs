@@ -99,7 +99,7 @@ fn top_level_and_hints_do_not_change_results() {
     let (mut hit_count, mut far_hits, mut ray_count) = (0, 0, 0);
     for case in 0..600 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
-        let objects = Objects::File(file.clone());
+        let objects = Objects::of_file(file.clone());
         let count = [1, 2, 7, 16, 17, 40, 300][case % 7];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = rays(&mut rng, &transforms, 40);
@@ -138,7 +138,7 @@ fn top_level_and_hints_do_not_change_results() {
 #[test]
 fn rays_that_are_not_finite_or_have_an_empty_range_hit_nothing() {
     let file = File::from_bytes(FILES[0]).unwrap();
-    let objects = Objects::File(file.clone());
+    let objects = Objects::of_file(file.clone());
     let world = world(&file, &mut Rng::new(3), 50).0;
     let good = Ray { origin: [0.0; 3], tmin: 0.0, direction: [1.0; 3], tmax: 1.0 };
     for ray in [
@@ -183,7 +183,7 @@ fn packets_through_the_top_level_do_not_change_results() {
     let (mut in_packets, mut ray_count, mut hit_count, mut refused) = (0, 0, 0, 0);
     for case in 0..200 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
-        let objects = Objects::File(file.clone());
+        let objects = Objects::of_file(file.clone());
         let count = [1, 7, 17, 40, 150][case % 5];
         let (world, transforms) = world(&file, &mut rng, count);
         let rays = bundle(&mut rng, &transforms, [33, 64, 100][case % 3]);
@@ -218,7 +218,7 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
     let (mut hit_count, mut ray_count) = (0, 0);
     for case in 0..60 {
         let file = File::from_bytes(FILES[case % 2]).unwrap();
-        let objects = Objects::File(file.clone());
+        let objects = Objects::of_file(file.clone());
         let identity = Affine::IDENTITY;
         let object = rng.below(u64::from(file.object_count())) as u32;
         let parts = PartBoxes::whole(file.object_header(object));

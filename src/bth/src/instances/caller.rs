@@ -32,6 +32,11 @@ pub(super) struct CallerInstances {
 }
 
 impl CallerInstances {
+    /// Forgets the boxes of an object, which has got others.
+    pub(super) fn forget_parts(&mut self, object: u32) {
+        self.parts[object as usize].take();
+    }
+
     pub(super) fn add_objects(&mut self, count: u32) {
         self.parts.resize_with(count as usize, OnceLock::new);
     }
@@ -119,6 +124,12 @@ impl World {
             update.cost_ratio = self.top.cost_ratio();
             return update;
         }
+        self.update_top(same_visible, &mut update);
+        update
+    }
+
+    /// Refits the top level if the same instances are visible and its cost permits, else builds it anew.
+    pub(super) fn update_top(&mut self, same_visible: bool, update: &mut Update) {
         let start = Instant::now();
         if same_visible {
             self.top.refit(&self.placements);
@@ -128,7 +139,6 @@ impl World {
             update.rebuilt = true;
         }
         (update.cost_ratio, update.top_level) = (self.top.cost_ratio(), start.elapsed());
-        update
     }
 
     /// Computes the placements of changed instances.
@@ -179,8 +189,7 @@ impl World {
             return Ok(None);
         }
         // As for the instances of files, the roots of mapped objects are not read before rays have reached them.
-        let is_loaded =
-            || self.is_traced(*object) || objects.locate(*object).is_some_and(|(file, _)| !file.is_mapped());
+        let is_loaded = || self.is_traced(*object) || !objects.is_mapped(*object);
         let parts = match parts.get() {
             Some(parts) => parts,
             None if is_loaded() => parts.get_or_init(|| Box::new(PartBoxes::of_root_children(view))),

@@ -16,17 +16,18 @@ pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {
 }
 
 impl World {
-    /// The instances of a file at the first frame of its scene; `None` if the file has no scene sections.
+    /// The instances of a file at the first frame of its scene; `None` if the objects are not those of a file with scene sections.
     ///
     /// # Errors
     /// Those of [`File::check_scene`] and of [`Self::update`].
-    pub(crate) fn new(file: &File) -> Result<Option<World>> {
+    pub(crate) fn new(objects: &Objects) -> Result<Option<World>> {
+        let Some(file) = objects.sole_file() else { return Ok(None) };
         let Some(view) = file.check_scene()? else { return Ok(None) };
         let scene = &view.scene[0];
         let seconds = f64::from(scene.first_frame) / scene.rate;
         let source = TransformSource::File(NodeHierarchy::new(&view));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
-        world.place_instances(file, seconds, true)?;
+        world.place_instances(objects, seconds, true)?;
         Ok(Some(world))
     }
 
@@ -37,21 +38,21 @@ impl World {
     /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it or the world box is not finite. The error
     /// gives the node.
     pub(crate) fn update(&mut self, objects: &Objects, seconds: f64) -> Result<Update> {
-        let (TransformSource::File(_), Some(file)) = (&self.source, objects.sole_file()) else {
+        if !matches!(self.source, TransformSource::File(_)) {
             return Ok(Update::default());
-        };
-        let result = self.place_instances(file, seconds, false);
+        }
+        let result = self.place_instances(objects, seconds, false);
         match &result {
             Ok(_) => self.seconds = seconds,
             // The instances of the former time have been placed before, so placing them again succeeds.
-            Err(_) => drop(self.place_instances(file, self.seconds, true)),
+            Err(_) => drop(self.place_instances(objects, self.seconds, true)),
         }
         result
     }
 
     /// Places the instances that moved, or with `all` every instance, and rebuilds the top level.
-    fn place_instances(&mut self, file: &File, seconds: f64, all: bool) -> Result<Update> {
-        let view = file.scene().expect("checked when the scene was opened");
+    fn place_instances(&mut self, objects: &Objects, seconds: f64, all: bool) -> Result<Update> {
+        let view = scene_of(objects);
         let TransformSource::File(hierarchy) = &mut self.source else { return Ok(Update::default()) };
         let mut update = Update { nodes: hierarchy.update(&view, seconds, all), ..Update::default() };
         for (row, instance) in view.instances.iter().enumerate() {
@@ -64,25 +65,19 @@ impl World {
             if hierarchy.hidden(instance.node) {
                 continue;
             }
-            let object = file.object_header(instance.object);
+            let object = objects.header(instance.object);
             if object.root == NONE {
                 continue;
             }
             let world = hierarchy.to_world(&view, instance.node);
-            // The boxes of the root's children give a tighter world box. They are used only if they are in memory already:
-            // reading the root of every mapped object would take longer than the tighter boxes save.
-            let parts = match file.view(instance.object) {
-                Ok(view) if self.is_traced(instance.object) || !file.is_mapped() => {
-                    PartBoxes::of_root_children(view)
-                }
-                _ => PartBoxes::whole(object),
-            };
+            let parts = self.parts_of(objects, instance.object);
             let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
                 let (code, expected, found) = error.words();
                 let name = view.node_name(instance.node).escape_debug();
                 let found = format!("{found}: node \"{name}\" at {seconds} s");
                 let offset = u64::from(instance.node) * size_of::<Node>() as u64;
-                file.locate(Error::within_file(code, kind::NODES, offset, expected, found), NONE)
+                let error = Error::within_file(code, kind::NODES, offset, expected, found);
+                objects.sole_file().expect("a file with nodes").locate(error, NONE)
             })?;
             self.placements[row] = Some(placement);
         }
@@ -93,6 +88,16 @@ impl World {
         }
         update.visible = self.placements.iter().flatten().count();
         Ok(update)
+    }
+
+    /// Boxes that contain all triangles of an object. Those of the root's children give a tighter world box. They are used only
+    /// if they are in memory already: reading the root of every mapped object would take longer than the tighter boxes save.
+    pub(super) fn parts_of(&self, objects: &Objects, object: u32) -> PartBoxes {
+        let in_memory = self.is_traced(object) || !objects.is_mapped(object);
+        match objects.unchecked_view(object).filter(|_| in_memory) {
+            Some(view) => PartBoxes::of_root_children(view),
+            None => PartBoxes::whole(objects.header(object)),
+        }
     }
 
     /// The transform from a node's space to world space, as rows of four, and whether the node is visible.

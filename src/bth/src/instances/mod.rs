@@ -11,6 +11,7 @@
 mod affine;
 mod batch;
 mod caller;
+mod deformed;
 mod enter_object;
 mod enumerate;
 #[cfg(test)]

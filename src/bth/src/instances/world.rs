@@ -28,12 +28,30 @@ pub struct Update {
     pub cost_ratio: f64,
     /// Time to rebuild or refit the top level.
     pub top_level: Duration,
+    /// Objects that got new positions ([`Scene::set_positions`](crate::Scene::set_positions)).
+    pub deformed: usize,
+    /// Expected cost of rays through a deformed object relative to that in the pose for which it was compiled, of several objects the
+    /// greatest: the sum of the areas of the boxes of all nodes and leaves, relative to the area of the object's box (SAH). 1 if
+    /// no object was deformed. Where it grows far beyond 1, compile the object anew in a pose nearer to the new one.
+    pub deformed_cost_ratio: f64,
+    /// Time to check the new positions and refit the objects.
+    pub refit: Duration,
 }
 
 impl Default for Update {
     /// An update in which nothing changed.
     fn default() -> Update {
-        Update { nodes: 0, placed: 0, visible: 0, rebuilt: false, cost_ratio: 1.0, top_level: Duration::ZERO }
+        Update {
+            nodes: 0,
+            placed: 0,
+            visible: 0,
+            rebuilt: false,
+            cost_ratio: 1.0,
+            top_level: Duration::ZERO,
+            deformed: 0,
+            deformed_cost_ratio: 1.0,
+            refit: Duration::ZERO,
+        }
     }
 }
 

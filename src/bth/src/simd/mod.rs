@@ -177,6 +177,21 @@ pub(crate) trait Simd: Lanewise {
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
     /// The least of all lanes, none of which may be NaN.
     fn least(self, a: Self::F) -> f32;
+    /// Loads rows of three: lane i of vector k is element k of row `row[i]`.
+    ///
+    /// # Panics
+    /// If the index of a row lies outside of `from`.
+    #[inline(always)]
+    fn points(self, from: &[[f32; 3]], row: &[u32; LANES]) -> [Self::F; 3] {
+        let mut columns = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let point = &from[row[i] as usize];
+            for k in 0..3 {
+                columns[k][i] = point[k];
+            }
+        }
+        [self.load(&columns[0]), self.load(&columns[1]), self.load(&columns[2])]
+    }
     /// Loads rows of four and transposes them: lane i of vector k is element k of row `row[i]`, and is undefined where the mask
     /// is clear. Much faster than four gathers on all instruction sets.
     ///

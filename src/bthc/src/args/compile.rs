@@ -70,6 +70,10 @@ pub(crate) struct Compile {
     /// triangles are in tetrahedra, in place of 180 to 200.
     #[arg(long, conflicts_with_all = ["tets", "subtrees"])]
     pub(crate) compact: bool,
+    /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
+    /// source, and the object is a BVH.
+    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
+    pub(crate) deformable: bool,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long)]
     pub(crate) no_geometry: bool,
@@ -183,7 +187,11 @@ impl Compile {
     /// If the profile cannot be used.
     pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
         let mut options = bth_compile::pipeline::CompileOptions {
-            structure: self.structure.into(),
+            structure: match self.structure {
+                // A tetrahedralization would not stay one.
+                Structure::Bth if self.deformable => bth_compile::pipeline::Structure::Bvh,
+                structure => structure.into(),
+            },
             attributes: if self.materials { Keep::All } else { self.attributes.into() },
             names: self.names || self.materials,
             materials: self.materials,
@@ -195,6 +203,7 @@ impl Compile {
                 None => self.structure == Structure::Bth && !self.compact,
             },
             geometry: !self.no_geometry,
+            deformable: self.deformable,
             ..Default::default()
         };
         self.selection.apply(&mut options)?;

@@ -15,14 +15,20 @@ use std::path::PathBuf;
 
 /// Compiles triangle models into BTH files, for tracing rays without building anything at the start.
 #[derive(Debug, Parser)]
-#[command(name = "bthc", version, after_help = EXIT_CODES, max_term_width = 100)]
+#[command(name = "bthc", version, disable_version_flag = true, arg_required_else_help = true, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
     /// Instruction set for tracing: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says, else the
     /// best of this machine. Answers do not depend on it.
     #[arg(long, global = true, value_name = "ISA")]
     pub(crate) isa: Option<bth::Isa>,
+    /// Print the version and end.
+    #[arg(short = 'V', long)]
+    pub(crate) version: bool,
+    /// With --version: also the version of files, the target, instruction sets, features, and the TetGen that is found.
+    #[arg(long, requires = "version")]
+    pub(crate) verbose: bool,
     #[command(subcommand)]
-    pub(crate) command: Command,
+    pub(crate) command: Option<Command>,
 }
 
 #[derive(Debug, Subcommand)]

@@ -15,7 +15,7 @@ pub(crate) fn run(args: &Marks) -> Result<(), Failure> {
     let (mesh, contacts) = with_threads(args.threads, || -> bth_compile::Result<_> {
         let (mesh, _) = bth_import::import(&args.model, Keep::None, &progress)?;
         // The contacts do not depend on the tree, so the fastest builder is used.
-        let options = bvh::BvhOptions { quality: bvh::Quality::Fast };
+        let options = bvh::BvhOptions { quality: bvh::Quality::Fast, ..Default::default() };
         let (tree, _) = bvh::build(&mesh, &options, &progress)?;
         let contacts = marks::bad_pairs(&mesh, &tree, &progress)?;
         Ok((mesh, contacts))

@@ -11,6 +11,7 @@ mod output;
 mod paper;
 mod quality;
 mod records;
+mod refit;
 mod run;
 mod scenes;
 mod speed;
@@ -28,6 +29,7 @@ pub use output::Output;
 pub use paper::Paper;
 pub use quality::Quality;
 pub use records::{RecordRows, Summary};
+pub use refit::Refit;
 pub use run::RunOptions;
 pub use scenes::Scenes;
 pub use speed::Speed;
@@ -75,6 +77,8 @@ pub enum Command {
     Scenes(Scenes),
     /// Instances that the caller moves: setting their transforms and committing, ours and Embree's.
     Instances(Instances),
+    /// Objects that deform: new positions of all vertices, ours and Embree's.
+    Refit(Refit),
     /// One start in a process of its own; `load` calls this.
     #[command(hide = true)]
     Probe(Probe),

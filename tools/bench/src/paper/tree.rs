@@ -15,7 +15,7 @@ use bth_import::Mesh;
 
 /// How the binary BVH is built: binned and top-down, as the paper has it.
 pub(super) fn bvh_options() -> bvh::BvhOptions {
-    bvh::BvhOptions { quality: bvh::Quality::Fast }
+    bvh::BvhOptions { quality: bvh::Quality::Fast, ..Default::default() }
 }
 
 /// Most triangles of a leaf (pbrt's default).

@@ -145,6 +145,8 @@ pub(super) struct EmbreeApi {
     pub(super) transform: unsafe extern "C" fn(Handle, u32, c_int, *const f32),
     pub(super) enable_geometry: unsafe extern "C" fn(Handle),
     pub(super) disable_geometry: unsafe extern "C" fn(Handle),
+    pub(super) geometry: unsafe extern "C" fn(Handle, u32) -> Handle,
+    pub(super) update_buffer: unsafe extern "C" fn(Handle, c_int, u32),
 }
 
 impl EmbreeApi {
@@ -186,6 +188,8 @@ impl EmbreeApi {
                 transform: *library.get(b"rtcSetGeometryTransform\0")?,
                 enable_geometry: *library.get(b"rtcEnableGeometry\0")?,
                 disable_geometry: *library.get(b"rtcDisableGeometry\0")?,
+                geometry: *library.get(b"rtcGetGeometry\0")?,
+                update_buffer: *library.get(b"rtcUpdateGeometryBuffer\0")?,
             })
         }
     }

@@ -19,6 +19,8 @@ pub const NAME: &str = "embree";
 #[derive(Clone, Copy, Debug)]
 pub struct Variant {
     quality: c_int,
+    /// Quality of the geometries.
+    geometry_quality: c_int,
     flags: c_int,
     packets: bool,
     /// The instruction set that the library may use; the best of the machine if absent.
@@ -28,20 +30,31 @@ pub struct Variant {
 const QUALITY_LOW: c_int = 0;
 const QUALITY_MEDIUM: c_int = 1;
 const QUALITY_HIGH: c_int = 2;
+const QUALITY_REFIT: c_int = 3;
 const FLAG_DYNAMIC: c_int = 1;
 const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
 /// The library's defaults; one ray a call.
-pub const DEFAULT: Variant = Variant { quality: QUALITY_MEDIUM, flags: 0, packets: false, isa: None };
+pub const DEFAULT: Variant = Variant {
+    quality: QUALITY_MEDIUM,
+    geometry_quality: QUALITY_MEDIUM,
+    flags: 0,
+    packets: false,
+    isa: None,
+};
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
-pub const DYNAMIC: Variant = Variant { quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
+pub const DYNAMIC: Variant =
+    Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
+/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call.
+pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, flags: FLAG_DYNAMIC, ..DEFAULT };
 /// High quality (spatial splits); 16 rays a call.
-pub const PACKETS: Variant = Variant { quality: QUALITY_HIGH, packets: true, ..DEFAULT };
+pub const PACKETS: Variant =
+    Variant { quality: QUALITY_HIGH, geometry_quality: QUALITY_HIGH, packets: true, ..DEFAULT };
 /// The defaults on a machine without AVX; one ray a call.
 pub const SSE4: Variant = Variant { isa: Some("sse4.2"), ..DEFAULT };
 

@@ -138,6 +138,7 @@ impl HeightField {
             bounds: ObjectBounds::new(&self.header),
             grid: None,
             lines: &self.lines,
+            leaf_vertices: &[],
             triangle_ids: &self.ids,
             tet_leaves: &[],
             records: Records::None,

@@ -1,0 +1,62 @@
+"""How surfaces look."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Material:
+    """How a material looks, as in glTF 2.0. Colors are linear, with the primaries of sRGB.
+
+    base_color: red, green, blue and alpha; to be multiplied by the texel of the texture and the vertex color.
+    base_color_texture, emissive_texture: indices of the object's textures, or None.
+    emissive: red, green and blue of the emitted radiance; to be multiplied by the texel of the texture.
+    alpha: "opaque"; "mask", where there is a surface where alpha is at least `alpha_cutoff`; "blend", where alpha is the share of light that
+        the surface stops.
+    double_sided: whether the back of triangles is seen too.
+    unlit: whether the base color is shown as it is, without light.
+    """
+
+    name: str
+    base_color: tuple
+    base_color_texture: int | None
+    emissive: tuple
+    emissive_texture: int | None
+    alpha: str
+    alpha_cutoff: float
+    double_sided: bool
+    unlit: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A texture: an image file, and how it lies on the surface.
+
+    image: equal for textures of the same image of a file.
+    data: the image file (PNG, JPEG or WebP), bytes. Red, green and blue of its texels are sRGB, alpha is linear.
+    wrap: for u and for v "repeat", "mirror" or "clamp".
+    nearest: whether the nearest texel is taken; else four are interpolated, after they have been made linear.
+    transform: (2, 3) float32, from (u, v, 1) to coordinates of the image; (0, 0) is its upper left corner, (1, 1) its lower right one.
+    """
+
+    image: int
+    data: bytes
+    wrap: tuple
+    nearest: bool
+    transform: np.ndarray
+
+    def coordinates(self, texcoord):
+        """Coordinates of the image at texture coordinates (..., 2), of the same shape and float64."""
+        transform = self.transform.astype(np.float64)
+        return np.asarray(texcoord, np.float64) @ transform[:, :2].T + transform[:, 2]
+
+
+def material(row):
+    """What the native module says of a material; None where the file keeps no more than its name."""
+    return None if row is None else Material(*row)
+
+
+def texture(row):
+    image, data, wrap, nearest, transform = row
+    return Texture(image, data, wrap, nearest, np.array(transform, np.float32))

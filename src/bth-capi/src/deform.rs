@@ -1,0 +1,80 @@
+//! The part of the C interface that gives objects new positions.
+
+use crate::builder::{UpdateC, with};
+use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
+use runtime::{Scene, SceneBuilder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Number of vertices of an object; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_vertex_count(scene: *const Scene, object: u32) -> usize {
+    // SAFETY: by contract it is null or open, hence valid for reads.
+    let scene = unsafe { scene.as_ref() }.filter(|scene| object < scene.object_count());
+    scene.and_then(|scene| scene.vertex_count(object)).unwrap_or(0)
+}
+
+/// Gives an object new positions; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open, and no other call uses it at the same time. `positions` is null or points to `count` positions. `update` is
+/// null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_set_positions(
+    scene: *mut Scene,
+    object: u32,
+    positions: *const [f32; 3],
+    count: usize,
+    update: *mut UpdateC,
+) -> i32 {
+    const NAME: &str = "bth_set_positions";
+    // SAFETY: by contract they are null or valid, and the scene is not used by another call at the same time.
+    let (Some(scene), Some(positions)) = (unsafe { scene.as_mut() }, unsafe { slice(positions, count) })
+    else {
+        return fail(ERROR_ARGUMENT, format!("{NAME}: scene and positions must not be null"));
+    };
+    // A panic must not unwind into C.
+    match catch_unwind(AssertUnwindSafe(|| scene.set_positions(object, positions))) {
+        Ok(Ok(done)) => {
+            if !update.is_null() {
+                // SAFETY: it is not null, so it is valid for writes by the contract of this function.
+                unsafe { update.write(UpdateC::new(&done)) };
+            }
+            OK
+        }
+        Ok(Err(error)) => fail(code_of(&error), format!("{NAME}: {error}")),
+        Err(_) => fail(ERROR_INTERNAL, format!("{NAME}: internal error")),
+    }
+}
+
+/// Stages new positions of an object of a builder; see `bth.h`.
+///
+/// # Safety
+/// `builder` is null or was not freed, and no other call uses it or its scene at the same time. `positions` is null or points to `count`
+/// positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_set_positions(
+    builder: *mut SceneBuilder,
+    object: u32,
+    positions: *const [f32; 3],
+    count: usize,
+) -> i32 {
+    const NAME: &str = "bth_builder_set_positions";
+    // SAFETY: the contract of `slice` is part of that of this function.
+    let Some(positions) = (unsafe { slice(positions, count) }) else {
+        return fail(ERROR_ARGUMENT, format!("{NAME}: positions must not be null"));
+    };
+    // SAFETY: the contract of `with` is part of that of this function.
+    unsafe { with(builder, NAME, |builder| builder.set_positions(object, positions)) }
+}
+
+/// Positions from C; `None` if the pointer is null.
+///
+/// # Safety
+/// `positions` is null or points to `count` positions that do not change as long as the slice is used.
+unsafe fn slice<'a>(positions: *const [f32; 3], count: usize) -> Option<&'a [[f32; 3]]> {
+    // SAFETY: it is not null, so it points to that many positions by the contract of this function.
+    (!positions.is_null()).then(|| unsafe { std::slice::from_raw_parts(positions, count) })
+}

@@ -1,0 +1,158 @@
+//! The part of the C interface that tells how surfaces look: materials, textures and vertex colours.
+
+use crate::surface::store;
+use crate::{ERROR_ARGUMENT, ERROR_MISSING, fail};
+use runtime::rays::Hit;
+use runtime::{Alpha, Scene, Wrap};
+
+const DOUBLE_SIDED: u32 = 1;
+const UNLIT: u32 = 2;
+
+/// `bth_material_look` of `bth.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct MaterialC {
+    base_color: [f32; 4],
+    emissive: [f32; 3],
+    alpha_cutoff: f32,
+    alpha_mode: u32,
+    flags: u32,
+    base_color_texture: u32,
+    emissive_texture: u32,
+}
+
+/// `bth_texture_image` of `bth.h`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub struct TextureC {
+    bytes: *const u8,
+    length: usize,
+    transform: [[f32; 3]; 2],
+    image: u32,
+    wrap: [u32; 2],
+    nearest: u32,
+}
+
+const _: () = assert!(size_of::<MaterialC>() == 48);
+const _: () = assert!(size_of::<TextureC>() == 40 + 2 * size_of::<usize>());
+
+impl MaterialC {
+    fn new(material: &runtime::Material) -> Self {
+        let flag = |holds: bool, flag: u32| if holds { flag } else { 0 };
+        let (alpha_mode, alpha_cutoff) = match material.alpha {
+            Alpha::Opaque => (0, 0.0),
+            Alpha::Mask(cutoff) => (1, cutoff),
+            Alpha::Blend => (2, 0.0),
+        };
+        Self {
+            base_color: material.base_color,
+            emissive: material.emissive,
+            alpha_cutoff,
+            alpha_mode,
+            flags: flag(material.double_sided, DOUBLE_SIDED) | flag(material.unlit, UNLIT),
+            base_color_texture: material.base_color_texture.unwrap_or(u32::MAX),
+            emissive_texture: material.emissive_texture.unwrap_or(u32::MAX),
+        }
+    }
+}
+
+/// Why a row of an object's list is not there.
+fn no_row(what: &str, object: u32, row: u32, (objects, rows): (u32, u32)) -> (i32, String) {
+    let text = match object < objects {
+        true => format!("there is no {what} {row} of object {object}, which has {rows}"),
+        false => format!("there is no object {object}"),
+    };
+    (ERROR_ARGUMENT, text)
+}
+
+/// How a material looks; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `look` is null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_material(
+    scene: *const Scene,
+    object: u32,
+    material: u32,
+    look: *mut MaterialC,
+) -> i32 {
+    let find = |scene: &Scene| {
+        let objects = scene.object_count();
+        let count = if object < objects { scene.material_count(object) } else { 0 };
+        if material >= count {
+            return Err(no_row("material", object, material, (objects, count)));
+        }
+        let found = scene.material(object, material).ok_or_else(|| {
+            let text = "the file keeps only the names of materials; compile it with --materials".to_owned();
+            (ERROR_MISSING, text)
+        });
+        found.map(|found| MaterialC::new(&found))
+    };
+    // SAFETY: the contract of `store` is part of that of this function.
+    unsafe { store("bth_material", scene, look, find) }
+}
+
+/// Number of textures of an object; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_texture_count(scene: *const Scene, object: u32) -> u32 {
+    // SAFETY: by contract it is null or open, hence valid for reads.
+    unsafe { scene.as_ref() }.map_or(0, |scene| scene.texture_count(object))
+}
+
+/// A texture of an object; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `image` is null or valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_texture(
+    scene: *const Scene,
+    object: u32,
+    texture: u32,
+    image: *mut TextureC,
+) -> i32 {
+    let wrap = |wrap: Wrap| match wrap {
+        Wrap::Repeat => 0,
+        Wrap::Mirror => 1,
+        Wrap::Clamp => 2,
+    };
+    let find = |scene: &Scene| {
+        let counts = (scene.object_count(), scene.texture_count(object));
+        let found =
+            scene.texture(object, texture).ok_or_else(|| no_row("texture", object, texture, counts))?;
+        Ok(TextureC {
+            bytes: found.bytes.as_ptr(),
+            length: found.bytes.len(),
+            transform: found.transform,
+            image: found.image,
+            wrap: found.wrap.map(wrap),
+            nearest: u32::from(found.nearest),
+        })
+    };
+    // SAFETY: the contract of `store` is part of that of this function.
+    unsafe { store("bth_texture", scene, image, find) }
+}
+
+/// The vertex colour at a hit; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `hit` is null or valid for reads; `color` is null or points to four numbers that are valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_vertex_color(scene: *const Scene, hit: *const Hit, color: *mut [f32; 4]) -> i32 {
+    // SAFETY: by contract it is null or valid for reads.
+    let Some(hit) = (unsafe { hit.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, "bth_vertex_color: hit must not be null".into());
+    };
+    let find = |scene: &Scene| {
+        let instance = hit.primitive.instance;
+        if instance >= scene.instance_count() {
+            return Err((ERROR_ARGUMENT, format!("there is no instance {instance}")));
+        }
+        let nothing = || (ERROR_MISSING, "the file keeps no vertex colors of the triangle".to_owned());
+        scene.vertex_color(hit).ok_or_else(nothing)
+    };
+    // SAFETY: the contract of `store` is part of that of this function.
+    unsafe { store("bth_vertex_color", scene, color, find) }
+}

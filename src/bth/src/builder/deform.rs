@@ -1,0 +1,64 @@
+//! New positions of objects in a scene builder: staged by a call, refitted by a commit.
+
+use super::SceneBuilder;
+use crate::instances::Update;
+use bth_format::Error;
+use std::time::Instant;
+
+impl SceneBuilder {
+    /// Gives an object new positions, as [`Scene::set_positions`](crate::Scene::set_positions), which the next commit makes visible
+    /// in all instances of the object. Of several calls for one object before a commit, the last one counts. Other objects of
+    /// the same file, and the same object of another scene, keep theirs.
+    ///
+    /// # Errors
+    /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with `--deformable`, `BTH-S007` if the number of
+    /// positions is wrong or one is not finite, `BTH-O001` if there is not enough memory. Nothing is changed then.
+    pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<(), Error> {
+        self.check_object(object)?;
+        self.scene.objects_mut().deforming(object)?.stage(positions)?;
+        if !self.deformed.contains(&object) {
+            self.deformed.push(object);
+        }
+        Ok(())
+    }
+
+    /// Refits the objects that get new positions, and notes that their instances have changed.
+    pub(super) fn refit_objects(&mut self) -> Update {
+        let mut update = Update { deformed: self.deformed.len(), ..Update::default() };
+        if self.deformed.is_empty() {
+            return update;
+        }
+        let start = Instant::now();
+        let mut greatest: f64 = 0.0;
+        for object in &self.deformed {
+            if let Ok(deforming) = self.scene.objects_mut().deforming(*object) {
+                deforming.refit_staged();
+                greatest = greatest.max(deforming.cost_ratio());
+            }
+        }
+        (update.deformed_cost_ratio, update.refit) = (greatest, start.elapsed());
+        self.forget_boxes();
+        for (id, staged) in self.instances.iter_mut().enumerate() {
+            if self.deformed.contains(&staged.object) {
+                staged.mark(id as u32, &mut self.changed);
+            }
+        }
+        update
+    }
+
+    /// Undoes [`Self::refit_objects`]. The new positions are staged again.
+    pub(super) fn undo_refit(&mut self) {
+        for object in &self.deformed {
+            if let Ok(deforming) = self.scene.objects_mut().deforming(*object) {
+                deforming.undo();
+            }
+        }
+        self.forget_boxes();
+    }
+
+    fn forget_boxes(&mut self) {
+        if let (_, Some(world)) = self.scene.objects_and_world_mut() {
+            world.forget_parts(&self.deformed);
+        }
+    }
+}

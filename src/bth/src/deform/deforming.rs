@@ -1,0 +1,139 @@
+//! An object that has been given new positions: its own memory, and the state of its refits.
+
+use super::cost::cost;
+use super::plan::RefitPlan;
+use super::refit::refit;
+use bth_format::file::{DeformedObject, Normals};
+use bth_format::object::ObjectView;
+use bth_format::{Code, Error, File};
+
+/// An object with positions, boxes and leaves of its own.
+#[derive(Debug)]
+pub(crate) struct Deforming {
+    object: DeformedObject,
+    plan: RefitPlan,
+    /// Positions of the next refit, or those of the one before.
+    staged: Vec<[f32; 3]>,
+    /// The same for normals. New positions without normals have those of the triangles.
+    staged_normals: Normals,
+    /// Expected cost of the tree for the positions of the file.
+    compiled_cost: f64,
+    /// The same for the positions of the last refit.
+    cost: f64,
+}
+
+/// From this number of positions on, several threads check and copy them.
+#[cfg(feature = "rayon")]
+const MIN_PARALLEL: usize = 1 << 16;
+/// Number of positions of one task.
+#[cfg(feature = "rayon")]
+const TASK: usize = 1 << 14;
+
+impl Deforming {
+    /// An object with the positions of its file.
+    ///
+    /// # Errors
+    /// `BTH-S006` if the object is not deformable, `BTH-O001` if there is not enough memory.
+    pub(crate) fn new(file: &File, object: u32) -> Result<Deforming, Error> {
+        let object = DeformedObject::new(file, object)?;
+        let view = object.view();
+        let plan = RefitPlan::new(view);
+        let compiled_cost = cost(&view.lines[..plan.node_lines as usize]);
+        let staged = view.positions.to_vec();
+        let staged_normals = Some(Vec::new());
+        Ok(Deforming { object, plan, staged, staged_normals, compiled_cost, cost: compiled_cost })
+    }
+
+    /// The sections of the object, with its own positions.
+    #[inline(always)]
+    pub(crate) fn view(&self) -> &ObjectView<'_> {
+        self.object.view()
+    }
+
+    /// Stages given positions.
+    ///
+    /// # Errors
+    /// `BTH-S007` if their number is another or one is not finite. What was staged before remains.
+    pub(crate) fn stage(&mut self, positions: &[[f32; 3]]) -> Result<(), Error> {
+        if positions.len() != self.staged.len() {
+            let expected = format!("{} positions", self.staged.len());
+            return Err(Error::of_call(Code::NewPositions, expected, positions.len().to_string()));
+        }
+        check_finite(positions)?;
+        copy_positions(positions, &mut self.staged);
+        self.staged_normals = Some(Vec::new());
+        Ok(())
+    }
+
+    /// Makes positions that [`Self::stage`] has staged those of the object.
+    pub(crate) fn refit_staged(&mut self) {
+        let plan = &self.plan;
+        let (positions, normals) = (&mut self.staged, &mut self.staged_normals);
+        let refitted = self.object.refit(positions, normals, |mut parts| {
+            let ends = refit(plan, &mut parts);
+            (ends, cost(&parts.lines[..plan.node_lines as usize]))
+        });
+        self.cost = refitted.unwrap_or(self.cost);
+    }
+
+    /// Undoes the last refit; its positions are staged again.
+    pub(crate) fn undo(&mut self) {
+        self.refit_staged();
+    }
+
+    /// Expected cost of rays relative to that for the positions of the file. 1 where the tree is a single leaf.
+    pub(crate) fn cost_ratio(&self) -> f64 {
+        let ratio = self.cost / self.compiled_cost;
+        if ratio.is_nan() { 1.0 } else { ratio }
+    }
+}
+
+/// Checks that all positions are finite.
+fn check_finite(positions: &[[f32; 3]]) -> Result<(), Error> {
+    if are_finite(positions) {
+        return Ok(());
+    }
+    let row = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())).unwrap_or_default();
+    let found = format!("{:?} of vertex {row}", positions[row]);
+    Err(Error::of_call(Code::NewPositions, "finite positions", found))
+}
+
+fn are_finite(positions: &[[f32; 3]]) -> bool {
+    #[cfg(feature = "rayon")]
+    if positions.len() >= MIN_PARALLEL {
+        use rayon::iter::ParallelIterator;
+        use rayon::slice::ParallelSlice;
+        return positions.par_chunks(TASK).all(all_finite);
+    }
+    all_finite(positions)
+}
+
+fn all_finite(positions: &[[f32; 3]]) -> bool {
+    // The product with 0 is 0, or NaN for what is not finite: sums without branches, which compile to vectors.
+    let (whole, rest) = positions.as_flattened().as_chunks::<16>();
+    let mut sums = [0.0f32; 16];
+    for values in whole {
+        for i in 0..16 {
+            sums[i] += values[i] * 0.0;
+        }
+    }
+    sums.iter().all(|sum| *sum == 0.0) && rest.iter().all(|x| x.is_finite())
+}
+
+/// Copies positions; as in compiled files, no zero is negative.
+fn copy_positions(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
+    #[cfg(feature = "rayon")]
+    if from.len() >= MIN_PARALLEL {
+        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
+        use rayon::slice::{ParallelSlice, ParallelSliceMut};
+        let tasks = from.par_chunks(TASK).zip(to.par_chunks_mut(TASK));
+        return tasks.for_each(|(from, to)| copy_some(from, to));
+    }
+    copy_some(from, to);
+}
+
+fn copy_some(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
+    for (to, from) in to.as_flattened_mut().iter_mut().zip(from.as_flattened()) {
+        *to = from + 0.0;
+    }
+}

@@ -16,7 +16,7 @@ class Helper {
     #next = 0;
 
     constructor(url) {
-        this.#worker = new Worker(url, { type: "module" });
+        this.#worker = new Worker(url);
         this.#worker.onmessage = ({ data }) => {
             const { resolve, reject } = this.#waiting.get(data.id);
             this.#waiting.delete(data.id);

@@ -1,6 +1,6 @@
 //! Choice of the instruction set of the kernels: detected once, or set by environment variable or call.
 
-use super::{Kernel, Scalar, Simd};
+use super::{Kernel, Simd};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -122,9 +122,16 @@ macro_rules! with_vectors {
 }
 
 /// Runs a kernel in scalar code. Not inlined, so that callers of [`Isa::run`] stay small.
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128")))]
 #[inline(never)]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run(Scalar)
+    kernel.run(super::Scalar)
+}
+
+/// A module of WebAssembly for browsers that is compiled for SIMD128 has no scalar kernels, which would be half of its size.
+#[cfg(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))]
+fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
+    super::quads::simd128::Simd128::new().run(kernel)
 }
 
 impl Isa {
@@ -139,7 +146,13 @@ impl Isa {
             #[inline(always)]
             fn run<S: Simd>(self, _: S) {}
         }
-        self == Isa::Scalar || self.run_wide(Nothing).is_ok()
+        match self {
+            // See `run_scalar`.
+            Isa::Scalar => {
+                !cfg!(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))
+            }
+            _ => self.run_wide(Nothing).is_ok(),
+        }
     }
 
     /// The most capable instruction set of this machine.

@@ -7,8 +7,11 @@ import { add, length } from "./vectors.js";
 
 /** Pixels of a tile's side, and how many pixels of the picture one of a coarse picture covers. */
 const TILE = 64, COARSE = 4;
+/** What the address of the page asks for: `?file=URL`, where it is served, and `?samples=N`. */
+const asked = new URLSearchParams(location.search);
 /** Samples of a pixel after which the picture is done. */
 const SAMPLES = { shaded: 64, normals: 16, ao: 64, steps: 4 };
+const samplesFor = (mode) => Math.max(1, Number(asked.get("samples")) || SAMPLES[mode]);
 
 const element = (id) => document.getElementById(id);
 const canvas = element("picture"), status = element("status"), message = element("message");
@@ -92,7 +95,7 @@ async function refine(of) {
             fresh = true;
             picture.showCoarse(job, colors);
         });
-        for (let sample = 0; sample < SAMPLES[common.mode] && !stopped(); sample++) {
+        for (let sample = 0; sample < samplesFor(common.mode) && !stopped(); sample++) {
             await shown.pool.work(jobs(common, 1, sample), stopped, (job, { picture: colors }) => picture.add(job, colors));
             if (!stopped()) report(sample + 1, performance.now() - start, common);
         }
@@ -135,7 +138,7 @@ function report(samples, milliseconds, { mode, size }) {
         name,
         `${number(content.triangles)} triangles`,
         content.instances > 1 ? `${number(content.instances)} instances` : "",
-        `${samples} of ${SAMPLES[mode]} samples`,
+        `${samples} of ${samplesFor(mode)} samples`,
         `${rate.toFixed(2)} million pixels a second`,
         `${pool.size} ${pool.size === 1 ? "worker" : "workers"}`,
         mode === "steps" ? `brightest: ${picture.mostSteps} steps` : "",
@@ -176,7 +179,7 @@ async function lookAt(x, y) {
     changed();
 }
 
-// Files: dropped, chosen, or named in the address (`?file=URL`, where the page is served).
+// Files: dropped, chosen, or named in the address.
 addEventListener("dragover", (event) => {
     event.preventDefault();
     document.body.classList.add("over");
@@ -192,7 +195,7 @@ async function openFile(file) {
     // `open` has said what is wrong.
     if (file) await file.arrayBuffer().then((bytes) => open(bytes, file.name)).catch(() => {});
 }
-const named = new URLSearchParams(location.search).get("file");
+const named = asked.get("file");
 if (named) {
     fetch(named)
         .then((response) => (response.ok ? response.arrayBuffer() : Promise.reject(new Error(`${response.status} ${response.statusText}`))))

@@ -63,7 +63,12 @@ class Rays {
         this.count = 0;
     }
     push(origin, direction, tmax) {
-        this.numbers.set([...origin, 0, ...direction, tmax], 8 * this.count++);
+        const { numbers } = this, at = 8 * this.count++;
+        for (let k = 0; k < 3; k++) {
+            numbers[at + k] = origin[k];
+            numbers[at + 4 + k] = direction[k];
+        }
+        numbers[at + 7] = tmax;
     }
     get used() {
         return this.numbers.subarray(0, 8 * this.count);
@@ -90,8 +95,8 @@ function visiblePoints(scene, camera, samples) {
         if (Number.isNaN(geometric[0])) geometric = normal = scale(direction, -1);
         if (dot(geometric, direction) > 0) geometric = scale(geometric, -1);
         if (dot(normal, geometric) < 0) normal = scale(normal, -1);
-        const color = [0, 1, 2].map((k) => surface.color[4 * i + k]);
-        const hasColor = surface.material[i] !== 0xffffffff || color.some((c) => c !== 1);
+        const color = [surface.color[4 * i], surface.color[4 * i + 1], surface.color[4 * i + 2]];
+        const hasColor = surface.material[i] !== 0xffffffff || color[0] !== 1 || color[1] !== 1 || color[2] !== 1;
         return {
             point: add(camera.eye, direction, hits.t[i]),
             geometric,
@@ -103,14 +108,17 @@ function visiblePoints(scene, camera, samples) {
 
 /** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */
 function above(point, normal, diagonal) {
-    const spacing = Math.max(...point.map(Math.abs)) * 2 ** -21;
-    return add(point, normal, Math.max(OFFSET * diagonal, spacing));
+    const greatest = Math.max(Math.abs(point[0]), Math.abs(point[1]), Math.abs(point[2]));
+    return add(point, normal, Math.max(OFFSET * diagonal, greatest * 2 ** -21));
 }
 
 function normals(scene, { camera }, samples) {
-    return visiblePoints(scene, camera, samples).map((at) =>
-        at === null ? DARK : at.normal.map((x, k) => 0.5 + 0.5 * dot(at.normal, k === 0 ? camera.right : k === 1 ? camera.up : scale(camera.forward, -1))),
-    );
+    const shade = (along) => 0.5 + 0.5 * along;
+    return visiblePoints(scene, camera, samples).map((at) => {
+        if (at === null) return DARK;
+        const { normal } = at;
+        return [shade(dot(normal, camera.right)), shade(dot(normal, camera.up)), shade(-dot(normal, camera.forward))];
+    });
 }
 
 function steps(scene, { camera }, samples) {
@@ -213,7 +221,8 @@ function lit(at, { fill }, camera, direction, key, open) {
     // A weak specular term (Blinn) shows curvature in the lit parts.
     const half = unit(add(at.toKey, direction, -1));
     const gloss = 0.06 * key * Math.max(dot(at.normal, half), 0) ** 24;
-    return at.color.map((c, k) => c * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss);
+    const channel = (k) => at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
+    return [channel(0), channel(1), channel(2)];
 }
 
 /** A vertical gradient with a slight vignette. */
@@ -225,5 +234,6 @@ function background({ h, v }) {
 
 /** Keeps bright colours below 1, smoothly. */
 function shoulder(color) {
-    return color.map((x) => (x < 0.7 ? x : 0.7 + 0.3 * (1 - Math.exp(-(x - 0.7) / 0.3))));
+    const channel = (x) => (x < 0.7 ? x : 0.7 + 0.3 * (1 - Math.exp(-(x - 0.7) / 0.3)));
+    return [channel(color[0]), channel(color[1]), channel(color[2])];
 }

@@ -4,7 +4,7 @@ export const add = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
 export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-export const length = (a) => Math.hypot(a[0], a[1], a[2]);
+export const length = (a) => Math.sqrt(dot(a, a));
 export const unit = (a) => scale(a, 1 / length(a));
 export const blend = (a, b, part) => add(scale(a, 1 - part), b, part);
 

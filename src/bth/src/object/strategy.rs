@@ -5,7 +5,6 @@
 //! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
 //! that grow while it remains the slower one; in the long run it gets one batch in 256.
 
-
 /// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Strategy {

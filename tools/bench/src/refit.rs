@@ -182,14 +182,15 @@ fn twisted(model: &Model, angle: f32) -> Vec<[f32; 3]> {
     model.mesh.positions.iter().map(twist).collect()
 }
 
-/// Rays from about a model to points of its triangles.
+/// Rays from about a model to the middles of its triangles: tracers that round may miss corners.
 fn rays(model: &Model, positions: &[[f32; 3]]) -> Vec<Ray> {
     let mut rng = Rng::new(3);
     let diagonal = model.bounds().diagonal() as f32;
     (0..RAYS)
         .map(|_| {
             let triangle = model.mesh.triangles[rng.below(model.triangles() as u64) as usize];
-            let target = positions[triangle[0] as usize];
+            let corners = triangle.map(|v| positions[v as usize]);
+            let target = [0, 1, 2].map(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
             let origin = target.map(|x| x + (rng.unit_f32() - 0.5) * 2.0 * diagonal);
             Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]))
         })
@@ -232,8 +233,8 @@ fn body(rows: &[Row]) -> String {
     format!(
         "Time to make new positions of all vertices visible, for each triangle; medians of interleaved rounds in which a model is twisted \
          on, by the CPU clock of the thread for one thread and by the wall clock for several. `bth` is `set_positions`: it checks and copies \
-         the positions and refits. `embree refit` is the commit of a dynamic scene whose geometry has the quality REFIT, `embree rebuild` \
-         that of a scene of medium quality; copying positions to Embree's buffer is not counted. `ns/ray`: one thread, rays one by one, \
+         the positions and refits. `embree refit` is the commit of a dynamic scene of low quality whose geometry has the quality REFIT, \
+         `embree rebuild` that of a scene of medium quality; copying positions to Embree's buffer is not counted. `ns/ray`: one thread, rays one by one, \
          through what each has after the last round. `differ`: of {RAYS} rays, those whose hit is not ours.\n\n{}",
         table(&head, &rows)
     )

@@ -34,9 +34,15 @@ pub fn run(arguments: &Stress) -> Result<()> {
         let model = shape.grid.model();
         let mut structures = every_structure(&model, shape.whole);
         structures.push(deformed(&model, arguments.seed));
+        structures.retain(|traced| traced.name.contains(&arguments.structure));
         ShapeRun { shape, structures, statistics: Statistics::default() }
     });
     let mut runs: Vec<ShapeRun> = compiled.collect();
+    ensure!(
+        runs.iter().all(|run| !run.structures.is_empty()),
+        "a shape has no structure that is named {:?}",
+        arguments.structure
+    );
     let mut round = 0;
     loop {
         let mut traced = false;
@@ -79,7 +85,7 @@ fn record(
     let isas: Vec<String> =
         bth::Isa::ALL.iter().filter(|isa| isa.is_available()).map(|isa| isa.to_string()).collect();
     let options = json!({
-        "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed, "seconds": seconds
+        "size": arguments.size, "one_in": arguments.one_in, "seed": arguments.seed, "structure": arguments.structure, "seconds": seconds
     });
     let head = Head::now("stress", isas.join(", in turn "), options);
     let found: Vec<_> =

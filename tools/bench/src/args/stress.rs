@@ -19,6 +19,9 @@ pub struct Stress {
     /// Start of the random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Only structures with this in their names, such as `deformed bvh` or `bth`.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    pub structure: String,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub output: Output,

@@ -50,8 +50,10 @@ pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
 pub const DYNAMIC: Variant =
     Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
-/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call.
-pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, flags: FLAG_DYNAMIC, ..DEFAULT };
+/// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call. Only
+/// scenes of low quality heed the quality of their geometries; others build anew. The first build of a geometry that is
+/// refitted is one of medium quality.
+pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, ..DYNAMIC };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant =
     Variant { quality: QUALITY_HIGH, geometry_quality: QUALITY_HIGH, packets: true, ..DEFAULT };

@@ -5,10 +5,10 @@
 //! are cut from.
 #![allow(unsafe_code)] // All functions are called from outside, and most take addresses.
 
-mod describe;
-mod memory;
-mod queries;
-mod surface;
+pub mod describe;
+pub mod memory;
+pub mod queries;
+pub mod surface;
 
 use std::cell::RefCell;
 

@@ -97,8 +97,13 @@ export class Browser {
 
     async end() {
         const ended = new Promise((resolve) => this.#process.on("exit", resolve));
-        this.#process.kill();
+        // The process may be over before it answers.
+        this.#session = undefined;
+        this.send("Browser.close").catch(() => {});
+        const late = setTimeout(() => this.#process.kill("SIGKILL"), 3000);
         await ended;
-        rmSync(this.#profile, { recursive: true, force: true, maxRetries: 5 });
+        clearTimeout(late);
+        for (const pipe of this.#process.stdio) pipe?.destroy();
+        rmSync(this.#profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
     }
 }

@@ -3,9 +3,15 @@
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Isa, Scene};
 use bth_compile::Silent;
-use bth_import::{AlphaMode, Keep, Wanted, import_bytes, import_cutouts_bytes};
+use bth_import::gltf::Chosen;
+use bth_import::gltf::scene::{self, ImportOptions};
+use bth_import::{
+    AlphaMode, GltfPart, Keep, Mesh, Timing, Wanted, import_bytes, import_cutouts_bytes,
+    import_gltf_parts_bytes, import_sequence_bytes, import_vertex_cache_bytes, read_vertex_cache,
+};
 use bth_random::Rng;
-use std::path::Path;
+use bth_scene::Source;
+use std::path::{Path, PathBuf};
 
 /// A generator seeded by the input (FNV-1a), so that an input always does the same.
 fn seeded_by(bytes: &[u8]) -> Rng {
@@ -26,6 +32,15 @@ pub fn open_and_trace(bytes: &[u8]) {
             if scene.set_seconds(seconds).is_ok() {
                 trace(&scene, &mut rng);
             }
+        }
+    }
+    for object in 0..scene.object_count() {
+        let Some(count) = scene.vertex_count(object) else { continue };
+        let mut number = || (rng.below(1 << 20) as f32 / (1u32 << 19) as f32 - 1.0) * 1e3;
+        let positions: Vec<[f32; 3]> = (0..count).map(|_| [number(), number(), number()]).collect();
+        if scene.set_positions(object, &positions).is_ok() {
+            assert_eq!(scene.positions(object), positions);
+            trace(&scene, &mut rng);
         }
     }
 }
@@ -50,8 +65,11 @@ fn trace(scene: &Scene, rng: &mut Rng) {
             if let Some(material) = surface.material {
                 scene.material_name(surface.object, material);
                 let look = scene.material(surface.object, material);
-                for texture in look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture]) {
-                    let texture = texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
+                for texture in
+                    look.into_iter().flat_map(|look| [look.base_color_texture, look.emissive_texture])
+                {
+                    let texture =
+                        texture.map(|row| scene.texture(surface.object, row).expect("a checked row"));
                     assert!(texture.is_none_or(|texture| !texture.bytes.is_empty()));
                 }
             }
@@ -99,14 +117,43 @@ pub fn import(format: &str, bytes: &[u8]) {
     let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
     let Ok((mesh, report)) = import_bytes(&name, bytes, wanted, &Silent) else { return };
     assert_eq!(report.triangles, mesh.triangles.len() as u64);
-    assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
-    assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
+    check(&mesh);
     if let Ok(cutouts) = import_cutouts_bytes(&name, bytes, AlphaMode::Blend, &Silent) {
         let fits = |t: &bth_import::CutoutTriangle| {
             (t.triangle as usize) < mesh.triangles.len() && (t.material as usize) < cutouts.materials.len()
         };
         assert!(cutouts.triangles.iter().all(fits));
     }
+}
+
+/// Imports a glTF file as a scene with all its animations; its manifest reads back equal, and its meshes keep the promises of their type,
+/// also those that deform.
+pub fn import_scene(bytes: &[u8]) {
+    let path = Path::new("/nonexistent/fuzz/model.gltf");
+    let options = ImportOptions { animation: Chosen::All, ..ImportOptions::default() };
+    let Ok((manifest, _)) = scene::import_bytes(path, bytes, "model.gltf", &options, &Silent) else { return };
+    let text = manifest.to_toml();
+    let again = bth_scene::parse(&text, Path::new("fuzz.manifest"));
+    assert!(again.expect("what is written can be read") == manifest, "{text}");
+    let part = |object: &bth_scene::Object| match object.source {
+        Source::Model { mesh, .. } => mesh.map(GltfPart::Mesh),
+        Source::Deforming { mesh, .. } => Some(GltfPart::Deforming(mesh)),
+        Source::AtRest { node, .. } => Some(GltfPart::AtRest(node)),
+        Source::Compiled { .. } => None,
+    };
+    let parts: Vec<GltfPart> = manifest.objects.iter().filter_map(part).take(16).collect();
+    let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+    let Ok(meshes) = import_gltf_parts_bytes(path, bytes, &parts, wanted, &Silent) else { return };
+    for ((mesh, _), part) in meshes.iter().zip(&parts) {
+        check(mesh);
+        assert_eq!(mesh.deformation.is_some(), matches!(part, GltfPart::Deforming(_)));
+    }
+}
+
+/// What the types of a mesh that was read with groups and materials promise.
+fn check(mesh: &Mesh) {
+    assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
+    assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
     let groups = mesh.groups.as_ref().expect("groups, which are wanted");
     assert!(groups.runs.first().is_none_or(|run| run[0] == 0));
     assert!(groups.runs.windows(2).all(|pair| pair[0][0] < pair[1][0] && pair[0][1] != pair[1][1]));
@@ -117,11 +164,85 @@ pub fn import(format: &str, bytes: &[u8]) {
     assert!(groups.groups.iter().all(material));
     let materials = mesh.materials.as_ref().expect("materials, which are wanted");
     assert!([0, groups.materials.len()].contains(&materials.parameters.len()));
-    assert!(materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len()));
+    assert!(
+        materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len())
+    );
     assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));
         assert_eq!(attributes.corners.len(), mesh.triangles.len());
     }
+    let Some(moved) = &mesh.deformation else { return };
+    let normals = mesh.attributes.as_ref().map_or(0, |attributes| attributes.normals.len());
+    let (sets, targets) = (moved.counts.influence_sets as usize, moved.counts.targets as usize);
+    assert_eq!([moved.joints.len(), moved.weights.len()], [sets * mesh.positions.len(); 2]);
+    assert!(moved.joints.as_flattened().iter().all(|joint| u32::from(*joint) < moved.counts.joints));
+    assert!(moved.weights.as_flattened().iter().all(|weight| weight.is_finite() && *weight >= 0.0));
+    assert!(moved.deltas.as_flattened().iter().all(|x| x.is_finite()));
+    assert!([targets, 2 * targets].contains(&moved.morphs.len()));
+    for (i, morph) in moved.morphs.iter().enumerate() {
+        let all = if i < targets { mesh.positions.len() } else { normals };
+        let first = morph.first_row as usize;
+        match morph.first_row {
+            u32::MAX => assert_eq!(morph.deltas as usize, all),
+            _ => {
+                let rows = &moved.morph_rows[first..][..morph.deltas as usize];
+                assert!(rows.windows(2).all(|pair| pair[0] < pair[1]));
+                assert!(rows.iter().all(|row| (*row as usize) < all));
+            }
+        }
+        assert!(morph.first_delta as usize + morph.deltas as usize <= moved.deltas.len());
+    }
+}
+
+/// Between two frames of a sequence in an input.
+const FRAME_END: &[u8] = b"\0FRAME\0";
+
+/// Imports the frames of a sequence, which the input has one after the other behind a byte that chooses their format.
+pub fn import_frames(bytes: &[u8]) {
+    let Some((choice, mut rest)) = bytes.split_first() else { return };
+    let name = PathBuf::from("frame").with_extension(["obj", "ply", "stl", "off"][usize::from(*choice % 4)]);
+    let mut files = Vec::new();
+    while let Some(end) = rest.windows(FRAME_END.len()).position(|part| part == FRAME_END) {
+        files.push((name.clone(), rest[..end].to_vec()));
+        rest = &rest[end + FRAME_END.len()..];
+    }
+    files.push((name, rest.to_vec()));
+    let timing = Timing { rate: Some(f64::from(*choice)), usual_rate: 24.0, start: 0.0 };
+    let wanted = |vertices| Wanted { attributes: Keep::All, groups: true, materials: true, vertices };
+    for vertices in [false, true] {
+        if let Ok((mesh, _)) = import_sequence_bytes(&files, &timing, wanted(vertices), &Silent) {
+            assert_eq!(mesh.sequence.as_ref().expect("frames").times.len(), files.len());
+            check_moving(&mesh);
+        }
+    }
+}
+
+/// Reads a vertex cache, and imports it with a model of four vertices.
+pub fn import_cache(bytes: &[u8]) {
+    let (name, model) = (Path::new("cache"), Path::new("model.obj"));
+    let square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    for rate in [None, Some(25.0)] {
+        let timing = Timing { rate, usual_rate: 24.0, start: 0.5 };
+        if let Ok(cache) = read_vertex_cache(name, bytes, &timing, &Silent) {
+            assert_eq!(cache.positions.len(), cache.points * cache.times.len());
+        }
+        let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };
+        let read = import_vertex_cache_bytes((model, square), (name, bytes), &timing, wanted, &Silent);
+        if let Ok((mesh, _)) = read {
+            check_moving(&mesh);
+        }
+    }
+}
+
+/// A mesh with frames keeps the promises of its type.
+fn check_moving(mesh: &Mesh) {
+    let sequence = mesh.sequence.as_ref().expect("frames");
+    assert!(sequence.times.iter().all(|time| time.is_finite()));
+    assert!(sequence.times.windows(2).all(|pair| pair[0] < pair[1]));
+    assert_eq!(sequence.positions.len(), sequence.times.len() * mesh.positions.len());
+    assert!(sequence.positions.as_flattened().iter().all(|x| x.is_finite()));
+    assert!(sequence.positions.starts_with(&mesh.positions));
+    assert!(mesh.triangles.as_flattened().iter().all(|row| (*row as usize) < mesh.positions.len()));
 }

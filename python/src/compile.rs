@@ -55,7 +55,8 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 
 fn gltf_options(keywords: &Keywords<'_, '_>) -> PyResult<ImportOptions> {
     let animation = match keywords.value::<String>("animation")?.as_deref() {
-        None | Some("all") => Chosen::All,
+        None => Chosen::First,
+        Some("all") => Chosen::All,
         Some("none") => Chosen::None,
         Some(name) => Chosen::One(name.to_owned()),
     };
@@ -67,6 +68,7 @@ fn gltf_options(keywords: &Keywords<'_, '_>) -> PyResult<ImportOptions> {
         scene: keywords.value("scene")?,
         animation,
         rate,
+        deform: !keywords.value("at_rest")?.unwrap_or(false),
         strict: keywords.value("strict")?.unwrap_or(false),
     })
 }

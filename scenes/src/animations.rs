@@ -2,11 +2,11 @@
 //! BTH paper.
 
 use crate::math::sin_cos;
-use crate::{Model, blob, gyroid, hairball, knot};
+use crate::{Model, blob, gyroid, hairball, knot, sheet};
 use bth_random::Rng;
 use bth_scene::{
-    Camera, Frames, Interpolation, Lens, Light, LightKind, Manifest, Node, Object, Property, Source, Track,
-    Transform,
+    Camera, Frames, Interpolation, Lens, Light, LightKind, Manifest, Node, Object, Property, SequenceFrames,
+    SequenceTiming, Source, Track, Transform,
 };
 use glam::DVec3;
 
@@ -27,11 +27,11 @@ pub struct Scene {
     /// The manifest.
     pub manifest: Manifest,
     /// Path of each model, relative to the manifest, and the model.
-    pub models: Vec<(&'static str, Model)>,
+    pub models: Vec<(String, Model)>,
 }
 
 /// All scenes.
-pub const ANIMATIONS: [Animation; 4] = [
+pub const ANIMATIONS: [Animation; 5] = [
     Animation { name: "turning", about: "one model of 100,000 faces that turns once", make: turning },
     Animation { name: "swarm", about: "101 objects in random motion", make: swarm },
     Animation { name: "falling", about: "100 hairballs that fall and tumble onto a floor", make: falling },
@@ -40,6 +40,7 @@ pub const ANIMATIONS: [Animation; 4] = [
         about: "hierarchy, instances, a lamp and a camera that move; small",
         make: carousel,
     },
+    Animation { name: "scroll", about: "a sheet that rolls up, as one file for each frame", make: scroll },
 ];
 
 /// The scene of that name.
@@ -150,7 +151,7 @@ fn turning() -> Scene {
     let object = b.object("gyroid", "models/gyroid.ply");
     let node = b.node("gyroid".into(), None, Some(object), Transform::default());
     b.turn(node, [0.0, 1.0, 0.0], 1.0, 2.0);
-    Scene { manifest: b.manifest, models: vec![("models/gyroid.ply", gyroid::gyroid(100_000))] }
+    Scene { manifest: b.manifest, models: vec![("models/gyroid.ply".to_owned(), gyroid::gyroid(100_000))] }
 }
 
 fn swarm() -> Scene {
@@ -174,7 +175,10 @@ fn swarm() -> Scene {
         let axis = rng.unit_vector().map(short);
         b.turn(node, axis, short(rng.between(-2.0, 2.0)), 4.0);
     }
-    let models = vec![("models/knot.ply", knot::torus_knot(12_000)), ("models/blob.ply", blob::blob(20_000))];
+    let models = vec![
+        ("models/knot.ply".to_owned(), knot::torus_knot(12_000)),
+        ("models/blob.ply".to_owned(), blob::blob(20_000)),
+    ];
     Scene { manifest: b.manifest, models }
 }
 
@@ -210,7 +214,10 @@ fn falling() -> Scene {
         Transform::Parts { translation: [0.0, 13.0, 24.0], rotation: view(0.0, 0.075), scale: [1.0; 3] };
     let eye = b.node("eye".into(), None, None, eye);
     b.camera("main", eye, 50.0);
-    let models = vec![("models/hairball.ply", hairball::hairball(60_000)), ("models/floor.ply", floor())];
+    let models = vec![
+        ("models/hairball.ply".to_owned(), hairball::hairball(60_000)),
+        ("models/floor.ply".to_owned(), floor()),
+    ];
     Scene { manifest: b.manifest, models }
 }
 
@@ -263,9 +270,26 @@ fn carousel() -> Scene {
     let sun = b.node("sun".into(), None, None, sun);
     b.light("sun", sun, LightKind::Directional, [1.0, 0.95, 0.85], 3.0);
     let models = vec![
-        ("models/knot.ply", knot::torus_knot(2_880)),
-        ("models/blob.ply", blob::blob(5_000)),
-        ("models/floor.ply", floor()),
+        ("models/knot.ply".to_owned(), knot::torus_knot(2_880)),
+        ("models/blob.ply".to_owned(), blob::blob(5_000)),
+        ("models/floor.ply".to_owned(), floor()),
     ];
     Scene { manifest: b.manifest, models }
+}
+
+fn scroll() -> Scene {
+    const FRAMES: u32 = 13;
+    let mut b = Builder::new(24, 24.0);
+    let frames = SequenceFrames::Numbered("models/sheet_##.ply".to_owned());
+    let timing = SequenceTiming { rate: Some(12.0), start: 0.0 };
+    b.manifest.objects.push(Object { name: "sheet".to_owned(), source: Source::Sequence { frames, timing } });
+    b.node("sheet".into(), None, Some(0), Transform::default());
+    let eye = Transform::Parts { translation: [0.5, 0.45, 0.9], rotation: view(0.0, 0.08), scale: [1.0; 3] };
+    let eye = b.node("eye".into(), None, None, eye);
+    b.camera("main", eye, 50.0);
+    let model = |frame: u32| {
+        let share = f64::from(frame) / f64::from(FRAMES - 1);
+        (format!("models/sheet_{frame:02}.ply"), sheet::sheet(0.9 * share, share))
+    };
+    Scene { manifest: b.manifest, models: (0..FRAMES).map(model).collect() }
 }

@@ -14,6 +14,7 @@ pub mod hall;
 pub mod knot;
 mod math;
 pub mod planted;
+pub mod sheet;
 pub mod soup;
 pub mod topology;
 pub mod write;

@@ -76,6 +76,7 @@ pub fn crowd(count: u32, own_tracks: bool) -> Vec<u8> {
         cameras: Vec::new(),
         lights: Vec::new(),
         names: Vec::new(),
+        deformers: Default::default(),
     };
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, &parts).unwrap();

@@ -74,6 +74,7 @@ pub fn placed_soup(triangles: &[[[f32; 3]; 3]], matrices: &[[f64; 12]]) -> Vec<u
         cameras: Vec::new(),
         lights: Vec::new(),
         names: Vec::new(),
+        deformers: Default::default(),
     };
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, &parts).expect("an object");

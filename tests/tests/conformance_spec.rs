@@ -77,6 +77,12 @@ fn byte_tables_are_those_of_the_structures() {
         MaterialParameters { base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved }
         Texture { image wrap filter transform reserved }
         Image { name first length }
+        Deformation { joints influence_sets targets reserved }
+        Morph { deltas first_delta first_row reserved }
+        Deformer { node object skin weights first_weight reserved }
+        Skin { first_joint joints reserved }
+        SkinJoint { inverse_bind node reserved }
+        Segment { first object reserved }
         TetLeaf { lower upper first_tet tets first_vertex vertices first_face faces first_hull hulls subtree flags }
         TetVertex { position reserved }
         TetFace { vertex triangle tet opposite }

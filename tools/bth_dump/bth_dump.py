@@ -12,12 +12,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from bth_container import Container, Invalid, NONE, kind_name  # noqa: E402
+from bth_deformation import DeformationView  # noqa: E402
 from bth_geometry import check_geometry  # noqa: E402
 from bth_groups import GroupsView, object_names  # noqa: E402
 from bth_indices import check_indices  # noqa: E402
 from bth_materials import MaterialsView, check_images  # noqa: E402
 from bth_object import ObjectView  # noqa: E402
 from bth_scene import SceneView, check_scene  # noqa: E402
+from bth_sequences import SequenceView, check_segments  # noqa: E402
 
 
 def describe(container):
@@ -38,6 +40,8 @@ def describe(container):
                 "depth": view.depth,
                 "tet_leaves": len(view.tet_leaves),
                 "tets": len(view.tets),
+                "frames": len(SequenceView(view).times),
+                "segments": len(SequenceView(view).segments),
                 "groups": GroupsView(view).describe(),
                 "materials": MaterialsView(view).describe(),
             }
@@ -88,17 +92,21 @@ def check(data, level):
     if level == "verify":
         container.check_bytes()
     if level != "open":
-        materials = []
+        materials, sequences = [], []
         for i in range(container.objects):
             view = ObjectView(container, i)
             GroupsView(view).check()
             materials.append(MaterialsView(view))
             materials[-1].check()
+            DeformationView(view).check()
             tets = check_indices(view)
+            sequences.append(SequenceView(view))
+            sequences[-1].check()
             if level == "verify":
                 check_geometry(view, tets)
         object_names(container)
         check_images(container, materials)
+        check_segments(sequences, {row.object for row in SceneView(container).instances})
         check_scene(SceneView(container))
     return container
 
@@ -118,6 +126,8 @@ def show(description):
         print(f"  bounds {o['lower']} to {o['upper']}")
         if o["tet_leaves"]:
             print(f"  {o['tet_leaves']} tet leaves with {o['tets']} tetrahedra ({o['record']})")
+        if o["frames"] or o["segments"]:
+            print(f"  {o['frames']} frames of its vertices, {o['segments']} segments")
         if o["groups"]:
             print(f"  {len(o['groups'])} groups of triangles")
         if o["materials"]["parameters"]:

@@ -1,4 +1,4 @@
-"""The scene sections (format-spec/README.md, "Scenes") and invariants F150 to F159."""
+"""The scene sections (format-spec/README.md, "Scenes") and invariants F150 to F159 and F185."""
 
 import math
 import struct
@@ -6,6 +6,7 @@ from collections import namedtuple
 
 import bth_container as c
 from bth_container import NONE, Invalid, kind_name
+from bth_deformation import Deformers
 
 Scene = namedtuple("Scene", "rate first_frame last_frame camera reserved")
 Node = namedtuple("Node", "transform parent flags name name_length reserved")
@@ -15,7 +16,7 @@ Camera = namedtuple("Camera", "node projection name name_length size aspect near
 Light = namedtuple("Light", "node kind name name_length color intensity range inner outer reserved")
 
 WIDTHS = (3, 4, 3, 1)
-TRANSLATION, ROTATION, SCALE, VISIBLE = range(4)
+TRANSLATION, ROTATION, SCALE, VISIBLE, WEIGHTS = range(5)
 STEP, LINEAR, CUBIC = range(3)
 HIDDEN, MATRIX = 1, 2
 FRAME_LIMIT = 1 << 24
@@ -26,7 +27,7 @@ class SceneView:
 
     def __init__(self, container):
         self.container = container
-        self.exists = any((NONE, kind) in container.by_key for kind in range(c.SCENE, c.NAMES + 1))
+        self.exists = any((NONE, kind) in container.by_key for kind in range(c.SCENE, c.MORPH_WEIGHTS + 1))
         self.scenes = [Scene(*r[:4], r[4:]) for r in self.rows(c.SCENE, "<dii12I")]
         self.nodes = [Node(r[:12], *r[12:16], r[16:]) for r in self.rows(c.NODES, "<12d8I")]
         self.instances = [Instance(*r) for r in self.rows(c.INSTANCES, "<4I")]
@@ -36,6 +37,7 @@ class SceneView:
         self.cameras = [Camera(*r[:8], r[8:]) for r in self.rows(c.CAMERAS, "<4I4d4I")]
         self.lights = [Light(*r[:4], r[4:7], *r[7:11], r[11:]) for r in self.rows(c.LIGHTS, "<4I7d2I")]
         self.names = bytes(container.section(NONE, c.NAMES))
+        self.deformers = Deformers(self)
 
     def rows(self, kind, form):
         return list(struct.iter_unpack(form, self.container.section(NONE, kind)))
@@ -80,6 +82,7 @@ def check_scene(view):
     for x in view.instances:
         there = x.node < len(view.nodes) and x.object < view.container.objects
         need(there and (x.flags, x.reserved) == (0, 0), "F154", f"{x}", c.INSTANCES)
+    view.deformers.check()
     check_tracks(view)
     for x in view.cameras:
         size = 0 < x.size < (180 if x.projection == 0 else math.inf)
@@ -96,18 +99,20 @@ def check_scene(view):
 
 
 def check_tracks(view):
-    """F155 to F157."""
+    """F155 to F157 and F185."""
     need = view.need
     before, times, values = (-1, -1), 0, 0
     for t in view.tracks:
-        good = t.node < len(view.nodes) and t.property < 4 and t.interpolation < 3 and not any(t.reserved)
+        good = t.node < len(view.nodes) and t.property < 5 and t.interpolation < 3 and not any(t.reserved)
         if good and t.property == VISIBLE:
             good = t.interpolation == STEP
-        elif good:
+        elif good and t.property != WEIGHTS:
             good = not view.nodes[t.node].flags & MATRIX
         need(good and before < (t.node, t.property), "F155", f"{t}", c.TRACKS)
         before = (t.node, t.property)
-        width = WIDTHS[t.property] * (3 if t.interpolation == CUBIC else 1)
+        numbers = view.deformers.weights_of(t.node) if t.property == WEIGHTS else WIDTHS[t.property]
+        need(numbers > 0, "F185", f"{t}", c.TRACKS)
+        width = numbers * (3 if t.interpolation == CUBIC else 1)
         need(t.keys > 0 and (t.first_time, t.first_value) == (times, values), "F156", f"{t}", c.TRACKS)
         keys = view.times[times : times + t.keys]
         numbers = view.values[values : values + t.keys * width]
@@ -116,7 +121,8 @@ def check_tracks(view):
         need(ascending, "F157", f"times of {t}", c.TIMES)
         need(all(map(math.isfinite, numbers)), "F157", f"values of {t}", c.VALUES)
         for i in range(0, len(numbers), width):
-            value = numbers[i + 4 : i + 8] if width == 12 else numbers[i : i + width]
+            rotation = t.property == ROTATION and width == 12
+            value = numbers[i + 4 : i + 8] if rotation else numbers[i : i + width]
             fits = {ROTATION: any(value), VISIBLE: value[0] in (0, 1)}.get(t.property, True)
             need(fits, "F157", f"values of {t}", c.VALUES)
         times, values = times + t.keys, values + t.keys * width

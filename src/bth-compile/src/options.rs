@@ -1,5 +1,6 @@
 //! The options of a compilation: those of all stages.
 
+use crate::pipeline::MotionOptions;
 use crate::{bvh, coordinates, costs, tets};
 use bth_format::layout::RecordKind;
 use bth_import as mesh;
@@ -51,6 +52,8 @@ pub struct CompileOptions {
     /// order, triangles of zero area are not dropped, and nothing is tetrahedralized, whatever `structure` says. Excludes
     /// `Structure::Tets`, `coordinates` other than f32, and leaving out the geometry.
     pub deformable: bool,
+    /// How objects whose vertices move by themselves are compiled.
+    pub motion: MotionOptions,
     /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
     /// may exceed it.
     /// The result does not depend on it.
@@ -74,6 +77,7 @@ impl Default for CompileOptions {
             keep_subtrees: true,
             geometry: true,
             deformable: false,
+            motion: MotionOptions::default(),
             objects_memory: u64::MAX,
         }
     }
@@ -88,6 +92,18 @@ impl CompileOptions {
             groups: self.names || self.materials,
             materials: self.materials,
             vertices: self.deformable,
+        }
+    }
+
+    /// The options of an object whose vertices move: a BVH over coordinates that stay as they are, which keeps the source's
+    /// positions and triangles.
+    pub fn of_deforming(&self) -> Self {
+        Self {
+            structure: Structure::Bvh,
+            deformable: true,
+            coordinates: coordinates::CoordinateOptions::default(),
+            geometry: true,
+            ..self.clone()
         }
     }
 

@@ -14,7 +14,7 @@ const NOTED: &str = "\
 bvh 1 043679c3f848da987a52b08afe248852a63686e9ba7fe1f9f3f44a3c4b3a8de3
 file 2.65536 ccea7f866f50e6b5cd7857429046bbecee5a0207fa5f6f8bf67b0e31bc729371
 marks 1 f1700307c15a7f23fface5b89ee0ce399fac1b93c7dd43e36616475cc7f08b70
-mesh 2 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
+mesh 3 2e8a3f74b02f7e74274f8b5c919979e536ff7bd5ca1ddeb6ece7be4e5c5f6c10
 ";
 
 /// As above for the tetrahedralization of a whole model, by the TetGen that made it: others make others, as do other

@@ -104,7 +104,7 @@ codes! {
     NodeTransform "F152" "A node's transform is finite; one that is no matrix has a quaternion that is not zero and ends with two zeros."
     Name "F153" "Names lie within NAMES, are UTF-8 and have at most 4,096 bytes."
     Instance "F154" "Instances refer to nodes and objects of the file; their flags and reserved fields are zero."
-    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist; visibility changes in steps; nodes with a matrix have no other tracks than of visibility; reserved fields are zero."
+    Track "F155" "Tracks ascend strictly by (node, property); their nodes, properties and interpolations exist; visibility changes in steps; nodes with a matrix have no other tracks than of visibility and of weights; reserved fields are zero."
     TrackRanges "F156" "A track has at least one key; the ranges of successive tracks follow each other, lie within TIMES and VALUES and together cover them."
     TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions are not zero, and visibility is 0 or 1."
     Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are finite and in the ranges of the table of Camera; its reserved fields are zero."
@@ -118,6 +118,26 @@ codes! {
     LeafRows "F165" "In a deformable object LEAF_VERTICES has one row for each indexed leaf and three for each raw leaf."
     LeafVertexRows "F166" "Elements of LEAF_VERTICES are rows of POSITIONS; those of unused slots repeat that of slot 0."
     LeafTriangles "F167" "In a deformable object the corners of a leaf's triangle have the rows of POSITIONS that TRIANGLES gives."
+    Deformation "F173" "DEFORMATION has one row or none; it comes with TRIANGLES, has at most 2 sets of influences and 2^16 joints, none of one only without the other, and a reserved field of zero; without it JOINTS, JOINT_WEIGHTS, MORPHS, MORPH_ROWS and MORPH_DELTAS are empty."
+    InfluenceRows "F174" "JOINTS and JOINT_WEIGHTS have as many rows for each position as DEFORMATION has sets of influences."
+    Influences "F175" "Joints are below the number of joints in DEFORMATION; the weights of a position are finite, not negative, and not all zero."
+    MorphRows "F176" "MORPHS has a row for each target, or two; reserved fields are zero."
+    MorphRanges "F177" "The ranges of successive morphs follow each other, lie within MORPH_DELTAS and MORPH_ROWS and together cover them; a dense morph has a delta for each row of POSITIONS or NORMALS."
+    MorphOrder "F178" "Rows of a sparse morph ascend strictly and are rows of POSITIONS or NORMALS."
+    MorphDeltas "F179" "Deltas of morphs are finite."
+    Deformer "F180" "Deformers ascend strictly by node; their nodes exist, their objects have DEFORMATION, no two have the same object, and reserved fields are zero."
+    DeformerSkin "F181" "The skin of a deformer is NONE or exists; its object has joints then, and no more than the skin."
+    MorphWeights "F182" "A deformer has a weight for each target of its object; the ranges of successive deformers follow each other, lie within MORPH_WEIGHTS and together cover it; weights are finite."
+    Skin "F183" "A skin has at least one joint; the ranges of successive skins follow each other, lie within SKIN_JOINTS and together cover it; reserved fields are zero."
+    SkinJoint "F184" "The node of a skin's joint exists, its matrix is finite, and its reserved fields are zero."
+    WeightTrack "F185" "A track of weights belongs to the node of a deformer that has weights."
+    DeformerObject "F186" "The object of a deformer has LEAF_VERTICES, or nothing that can be hit."
+
+    SequenceRows "F190" "SEQUENCE_POSITIONS has a row for each time of SEQUENCE_TIMES and each row of POSITIONS; an object with times is deformable."
+    SequenceTimes "F191" "Times of SEQUENCE_TIMES are finite and ascend strictly."
+    SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
+    Segments "F193" "SEGMENTS is empty or has at least two rows; their times are finite and ascend strictly, the first row and no other is of the object itself, and reserved fields are zero."
+    SegmentObjects "F194" "The objects of SEGMENTS exist; each but the first is in one row of one object, has neither SEGMENTS nor SEQUENCE_TIMES and no instance; all are deformable and have equal POSITIONS and TRIANGLES, bit for bit."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
@@ -335,6 +355,9 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::GROUP_RUNS => "GROUP_RUNS",
         kind::MATERIALS => "MATERIALS",
         kind::LABELS => "LABELS",
+        kind::SEQUENCE_TIMES => "SEQUENCE_TIMES",
+        kind::SEQUENCE_POSITIONS => "SEQUENCE_POSITIONS",
+        kind::SEGMENTS => "SEGMENTS",
         kind::OPACITY => "OPACITY",
         kind::OPACITY_MICRO => "OPACITY_MICRO",
         kind::PROVENANCE => "PROVENANCE",
@@ -346,6 +369,12 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::COLORS => "COLORS",
         kind::IMAGES => "IMAGES",
         kind::IMAGE_BYTES => "IMAGE_BYTES",
+        kind::DEFORMATION => "DEFORMATION",
+        kind::JOINTS => "JOINTS",
+        kind::JOINT_WEIGHTS => "JOINT_WEIGHTS",
+        kind::MORPHS => "MORPHS",
+        kind::MORPH_ROWS => "MORPH_ROWS",
+        kind::MORPH_DELTAS => "MORPH_DELTAS",
         kind::SCENE => "SCENE",
         kind::NODES => "NODES",
         kind::INSTANCES => "INSTANCES",
@@ -355,6 +384,10 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::CAMERAS => "CAMERAS",
         kind::LIGHTS => "LIGHTS",
         kind::NAMES => "NAMES",
+        kind::DEFORMERS => "DEFORMERS",
+        kind::SKINS => "SKINS",
+        kind::SKIN_JOINTS => "SKIN_JOINTS",
+        kind::MORPH_WEIGHTS => "MORPH_WEIGHTS",
         _ => "unknown",
     }
 }

@@ -19,6 +19,7 @@
 #![warn(missing_docs)]
 
 mod check;
+mod deformation_view;
 pub mod error;
 pub mod exact;
 pub mod file;
@@ -28,11 +29,14 @@ mod materials_view;
 mod names;
 pub mod object;
 mod scene_view;
+mod sequence_view;
 mod unpack;
 pub mod verify;
 
+pub use deformation_view::{DeformationView, MorphDeltas};
 pub use error::{Code, Error};
 pub use file::{File, FileMemory};
 pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
 pub use scene_view::SceneView;
+pub use sequence_view::{FramePosition, SequenceView};

@@ -24,6 +24,14 @@ pub struct SceneView<'a> {
     pub lights: &'a [Light],
     /// Bytes of the names of nodes, cameras and lights.
     pub names: &'a [u8],
+    /// Objects that deform, ascending by node.
+    pub deformers: &'a [Deformer],
+    /// Skins of the deformers.
+    pub skins: &'a [Skin],
+    /// Joints of the skins.
+    pub skin_joints: &'a [SkinJoint],
+    /// Weights of the deformers' morph targets, before tracks.
+    pub morph_weights: &'a [f64],
 }
 
 impl<'a> SceneView<'a> {
@@ -46,6 +54,19 @@ impl<'a> SceneView<'a> {
     /// BTH-F153: whether the bytes from `first` on are a name of an allowed length.
     pub(crate) fn is_name(&self, first: u32, length: u32) -> bool {
         names::is_name(self.names, first, length)
+    }
+
+    /// The deformer whose weights a node's track of weights gives.
+    pub fn deformer_of(&self, node: u32) -> Option<&'a Deformer> {
+        let row = self.deformers.binary_search_by_key(&node, |deformer| deformer.node).ok()?;
+        self.deformers.get(row)
+    }
+
+    /// Numbers of a value of a track; 0 for unknown properties and for weights of a node without a deformer.
+    pub fn width_of(&self, track: &Track) -> usize {
+        let property = Property::from_code(track.property);
+        let weights = || self.deformer_of(track.node).map_or(0, |deformer| deformer.weights as usize);
+        property.map_or(0, |property| property.width().unwrap_or_else(weights))
     }
 
     /// Times and values of a track, given the numbers per key. Panics where they do not lie within their sections, which the

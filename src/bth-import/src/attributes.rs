@@ -9,17 +9,17 @@ use crate::source::input_error;
 
 /// Shading attributes with one row for each used pair of normal and texture coordinate, in order of first use. A corner
 /// without one gets zeros; a zero normal means that the geometric normal is to be used. `None` when the source has
-/// nothing of what `keep` names.
+/// nothing of what `keep` names. The second value has for each row of normals its row in the source, or [`NONE`] for zeros.
 ///
 /// # Errors
 /// `BTH-I008` for a used value that is not finite.
-pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
+pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<(Attributes, Vec<u32>)>> {
     let has_normals = keep != Keep::None && !raw.normal_rows.is_empty();
     let has_uvs = keep == Keep::All && !raw.uv_rows.is_empty();
     if !has_normals && !has_uvs {
         return Ok(None);
     }
-    let mut attributes = Attributes::default();
+    let (mut attributes, mut sources) = (Attributes::default(), Vec::new());
     let mut rows: HashMap<(u32, u32), u32> = HashMap::new();
     let none = [NONE; 3];
     attributes.corners.reserve_exact(raw.triangles.len());
@@ -32,6 +32,7 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
             *corner = *rows.entry(pair).or_insert(next);
             if *corner == next {
                 if has_normals {
+                    sources.push(pair.0);
                     attributes.normals.push(value(raw, RowKind::Normal, &raw.normals, pair.0)?);
                 }
                 if has_uvs {
@@ -41,7 +42,7 @@ pub(super) fn collect(raw: &Raw<'_>, keep: Keep) -> Result<Option<Attributes>> {
         }
         attributes.corners.push(corners);
     }
-    Ok(Some(attributes))
+    Ok(Some((attributes, sources)))
 }
 
 fn value<const N: usize>(raw: &Raw<'_>, kind: RowKind, values: &[[f32; N]], row: u32) -> Result<[f32; N]> {
@@ -78,11 +79,11 @@ mod tests {
 
     #[test]
     fn one_row_for_each_used_pair_in_order_of_first_use() {
-        let all = collect(&raw(), Keep::All).unwrap().unwrap();
+        let all = collect(&raw(), Keep::All).unwrap().unwrap().0;
         assert_eq!(all.corners, [[0, 1, 0], [1, 2, 0]]);
         assert_eq!(all.normals, [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0; 3]]);
         assert_eq!(all.uvs, [[0.0, 0.5], [1.0, 0.5], [1.0, 0.5]]);
-        let normals = collect(&raw(), Keep::Normals).unwrap().unwrap();
+        let normals = collect(&raw(), Keep::Normals).unwrap().unwrap().0;
         assert_eq!(normals.corners, [[0, 0, 0], [0, 1, 0]]);
         assert!(normals.uvs.is_empty());
         assert_eq!(collect(&raw(), Keep::None).unwrap(), None);

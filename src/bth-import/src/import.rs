@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cutout::{AlphaMode, Cutouts};
 use crate::error::{Error, Result};
+use crate::gltf::GltfPart;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::groups::Groups;
 use crate::materials::{ImageFile, Looks};
@@ -15,7 +16,7 @@ use crate::{attributes, gltf, mtl, obj, off, ply, stl, topology, weld};
 
 /// The supported formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+pub(crate) enum Format {
     Obj,
     Gltf,
     Ply,
@@ -48,31 +49,49 @@ pub fn import_bytes(
     let wanted = wanted.into();
     monitor.stage("import", Some(data.len() as u64));
     let source = Source::new(name, data, monitor);
-    let raw = match format(&source)? {
-        Format::Obj => obj::read(&source, wanted)?,
-        Format::Gltf => gltf::flatten::read(&source, wanted)?,
-        Format::Ply => ply::read(&source, wanted)?,
-        Format::Stl => stl::read(&source)?,
-        Format::Off => off::read(&source)?,
-    };
+    let raw = read_raw(&source, wanted)?;
     source.progress(data.len())?;
     finish(raw, wanted, monitor)
 }
 
-/// Reads meshes of a glTF or GLB file by their numbers, each in its own space, without the transforms of nodes.
+/// Reads a source with its own rows.
+pub(crate) fn read_raw<'a>(source: &'a Source<'_>, wanted: Wanted) -> Result<Raw<'a>> {
+    match format(source)? {
+        Format::Obj => obj::read(source, wanted),
+        Format::Gltf => gltf::flatten::read(source, wanted),
+        Format::Ply => ply::read(source, wanted),
+        Format::Stl => stl::read(source),
+        Format::Off => off::read(source),
+    }
+}
+
+/// Reads parts of a glTF or GLB file, each as a model of its own, without the transforms of nodes.
 ///
 /// # Errors
-/// As [`import`]; also when the file is no glTF or a mesh does not exist.
-pub fn import_gltf_meshes(
+/// As [`import`]; also when the file is no glTF or a part does not exist.
+pub fn import_gltf_parts(
     path: &Path,
-    meshes: &[u32],
+    parts: &[GltfPart],
+    wanted: impl Into<Wanted>,
+    monitor: &dyn Monitor,
+) -> Result<Vec<(Mesh, Report)>> {
+    import_gltf_parts_bytes(path, &read_file(path)?, parts, wanted, monitor)
+}
+
+/// As [`import_gltf_parts`], from the bytes of a file, as [`import_bytes`] reads it.
+///
+/// # Errors
+/// As [`import_gltf_parts`].
+pub fn import_gltf_parts_bytes(
+    name: &Path,
+    data: &[u8],
+    parts: &[GltfPart],
     wanted: impl Into<Wanted>,
     monitor: &dyn Monitor,
 ) -> Result<Vec<(Mesh, Report)>> {
     let wanted = wanted.into();
-    let data = read_file(path)?;
     monitor.stage("import", Some(data.len() as u64));
-    let source = Source::new(path, &data, monitor);
+    let source = Source::new(name, data, monitor);
     if format(&source)? != Format::Gltf {
         let message = "expected a glTF or GLB file, of which single meshes can be named";
         return Err(source.error("BTH-I001", message, "leave out the number of the mesh"));
@@ -80,11 +99,11 @@ pub fn import_gltf_meshes(
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = gltf::document::read(&source, &supported)?;
     let shared = gltf::materials::SharedMaterials::default();
-    let one = |mesh: &u32| {
-        let raw = gltf::flatten::read_mesh(&source, &document, binary, *mesh as usize, (wanted, &shared))?;
+    let one = |part: &GltfPart| {
+        let raw = gltf::flatten::read_part(&source, &document, binary, *part, (wanted, &shared))?;
         finish(raw, wanted, monitor)
     };
-    let imported = meshes.iter().map(one).collect();
+    let imported = parts.iter().map(one).collect();
     shared.report(&source);
     imported
 }
@@ -114,18 +133,18 @@ pub fn import_cutouts_bytes(
     }
 }
 
-/// The cut-outs of meshes of a glTF file, whose triangles have the numbers that [`import_gltf_meshes`] gives them.
+/// The cut-outs of parts of a glTF file, whose triangles have the numbers that [`import_gltf_parts`] gives them.
 ///
 /// # Errors
 /// As [`import_cutouts`].
 pub fn import_gltf_cutouts(
     path: &Path,
-    meshes: &[u32],
+    parts: &[GltfPart],
     mode: AlphaMode,
     monitor: &dyn Monitor,
 ) -> Result<Vec<Cutouts>> {
     let data = read_file(path)?;
-    gltf::cutout::meshes(&Source::new(path, &data, monitor), mode, meshes)
+    gltf::cutout::parts(&Source::new(path, &data, monitor), mode, parts)
 }
 
 /// The images of the materials of a model ([`Wanted::materials`]), each with the name by which textures refer to it.
@@ -163,25 +182,41 @@ pub fn source_files(path: &Path, looks: impl Into<Looks>) -> Result<Vec<PathBuf>
 fn finish(mut raw: Raw<'_>, wanted: Wanted, monitor: &dyn Monitor) -> Result<(Mesh, Report)> {
     check_triangles(raw.triangles.len() as u64)?;
     check_rows(raw.positions.len() as u64)?;
-    let attributes = attributes::collect(&raw, wanted.attributes)?;
+    let collected = attributes::collect(&raw, wanted.attributes)?;
+    let (attributes, normal_sources) = collected.map_or((None, Vec::new()), |(a, rows)| (Some(a), rows));
     let triangles = std::mem::take(&mut raw.triangles);
     let groups = wanted.groups.then(|| std::mem::take(&mut raw.groups).finish(triangles.len()));
     let recorder = std::mem::take(&mut raw.materials);
     let of = |(_, kept): &(Groups, Vec<u32>)| recorder.finish(kept, triangles.len());
     let materials = groups.as_ref().filter(|_| wanted.materials).map(of);
     let groups = groups.map(|(groups, _)| groups);
-    let rows = (raw.positions.as_slice(), triangles);
-    let (mesh, counted) = weld_and_count(rows, attributes, wanted, monitor, |row| {
+    let not_finite = |row| {
         input_error(
             NON_FINITE,
             (raw.locate)(RowKind::Position, row),
             format!("expected finite coordinates, found {:?} (as 32-bit numbers)", raw.positions[row]),
             "remove the vertex and the faces that use it, or export the model again",
         )
-    })?;
+    };
+    let Some(deformation) = &raw.deformation else {
+        let rows = (raw.positions.as_slice(), triangles);
+        let (mesh, counted) = weld_and_count(rows, attributes, wanted, monitor, not_finite)?;
+        let mesh = Mesh { groups, materials, ..mesh };
+        return Ok((mesh, report(&raw, counted)));
+    };
+    let mut triangles = triangles;
+    let (welded, sources) = deformation.weld(&raw.positions, &mut triangles).map_err(not_finite)?;
+    let deformation = Some(deformation.finish(&sources, &normal_sources));
+    let left_out = welded.non_finite_unused;
+    let (mesh, counted) = count(welded, triangles, (raw.positions.len(), attributes), monitor)?;
+    warn_not_finite(left_out, "are left out", monitor);
+    Ok((Mesh { groups, materials, deformation, ..mesh }, report(&raw, counted)))
+}
+
+/// The counts with what the reader counted.
+fn report(raw: &Raw<'_>, counted: Report) -> Report {
     let format = raw.format.to_owned();
-    let mesh = Mesh { groups, materials, ..mesh };
-    Ok((mesh, Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }))
+    Report { format, polygons: raw.polygons, skipped: raw.skipped, ..counted }
 }
 
 /// Welds and counts triangles whose indices have been checked. The report's fields that depend on the format are empty.
@@ -197,18 +232,36 @@ pub(crate) fn weld_and_count(
 ) -> Result<(Mesh, Report)> {
     let unwelded = wanted.vertices.then(|| triangles.clone());
     let welded = weld::weld(positions, &mut triangles).map_err(not_finite)?;
-    if welded.non_finite_unused > 0 {
-        let count = welded.non_finite_unused;
-        let fate = if wanted.vertices { "are kept as zeros" } else { "are left out" };
+    let fate = if wanted.vertices { "are kept as zeros" } else { "are left out" };
+    warn_not_finite(welded.non_finite_unused, fate, monitor);
+    let (mut mesh, report) = count(welded, triangles, (positions.len(), attributes), monitor)?;
+    if let Some(triangles) = unwelded {
+        (mesh.positions, mesh.triangles) = (positions.iter().map(kept_vertex).collect(), triangles);
+    }
+    Ok((mesh, report))
+}
+
+/// Warns of positions that are not finite and that no face uses.
+fn warn_not_finite(count: u64, fate: &str, monitor: &dyn Monitor) {
+    if count > 0 {
         monitor.warn(&format!("{count} positions are not finite; no face uses them, they {fate}"));
     }
+}
+
+/// The mesh of welded triangles, with counts; `positions_read` are the positions before welding.
+fn count(
+    welded: weld::Welded,
+    triangles: Vec<[u32; 3]>,
+    (positions_read, attributes): (usize, Option<Attributes>),
+    monitor: &dyn Monitor,
+) -> Result<(Mesh, Report)> {
     monitor.check()?;
-    let mut mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
+    let mesh = Mesh { positions: welded.positions, triangles, attributes, ..Mesh::default() };
     let counts = topology::topology(&mesh);
     monitor.check()?;
     let report = Report {
         triangles: mesh.triangles.len() as u64,
-        positions_read: positions.len() as u64,
+        positions_read: positions_read as u64,
         positions: mesh.positions.len() as u64,
         degenerate: counts.degenerate,
         duplicate: counts.duplicate,
@@ -218,9 +271,6 @@ pub(crate) fn weld_and_count(
         non_finite_unused: welded.non_finite_unused,
         ..Report::default()
     };
-    if let Some(triangles) = unwelded {
-        (mesh.positions, mesh.triangles) = (positions.iter().map(kept_vertex).collect(), triangles);
-    }
     Ok((mesh, report))
 }
 
@@ -231,7 +281,7 @@ fn kept_vertex(position: &[f32; 3]) -> [f32; 3] {
 }
 
 /// The format of a source by its extension, or else by its content.
-fn format(source: &Source<'_>) -> Result<Format> {
+pub(crate) fn format(source: &Source<'_>) -> Result<Format> {
     source.fetched()?;
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let by_name = match extension.as_deref() {

@@ -1,6 +1,6 @@
 //! Reads models: OBJ, PLY, STL, OFF, glTF and GLB into welded triangle meshes, and glTF scenes into manifests.
 //!
-//! [`import()`] is the entry point. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
+//! [`import()`] is the entry point; [`import_sequence`] and [`import_vertex_cache`] are those for meshes whose vertices move. It finds the format, and the format's reader (`obj`, `ply`, `stl`, `off` or [`gltf`])
 //! turns the file into a `raw` mesh with the source's own rows. Then `weld` merges bit-equal positions, `attributes`
 //! merges shading rows, and `topology` makes the counts of the report. [`gltf::scene`] reads nodes, animations, cameras
 //! and lights into a manifest instead.
@@ -8,6 +8,7 @@
 
 mod attributes;
 mod cutout;
+mod deformation;
 pub mod error;
 pub mod gltf;
 mod groups;
@@ -23,6 +24,7 @@ mod obj;
 mod off;
 mod ply;
 mod raw;
+mod sequence;
 mod source;
 mod stl;
 mod topology;
@@ -30,15 +32,21 @@ mod weld;
 mod zero_area;
 
 pub use cutout::{AlphaImage, AlphaMode, CutoutCorner, CutoutMaterial, CutoutTriangle, Cutouts, Wrap};
+pub use deformation::Deformation;
 pub use error::{Error, Place, Result};
+pub use gltf::GltfPart;
 pub use groups::{Group, Groups};
 pub use import::{
-    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_meshes,
-    import_images, source_files,
+    import, import_bytes, import_cutouts, import_cutouts_bytes, import_gltf_cutouts, import_gltf_parts,
+    import_gltf_parts_bytes, import_images, source_files,
 };
 pub use materials::{ImageFile, Looks, Materials};
 pub use memory::{MEMORY_FORMAT, import_triangles};
-pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, TriangleOpacities, Wanted};
+pub use mesh::{Attributes, Keep, Mesh, OpacityReport, Report, Sequence, TriangleOpacities, Wanted};
 pub use monitor::{Monitor, Silent};
+pub use sequence::{
+    MAX_FRAMES, Timing, VertexCache, import_sequence, import_sequence_bytes, import_vertex_cache,
+    import_vertex_cache_bytes, read_vertex_cache, sequence_files,
+};
 pub use source::read_file;
 pub use zero_area::is_zero_area;

@@ -1,5 +1,6 @@
 //! The triangle mesh that importers make, and their report about it.
 
+use crate::deformation::Deformation;
 use crate::groups::Groups;
 use crate::materials::Materials;
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,21 @@ pub struct Mesh {
     pub groups: Option<Groups>,
     /// How the materials of the groups look, if the caller wants them.
     pub materials: Option<Materials>,
+    /// The positions at other times, if the mesh is a sequence; `positions` are then those of the first frame.
+    pub sequence: Option<Sequence>,
+    /// What moves its vertices, of a [`GltfPart::Deforming`](crate::GltfPart::Deforming). Positions are then distinct together with what
+    /// moves them.
+    pub deformation: Option<Deformation>,
+}
+
+/// Positions of a mesh at several times. Between two frames vertices move on straight lines at constant speed; before the first and
+/// after the last they stand still.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sequence {
+    /// Seconds of the frames, strictly ascending; at least one.
+    pub times: Vec<f64>,
+    /// Finite positions by frame, each with as many rows as [`Mesh::positions`].
+    pub positions: Vec<[f32; 3]>,
 }
 
 /// Opacity of each triangle, as the sections OPACITY and OPACITY_MICRO of a compiled file have it.
@@ -120,9 +136,16 @@ pub struct Report {
     pub components: u64,
     /// Positions that are not finite and that no face uses. Used ones are an error.
     pub non_finite_unused: u64,
+    /// Frames of a sequence; 0 for other models.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub frames: u64,
     /// Opacity of triangles, where some are not opaque.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<OpacityReport>,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 impl Mesh {

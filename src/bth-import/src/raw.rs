@@ -1,5 +1,6 @@
 //! The mesh that a format's reader makes: the source's own rows, not welded.
 
+use crate::deformation::RawDeformation;
 use crate::error::{Error, Place, Result};
 use crate::groups::GroupRecorder;
 use crate::materials::MaterialRecorder;
@@ -46,6 +47,8 @@ pub(super) struct Raw<'a> {
     pub(super) groups: GroupRecorder,
     /// How materials look, and vertex colours, if the caller wants them.
     pub(super) materials: MaterialRecorder,
+    /// What moves the vertices, if the caller wants it.
+    pub(super) deformation: Option<RawDeformation>,
     /// Finds places for error messages.
     pub(super) locate: Locate<'a>,
 }
@@ -65,6 +68,7 @@ impl<'a> Raw<'a> {
             skipped: 0,
             groups: GroupRecorder::default(),
             materials: MaterialRecorder::default(),
+            deformation: None,
             locate,
         }
     }

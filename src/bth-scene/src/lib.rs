@@ -10,6 +10,8 @@ pub mod limits;
 mod model;
 mod names;
 mod read;
+mod read_deformers;
+mod read_sequence;
 mod read_tracks;
 mod read_transform;
 mod table;
@@ -23,10 +25,12 @@ pub use read::{parse, read};
 pub const KEYS: &[(&str, &[&str])] = &[
     ("scene", read::SCENE_KEYS),
     ("frames", read::FRAMES_KEYS),
-    ("object", read::OBJECT_KEYS),
+    ("object", read_sequence::OBJECT_KEYS),
     ("node", read::NODE_KEYS),
     ("camera", read::CAMERA_KEYS),
     ("light", read::LIGHT_KEYS),
+    ("skin", read_deformers::SKIN_KEYS),
+    ("deformer", read_deformers::DEFORMER_KEYS),
     ("track", read_tracks::TRACK_KEYS),
     ("turn", read_transform::TURN_KEYS),
     ("look", read_transform::LOOK_KEYS),

@@ -18,6 +18,10 @@ pub struct Manifest {
     pub cameras: Vec<Camera>,
     /// Lights.
     pub lights: Vec<Light>,
+    /// Skins of deformers.
+    pub skins: Vec<Skin>,
+    /// What deforms objects; no two of the same node or of the same object.
+    pub deformers: Vec<Deformer>,
     /// Animated properties; no two of the same node and property.
     pub tracks: Vec<Track>,
 }
@@ -50,7 +54,7 @@ pub struct Object {
 
 /// Where a geometry comes from. Paths are relative to the manifest's folder and stay within it; their
 /// separator is `/`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Source {
     /// A model that is to be compiled.
     Model {
@@ -66,13 +70,70 @@ pub enum Source {
         /// Object of that file.
         object: u32,
     },
+    /// Models of equal topology, one for each frame.
+    Sequence {
+        /// The models.
+        frames: SequenceFrames,
+        /// When they are shown.
+        timing: SequenceTiming,
+    },
+    /// A model whose vertices are moved by a vertex cache.
+    Cached {
+        /// OBJ, PLY, STL or OFF file.
+        path: String,
+        /// PC2 or MDD file.
+        cache: String,
+        /// When its frames are shown.
+        timing: SequenceTiming,
+    },
+    /// A mesh that is to be compiled so that a deformer can move its vertices.
+    Deforming {
+        /// glTF or GLB file.
+        path: String,
+        /// Number of the mesh.
+        mesh: u32,
+    },
+    /// The mesh of a node at rest: with its default morph weights and with its joints where the nodes place them.
+    AtRest {
+        /// glTF or GLB file.
+        path: String,
+        /// Number of the node. A mesh with a skin is in world space, another one in that of the node.
+        node: u32,
+    },
+}
+
+/// The models of a sequence: OBJ, PLY, STL or OFF files.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SequenceFrames {
+    /// All files whose names have a number in the place of the one run of `#`, by number.
+    Numbered(String),
+    /// These files, at least one.
+    Listed(Vec<String>),
+}
+
+/// When the frames of a sequence or of a vertex cache are shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SequenceTiming {
+    /// Frames a second, above 0; `None` for the rate of the scene's frames, or where the file states the times.
+    pub rate: Option<f64>,
+    /// Seconds at which the first frame of a sequence, or frame 0 of a vertex cache, is shown.
+    pub start: f64,
 }
 
 impl Source {
-    /// The file, relative to the manifest's folder.
+    /// The file, relative to the manifest's folder. Of a sequence its pattern or its first file, of a model with a vertex cache
+    /// the model.
     pub fn path(&self) -> &str {
         match self {
-            Source::Model { path, .. } | Source::Compiled { path, .. } => path,
+            Source::Model { path, .. }
+            | Source::Compiled { path, .. }
+            | Source::Cached { path, .. }
+            | Source::Deforming { path, .. }
+            | Source::AtRest { path, .. } => path,
+            Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => pattern,
+            Source::Sequence { frames: SequenceFrames::Listed(files), .. } => {
+                files.first().map_or("", String::as_str)
+            }
         }
     }
 }
@@ -174,11 +235,36 @@ pub enum LightKind {
     },
 }
 
+/// The joints that move the vertices of an object (glTF 2.0 specification, §3.7.3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skin {
+    /// Unique among skins.
+    pub name: String,
+    /// The nodes that are its joints, at least one.
+    pub joints: Vec<usize>,
+    /// For each joint rows of the matrix from the space of the object to that of the joint, applied to columns (x, y, z, 1);
+    /// `None` where all are the identity.
+    pub inverse_binds: Option<Vec<[[f64; 4]; 3]>>,
+}
+
+/// What deforms an object: a vertex is first moved by the morph targets, then by the joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deformer {
+    /// The node whose tracks of weights apply.
+    pub node: usize,
+    /// The object that deforms, one of [`Source::Deforming`] or of a compiled file.
+    pub object: usize,
+    /// Its skin. Instances of the object are then in world space: the transforms of their nodes have no effect.
+    pub skin: Option<usize>,
+    /// A weight for each morph target of the object, before tracks.
+    pub weights: Vec<f64>,
+}
+
 /// Keyframes of one property of one node, with the meanings of glTF. Before the first key and after the
 /// last the track has the value of that key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Track {
-    /// The animated node. It has no matrix, unless the property is its visibility.
+    /// The animated node. It has no matrix, unless the property is its visibility or its weights.
     pub node: usize,
     /// The animated property.
     pub property: Property,
@@ -186,7 +272,7 @@ pub struct Track {
     pub interpolation: Interpolation,
     /// Seconds, strictly ascending, at least one.
     pub times: Vec<f64>,
-    /// For each key [`Property::width`] numbers; with [`Interpolation::Cubic`] those of the in-tangent, the
+    /// For each key [`Property::width`] numbers, of weights as many as the deformer of the node has; with [`Interpolation::Cubic`] those of the in-tangent, the
     /// value and the out-tangent.
     pub values: Vec<f64>,
 }
@@ -202,18 +288,22 @@ pub enum Property {
     Scale,
     /// One number, 0 or 1; always in steps.
     Visible,
+    /// The weights of the deformer of the node.
+    Weights,
 }
 
 impl Property {
     /// All of them, in order.
-    pub const ALL: [Property; 4] = [Self::Translation, Self::Rotation, Self::Scale, Self::Visible];
+    pub const ALL: [Property; 5] =
+        [Self::Translation, Self::Rotation, Self::Scale, Self::Visible, Self::Weights];
 
-    /// Numbers of a value.
-    pub const fn width(self) -> usize {
+    /// Numbers of a value; `None` for weights, of which the deformer of the node has some number.
+    pub const fn width(self) -> Option<usize> {
         match self {
-            Self::Translation | Self::Scale => 3,
-            Self::Rotation => 4,
-            Self::Visible => 1,
+            Self::Translation | Self::Scale => Some(3),
+            Self::Rotation => Some(4),
+            Self::Visible => Some(1),
+            Self::Weights => None,
         }
     }
     /// The word that manifests use.
@@ -223,6 +313,7 @@ impl Property {
             Self::Rotation => "rotation",
             Self::Scale => "scale",
             Self::Visible => "visible",
+            Self::Weights => "weights",
         }
     }
 }

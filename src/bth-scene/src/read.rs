@@ -4,6 +4,8 @@ use crate::error::{Error, Result, code};
 use crate::limits::{MAX_MANIFEST, MAX_PATH};
 use crate::model::*;
 use crate::names::Names;
+use crate::read_deformers::{DEFORMER_KEYS, SKIN_KEYS, deformers, skin};
+use crate::read_sequence::{OBJECT_KEYS, sequence, vertex_cache};
 use crate::read_tracks::{TRACK_KEYS, tracks};
 use crate::read_transform::transform;
 use crate::table::{Document, Table, Value};
@@ -12,9 +14,8 @@ use std::path::Path;
 use toml::de::DeTable;
 
 pub(crate) const SCENE_KEYS: &[&str] =
-    &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "tracks"];
+    &["version", "camera", "frames", "objects", "nodes", "cameras", "lights", "skins", "deformers", "tracks"];
 pub(crate) const FRAMES_KEYS: &[&str] = &["first", "last", "rate"];
-pub(crate) const OBJECT_KEYS: &[&str] = &["name", "model", "mesh", "file", "object"];
 pub(crate) const NODE_KEYS: &[&str] =
     &["name", "parent", "object", "visible", "translation", "rotation", "scale", "matrix", "look"];
 pub(crate) const CAMERA_KEYS: &[&str] = &["name", "node", "fov", "height", "aspect", "near", "far"];
@@ -73,7 +74,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
     let camera = scene.get("camera").map(|v| camera_names.row(&v)).transpose()?;
     let read_nodes = nodes.iter().map(|t| node(t, &node_names, &object_names)).collect::<Result<Vec<_>>>()?;
     check_cycles(&nodes, &read_nodes)?;
-    let tracks = tracks(&scene.tables("tracks", TRACK_KEYS)?, &node_names, &read_nodes)?;
+    let skins = scene.tables("skins", SKIN_KEYS)?;
+    let skin_names = Names::collect("skin", &skins)?;
+    let deformers =
+        deformers(&scene.tables("deformers", DEFORMER_KEYS)?, &node_names, &object_names, &skin_names)?;
+    let tracks = tracks(&scene.tables("tracks", TRACK_KEYS)?, &node_names, &read_nodes, &deformers)?;
     Ok(Manifest {
         frames,
         camera,
@@ -81,6 +86,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Manifest> {
         nodes: read_nodes,
         cameras: cameras.iter().map(|t| self::camera(t, &node_names)).collect::<Result<_>>()?,
         lights: lights.iter().map(|t| light(t, &node_names)).collect::<Result<_>>()?,
+        skins: skins.iter().map(|t| skin(t, &node_names)).collect::<Result<_>>()?,
+        deformers,
         tracks,
     })
 }
@@ -113,21 +120,50 @@ fn frames(value: &Value<'_>) -> Result<Frames> {
 }
 
 fn object(table: &Table<'_>) -> Result<Object> {
-    for (a, b) in [("model", "file"), ("model", "object"), ("file", "mesh")] {
+    for (a, b) in [
+        ("model", "file"),
+        ("model", "object"),
+        ("file", "mesh"),
+        ("file", "deforms"),
+        ("file", "node"),
+        ("node", "mesh"),
+        ("node", "deforms"),
+    ] {
         table.exclude(a, b)?;
+    }
+    if let Some(source) = sequence(table)? {
+        return Ok(Object { name: name(table)?, source });
+    }
+    if let Some(source) = vertex_cache(table)? {
+        return Ok(Object { name: name(table)?, source });
     }
     let index = |key| -> Result<Option<u32>> {
         table.get(key).map(|v| v.integer(0..=i64::from(u32::MAX - 1)).map(|n| n as u32)).transpose()
     };
     let source = match table.get("file") {
         Some(file) => Source::Compiled { path: path(&file)?, object: index("object")?.unwrap_or(0) },
-        None => Source::Model { path: path(&table.need("model")?)?, mesh: index("mesh")? },
+        None => {
+            let path = path(&table.need("model")?)?;
+            let deforms = table.get("deforms").map_or(Ok(false), |v| v.boolean())?;
+            match (index("node")?, index("mesh")?) {
+                (Some(node), _) => Source::AtRest { path, node },
+                (None, Some(mesh)) if deforms => Source::Deforming { path, mesh },
+                (None, None) if deforms => return Err(missing_mesh(table)?),
+                (None, mesh) => Source::Model { path, mesh },
+            }
+        }
     };
     Ok(Object { name: name(table)?, source })
 }
 
+/// The error for an object that deforms without a mesh.
+fn missing_mesh(table: &Table<'_>) -> Result<Error> {
+    let message = "only single meshes of glTF files deform";
+    Ok(table.need("deforms")?.error(code::CONFLICT, message, "name a mesh by its number"))
+}
+
 /// A path that stays within the manifest's folder on every system.
-fn path(value: &Value<'_>) -> Result<String> {
+pub(crate) fn path(value: &Value<'_>) -> Result<String> {
     let text = value.string()?;
     if text.len() > MAX_PATH {
         let message = format!("expected a path of at most {MAX_PATH} bytes, found {}", text.len());

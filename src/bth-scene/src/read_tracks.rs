@@ -1,24 +1,31 @@
 //! Tracks: keyframes of one property of one node.
 
 use crate::error::{Result, code};
-use crate::model::{Interpolation, Node, Property, Track, Transform};
+use crate::model::{Deformer, Interpolation, Node, Property, Track, Transform};
 use crate::names::Names;
 use crate::read_transform::rotation;
 use crate::table::{Table, Value};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Keys of a track.
 pub(crate) const TRACK_KEYS: &[&str] = &["node", "property", "interpolation", "times", "values"];
 
 /// Reads the tracks of a manifest.
-pub(crate) fn tracks(tables: &[Table<'_>], names: &Names<'_>, nodes: &[Node]) -> Result<Vec<Track>> {
+pub(crate) fn tracks(
+    tables: &[Table<'_>],
+    names: &Names<'_>,
+    nodes: &[Node],
+    deformers: &[Deformer],
+) -> Result<Vec<Track>> {
     let mut seen = HashSet::new();
+    let weights: HashMap<usize, usize> = deformers.iter().map(|d| (d.node, d.weights.len())).collect();
     tables
         .iter()
         .map(|table| {
-            let track = track(table, names)?;
+            let track = track(table, names, &weights)?;
             let node = &nodes[track.node];
-            if matches!(node.transform, Transform::Matrix(_)) && track.property != Property::Visible {
+            let moves = !matches!(track.property, Property::Visible | Property::Weights);
+            if matches!(node.transform, Transform::Matrix(_)) && moves {
                 let message = format!("the node \"{}\" has a matrix, which tracks cannot move", node.name);
                 return Err(table.need("node")?.error(
                     code::CONFLICT,
@@ -36,9 +43,15 @@ pub(crate) fn tracks(tables: &[Table<'_>], names: &Names<'_>, nodes: &[Node]) ->
         .collect()
 }
 
-fn track(table: &Table<'_>, names: &Names<'_>) -> Result<Track> {
-    let node = names.row(&table.need("node")?)?;
+/// Reads a track; `weights` has for each node with a deformer the number of its weights.
+fn track(table: &Table<'_>, names: &Names<'_>, weights: &HashMap<usize, usize>) -> Result<Track> {
+    let node_value = table.need("node")?;
+    let node = names.row(&node_value)?;
     let property = table.need("property")?.choice(&Property::ALL.map(|p| (p.name(), p)))?;
+    let Some(width) = property.width().or_else(|| weights.get(&node).copied().filter(|n| *n > 0)) else {
+        let message = "a track of weights is of a node whose deformer has weights";
+        return Err(node_value.error(code::CONFLICT, message, "give the node a deformer with weights"));
+    };
     let usual = if property == Property::Visible { Interpolation::Step } else { Interpolation::Linear };
     let interpolation = match table.get("interpolation") {
         None => usual,
@@ -57,10 +70,10 @@ fn track(table: &Table<'_>, names: &Names<'_>) -> Result<Track> {
         let message = format!("expected a value for each of {} times, found {}", times.len(), keys.len());
         return Err(values_value.error(code::TRACK, message, "give as many values as times"));
     }
-    let mut values = Vec::with_capacity(keys.len() * interpolation.values_per_key() * property.width());
+    let mut values = Vec::with_capacity(keys.len() * interpolation.values_per_key() * width);
     for key in &keys {
         if interpolation != Interpolation::Cubic {
-            value(key, property, &mut values)?;
+            value(key, (property, width), &mut values)?;
             continue;
         }
         let parts = key.array()?;
@@ -69,9 +82,9 @@ fn track(table: &Table<'_>, names: &Names<'_>) -> Result<Track> {
                 format!("expected an in-tangent, a value and an out-tangent, found {} rows", parts.len());
             return Err(key.error(code::TRACK, message, "give three rows for each key"));
         };
-        tangent(before, property, &mut values)?;
-        value(at, property, &mut values)?;
-        tangent(after, property, &mut values)?;
+        tangent(before, (property, width), &mut values)?;
+        value(at, (property, width), &mut values)?;
+        tangent(after, (property, width), &mut values)?;
     }
     Ok(Track { node, property, interpolation, times, values })
 }
@@ -93,18 +106,20 @@ fn times(value: &Value<'_>) -> Result<Vec<f64>> {
     Ok(times)
 }
 
-fn value(value: &Value<'_>, property: Property, into: &mut Vec<f64>) -> Result<()> {
+fn value(value: &Value<'_>, (property, width): (Property, usize), into: &mut Vec<f64>) -> Result<()> {
     match property {
         Property::Translation | Property::Scale => into.extend(value.numbers::<3>()?),
         Property::Rotation => into.extend(rotation(value)?),
         Property::Visible => into.push(f64::from(u8::from(value.boolean()?))),
+        Property::Weights => into.extend(value.numbers_of(width)?),
     }
     Ok(())
 }
 
-fn tangent(value: &Value<'_>, property: Property, into: &mut Vec<f64>) -> Result<()> {
+fn tangent(value: &Value<'_>, (property, width): (Property, usize), into: &mut Vec<f64>) -> Result<()> {
     match property {
         Property::Rotation => into.extend(value.numbers::<4>()?),
+        Property::Weights => into.extend(value.numbers_of(width)?),
         _ => into.extend(value.numbers::<3>()?),
     }
     Ok(())

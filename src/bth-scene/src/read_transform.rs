@@ -18,7 +18,7 @@ pub(crate) fn transform(node: &Table<'_>) -> Result<Transform> {
         node.exclude("look", parts)?;
     }
     if let Some(value) = node.get("matrix") {
-        return matrix(&value);
+        return Ok(Transform::Matrix(value.matrix()?));
     }
     let Transform::Parts { mut translation, mut rotation, mut scale } = Transform::default() else {
         unreachable!("the default has parts")
@@ -36,18 +36,6 @@ pub(crate) fn transform(node: &Table<'_>) -> Result<Transform> {
         scale = value.numbers()?;
     }
     Ok(Transform::Parts { translation, rotation, scale })
-}
-
-fn matrix(value: &Value<'_>) -> Result<Transform> {
-    let rows = value.array()?;
-    if rows.len() != 3 {
-        return Err(value.not_allowed("three rows of four numbers", format!("{} rows", rows.len())));
-    }
-    let mut matrix = [[0.0; 4]; 3];
-    for (row, value) in matrix.iter_mut().zip(&rows) {
-        *row = value.numbers()?;
-    }
-    Ok(Transform::Matrix(matrix))
 }
 
 /// A quaternion, or `{ axis = [x, y, z], degrees = d }`.

@@ -145,6 +145,10 @@ impl<'a> Value<'a> {
         self.value.get_ref().is_table()
     }
 
+    pub(crate) fn is_array(&self) -> bool {
+        self.value.get_ref().is_array()
+    }
+
     pub(crate) fn string(&self) -> Result<&'a str> {
         self.value.get_ref().as_str().ok_or_else(|| self.wrong_type("a string"))
     }
@@ -187,15 +191,31 @@ impl<'a> Value<'a> {
 
     /// An array of `N` finite numbers.
     pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N]> {
-        let array = self.array()?;
-        if array.len() != N {
-            return Err(self.not_allowed(&format!("{N} numbers"), array.len()));
-        }
         let mut numbers = [0.0; N];
-        for (number, value) in numbers.iter_mut().zip(&array) {
-            *number = value.number()?;
-        }
+        numbers.copy_from_slice(&self.numbers_of(N)?);
         Ok(numbers)
+    }
+
+    /// An array of a number of finite numbers.
+    pub(crate) fn numbers_of(&self, count: usize) -> Result<Vec<f64>> {
+        let array = self.array()?;
+        if array.len() != count {
+            return Err(self.not_allowed(&format!("{count} numbers"), array.len()));
+        }
+        array.iter().map(Value::number).collect()
+    }
+
+    /// Rows of a matrix that is applied to columns (x, y, z, 1).
+    pub(crate) fn matrix(&self) -> Result<[[f64; 4]; 3]> {
+        let rows = self.array()?;
+        if rows.len() != 3 {
+            return Err(self.not_allowed("three rows of four numbers", format!("{} rows", rows.len())));
+        }
+        let mut matrix = [[0.0; 4]; 3];
+        for (row, value) in matrix.iter_mut().zip(&rows) {
+            *row = value.numbers()?;
+        }
+        Ok(matrix)
     }
 
     /// A table whose keys are all known.

@@ -31,12 +31,44 @@ impl Manifest {
                 Source::Compiled { path, object } => {
                     writeln!(out, "file = {}\nobject = {object}", text(path))?;
                 }
+                Source::Sequence { frames, timing } => write_sequence(out, frames, timing)?,
+                Source::Cached { path, cache, timing } => {
+                    writeln!(out, "model = {}\nvertex_cache = {}", text(path), text(cache))?;
+                    write_timing(out, timing)?;
+                }
+                Source::Deforming { path, mesh } => {
+                    writeln!(out, "model = {}\nmesh = {mesh}\ndeforms = true", text(path))?;
+                }
+                Source::AtRest { path, node } => writeln!(out, "model = {}\nnode = {node}", text(path))?,
             }
         }
         self.nodes.iter().try_for_each(|node| self.write_node(out, node))?;
         self.cameras.iter().try_for_each(|camera| self.write_camera(out, camera))?;
         self.lights.iter().try_for_each(|light| self.write_light(out, light))?;
+        self.skins.iter().try_for_each(|skin| self.write_skin(out, skin))?;
+        self.deformers.iter().try_for_each(|deformer| self.write_deformer(out, deformer))?;
         self.tracks.iter().try_for_each(|track| self.write_track(out, track))
+    }
+
+    fn write_skin(&self, out: &mut String, skin: &Skin) -> std::fmt::Result {
+        writeln!(out, "\n[[skins]]\nname = {}", text(&skin.name))?;
+        list(out, "joints", skin.joints.iter().map(|joint| text(&self.nodes[*joint].name)))?;
+        match &skin.inverse_binds {
+            Some(matrices) => list(out, "inverse_binds", matrices.iter().map(|rows| format!("{rows:?}"))),
+            None => Ok(()),
+        }
+    }
+
+    fn write_deformer(&self, out: &mut String, deformer: &Deformer) -> std::fmt::Result {
+        writeln!(out, "\n[[deformers]]\nnode = {}", text(&self.nodes[deformer.node].name))?;
+        writeln!(out, "object = {}", text(&self.objects[deformer.object].name))?;
+        if let Some(skin) = deformer.skin {
+            writeln!(out, "skin = {}", text(&self.skins[skin].name))?;
+        }
+        if !deformer.weights.is_empty() {
+            list(out, "weights", deformer.weights.iter().map(|weight| format!("{weight:?}")))?;
+        }
+        Ok(())
     }
 
     fn write_node(&self, out: &mut String, node: &Node) -> std::fmt::Result {
@@ -102,12 +134,13 @@ impl Manifest {
         let (property, interpolation) = (track.property.name(), track.interpolation.name());
         writeln!(out, "property = \"{property}\"\ninterpolation = \"{interpolation}\"")?;
         list(out, "times", track.times.iter().map(|t| format!("{t:?}")))?;
-        let width = track.property.width();
+        let per_key = track.values.len() / track.times.len().max(1);
+        let width = (per_key / track.interpolation.values_per_key()).max(1);
         let value = |v: &[f64]| match track.property {
             Property::Visible => (v[0] != 0.0).to_string(),
             _ => format!("{v:?}"),
         };
-        let keys = track.values.chunks(width * track.interpolation.values_per_key());
+        let keys = track.values.chunks(per_key.max(1));
         list(
             out,
             "values",
@@ -120,6 +153,19 @@ impl Manifest {
             }),
         )
     }
+}
+
+fn write_sequence(out: &mut String, frames: &SequenceFrames, timing: &SequenceTiming) -> std::fmt::Result {
+    match frames {
+        SequenceFrames::Numbered(pattern) => writeln!(out, "sequence = {}", text(pattern))?,
+        SequenceFrames::Listed(files) => list(out, "sequence", files.iter().map(|file| text(file)))?,
+    }
+    write_timing(out, timing)
+}
+
+fn write_timing(out: &mut String, timing: &SequenceTiming) -> std::fmt::Result {
+    timing.rate.map_or(Ok(()), |rate| writeln!(out, "rate = {rate:?}"))?;
+    writeln!(out, "start = {:?}", timing.start)
 }
 
 /// An array, over several lines if it is long.

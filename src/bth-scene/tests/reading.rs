@@ -1,6 +1,9 @@
 //! The meaning of manifests, and the errors of malformed ones with their places.
 
-use bth_scene::{Error, Interpolation, Lens, LightKind, Manifest, Property, Source, Transform, parse};
+use bth_scene::{
+    Error, Interpolation, Lens, LightKind, Manifest, Property, SequenceFrames, SequenceTiming, Source,
+    Transform, parse,
+};
 use std::path::Path;
 
 fn read(text: &str) -> Result<Manifest, Error> {
@@ -91,6 +94,48 @@ fn every_part_of_a_scene_is_read() {
     assert!((turn.values[4] - 1.0).abs() < 1e-15 && turn.values[7].abs() < 1e-15);
     assert_eq!((seen.interpolation, seen.values.as_slice()), (Interpolation::Step, &[1.0, 0.0][..]));
     assert_eq!(move_.values, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+}
+
+#[test]
+fn objects_whose_vertices_move_are_read() {
+    let timed = |rate, start| SequenceTiming { rate, start };
+    let source = |keys: &str| {
+        read(&format!("version = 1\n[[objects]]\nname = \"a\"\n{keys}"))
+            .map(|scene| scene.objects[0].source.clone())
+    };
+    assert_eq!(
+        source("sequence = \"in/walk_####.ply\"\nrate = 30\nstart = -1").unwrap(),
+        Source::Sequence {
+            frames: SequenceFrames::Numbered("in/walk_####.ply".into()),
+            timing: timed(Some(30.0), -1.0)
+        }
+    );
+    assert_eq!(
+        source("sequence = [\"b.obj\", \"a.obj\"]").unwrap(),
+        Source::Sequence {
+            frames: SequenceFrames::Listed(vec!["b.obj".into(), "a.obj".into()]),
+            timing: timed(None, 0.0)
+        }
+    );
+    assert_eq!(
+        source("model = \"a.obj\"\nvertex_cache = \"a.mdd\"").unwrap(),
+        Source::Cached { path: "a.obj".into(), cache: "a.mdd".into(), timing: timed(None, 0.0) }
+    );
+    for (keys, code, words) in [
+        ("sequence = \"walk.ply\"", "BTH-M011", "one run of `#`"),
+        ("sequence = \"a#b#.ply\"", "BTH-M011", "one run of `#`"),
+        ("sequence = \"w#/a#.ply\"", "BTH-M011", "one run of `#`"),
+        ("sequence = []", "BTH-M005", "at least one file"),
+        ("sequence = \"a#.ply\"\nmodel = \"a.ply\"", "BTH-M013", "exclude"),
+        ("sequence = \"a#.ply\"\nrate = 0", "BTH-M005", "above 0"),
+        ("model = \"a.ply\"\nrate = 3", "BTH-M013", "belongs to objects with"),
+        ("vertex_cache = \"a.pc2\"", "BTH-M006", "`model` is missing"),
+        ("model = \"a.glb\"\nvertex_cache = \"a.pc2\"\nmesh = 1", "BTH-M013", "exclude"),
+    ] {
+        let error = source(keys).unwrap_err();
+        assert!(error.to_string().contains(words), "{error}");
+        assert_eq!(error.code, code, "{error}");
+    }
 }
 
 #[test]

@@ -28,12 +28,36 @@ prop_compose! {
         keys in prop::collection::vec((finite(), prop::collection::vec(finite(), 12)), 1..20),
         frames in (-50i32..50, 0i32..100, 0.001f64..1e6),
         lens in (0.001f64..179.9, any::<bool>(), prop::option::of(0.1f64..10.0)),
-        property in 0usize..4, interpolation in 0usize..3,
+        property in 0usize..5, interpolation in 0usize..3,
     ) -> Manifest {
         let objects = vec![
             Object { name: "model".into(), source: Source::Model { path: "a b/ü.ply".into(), mesh: None } },
             Object { name: "mesh".into(), source: Source::Model { path: "x.glb".into(), mesh: Some(7) } },
             Object { name: "file".into(), source: Source::Compiled { path: "x.bth".into(), object: 1 } },
+            Object { name: "deforms".into(), source: Source::Deforming { path: "x.glb".into(), mesh: 2 } },
+            Object { name: "rests".into(), source: Source::AtRest { path: "x.glb".into(), node: 3 } },
+            Object {
+                name: "walk".into(),
+                source: Source::Sequence {
+                    frames: SequenceFrames::Numbered("w/a_##.ply".into()),
+                    timing: SequenceTiming { rate: Some(frames.2), start: -0.5 },
+                },
+            },
+            Object {
+                name: "list".into(),
+                source: Source::Sequence {
+                    frames: SequenceFrames::Listed((0..11).map(|i| format!("{i} \"#.obj")).collect()),
+                    timing: SequenceTiming::default(),
+                },
+            },
+            Object {
+                name: "cloth".into(),
+                source: Source::Cached {
+                    path: "c.obj".into(),
+                    cache: "c.pc2".into(),
+                    timing: SequenceTiming { rate: None, start: frames.2 },
+                },
+            },
         ];
         let row = |i: usize, (name, transform, flags, object): &(String, Transform, [bool; 3], usize)| Node {
             name: format!("{name}{i}"),
@@ -49,7 +73,7 @@ prop_compose! {
         let mut times: Vec<f64> = keys.iter().map(|k| k.0).collect();
         times.sort_by(f64::total_cmp);
         times.dedup_by(|a, b| a == b);
-        let numbers = interpolation.values_per_key() * property.width();
+        let numbers = interpolation.values_per_key() * property.width().unwrap_or(2);
         let value = |k: &(f64, Vec<f64>)| -> Vec<f64> {
             k.1[..numbers].iter().enumerate().map(|(i, x)| match property {
                 Property::Visible => f64::from(u8::from(*x > 0.0)),
@@ -59,9 +83,12 @@ prop_compose! {
             }).collect()
         };
         let values = keys[..times.len()].iter().flat_map(value).collect();
-        let movable = matches!(nodes[0].transform, Transform::Parts { .. }) || visible;
-        let track = Track { node: 0, property, interpolation, times, values };
         let (fov, perspective, extra) = lens;
+        let extra_number = extra.unwrap_or(0.0);
+        let moves = !matches!(property, Property::Visible | Property::Weights);
+        let movable = matches!(nodes[0].transform, Transform::Parts { .. }) || !moves;
+        let binds = [[[frames.2, 0.0, -1.5, extra_number], [0.0; 4], [fov, 1.0, 2.0, 3.0]]; 2];
+        let track = Track { node: 0, property, interpolation, times, values };
         Manifest {
             frames: Frames { first: frames.0, last: frames.0 + frames.1, rate: frames.2 },
             camera: perspective.then_some(0),
@@ -81,6 +108,20 @@ prop_compose! {
                     color: [0.0, 1.0, 0.5], intensity: 0.0, range: None,
                 },
             ],
+            skins: vec![
+                Skin { name: "plain \"skin\"".into(), joints: vec![0], inverse_binds: None },
+                Skin {
+                    name: "bound".into(),
+                    joints: vec![nodes.len() - 1, 0],
+                    inverse_binds: Some(binds.to_vec()),
+                },
+            ],
+            deformers: vec![Deformer {
+                node: 0,
+                object: 3,
+                skin: perspective.then_some(1),
+                weights: vec![fov, -1.0],
+            }],
             tracks: if movable { vec![track] } else { Vec::new() },
             nodes,
         }

@@ -40,15 +40,15 @@ impl Scene {
         self.world().map_or(0.0, |world| world.seconds)
     }
 
-    /// Sets the time of the scene in seconds: evaluates the animation, places the instances that moved and rebuilds the top-level
-    /// BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections, and in
+    /// Sets the time of the scene in seconds: evaluates the animation, refits the objects that skins and morph targets deform, places the
+    /// instances that moved and rebuilds the top-level BVH. The time may lie outside of the range of frames; tracks are constant beyond their keys. Without scene sections, and in
     /// scenes of a scene builder, this has no effect.
     ///
     /// # Errors
-    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
-    /// finite in `f32`. The error gives the node. The scene is then unchanged.
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position of
+    /// a vertex that deforms is not finite in `f32`. The error gives the node. The scene is then unchanged.
     pub fn set_seconds(&mut self, seconds: f64) -> Result<Update, Error> {
-        let (objects, world) = self.objects_and_world_mut();
+        let (objects, world) = self.parts_mut();
         world.as_mut().map_or(Ok(Update::default()), |world| world.update(objects, seconds))
     }
 

@@ -95,14 +95,18 @@ impl Scene {
         }
         file.check_object_names()?;
         file.check_images()?;
+        file.check_segments()?;
         Scene::with_world(file)
     }
 
     /// Checks only the scene sections of a file and opens its scene.
     fn with_world(file: File) -> Result<Scene, Error> {
         let has_opacity = file.table().iter().any(|e| e.kind == kind::OPACITY && e.count != 0);
-        let objects = Objects::of_file(file);
-        let world = World::new(&objects)?;
+        let mut objects = Objects::of_file(file);
+        let mut world = World::new(&objects)?;
+        if let Some(world) = &mut world {
+            world.deform_first(&mut objects)?;
+        }
         Ok(Scene { objects, world, has_opacity, masks: Masks::default() })
     }
 
@@ -118,6 +122,12 @@ impl Scene {
         self.objects.add(&other.objects);
         if let Some(world) = &mut self.world {
             world.add_objects(self.objects.count());
+            for object in first..self.objects.count() {
+                let file = self.objects.locate(object).filter(|(_, row)| *row == 0);
+                if let Some((file, _)) = file {
+                    world.deformers.add(file, object);
+                }
+            }
         }
         self.has_opacity |= other.has_opacity;
         first
@@ -141,6 +151,11 @@ impl Scene {
     /// The objects, and mutable access to the instances.
     pub(crate) fn objects_and_world_mut(&mut self) -> (&Objects, &mut Option<World>) {
         (&self.objects, &mut self.world)
+    }
+
+    /// Mutable access to the objects and the instances.
+    pub(crate) fn parts_mut(&mut self) -> (&mut Objects, &mut Option<World>) {
+        (&mut self.objects, &mut self.world)
     }
 
     /// Mutable access to the objects.

@@ -87,7 +87,7 @@ impl Scene {
         let weights = [1.0 - u - v, u, v];
         let object_position = weighted(weights, corners.map(|corner| corner.map(f64::from)));
         let object_geometric_normal = plane_normal(corners)?;
-        let object_normal = interpolated_normal(&view, id, weights, object_geometric_normal);
+        let object_normal = self.interpolated_normal((object, id), weights, object_geometric_normal);
         let to_world = |normal: [f64; 3]| match self.world() {
             None => normal,
             Some(_) => unit(self.normal_to_world(instance, normal)).unwrap_or(normal),
@@ -174,6 +174,29 @@ impl Scene {
         })
     }
 
+    /// The interpolated normal at barycentric weights of a triangle, in the space of the object. What deforms the object turns
+    /// normals, too.
+    fn interpolated_normal(
+        &self,
+        (object, id): (u32, u32),
+        weights: [f64; 3],
+        geometric: [f64; 3],
+    ) -> [f64; 3] {
+        let view = self.view(object);
+        let Some(corners) = attribute(view, view.normals, id) else { return geometric };
+        let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
+        if corners.iter().all(zero) {
+            return geometric;
+        }
+        let deformed = self.deformed_normals(object, id, corners);
+        let normals = [0, 1, 2].map(|k| match &deformed {
+            _ if zero(&corners[k]) => geometric,
+            Some(deformed) => unit(deformed[k]).unwrap_or(geometric),
+            None => corners[k].map(f64::from),
+        });
+        unit(weighted(weights, normals)).unwrap_or(geometric)
+    }
+
     /// The object of a triangle; `None` if there is no such instance.
     pub(crate) fn object_at(&self, primitive: PrimitiveRef) -> Option<u32> {
         let object = (primitive.instance < self.instance_count()).then(|| self.object_of(primitive.instance));
@@ -204,17 +227,6 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
         products.iter().fold(0.0, |most: f64, (p, q)| most.max(p.abs() + q.abs())) * 8.0 * f64::EPSILON;
     let greatest = normal.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     unit(if error <= NORMAL_ERROR * greatest { normal } else { exact_normal(corners) })
-}
-
-/// The interpolated normal at barycentric weights, in the space of the object.
-fn interpolated_normal(view: &ObjectView<'_>, id: u32, weights: [f64; 3], geometric: [f64; 3]) -> [f64; 3] {
-    let Some(corners) = attribute(view, view.normals, id) else { return geometric };
-    let zero = |normal: &[f32; 3]| normal.iter().all(|x| *x == 0.0);
-    if corners.iter().all(zero) {
-        return geometric;
-    }
-    let corners = corners.map(|normal| if zero(&normal) { geometric } else { normal.map(f64::from) });
-    unit(weighted(weights, corners)).unwrap_or(geometric)
 }
 
 /// The interpolated texture coordinates at barycentric weights.

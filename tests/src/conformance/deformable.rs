@@ -3,7 +3,7 @@
 use super::invalid::{broken, field};
 use super::valid::{bounds, file, indexed, lines, node, raw};
 use super::{Case, Seal};
-use bth_compile::write::{ObjectParts, Source};
+use bth_compile::write::{FileBuilder, ObjectParts, Source, object, scene};
 use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
@@ -44,6 +44,11 @@ fn leaf_vertices() -> Vec<[u32; WIDTH]> {
 }
 
 pub(super) fn deformable() -> Vec<u8> {
+    with_parts(file)
+}
+
+/// Makes something of the parts of the object.
+fn with_parts<T>(make: impl FnOnce(&ObjectParts<'_>) -> T) -> T {
     let of = |leaf: usize| bounds(corners(LEAVES[leaf]).as_flattened());
     let inner = [corners(LEAVES[0]), corners(LEAVES[1])].concat();
     let root = node(&[(Child::Node(7), bounds(inner.as_flattened())), (Child::Indexed(LINES[2]), of(2))]);
@@ -61,7 +66,7 @@ pub(super) fn deformable() -> Vec<u8> {
     all.extend(lines(indexed(&corners(LEAVES[0]), 0).as_bytes()));
     all.extend(lines(raw(&corners(LEAVES[1]), 3).as_bytes()));
     all.extend(lines(last.as_bytes()));
-    file(&ObjectParts {
+    make(&ObjectParts {
         bounds: Some(bounds(&POSITIONS[..9])),
         root: Child::Node(0).code(),
         triangles: 8,
@@ -71,6 +76,63 @@ pub(super) fn deformable() -> Vec<u8> {
         source: Some(Source { positions: &POSITIONS, triangles: &TRIANGLES, ..Source::default() }),
         ..ObjectParts::default()
     })
+}
+
+/// The object with frames and a second hierarchy, which is equal here, and an instance of it.
+pub(super) fn sequence() -> Vec<u8> {
+    let moved = POSITIONS.map(|[x, y, z]| [x, y + 0.25 * x, z - 1.5]);
+    let frames = [POSITIONS, moved, POSITIONS].concat();
+    let segments = [(-1.0, 0), (0.75, 2)].map(|(first, object)| Segment { first, object, reserved: 0 });
+    with_parts(|parts| {
+        let mut builder = FileBuilder::new();
+        let moving = ObjectParts {
+            sequence_times: &[0.0, 0.5, 1.5],
+            sequence_positions: &frames,
+            segments: &segments,
+            ..*parts
+        };
+        object(&mut builder, 0, &moving).unwrap();
+        object(&mut builder, 1, parts).unwrap();
+        object(&mut builder, 2, parts).unwrap();
+        let still = super::scenes::still();
+        scene(&mut builder, &still).unwrap();
+        builder.finish()
+    })
+}
+
+/// Faults of sequences and segments.
+pub(super) fn invalid_sequences() -> Vec<Case> {
+    let base = "sequence";
+    let bits = |x: f32| x.to_bits();
+    let high = |x: f64| (x.to_bits() >> 32) as u32;
+    let case = |name, kind, at: usize, value| field(name, base, kind, at, value);
+    let (object_at, row) = (offset_of!(Segment, object), size_of::<Segment>());
+    let other = |name: &str, object: u32, kind: u32, at: usize, value: u32| {
+        broken(name, base, Seal::Sections, |e| {
+            let entry = e.entry_at(object, kind) + offset_of!(SectionEntry, offset);
+            let start = e.bytes_at(entry) + at;
+            e.put(start, &value.to_le_bytes());
+        })
+    };
+    vec![
+        broken("F190-rows", base, Seal::Sections, |e| {
+            let (at, start) = (e.entry_at(0, kind::SEQUENCE_TIMES), e.section_at(kind::SEQUENCE_TIMES));
+            e.put(at + offset_of!(SectionEntry, length), &16u64.to_le_bytes());
+            e.put(at + offset_of!(SectionEntry, count), &2u64.to_le_bytes());
+            e.put(start + 16, &[0; 8]);
+        }),
+        case("F191-not-ascending", kind::SEQUENCE_TIMES, 12, high(2.0)),
+        case("F191-infinite", kind::SEQUENCE_TIMES, 20, high(f64::INFINITY)),
+        case("F192-infinite", kind::SEQUENCE_POSITIONS, 12 * 25, bits(f32::NAN)),
+        case("F192-other-first-frame", kind::SEQUENCE_POSITIONS, 12 * 9, bits(9.5)),
+        case("F193-not-ascending", kind::SEGMENTS, row + 4, high(-1.0)),
+        case("F193-first-of-another", kind::SEGMENTS, object_at, 1),
+        case("F193-second-of-itself", kind::SEGMENTS, row + object_at, 0),
+        case("F193-reserved", kind::SEGMENTS, row + offset_of!(Segment, reserved), 1),
+        case("F194-no-object", kind::SEGMENTS, row + object_at, 3),
+        other("F194-other-positions", 2, kind::POSITIONS, 12 * 9, bits(9.5)),
+        other("F194-instance", NONE, kind::INSTANCES, offset_of!(Instance, object), 2),
+    ]
 }
 
 /// Faults of it.

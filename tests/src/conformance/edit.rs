@@ -62,6 +62,10 @@ impl Editor {
     pub fn put_u32(&mut self, kind: u32, at: usize, value: u32) -> &mut Self {
         self.put(self.section_at(kind) + at, &value.to_le_bytes())
     }
+    /// A 64-bit number at a byte of the file.
+    pub fn bytes_at(&self, at: usize) -> usize {
+        u64::from_le_bytes(self.bytes[at..at + 8].try_into().unwrap()) as usize
+    }
     /// Overwrites a number in a section of object 0.
     pub fn put_f32(&mut self, kind: u32, at: usize, value: f32) -> &mut Self {
         self.put_u32(kind, at, value.to_bits())

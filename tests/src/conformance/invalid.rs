@@ -12,6 +12,8 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(super::deformable::invalid());
+    cases.extend(super::deformers::invalid());
+    cases.extend(super::deformable::invalid_sequences());
     cases.extend(groups());
     cases.extend(super::materials::invalid());
     cases.extend(super::scenes::invalid());

@@ -2,7 +2,7 @@
 
 use super::valid::{CORNERS, bounds, indexed, lines};
 use super::{Case, Editor, Seal};
-use bth_compile::write::{FileBuilder, ObjectParts, SceneParts, object, scene};
+use bth_compile::write::{DeformerParts, FileBuilder, ObjectParts, SceneParts, object, scene};
 use bth_format::layout::*;
 use std::mem::offset_of;
 use zerocopy::IntoBytes;
@@ -22,7 +22,7 @@ fn node(transform: [f64; 12], parent: u32, flags: u32, name: (u32, u32)) -> Node
     Node { transform, parent, flags, name: name.0, name_length: name.1, reserved: [0; 4] }
 }
 
-fn still() -> SceneParts {
+pub(super) fn still() -> SceneParts {
     let identity = parts([0.0; 3], [0.0, 0.0, 0.0, 1.0], [1.0; 3]);
     SceneParts {
         scene: Scene { rate: 24.0, first_frame: 0, last_frame: 0, camera: NONE, reserved: [0; 11] },
@@ -34,6 +34,7 @@ fn still() -> SceneParts {
         cameras: Vec::new(),
         lights: Vec::new(),
         names: Vec::new(),
+        deformers: DeformerParts::default(),
     }
 }
 
@@ -215,7 +216,7 @@ fn tracks() -> Vec<Case> {
     };
     vec![
         word("F155-node", kind::TRACKS, 3 * row, 3),
-        word("F155-property", kind::TRACKS, 3 * row + 4, 4),
+        word("F155-property", kind::TRACKS, 3 * row + 4, 5),
         word("F155-interpolation", kind::TRACKS, 3 * row + 8, 3),
         word("F155-twice", kind::TRACKS, 3 * row + 4, Property::Rotation as u32),
         word("F155-fading", kind::TRACKS, 8, Interpolation::Linear as u32),

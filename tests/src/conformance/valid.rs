@@ -23,6 +23,8 @@ pub fn valid() -> Vec<Case> {
         Case::new("two-objects", two_objects()),
         Case::new("groups", groups()),
         Case::new("deformable", super::deformable::deformable()),
+        Case::new("deformers", super::deformers::deforming()),
+        Case::new("sequence", super::deformable::sequence()),
         Case::new("materials", super::materials::materials()),
         Case::new("unknown-optional-section", unknown_section()),
     ];

@@ -88,7 +88,8 @@ fn edited(edit: impl FnOnce(&mut Value)) -> Value {
 
 #[test]
 fn nodes_keep_their_hierarchy_transforms_names_and_visibility() {
-    let (manifest, report) = import(&document(), &ImportOptions::default()).unwrap();
+    let all = ImportOptions { animation: Chosen::All, ..ImportOptions::default() };
+    let (manifest, report) = import(&document(), &all).unwrap();
     let nodes: Vec<_> =
         manifest.nodes.iter().map(|n| (n.name.as_str(), n.parent, n.object, n.visible)).collect();
     let expected = [
@@ -144,6 +145,11 @@ fn animations_are_chosen_by_name_or_number() {
     assert_eq!(report.ignored.len(), 1, "the second translation: {:?}", report.ignored);
     assert!(report.ignored[0].contains("animation 1 channel 1") && report.ignored[0].contains("\"arm\""));
     assert_eq!(tracks(Chosen::One("wave".into())).unwrap().0.len(), 2);
+    let (first, _, report) = tracks(Chosen::First).unwrap();
+    assert_eq!(
+        (first.len(), report.animations, report.animations_left_out),
+        (2, vec!["wave".into()], vec!["1".into()])
+    );
     let second = tracks(Chosen::One("1".into())).unwrap().0;
     assert_eq!(
         second.iter().map(|t| t.property).collect::<Vec<_>>(),
@@ -168,16 +174,10 @@ fn scenes_are_chosen_by_name_or_number() {
 
 #[test]
 fn what_is_ignored_is_said_and_refused_when_strict() {
-    let skinned = edited(|d| d["nodes"][1]["skin"] = 0.into());
-    let morphed = edited(|d| d["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}]));
     let pointed = edited(|d| d["animations"][0]["channels"][0]["target"]["path"] = "pointer".into());
-    for (document, words) in [(skinned, "skin"), (morphed, "morph"), (pointed, "animations of pointer")] {
-        let document = {
-            let mut d = document;
-            // The two tracks of one property are another matter.
-            d["animations"][1]["channels"].as_array_mut().unwrap().truncate(1);
-            d
-        };
+    let without_targets =
+        edited(|d| d["animations"][0]["channels"][0]["target"] = json!({"node": 3, "path": "weights"}));
+    for (document, words) in [(pointed, "animations of pointer"), (without_targets, "no morph targets")] {
         let (_, report) = import(&document, &ImportOptions::default()).unwrap();
         assert!(report.ignored.len() == 1 && report.ignored[0].contains(words), "{:?}", report.ignored);
         let strict = ImportOptions { strict: true, ..ImportOptions::default() };

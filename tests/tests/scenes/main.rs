@@ -3,9 +3,11 @@
 
 mod built;
 mod deform;
+mod deformers;
 mod flattened;
 mod import;
 mod motion;
 mod poses;
+mod sequences;
 mod sources;
 mod support;

@@ -3,6 +3,7 @@
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_compile::scene::{self, SceneReport};
+use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{ImportOptions, ImportReport, import};
 use bth_scene::Manifest;
 use std::path::{Path, PathBuf};
@@ -26,11 +27,11 @@ pub(crate) fn animated() -> Vec<PathBuf> {
     files
 }
 
-/// The scene of a glTF file.
+/// The scene of a glTF file with all its animations.
 pub(crate) fn imported(path: &Path) -> (Manifest, ImportReport) {
     let name = path.file_name().unwrap().to_str().unwrap();
-    import(path, name, &ImportOptions::default(), &Silent)
-        .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    let options = ImportOptions { animation: Chosen::All, ..ImportOptions::default() };
+    import(path, name, &options, &Silent).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 /// Compiles a manifest; its files count from `folder`.

@@ -1,11 +1,12 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `instances` and `refit` are the measurements; `output` writes their records as Markdown, JSON and
-//! SVG, and `records` keeps the figures of `benchmarks/`.
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `instances`, `refit` and `animation` are the measurements; `output` writes their
+//! records as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
 pub mod accuracy;
+pub mod animation;
 pub mod args;
 pub mod chart;
 pub mod clock;
@@ -35,3 +36,4 @@ pub mod stress;
 pub mod structures;
 pub mod tracer;
 pub mod triangle_tests;
+mod twist;

@@ -3,8 +3,8 @@
 use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
-    accuracy, compare, costs, inside, instances, load, output, paper, quality, records, refit, scenes, speed,
-    stress,
+    accuracy, animation, compare, costs, inside, instances, load, output, paper, quality, records, refit,
+    scenes, speed, stress,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Instances(arguments) => instances::run(&arguments),
         Command::Refit(arguments) => refit::run(&arguments),
+        Command::Animation(arguments) => animation::run(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
     };
     match done {

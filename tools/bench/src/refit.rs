@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use crate::rivals::embree::{self, EmbreeScene};
 use crate::rounds::median;
 use crate::tracer::{Batch, Tracer};
+use crate::twist::{TWIST, twisted};
 use anyhow::{Result, ensure};
 use bth::rays::{Hit, Ray};
 use bth_compile::Silent;
@@ -23,8 +24,6 @@ use serde_json::json;
 const RAYS: usize = 20_000;
 /// Answers of a tracer that rounds count as equal up to this relative difference of t.
 const SAME: f32 = 1e-4;
-/// Greatest angle of the twist from one end of a model to the other, in radians.
-const TWIST: f32 = 1.5;
 
 /// What was measured of a contender.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -162,24 +161,6 @@ fn measure(model: &Model, bytes: &[u8], threads: usize, rounds: usize) -> Result
         },
     );
     Ok(rows.collect())
-}
-
-/// The positions of a model, twisted about the axis along which it is longest.
-fn twisted(model: &Model, angle: f32) -> Vec<[f32; 3]> {
-    let bounds = model.bounds();
-    let (lower, upper) = (bounds.lower.as_vec3().to_array(), bounds.upper.as_vec3().to_array());
-    let size = |k: &usize| upper[*k] - lower[*k];
-    let axis = (0..3).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or_default();
-    let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-    let [center_u, center_v] = [u, v].map(|k| 0.5 * (lower[k] + upper[k]));
-    let twist = |p: &[f32; 3]| {
-        let (sin, cos) = (angle * (p[axis] - lower[axis]) / size(&axis).max(f32::MIN_POSITIVE)).sin_cos();
-        let (a, b) = (p[u] - center_u, p[v] - center_v);
-        let mut moved = *p;
-        (moved[u], moved[v]) = (center_u + cos * a - sin * b, center_v + sin * a + cos * b);
-        moved
-    };
-    model.mesh.positions.iter().map(twist).collect()
 }
 
 /// Rays from about a model to the middles of its triangles: tracers that round may miss corners.

@@ -1,6 +1,6 @@
 //! Binned SAH: "On fast Construction of SAH-based Bounding Volume Hierarchies" (Wald 2007).
 
-use super::bounds::Bounds;
+use super::extent::Extent;
 use super::split::{Reference, Split};
 use rayon::prelude::*;
 
@@ -11,42 +11,84 @@ const PARALLEL_COUNT: usize = 1 << 15;
 const CHUNK: usize = 1 << 13;
 
 #[derive(Clone, Copy)]
-struct Bin {
-    bounds: Bounds,
+struct Bin<E> {
+    bounds: E,
     count: u32,
 }
 
-type Bins = [[Bin; MAX_BINS]; 3];
+/// The bins of each axis, or of each order of several poses. On the heap: those of 16 poses take 150 KiB, and a thread that waits for others
+/// splits further nodes on top of its stack.
+type Bins<E> = Vec<[Bin<E>; MAX_BINS]>;
 
-const EMPTY: Bins = [[Bin { bounds: Bounds::EMPTY, count: 0 }; MAX_BINS]; 3];
+fn empty<E: Extent>() -> Bins<E> {
+    let orders = E::orders(|_| ()).as_ref().len();
+    vec![[Bin { bounds: E::EMPTY, count: 0 }; MAX_BINS]; orders]
+}
+
+/// The range of the centres of triangles, halved (see [`Extent::half_center`]), per axis or order.
+pub(super) struct Centers<E: Extent> {
+    lower: E::Orders<f32>,
+    upper: E::Orders<f32>,
+}
+
+impl<E: Extent> Centers<E> {
+    fn empty() -> Self {
+        Centers { lower: E::orders(|_| f32::INFINITY), upper: E::orders(|_| f32::NEG_INFINITY) }
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, other: &Self) {
+        self.grow_to(&other.lower, &other.upper);
+    }
+
+    #[inline(always)]
+    fn grow_to(&mut self, lower: &E::Orders<f32>, upper: &E::Orders<f32>) {
+        for (a, b) in self.lower.as_mut().iter_mut().zip(lower.as_ref()) {
+            *a = if *b < *a { *b } else { *a };
+        }
+        for (a, b) in self.upper.as_mut().iter_mut().zip(upper.as_ref()) {
+            *a = if *b > *a { *b } else { *a };
+        }
+    }
+
+    /// Whether all centres are equal.
+    pub(super) fn coincide(&self) -> bool {
+        self.lower.as_ref() == self.upper.as_ref()
+    }
+
+    /// The order of the widest range, the first of several.
+    pub(super) fn widest(&self) -> usize {
+        let extent = |k: usize| self.upper.as_ref()[k] - self.lower.as_ref()[k];
+        (1..self.lower.as_ref().len()).fold(0, |best, k| if extent(k) > extent(best) { k } else { best })
+    }
+}
 
 /// Maps centres to bins. The partition uses the same arithmetic, so its counts agree with those of the bins.
-#[derive(Clone, Copy)]
-struct Grid {
-    origin: [f32; 3],
-    scale: [f32; 3],
+struct Grid<E: Extent> {
+    origin: E::Orders<f32>,
+    scale: E::Orders<f32>,
     last: usize,
 }
 
-impl Grid {
-    fn new(centers: &Bounds, bins: usize) -> Grid {
-        let scale = std::array::from_fn(|k| bins as f32 / (centers.upper[k] - centers.lower[k]));
-        Grid { origin: centers.lower, scale, last: bins - 1 }
+impl<E: Extent> Grid<E> {
+    fn new(centers: &Centers<E>, bins: usize) -> Grid<E> {
+        let scale = E::orders(|k| bins as f32 / (centers.upper.as_ref()[k] - centers.lower.as_ref()[k]));
+        Grid { origin: centers.lower.clone(), scale, last: bins - 1 }
     }
 
     /// The cast saturates and turns the NaN of 0 * infinity (extent 0 or nearly so) to 0.
     #[inline(always)]
     fn bin(&self, center: f32, axis: usize) -> usize {
-        (((center - self.origin[axis]) * self.scale[axis]) as usize).min(self.last)
+        (((center - self.origin.as_ref()[axis]) * self.scale.as_ref()[axis]) as usize).min(self.last)
     }
 
     #[inline(never)]
-    fn fill(&self, references: &[Reference]) -> Bins {
-        let mut bins = EMPTY;
+    fn fill(&self, references: &[Reference<E>]) -> Bins<E> {
+        let mut bins = empty::<E>();
         for reference in references {
             let center = reference.bounds.half_center();
-            for k in 0..3 {
-                let bin = &mut bins[k][self.bin(center[k], k)];
+            for (k, (bins, center)) in bins.iter_mut().zip(center.as_ref()).enumerate() {
+                let bin = &mut bins[self.bin(*center, k)];
                 bin.bounds.grow(&reference.bounds);
                 bin.count += 1;
             }
@@ -55,7 +97,7 @@ impl Grid {
     }
 }
 
-fn merge(mut a: Bins, b: Bins) -> Bins {
+fn merge<E: Extent>(mut a: Bins<E>, b: Bins<E>) -> Bins<E> {
     for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
         a.bounds.grow(&b.bounds);
         a.count += b.count;
@@ -63,44 +105,52 @@ fn merge(mut a: Bins, b: Bins) -> Bins {
     a
 }
 
-/// Bounds of the triangles and of their half centres (see [`Bounds::half_center`]).
-pub(super) fn measure(references: &[Reference]) -> (Bounds, Bounds) {
-    fn serial(references: &[Reference]) -> (Bounds, Bounds) {
-        let (mut all, mut centers) = (Bounds::EMPTY, Bounds::EMPTY);
+/// Bounds of the triangles and the range of their centres.
+pub(super) fn measure<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>) {
+    fn serial<E: Extent>(references: &[Reference<E>]) -> (E, Centers<E>) {
+        let (mut all, mut centers) = (E::EMPTY, Centers::empty());
         for reference in references {
             all.grow(&reference.bounds);
             let center = reference.bounds.half_center();
-            centers.grow(&Bounds { lower: center, upper: center });
+            centers.grow_to(&center, &center);
         }
         (all, centers)
     }
     if references.len() <= PARALLEL_COUNT {
         return serial(references);
     }
-    references
-        .par_chunks(CHUNK)
-        .map(serial)
-        .reduce(|| (Bounds::EMPTY, Bounds::EMPTY), |a, b| (a.0.union(&b.0), a.1.union(&b.1)))
+    let join = |mut a: (E, Centers<E>), b: (E, Centers<E>)| {
+        a.0.grow(&b.0);
+        a.1.grow(&b.1);
+        a
+    };
+    references.par_chunks(CHUNK).map(serial).reduce(|| (E::EMPTY, Centers::empty()), join)
 }
 
 /// Partitions the references at the best of the boundaries between `bins` equal slabs per axis and
 /// returns the size of the left side; `None`, with nothing changed, when no boundary separates them.
-pub(super) fn split(references: &mut [Reference], centers: &Bounds, bins: usize) -> Option<usize> {
+// Its frame must not become part of that of the recursion.
+#[inline(never)]
+pub(super) fn split<E: Extent>(
+    references: &mut [Reference<E>],
+    centers: &Centers<E>,
+    bins: usize,
+) -> Option<usize> {
     let grid = Grid::new(centers, bins);
     let filled = if references.len() <= PARALLEL_COUNT {
         grid.fill(references)
     } else {
-        references.par_chunks(CHUNK).map(|chunk| grid.fill(chunk)).reduce(|| EMPTY, merge)
+        references.par_chunks(CHUNK).map(|chunk| grid.fill(chunk)).reduce(empty::<E>, merge::<E>)
     };
     let total = references.len();
     let mut best = Split::NONE;
     for (axis, row) in filled.iter().enumerate() {
-        if centers.lower[axis] >= centers.upper[axis] {
+        if centers.lower.as_ref()[axis] >= centers.upper.as_ref()[axis] {
             continue;
         }
         // Costs of all triangles from each bin on; the sweep from the left then adds the costs of those before.
         let mut right_cost = [f64::INFINITY; MAX_BINS];
-        let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
+        let (mut bounds, mut count) = (E::EMPTY, 0u32);
         for (bin, cost) in row[..bins].iter().zip(&mut right_cost).rev() {
             bounds.grow(&bin.bounds);
             count += bin.count;
@@ -108,7 +158,7 @@ pub(super) fn split(references: &mut [Reference], centers: &Bounds, bins: usize)
                 *cost = bounds.half_area() * f64::from(count);
             }
         }
-        let (mut bounds, mut count) = (Bounds::EMPTY, 0u32);
+        let (mut bounds, mut count) = (E::EMPTY, 0u32);
         for at in 1..bins {
             bounds.grow(&row[at - 1].bounds);
             count += row[at - 1].count;
@@ -119,13 +169,14 @@ pub(super) fn split(references: &mut [Reference], centers: &Bounds, bins: usize)
         }
     }
     let found = best.is_some().then_some(best)?;
-    let is_left = |r: &Reference| grid.bin(r.bounds.half_center()[found.axis], found.axis) < found.position;
+    let is_left =
+        |r: &Reference<E>| grid.bin(r.bounds.half_center().as_ref()[found.axis], found.axis) < found.position;
     partition(references, is_left);
     Some(found.left)
 }
 
 /// Moves the references that are `is_left` to the front, in place. The order depends on the input order alone.
-fn partition(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) {
+fn partition<E>(references: &mut [Reference<E>], is_left: impl Fn(&Reference<E>) -> bool) {
     let (mut i, mut j) = (0, references.len());
     loop {
         while i < j && is_left(&references[i]) {

@@ -1,6 +1,8 @@
 //! Top-down construction of the binary BVH.
 
+use super::binned_split::Centers;
 use super::bounds::Bounds;
+use super::extent::Extent;
 use super::split::Reference;
 use super::{BinaryBvh, Node, binned_split, linked_tree::LinkedTree, reinsertion, sweep_split};
 use crate::error::{Error, Result};
@@ -107,7 +109,7 @@ fn build_tree(
     monitor: &dyn Monitor,
 ) -> Result<(BinaryBvh, BvhReport)> {
     check_mesh(mesh)?;
-    let mut references: Vec<Reference> = (0..mesh.triangles.len() as u32)
+    let references: Vec<Reference<Bounds>> = (0..mesh.triangles.len() as u32)
         .into_par_iter()
         .filter_map(|id| {
             let corners = mesh.corners(id);
@@ -124,14 +126,7 @@ fn build_tree(
         return Ok((BinaryBvh::default(), report));
     }
 
-    monitor.stage("build", Some(references.len() as u64));
-    let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
-    let mut nodes = vec![blank; 2 * references.len() - 1];
-    let builder = Builder { effort, monitor };
-    builder.subtree(&mut references, &mut nodes, Destination::ROOT, &mut sweep_split::Scratch::default())?;
-    let order = references.iter().map(|r| r.id).collect();
-    drop(references);
-    let mut bvh = BinaryBvh { nodes, order };
+    let mut bvh = split_all(references, effort, monitor)?;
     report.visits.push(visits(&bvh));
 
     bvh = reinsert(bvh, &effort.reinsertion, &mut report, monitor)?;
@@ -140,12 +135,27 @@ fn build_tree(
     Ok((bvh, report))
 }
 
+/// Splits the references, of which there is at least one, from the top down.
+pub(super) fn split_all<E: Extent>(
+    mut references: Vec<Reference<E>>,
+    effort: &Effort,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
+    monitor.stage("build", Some(references.len() as u64));
+    let blank = Node { lower: [0.0; 3], upper: [0.0; 3], first: 0, count: 0, right: 0 };
+    let mut nodes = vec![blank; 2 * references.len() - 1];
+    let builder = Builder { effort, monitor };
+    builder.subtree(&mut references, &mut nodes, Destination::ROOT, &mut sweep_split::Scratch::default())?;
+    let order = references.iter().map(|r| r.id).collect();
+    Ok(BinaryBvh { nodes, order })
+}
+
 /// Moves subtrees to positions of lower cost, in passes that each try a share of the nodes. Boxes of leaves do not change.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn reinsert(
-    mut bvh: BinaryBvh,
+    bvh: BinaryBvh,
     passes: &[f64],
     report: &mut BvhReport,
     monitor: &dyn Monitor,
@@ -153,17 +163,27 @@ pub fn reinsert(
     if passes.is_empty() || bvh.nodes.len() <= 3 {
         return Ok(bvh);
     }
+    let tree = LinkedTree::new(&bvh);
+    reinsert_linked(tree, bvh, passes, report, monitor)
+}
+
+/// As [`reinsert`], for a BVH whose tree has been linked.
+pub(super) fn reinsert_linked<E: Extent>(
+    mut tree: LinkedTree<E>,
+    bvh: BinaryBvh,
+    passes: &[f64],
+    report: &mut BvhReport,
+    monitor: &dyn Monitor,
+) -> Result<BinaryBvh> {
     monitor.stage("reinsertion", None);
-    let mut tree = LinkedTree::new(&bvh);
     for &share in passes {
         report.moved.push(reinsertion::pass(&mut tree, share, monitor)?);
         report.visits.push(tree.visits());
     }
-    bvh = tree.into_preorder(bvh);
-    Ok(bvh)
+    Ok(tree.into_preorder(bvh))
 }
 
-fn check_mesh(mesh: &Mesh) -> Result<()> {
+pub(super) fn check_mesh(mesh: &Mesh) -> Result<()> {
     let internal = |message: String| Err(Error::Internal { code: "BTH-X201", message });
     if mesh.triangles.len() > bth_format::limits::MAX_TRIANGLES as usize {
         return Err(Error::Limit {
@@ -207,12 +227,12 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// Fills `nodes` (of length `2 * references.len() - 1`) with the subtree over the references, in preorder.
-    fn subtree(
+    fn subtree<E: Extent>(
         &self,
-        references: &mut [Reference],
+        references: &mut [Reference<E>],
         nodes: &mut [Node],
         to: Destination,
-        scratch: &mut sweep_split::Scratch,
+        scratch: &mut sweep_split::Scratch<E>,
     ) -> Result<()> {
         let count = references.len();
         let task = count > BUILD_TASK;
@@ -220,8 +240,8 @@ impl Builder<'_> {
             self.monitor.check()?;
         }
         let (bounds, centers) = binned_split::measure(references);
-        nodes[0] =
-            Node { lower: bounds.lower, upper: bounds.upper, first: to.first, count: count as u32, right: 0 };
+        let Bounds { lower, upper } = bounds.node_box();
+        nodes[0] = Node { lower, upper, first: to.first, count: count as u32, right: 0 };
         if count == 1 {
             return Ok(());
         }
@@ -245,7 +265,12 @@ impl Builder<'_> {
     }
 
     /// As [`Self::subtree`], with buffers of its own.
-    fn task(&self, references: &mut [Reference], nodes: &mut [Node], to: Destination) -> Result<()> {
+    fn task<E: Extent>(
+        &self,
+        references: &mut [Reference<E>],
+        nodes: &mut [Node],
+        to: Destination,
+    ) -> Result<()> {
         self.subtree(references, nodes, to, &mut sweep_split::Scratch::default())?;
         if references.len() <= BUILD_TASK {
             self.monitor.advance(references.len() as u64);
@@ -254,12 +279,12 @@ impl Builder<'_> {
     }
 
     /// Partitions the references and returns the size of the left side, 1 to one less than all.
-    fn split(
+    fn split<E: Extent>(
         &self,
-        references: &mut [Reference],
-        centers: &Bounds,
+        references: &mut [Reference<E>],
+        centers: &Centers<E>,
         level: u32,
-        scratch: &mut sweep_split::Scratch,
+        scratch: &mut sweep_split::Scratch<E>,
     ) -> usize {
         let count = references.len();
         if count == 2 {
@@ -271,7 +296,7 @@ impl Builder<'_> {
         if level + 1 + halvings > MAX_LEVELS {
             return split_median(references, centers);
         }
-        if centers.lower == centers.upper {
+        if centers.coincide() {
             return split_by_id(references);
         }
         if count <= self.effort.sweep_count {
@@ -283,19 +308,19 @@ impl Builder<'_> {
 }
 
 /// Halves the references by the order of their centres along the widest axis.
-fn split_median(references: &mut [Reference], centers: &Bounds) -> usize {
-    let extent = |k: usize| centers.upper[k] - centers.lower[k];
-    let axis = (1..3).fold(0, |best, k| if extent(k) > extent(best) { k } else { best });
+fn split_median<E: Extent>(references: &mut [Reference<E>], centers: &Centers<E>) -> usize {
+    let axis = centers.widest();
     let middle = references.len() / 2;
     references.select_nth_unstable_by(middle, |a, b| {
-        let (x, y) = (a.bounds.half_center()[axis], b.bounds.half_center()[axis]);
+        let center = |r: &Reference<E>| r.bounds.half_center().as_ref()[axis];
+        let (x, y) = (center(a), center(b));
         x.total_cmp(&y).then(a.id.cmp(&b.id))
     });
     middle
 }
 
 /// Halves references with equal centres by id.
-fn split_by_id(references: &mut [Reference]) -> usize {
+fn split_by_id<E: Extent>(references: &mut [Reference<E>]) -> usize {
     let middle = references.len() / 2;
     references.select_nth_unstable_by_key(middle, |r| r.id);
     middle
@@ -310,7 +335,7 @@ pub fn visits(bvh: &BinaryBvh) -> f64 {
 }
 
 /// Edges on the longest path.
-fn levels(bvh: &BinaryBvh) -> u32 {
+pub(super) fn levels(bvh: &BinaryBvh) -> u32 {
     let mut deepest = 0;
     let mut stack = vec![(0u32, 0u32)];
     while let Some((at, level)) = stack.pop() {

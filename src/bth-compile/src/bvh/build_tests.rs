@@ -134,7 +134,7 @@ fn a_build_can_be_cancelled_anywhere() {
 }
 
 /// Oracle: the least sum of areas over all splits of a few triangles, tried one by one.
-fn best_split_by_trial(references: &[Reference]) -> f64 {
+fn best_split_by_trial(references: &[Reference<Bounds>]) -> f64 {
     let mut best = f64::INFINITY;
     for axis in 0..3 {
         let mut sorted = references.to_vec();
@@ -146,15 +146,15 @@ fn best_split_by_trial(references: &[Reference]) -> f64 {
     best
 }
 
-fn split_cost(references: &[Reference], left: usize) -> f64 {
-    let cost = |part: &[Reference]| {
+fn split_cost(references: &[Reference<Bounds>], left: usize) -> f64 {
+    let cost = |part: &[Reference<Bounds>]| {
         let bounds = part.iter().fold(Bounds::EMPTY, |b, r| b.union(&r.bounds));
         bounds.half_area() * part.len() as f64
     };
     cost(&references[..left]) + cost(&references[left..])
 }
 
-fn references_of(mesh: &Mesh) -> Vec<Reference> {
+fn references_of(mesh: &Mesh) -> Vec<Reference<Bounds>> {
     (0..mesh.triangles.len() as u32)
         .map(|id| Reference { bounds: Bounds::of_points(&mesh.corners(id)), id })
         .collect()

@@ -1,7 +1,7 @@
 //! The collapse of a binary BVH to the wide BVH: plans the nodes and leaves and writes their lines.
 
-use super::bounds::Bounds;
 use super::plan::{Costs, Decision, Plan, Planner, Role, children};
+use super::poses::Weighed;
 use super::wide_lines::{indexed_leaf, put, raw_leaf, wide_node};
 use super::{BinaryBvh, MAX_LEVELS};
 use crate::error::{Error, Result};
@@ -82,15 +82,15 @@ impl CollapseReport {
     }
 }
 
-/// Collapses a binary BVH to the nodes and leaves of the file. The nodes in `cut` (ascending, none
+/// Collapses a binary BVH to the nodes and leaves of the file, chosen by the nodes' areas or by given probabilities. The nodes in `cut` (ascending, none
 /// below another) become tet leaves: the i-th is child `Child::Tets(i)`, in a slot with its node's exact box.
 ///
 /// # Errors
 /// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
 /// [`Error::Internal`] when `cut` is not as described, [`Error::Cancelled`].
-pub fn collapse(
+pub fn collapse<'a>(
     mesh: &Mesh,
-    bvh: &BinaryBvh,
+    bvh: impl Into<Weighed<'a>>,
     cut: &[u32],
     options: &CollapseOptions,
     monitor: &dyn Monitor,
@@ -105,14 +105,16 @@ pub type Decide<'a> = dyn Fn(&Planner<'_>, &[u32]) -> Result<(Vec<Decision>, f32
 ///
 /// # Errors
 /// As [`collapse`], and those of `decide`.
-pub fn collapse_by(
+pub fn collapse_by<'a>(
     mesh: &Mesh,
-    bvh: &BinaryBvh,
+    bvh: impl Into<Weighed<'a>>,
     cut: &[u32],
     options: &CollapseOptions,
     decide: &Decide<'_>,
     monitor: &dyn Monitor,
 ) -> Result<(Wide, CollapseReport)> {
+    let weighed = bvh.into();
+    let bvh = weighed.bvh;
     check_cut(bvh, cut)?;
     monitor.stage("collapse", None);
     let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], ..Wide::default() };
@@ -120,13 +122,14 @@ pub fn collapse_by(
     if bvh.nodes.is_empty() {
         return Ok((wide, report));
     }
-    let planner = Planner::new(mesh, bvh, options.costs, options.plan, options.keep_subtrees, monitor);
+    let planner = Planner::new(mesh, weighed, options.costs, options.plan, options.keep_subtrees, monitor);
     let (decisions, cost) = decide(&planner, cut)?;
     report.cost = f64::from(cost);
-    let root_area = Bounds::of_node(&bvh.nodes[0]).half_area();
+    let root_area = weighed.area(0);
     let mut writer = Writer {
         mesh,
         bvh,
+        weighed,
         cut,
         decisions: &decisions,
         plan: options.plan,
@@ -214,6 +217,7 @@ struct Slot {
 struct Writer<'a> {
     mesh: &'a Mesh,
     bvh: &'a BinaryBvh,
+    weighed: Weighed<'a>,
     cut: &'a [u32],
     decisions: &'a [Decision],
     plan: Plan,
@@ -330,7 +334,7 @@ impl Writer<'_> {
     }
 
     fn area(&self, at: u32) -> f64 {
-        Bounds::of_node(&self.bvh.nodes[at as usize]).half_area()
+        self.weighed.area(at)
     }
 }
 

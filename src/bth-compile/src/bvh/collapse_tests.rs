@@ -1,3 +1,4 @@
+use super::super::bounds::Bounds;
 use super::super::samples::{clutter, exponential, grid, model, soup};
 use super::super::validate::validate_wide;
 use super::super::{BvhOptions, Plan, Quality, build};
@@ -211,7 +212,7 @@ fn the_plan_has_the_least_cost_by_definition() {
             let bvh = built(&mesh, Quality::Best);
             let options = CollapseOptions { costs, ..CollapseOptions::default() };
             let (_, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-            let planner = Planner::new(&mesh, &bvh, costs, Plan::default(), false, &Silent);
+            let planner = Planner::new(&mesh, (&bvh).into(), costs, Plan::default(), false, &Silent);
             let least = cost_by_definition(&mesh, &bvh, &planner, 0, 1);
             assert!((report.cost - least).abs() <= 1e-5 * least, "{} {least}", report.cost);
         }
@@ -226,7 +227,7 @@ fn the_written_tree_costs_what_the_plan_says() {
         let bvh = built(&mesh, Quality::Balanced);
         let options = CollapseOptions { costs, ..CollapseOptions::default() };
         let (wide, report) = collapse(&mesh, &bvh, &[], &options, &Silent).expect("collapses");
-        let line = f64::from(Planner::new(&mesh, &bvh, costs, Plan::default(), false, &Silent).line);
+        let line = f64::from(Planner::new(&mesh, (&bvh).into(), costs, Plan::default(), false, &Silent).line);
         let cost = 1.3 * report.node_visits + 0.9 * report.leaf_visits + line * wide.lines.len() as f64;
         assert!((report.cost - cost).abs() <= 1e-3 * cost, "{} {cost}", report.cost);
     }

@@ -1,13 +1,14 @@
 //! A binary BVH with parent links, in which subtrees can be moved.
 
 use super::bounds::Bounds;
+use super::extent::Extent;
 use super::{BinaryBvh, MAX_LEVELS, Node};
 use bth_format::layout::NONE;
 
 /// Node of a [`LinkedTree`].
 #[derive(Clone, Copy)]
-pub(super) struct LinkedNode {
-    pub(super) bounds: Bounds,
+pub(super) struct LinkedNode<E> {
+    pub(super) bounds: E,
     /// `NONE` for the root.
     pub(super) parent: u32,
     /// `NONE` for a leaf.
@@ -16,7 +17,7 @@ pub(super) struct LinkedNode {
     pub(super) right: u32,
 }
 
-impl LinkedNode {
+impl<E> LinkedNode<E> {
     #[inline(always)]
     pub(super) fn is_leaf(&self) -> bool {
         self.left == NONE
@@ -24,16 +25,37 @@ impl LinkedNode {
 }
 
 /// A binary BVH whose nodes keep their index while they move.
-pub(super) struct LinkedTree {
-    nodes: Vec<LinkedNode>,
+pub(super) struct LinkedTree<E> {
+    nodes: Vec<LinkedNode<E>>,
     /// Edges to the deepest leaf below; at most [`MAX_LEVELS`].
     heights: Vec<u8>,
     root: u32,
 }
 
-impl LinkedTree {
-    pub(super) fn new(bvh: &BinaryBvh) -> LinkedTree {
-        let mut nodes: Vec<LinkedNode> = bvh
+impl LinkedTree<Bounds> {
+    /// The tree of a BVH, with the BVH's boxes.
+    pub(super) fn new(bvh: &BinaryBvh) -> Self {
+        Self::linked(bvh, |node, _| Bounds::of_node(node))
+    }
+}
+
+impl<E: Extent> LinkedTree<E> {
+    /// The tree of a BVH, with bounds that `leaf` gives for a triangle.
+    pub(super) fn of_leaves(bvh: &BinaryBvh, leaf: impl Fn(u32) -> E) -> Self {
+        let bounds = |node: &Node, triangle: u32| if node.is_leaf() { leaf(triangle) } else { E::EMPTY };
+        let mut tree = Self::linked(bvh, bounds);
+        for at in (0..tree.nodes.len()).rev() {
+            let LinkedNode { left, right, .. } = tree.nodes[at];
+            if left != NONE {
+                tree.nodes[at].bounds = tree.node(left).bounds.union(&tree.node(right).bounds);
+            }
+        }
+        tree
+    }
+
+    /// The tree of a BVH; `bounds` gives those of a node, which for a leaf is told its triangle.
+    fn linked(bvh: &BinaryBvh, bounds: impl Fn(&Node, u32) -> E) -> Self {
+        let mut nodes: Vec<LinkedNode<E>> = bvh
             .nodes
             .iter()
             .zip(0u32..)
@@ -43,7 +65,7 @@ impl LinkedTree {
                 } else {
                     (at + 1, node.right)
                 };
-                LinkedNode { bounds: Bounds::of_node(node), parent: NONE, left, right }
+                LinkedNode { bounds: bounds(node, right), parent: NONE, left, right }
             })
             .collect();
         let mut heights = vec![0u8; nodes.len()];
@@ -63,7 +85,7 @@ impl LinkedTree {
     }
 
     #[inline(always)]
-    pub(super) fn node(&self, at: u32) -> &LinkedNode {
+    pub(super) fn node(&self, at: u32) -> &LinkedNode<E> {
         &self.nodes[at as usize]
     }
 
@@ -163,7 +185,7 @@ impl LinkedTree {
             let node = self.node(at);
             let first = bvh.order.len() as u32;
             let out = &mut bvh.nodes[visited.len()];
-            let Bounds { lower, upper } = node.bounds;
+            let Bounds { lower, upper } = node.bounds.node_box();
             *out = Node { lower, upper, first, count: 1, right: 0 };
             visited.push(at);
             if node.is_leaf() {

@@ -3,15 +3,22 @@
 //! [`build`] splits top-down (binned or full-sweep SAH), then moves subtrees to positions of lower cost.
 //! [`collapse`] plans the wide tree by dynamic programming and writes its lines.
 //!
+//! [`build_poses`] builds one tree for several poses of a mesh that deforms, with the cost summed over them.
+//!
 //! `bth-bench quality` measures the gain of each step. Spatial splits are not made: with nodes of 16 children the few large
 //! triangles of much overlap end up in one leaf near the root, and splitting them gained nothing.
 
 mod binned_split;
 mod bounds;
 mod build;
+mod build_poses;
 mod collapse;
+mod extent;
 mod linked_tree;
 mod plan;
+mod pose_bounds;
+mod pose_costs;
+mod poses;
 mod reinsertion;
 mod split;
 mod sweep_split;
@@ -23,8 +30,14 @@ mod samples;
 mod validate;
 
 pub use build::{BvhOptions, BvhReport, Effort, MAX_LEVELS, Quality, build, build_with, reinsert, visits};
+pub use build_poses::{PoseOptions, build_poses};
 pub use collapse::{CollapseOptions, CollapseReport, Decide, Wide, collapse, collapse_by};
 pub use plan::{Costs, Decision, Plan, Planner, Role, Vertices};
+pub use pose_costs::{PoseCost, pose_costs};
+pub use poses::{Poses, Weighed};
+
+/// Greatest number of poses over which the cost of a tree is summed.
+pub const MAX_POSES: usize = 16;
 
 /// Node of a [`BinaryBvh`].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@
 //! 2017, §3.1): `cost[k]` of a node is the least cost of its subtree as at most `k` children of one
 //! wide node. The costs of a node are needed by its parent alone, so only decisions are stored.
 
-use super::bounds::Bounds;
-use super::{BinaryBvh, Node};
+use super::BinaryBvh;
+use super::poses::Weighed;
 use crate::error::Result;
 use crate::monitor::Monitor;
 use bth_format::layout::{INDEXED_LINES, NODE_LINES, RAW_LINES, WIDTH};
@@ -164,6 +164,7 @@ pub struct Planner<'a> {
     pub below_cut: bool,
     /// Receives warnings and cancels.
     pub monitor: &'a dyn Monitor,
+    weighed: Weighed<'a>,
     inverse_area: f64,
     /// Price of a line.
     pub line: f32,
@@ -176,18 +177,19 @@ impl<'a> Planner<'a> {
     /// Prepares the planning for a BVH of at least one node.
     pub(super) fn new(
         mesh: &'a Mesh,
-        bvh: &'a BinaryBvh,
+        weighed: Weighed<'a>,
         costs: Costs,
         plan: Plan,
         below_cut: bool,
         monitor: &'a dyn Monitor,
     ) -> Self {
-        let area = Bounds::of_node(&bvh.nodes[0]).half_area();
+        let bvh = weighed.bvh;
+        let area = weighed.area(0);
         // A deformable mesh may lie on one line: then all trees cost the same.
         let inverse_area = if area > 0.0 { 1.0 / area } else { 0.0 };
-        let visits = bvh.nodes.iter().map(|n| Bounds::of_node(n).half_area()).sum::<f64>() * inverse_area;
+        let visits = weighed.total() * inverse_area;
         let line = (f64::from(costs.line) * visits / bvh.order.len() as f64) as f32;
-        Planner { mesh, bvh, costs, plan, below_cut, monitor, inverse_area, line }
+        Planner { mesh, bvh, costs, plan, below_cut, monitor, weighed, inverse_area, line }
     }
 
     /// Decisions for all nodes, and the cost of the tree without its tet leaves; `cut` holds these, ascending.
@@ -198,17 +200,16 @@ impl<'a> Planner<'a> {
     }
 
     /// Probability that a ray through the root meets the node.
-    pub fn area(&self, node: &Node) -> f32 {
-        (Bounds::of_node(node).half_area() * self.inverse_area) as f32
+    pub fn area(&self, at: u32) -> f32 {
+        (self.weighed.area(at) * self.inverse_area) as f32
     }
 
     fn subtree(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
-        let node = &self.bvh.nodes[at as usize];
         if cut.first() != Some(&at) {
-            return self.plain(at, node, cut, decisions);
+            return self.plain(at, cut, decisions);
         }
         if self.below_cut {
-            self.plain(at, node, &[], decisions)?;
+            self.plain(at, &[], decisions)?;
         }
         decisions[0].set_cut();
         // The cut nodes are given, and the cost of the slot of a tet leaf is the same in every tree, so it is left out.
@@ -216,8 +217,9 @@ impl<'a> Planner<'a> {
     }
 
     /// Plans a node that is not cut.
-    fn plain(&self, at: u32, node: &Node, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
-        let area = self.area(node);
+    fn plain(&self, at: u32, cut: &[u32], decisions: &mut [Decision]) -> Result<Summary> {
+        let node = &self.bvh.nodes[at as usize];
+        let area = self.area(at);
         if node.is_leaf() {
             let triangle = self.bvh.order[node.first as usize];
             let vertices = Vertices::of_triangle(self.mesh.triangles[triangle as usize]);

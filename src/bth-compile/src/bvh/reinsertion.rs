@@ -5,7 +5,7 @@
 //! The moves are then made one after the other, each undone if it does not pay after the ones
 //! before it, so that the cost never rises and the result is the same at any number of threads.
 
-use super::bounds::Bounds;
+use super::extent::Extent;
 use super::linked_tree::LinkedTree;
 use crate::error::Result;
 use crate::monitor::Monitor;
@@ -18,7 +18,7 @@ const FIRST_BATCH: usize = 16;
 const BATCH_GROWTH: usize = 16;
 
 /// Tries to move the given share of the nodes, largest area first. Returns how many moved.
-pub(super) fn pass(tree: &mut LinkedTree, share: f64, monitor: &dyn Monitor) -> Result<u64> {
+pub(super) fn pass<E: Extent>(tree: &mut LinkedTree<E>, share: f64, monitor: &dyn Monitor) -> Result<u64> {
     let candidates = largest(tree, share);
     let mut moved = 0;
     let mut done = 0;
@@ -50,7 +50,7 @@ pub(super) fn pass(tree: &mut LinkedTree, share: f64, monitor: &dyn Monitor) -> 
 }
 
 /// The nodes with a grandparent of the largest areas.
-fn largest(tree: &LinkedTree, share: f64) -> Vec<u32> {
+fn largest<E: Extent>(tree: &LinkedTree<E>, share: f64) -> Vec<u32> {
     let mut keyed: Vec<(f32, u32)> = (0..tree.len() as u32)
         .filter(|&at| {
             let parent = tree.node(at).parent;
@@ -77,7 +77,7 @@ struct Move {
 }
 
 /// The best new sibling of a subtree that has a grandparent.
-fn search(tree: &LinkedTree, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Option<Move> {
+fn search<E: Extent>(tree: &LinkedTree<E>, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Option<Move> {
     let bounds = tree.node(subtree).bounds;
     let area = bounds.half_area();
     let parent = tree.node(subtree).parent;
@@ -85,7 +85,7 @@ fn search(tree: &LinkedTree, subtree: u32, stack: &mut Vec<(u32, f64)>) -> Optio
     // The area that removing the subtree saves: its parent's, and the decrease of each ancestor below the one under which
     // it is inserted again.
     let mut saved = tree.node(parent).bounds.half_area();
-    let mut remaining = Bounds::EMPTY;
+    let mut remaining = E::EMPTY;
     let mut below = subtree;
     loop {
         let beside = tree.sibling(below);

@@ -1,11 +1,9 @@
 //! Triangles during the build, and the best way found to split them.
 
-use super::bounds::Bounds;
-
-/// A triangle during the build.
+/// A triangle during the build, with its bounds in one pose or several.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reference {
-    pub(super) bounds: Bounds,
+pub(super) struct Reference<E> {
+    pub(super) bounds: E,
     pub(super) id: u32,
 }
 
@@ -14,6 +12,7 @@ pub(super) struct Reference {
 pub(super) struct Split {
     cost: f64,
     imbalance: usize,
+    /// Axis, or order in which triangles of several poses are sorted.
     pub(super) axis: usize,
     /// First position (bin or rank) of the right side.
     pub(super) position: usize,

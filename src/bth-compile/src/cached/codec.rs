@@ -5,7 +5,9 @@ use crate::marks::Marks;
 use crate::tets::{Behind, Face, TetMesh};
 use bth_files::Digest;
 use bth_format::layout::{MaterialParameters, NONE, Texture};
-use bth_import::{self as mesh, Attributes, Group, Groups, Materials, Mesh, TriangleOpacities};
+use bth_import::{
+    self as mesh, Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities,
+};
 use serde::{Deserialize, Serialize};
 
 /// A result that can be kept.
@@ -75,6 +77,24 @@ fn materials(mesh: &Mesh) -> Option<Digest> {
     Some(hasher.finish())
 }
 
+/// Hash of the frames of a mesh that is a sequence.
+fn sequence(mesh: &Mesh) -> Option<Digest> {
+    let sequence = mesh.sequence.as_ref()?;
+    let mut hasher = HashedRows::new("sequence");
+    hasher.add(&sequence.times);
+    hasher.add(&sequence.positions);
+    Some(hasher.finish())
+}
+
+/// Hash of what moves a mesh's vertices, if that is wanted.
+fn deformation(mesh: &Mesh) -> Option<Digest> {
+    let mut rows = RowWriter::default();
+    mesh.deformation.as_ref()?.write(&mut rows);
+    let mut hasher = HashedRows::new("deformation");
+    hasher.add(&rows.finish());
+    Some(hasher.finish())
+}
+
 /// CompileReport and hashes of a mesh, without the mesh itself.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct MeshSummary {
@@ -93,6 +113,12 @@ pub(crate) struct MeshSummary {
     /// Hash of how materials look.
     #[serde(default)]
     pub(crate) materials: Option<Digest>,
+    /// Hash of the frames of a sequence.
+    #[serde(default)]
+    pub(crate) sequence: Option<Digest>,
+    /// Hash of what moves the vertices.
+    #[serde(default)]
+    pub(crate) deformation: Option<Digest>,
 }
 
 impl MeshSummary {
@@ -105,6 +131,8 @@ impl MeshSummary {
             opacity: opacity(&mesh),
             groups: groups(&mesh),
             materials: materials(&mesh),
+            sequence: sequence(&mesh),
+            deformation: deformation(&mesh),
         };
         (mesh, summary)
     }
@@ -116,7 +144,10 @@ impl Codec for Mesh {
         to.add(&self.triangles);
         let has_groups = if self.groups.is_some() { HAS_GROUPS } else { 0 };
         let has_materials = if self.materials.is_some() { HAS_MATERIALS } else { 0 };
-        to.add(&[u8::from(self.attributes.is_some()) | has_groups | has_materials]);
+        let has_sequence = if self.sequence.is_some() { HAS_SEQUENCE } else { 0 };
+        let has_deformation = if self.deformation.is_some() { HAS_DEFORMATION } else { 0 };
+        let has_attributes = u8::from(self.attributes.is_some());
+        to.add(&[has_attributes | has_groups | has_materials | has_sequence | has_deformation]);
         if let Some(attributes) = &self.attributes {
             to.add(&attributes.corners);
             to.add(&attributes.normals);
@@ -127,6 +158,13 @@ impl Codec for Mesh {
         }
         if let Some(materials) = &self.materials {
             materials.write(to);
+        }
+        if let Some(sequence) = &self.sequence {
+            to.add(&sequence.times);
+            to.add(&sequence.positions);
+        }
+        if let Some(deformation) = &self.deformation {
+            deformation.write(to);
         }
         // Without opacity nothing is added, so that such meshes are the bytes that they were before there was any.
         if let Some(opacity) = &self.opacity {
@@ -150,6 +188,14 @@ impl Codec for Mesh {
             0 => None,
             _ => Some(Materials::read(from)?),
         };
+        let sequence = match parts & HAS_SEQUENCE {
+            0 => None,
+            _ => Some(Sequence { times: from.take()?, positions: from.take()? }),
+        };
+        let deformation = match parts & HAS_DEFORMATION {
+            0 => None,
+            _ => Some(Deformation::read(from)?),
+        };
         let opacity = match from.is_empty() {
             true => None,
             false => Some(TriangleOpacities { rows: from.take()?, micro: from.take()? }),
@@ -170,12 +216,25 @@ impl Codec for Mesh {
                 && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
                 && within(&m.color_corners, m.colors.len())
         });
+        let sequence_fits = sequence.as_ref().is_none_or(|s: &Sequence| {
+            !s.times.is_empty() && s.times.len().checked_mul(positions.len()) == Some(s.positions.len())
+        });
         let fits = attributes_fit
+            && sequence_fits
             && opacity_fits
             && groups_fit
             && materials_fit
             && within(&triangles, positions.len());
-        fits.then_some(Mesh { positions, triangles, attributes, opacity, groups, materials })
+        fits.then_some(Mesh {
+            positions,
+            triangles,
+            attributes,
+            opacity,
+            groups,
+            materials,
+            sequence,
+            deformation,
+        })
     }
 }
 
@@ -183,6 +242,34 @@ impl Codec for Mesh {
 const HAS_GROUPS: u8 = 2;
 /// As [`HAS_GROUPS`], for how materials look.
 const HAS_MATERIALS: u8 = 4;
+/// As [`HAS_GROUPS`], for the frames of a sequence.
+const HAS_SEQUENCE: u8 = 16;
+
+/// As [`HAS_GROUPS`], for what moves the vertices.
+const HAS_DEFORMATION: u8 = 8;
+
+// Whether the rows fit each other is not checked here: the file that is made from them is.
+impl Codec for Deformation {
+    fn write(&self, to: &mut RowWriter) {
+        to.add(std::slice::from_ref(&self.counts));
+        to.add(&self.joints);
+        to.add(&self.weights);
+        to.add(&self.morphs);
+        to.add(&self.morph_rows);
+        to.add(&self.deltas);
+    }
+
+    fn read(from: &mut RowReader<'_>) -> Option<Self> {
+        Some(Deformation {
+            counts: from.one()?,
+            joints: from.take()?,
+            weights: from.take()?,
+            morphs: from.take()?,
+            morph_rows: from.take()?,
+            deltas: from.take()?,
+        })
+    }
+}
 
 impl Codec for Materials {
     fn write(&self, to: &mut RowWriter) {
@@ -298,6 +385,7 @@ impl Codec for TetMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bth_format::layout::Morph;
 
     fn parameters(base_color_texture: u32) -> MaterialParameters {
         MaterialParameters {
@@ -338,9 +426,34 @@ mod tests {
                 color_corners: vec![[0, 1, 1]],
                 colors: vec![[65535; 4], [0, 1, 2, 3]],
             }),
+            sequence: Some(Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 6] }),
+            deformation: Some(Deformation {
+                counts: bth_format::layout::Deformation {
+                    joints: 4,
+                    influence_sets: 1,
+                    targets: 1,
+                    reserved: 0,
+                },
+                joints: vec![[3, 0, 1, 2]; 3],
+                weights: vec![[0.5, 0.5, 0.0, 0.0]; 3],
+                morphs: vec![Morph { deltas: 1, first_delta: 0, first_row: 0, reserved: 0 }],
+                morph_rows: vec![2],
+                deltas: vec![[0.0, 1.0, 0.0]],
+            }),
         };
         assert_eq!(decode::<Mesh>(&encode(&mesh)), Some(mesh.clone()));
-        let plain = Mesh { attributes: None, opacity: None, groups: None, materials: None, ..mesh.clone() };
+        let short = Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 5] };
+        let short = Mesh { sequence: Some(short), ..mesh.clone() };
+        assert_eq!(decode::<Mesh>(&encode(&short)), None);
+        let plain = Mesh {
+            attributes: None,
+            opacity: None,
+            groups: None,
+            materials: None,
+            sequence: None,
+            deformation: None,
+            ..mesh.clone()
+        };
         assert_eq!(decode::<Mesh>(&encode(&plain)), Some(plain.clone()));
         let short = Mesh { positions: vec![[0.0; 3]; 2], ..plain };
         assert_eq!(decode::<Mesh>(&encode(&short)), None);

@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::path::Path;
 
 /// Versions of the results of the stages.
-const MESH: &str = "2";
+const MESH: &str = "3";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
 const MARKS: &str = "1";
@@ -27,6 +27,8 @@ const OPACITY: &str = "1";
 const NAMES: &str = "1";
 const MATERIALS: &str = "1";
 const DEFORMABLE: &str = "1";
+/// Version of how objects are compiled whose vertices move by themselves.
+pub(crate) const MOTION: &str = "1";
 const FILE: &str = "2";
 const OUTLINE: &str = "1";
 
@@ -97,15 +99,15 @@ pub(crate) fn tets_of_node(
 }
 
 /// The keys of a scene's objects; the components that all of them share are made once.
-pub(crate) struct ObjectKeys(Vec<(String, String)>);
+pub(crate) struct ObjectKeys(Vec<(String, String)>, String);
 
 impl ObjectKeys {
     pub(crate) fn new(options: &CompileOptions, tetgen: &str) -> Self {
-        Self(components(options, tetgen))
+        Self(components(options, tetgen), text(&options.motion))
     }
 
-    /// The key of an object.
-    pub(crate) fn of(&self, mesh: &MeshSummary) -> Key {
+    /// The key of an object, which is posed by a clip of the scene or by none.
+    pub(crate) fn of(&self, mesh: &MeshSummary, clip: Option<&Digest>) -> Key {
         Key::new("object")
             .with("geometry", mesh.geometry.hex())
             .with("shading", mesh.shading.as_ref().map_or_else(|| "none".to_owned(), Digest::hex))
@@ -114,7 +116,25 @@ impl ObjectKeys {
             .with_all(
                 mesh.materials.iter().map(|materials| ("surface materials".to_owned(), materials.hex())),
             )
+            .with_all(self.of_motion(mesh, clip))
+            .with_all(mesh.deformation.iter().map(|rows| ("deformation".to_owned(), rows.hex())))
             .with_all(self.0.iter().cloned())
+    }
+
+    /// What only objects depend on whose vertices move.
+    fn of_motion(&self, mesh: &MeshSummary, clip: Option<&Digest>) -> Vec<(String, String)> {
+        let (name, moved_by) = match (&mesh.sequence, clip) {
+            (Some(sequence), _) => ("sequence", sequence),
+            (None, Some(clip)) => ("clip", clip),
+            (None, None) => return Vec::new(),
+        };
+        let named = |name: &str, value: String| (name.to_owned(), value);
+        vec![
+            named(name, moved_by.hex()),
+            named("motion", self.1.clone()),
+            named("motion version", MOTION.to_owned()),
+            named("deformable version", DEFORMABLE.to_owned()),
+        ]
     }
 }
 
@@ -140,6 +160,13 @@ pub(crate) fn scene(parts: &SceneParts, sources: &[String], options: &CompileOpt
     hasher.add(&parts.cameras);
     hasher.add(&parts.lights);
     hasher.add(&parts.names);
+    // Without deformers nothing is added, so that the keys of such scenes are what they were before there were any.
+    if !parts.deformers.deformers.is_empty() {
+        hasher.add(&parts.deformers.deformers);
+        hasher.add(&parts.deformers.skins);
+        hasher.add(&parts.deformers.joints);
+        hasher.add(&parts.deformers.weights);
+    }
     let mut objects = HashedRows::new("objects");
     sources.iter().for_each(|source| objects.add(source.as_bytes()));
     Key::new("scene")
@@ -177,6 +204,9 @@ fn components(options: &CompileOptions, tetgen: &str) -> Vec<(String, String)> {
     }
     if options.deformable {
         all.extend([("deformable", "true".to_owned()), ("deformable version", DEFORMABLE.to_owned())]);
+    }
+    if options.motion != Default::default() {
+        all.push(("motion", text(&options.motion)));
     }
     if options.names {
         all.extend([("names", "true".to_owned()), ("names version", NAMES.to_owned())]);

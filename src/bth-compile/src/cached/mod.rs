@@ -21,6 +21,6 @@ pub use log::{Log, Miss};
 
 pub(crate) use codec::{Codec, MeshSummary, decode, encode};
 pub(crate) use compile::{compile_or_fetch, compile_triangles, joined, tetgen_in_keys};
-pub(crate) use keys::{ObjectKeys, extension, file_index, mesh, scene};
-pub(crate) use rows::{RowReader, RowWriter};
+pub(crate) use keys::{MOTION, ObjectKeys, extension, file_index, mesh, scene};
+pub(crate) use rows::{HashedRows, RowReader, RowWriter};
 pub(crate) use stages::CachedStages;

@@ -57,21 +57,21 @@ impl<'a> RowReader<'a> {
 }
 
 /// Hashes slices, each preceded by its length.
-pub(super) struct HashedRows(blake3::Hasher);
+pub(crate) struct HashedRows(blake3::Hasher);
 
 impl HashedRows {
-    pub(super) fn new(kind: &str) -> Self {
+    pub(crate) fn new(kind: &str) -> Self {
         let mut rows = Self(blake3::Hasher::new());
         rows.add(kind.as_bytes());
         rows
     }
 
-    pub(super) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
+    pub(crate) fn add<T: IntoBytes + Immutable>(&mut self, rows: &[T]) {
         let bytes = rows.as_bytes();
         self.0.update(&(bytes.len() as u64).to_le_bytes()).update(bytes);
     }
 
-    pub(super) fn finish(self) -> Digest {
+    pub(crate) fn finish(self) -> Digest {
         self.0.finalize().into()
     }
 }

@@ -20,7 +20,7 @@ pub fn storage(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<costs::Storage> {
-    storage_of(TracedRef { mesh, on_grid: None, tree }, options, monitor)
+    storage_of(TracedRef { mesh, on_grid: None, tree, probabilities: None }, options, monitor)
 }
 
 /// As [`storage`], for a mesh that may be on a grid.

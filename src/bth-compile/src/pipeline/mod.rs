@@ -5,6 +5,7 @@
 
 mod clock;
 mod limit;
+mod moving;
 pub(crate) mod object;
 pub(crate) mod provenance;
 mod report;
@@ -16,6 +17,8 @@ pub use clock::StageTime;
 pub(crate) use clock::{Clock, timed};
 pub use limit::storage;
 pub(crate) use limit::warn_over_limit;
+pub use moving::{MotionOptions, MotionReport, SegmentReport};
+pub(crate) use moving::{PoseSource, compile_moving, warn_of_options};
 pub(crate) use object::{Checked, Object, TracedMesh};
 pub use object::{Compiled, assemble};
 pub(crate) use report::StageReports;
@@ -106,13 +109,17 @@ pub(crate) fn compile_mesh(
     monitor: &dyn Monitor,
 ) -> Result<(Object, StageReports)> {
     options.check()?;
+    if let Some(sequence) = mesh.sequence.clone() {
+        warn_of_options(&source.display().to_string(), options, monitor);
+        return compile_moving(mesh, &sequence, &options.of_deforming(), clock, monitor);
+    }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
     let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
-    let traced = TracedMesh { mesh, on_grid, tree };
+    let traced = TracedMesh { mesh, on_grid, tree, probabilities: None };
     let (leaves, tets) = match options.built_structure() {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,

@@ -1,12 +1,13 @@
 //! Assembles an object from the results of the stages, and the file with one object.
 
 use super::clock::timed;
+use super::moving::MotionReport;
 use super::{CompileOptions, FileReport};
 use crate::coordinates::{Boxes, OnGrid};
 use crate::error::Result;
 use crate::monitor::Monitor;
 use crate::{bvh, coordinates, tets, write};
-use bth_format::layout::Object as Header;
+use bth_format::layout::{Object as Header, Segment};
 use bth_import::{ImageFile, Mesh};
 use std::collections::BTreeSet;
 
@@ -30,6 +31,8 @@ pub(crate) struct TracedMesh {
     /// The grid and the original positions, if vertices were moved.
     pub(crate) on_grid: Option<OnGrid>,
     pub(crate) tree: bvh::BinaryBvh,
+    /// For each node the probability that a ray meets it, if that is a mean over poses.
+    pub(crate) probabilities: Option<Vec<f64>>,
 }
 
 /// As [`TracedMesh`], borrowed.
@@ -38,11 +41,13 @@ pub(super) struct TracedRef<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) on_grid: Option<&'a OnGrid>,
     pub(super) tree: &'a bvh::BinaryBvh,
+    pub(super) probabilities: Option<&'a [f64]>,
 }
 
 impl TracedMesh {
     pub(super) fn by_ref(&self) -> TracedRef<'_> {
-        TracedRef { mesh: &self.mesh, on_grid: self.on_grid.as_ref(), tree: &self.tree }
+        let probabilities = self.probabilities.as_deref();
+        TracedRef { mesh: &self.mesh, on_grid: self.on_grid.as_ref(), tree: &self.tree, probabilities }
     }
 }
 
@@ -57,6 +62,12 @@ pub(crate) struct Object {
     groups: Option<write::GroupParts>,
     pub(crate) tet_leaves: u64,
     pub(crate) tet_triangles: u64,
+    /// When which of its hierarchies applies; empty where one applies always.
+    pub(crate) segments: Vec<Segment>,
+    /// The objects with the hierarchies of all segments but the first.
+    pub(crate) segment_objects: Vec<Object>,
+    /// What the trees of an object whose vertices move cost.
+    pub(crate) motion: Option<MotionReport>,
 }
 
 /// Assembles an object: collapses the BVH with tet leaves in place of their nodes, and encodes the tet leaves.
@@ -77,7 +88,19 @@ pub(super) fn join(
     let tet_leaves = meshes.len() as u64;
     let tet_triangles = meshes.iter().map(|m| m.faces.len() as u64).sum();
     let groups = traced.mesh.groups.as_ref().map(write::GroupParts::of);
-    Ok((Object { traced, wide, packed_nodes, encoded, groups, tet_leaves, tet_triangles }, collapse))
+    let object = Object {
+        traced,
+        wide,
+        packed_nodes,
+        encoded,
+        groups,
+        tet_leaves,
+        tet_triangles,
+        segments: Vec::new(),
+        segment_objects: Vec::new(),
+        motion: None,
+    };
+    Ok((object, collapse))
 }
 
 /// A wide BVH as it will be stored.
@@ -98,7 +121,8 @@ pub(super) fn collapse(
         leaf_vertices: options.deformable,
         ..options.collapse
     };
-    let collapse = || bvh::collapse(traced.mesh, traced.tree, cut, &collapse_options, monitor);
+    let weighed = bvh::Weighed { bvh: traced.tree, probabilities: traced.probabilities };
+    let collapse = || bvh::collapse(traced.mesh, weighed, cut, &collapse_options, monitor);
     let (mut wide, mut report) = timed(collapse)?;
     let grid = traced.on_grid.map(|on_grid| &on_grid.grid);
     let packed_nodes = coordinates::pack(&mut wide, grid, options.coordinates.boxes == Boxes::Bytes)?;
@@ -118,7 +142,7 @@ pub fn assemble(
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<Compiled> {
-    let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone() };
+    let traced = TracedMesh { mesh: mesh.clone(), on_grid: None, tree: tree.clone(), probabilities: None };
     let (object, _) = join(traced, built.to_vec(), options, monitor)?;
     Ok(object.file("{}".to_owned(), &[], options)?.0.compiled)
 }
@@ -164,7 +188,7 @@ impl Object {
 
     /// The contents of the object's sections.
     pub(crate) fn parts(&self, options: &CompileOptions) -> write::ObjectParts<'_> {
-        let TracedMesh { mesh, on_grid, tree } = &self.traced;
+        let TracedMesh { mesh, on_grid, tree, .. } = &self.traced;
         let mut parts = write::ObjectParts {
             bounds: tree.nodes.first().map(|root| (root.lower, root.upper)),
             root: self.wide.root,
@@ -177,9 +201,15 @@ impl Object {
             packed_nodes: self.packed_nodes,
             groups: self.groups.as_ref(),
             materials: mesh.materials.as_ref(),
+            deformation: mesh.deformation.as_ref(),
             source: Some(source(mesh, on_grid.as_ref(), options)),
             ..Default::default()
         };
+        if let Some(sequence) = mesh.sequence.as_ref().filter(|_| !self.wide.leaf_vertices.is_empty()) {
+            parts.sequence_times = &sequence.times;
+            parts.sequence_positions = &sequence.positions;
+        }
+        parts.segments = &self.segments;
         if let Some(opacity) = &mesh.opacity {
             parts.opacity = &opacity.rows;
             parts.opacity_micro = &opacity.micro;

@@ -6,7 +6,7 @@ use super::objects::{self, Objects};
 use super::plan::ScenePlan;
 use super::previous::Previous;
 use super::report::{ObjectReport, SceneReport};
-use super::{encode, meshes, sources, weights};
+use super::{deformers, encode, meshes, sources, weights};
 use crate::cached::{self, Cache, CachedCompilation, DryRun};
 use crate::costs;
 use crate::error::{self, Error, Result};
@@ -36,7 +36,7 @@ pub fn compile(
     let cache = Cache::none();
     let context = Context::of(options, &cache, None, monitor);
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, folder, options.looks(), &mut clock)?;
+    let plan = ScenePlan::of(manifest, folder, options, &mut clock)?;
     let (content, report, _) = build(manifest, &plan, name, &context, clock)?;
     warn_over_limit(&report.objects, options, monitor);
     Ok((Compiled { bytes: cached::joined(&content)?.into_owned() }, report))
@@ -78,7 +78,7 @@ pub fn compile_cached(
 ) -> Result<CachedCompilation<SceneReport>> {
     let mut context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut clock)?;
+    let plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let key = key(manifest, &plan, &context)?;
     let outcome = cached::compile_or_fetch(cache, key.as_ref(), policy.needed, monitor, || {
         context.previous = previous(policy.target, &context);
@@ -124,7 +124,7 @@ pub fn compile_objects(
 ) -> Result<u64> {
     let context = Context::new(options, cache, monitor)?;
     let mut clock = Clock::default();
-    let mut plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut clock)?;
+    let mut plan = ScenePlan::of(manifest, source.folder, options, &mut clock)?;
     let mut row = 0;
     for file in &mut plan.sources {
         file.parts.retain(|_| {
@@ -151,7 +151,7 @@ pub fn dry_run(
 ) -> Result<DryRun> {
     let mut context = Context::new(options, cache, monitor)?;
     context.previous = previous(target, &context);
-    let plan = ScenePlan::of(manifest, source.folder, options.looks(), &mut Clock::default())?;
+    let plan = ScenePlan::of(manifest, source.folder, options, &mut Clock::default())?;
     let mut found = DryRun::of(key(manifest, &plan, &context)?.as_ref(), cache, monitor);
     if found.record.is_none() {
         for file in plan.sources.iter().filter(|file| !file.compiled) {
@@ -214,6 +214,7 @@ pub(super) fn build(
         false => context,
     };
     let objects = objects::build(manifest, &plan.sources, context, &mut clock)?;
+    deformers::check(manifest, &objects.number, name, &|object| objects.deformation(object))?;
     let parts = encode::encode(manifest, &plan.order, &plan.visible, &objects.number)?;
 
     let tetgen = match &objects.worker {
@@ -259,6 +260,7 @@ fn report(
         tracks: parts.tracks.len() as u64,
         cameras: parts.cameras.len() as u64,
         lights: parts.lights.len() as u64,
+        deformers: parts.deformers.deformers.len() as u64,
         first_frame: manifest.frames.first,
         last_frame: manifest.frames.last,
         rate: manifest.frames.rate,
@@ -272,8 +274,11 @@ fn report(
 }
 
 /// Checks the first frame as a reader does. The sections of the objects have been checked one by one before, so the check
-/// reads a file with their OBJECT rows only.
+/// reads a file with their OBJECT rows only; the whole file where objects deform.
 fn check(objects: &Objects, parts: &SceneParts, content: &Content, name: &Path) -> Result<()> {
+    if !parts.deformers.deformers.is_empty() {
+        return bth::from_bytes(&cached::joined(content)?).map(drop).map_err(|e| refused(name, &e));
+    }
     let mut rows_only = FileBuilder::new();
     objects.write_rows(&mut rows_only)?;
     write::scene(&mut rows_only, parts)?;

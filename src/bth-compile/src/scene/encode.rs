@@ -1,10 +1,11 @@
 //! The rows of the scene sections, from a manifest.
 
+use super::deformers;
 use crate::error::{Error, Result};
 use crate::write::SceneParts;
 use bth_format::layout as on_disk;
 use bth_format::layout::NONE;
-use bth_scene::{Lens, LightKind, Manifest, Transform};
+use bth_scene::{Lens, LightKind, Manifest, Track, Transform};
 use std::collections::HashMap;
 
 /// The order of the nodes with parents before children: that of the manifest where it has this property, else by depth.
@@ -84,6 +85,7 @@ pub(super) fn encode(
         cameras: Vec::new(),
         lights: Vec::new(),
         names: Vec::new(),
+        deformers: deformers::encode(manifest, &row_of, objects),
     };
     for (row, &index) in order.iter().enumerate() {
         let node = &manifest.nodes[index];
@@ -197,8 +199,12 @@ fn transform(transform: &Transform) -> ([f64; 12], u32) {
     }
 }
 
+/// Adds the tracks, but for those of weights of deformers that are left out.
 fn add_tracks(parts: &mut SceneParts, manifest: &Manifest, row_of: &[u32]) {
-    let mut tracks: Vec<_> = manifest.tracks.iter().collect();
+    let deformers = &parts.deformers.deformers;
+    let deforms = |node: usize| deformers.binary_search_by_key(&row_of[node], |d| d.node).is_ok();
+    let is_kept = |t: &&Track| t.property != bth_scene::Property::Weights || deforms(t.node);
+    let mut tracks: Vec<_> = manifest.tracks.iter().filter(is_kept).collect();
     tracks.sort_by_key(|t| (row_of[t.node], t.property));
     for track in tracks {
         let property = match track.property {
@@ -206,6 +212,7 @@ fn add_tracks(parts: &mut SceneParts, manifest: &Manifest, row_of: &[u32]) {
             bth_scene::Property::Rotation => on_disk::Property::Rotation,
             bth_scene::Property::Scale => on_disk::Property::Scale,
             bth_scene::Property::Visible => on_disk::Property::Visible,
+            bth_scene::Property::Weights => on_disk::Property::Weights,
         };
         let interpolation = match track.interpolation {
             bth_scene::Interpolation::Step => on_disk::Interpolation::Step,

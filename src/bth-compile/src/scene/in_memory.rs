@@ -4,7 +4,7 @@ use super::compile::{build, key, warn_over_limit};
 use super::context::Context;
 use super::plan::ScenePlan;
 use super::report::{ObjectReport, SceneReport};
-use super::sources::File;
+use super::sources::{File, SourcePart};
 use crate::cached::{self, Cache, CachedCompilation};
 use crate::error::{Error, Place, Result};
 use crate::monitor::Monitor;
@@ -100,7 +100,16 @@ fn plan<'a>(manifest: &'a Manifest, meshes: &[TriangleMesh<'a>], clock: &mut Clo
         let path = manifest.objects[row].source.path();
         let digest = SourceDigest::of_triangles(meshes[row]);
         let in_memory = Some(meshes[row]);
-        File { path, full: path.into(), compiled: false, parts: vec![(None, vec![row])], digest, in_memory }
+        File {
+            path,
+            full: path.into(),
+            compiled: false,
+            parts: vec![(SourcePart::Whole, vec![row])],
+            digest,
+            moving: None,
+            clips: Default::default(),
+            in_memory,
+        }
     };
     let rows: Vec<usize> = (0..meshes.len()).filter(|row| used[*row]).collect();
     let sources = clock.time("hash", || rows.into_par_iter().map(file).collect());

@@ -1,15 +1,19 @@
 //! The compilation of scenes: manifest → plan (visible nodes, source files) → meshes → objects → file.
 //!
-//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files;
+//! `compile` is the entry, `in_memory` that for meshes in memory; `objects` compiles all objects and `object` one; `sources` and `meshes` read the source files; `clips` gives the
+//! poses of objects that skins and morph targets deform;
 //! `previous`, `file_index` and `sections` reuse the file of an earlier compilation; `encode` lays out the scene itself.
 
+mod clips;
 mod compile;
 mod context;
+mod deformers;
 mod encode;
 mod file_index;
 mod images;
 mod in_memory;
 mod meshes;
+mod moving;
 mod object;
 mod objects;
 mod parallel;
@@ -24,4 +28,5 @@ mod weights;
 pub use compile::{CachePolicy, SceneSource, compile, compile_cached, compile_objects, dry_run};
 pub use in_memory::Instance;
 pub(crate) use in_memory::compile_meshes;
+pub use moving::moving_files;
 pub use report::{ObjectReport, SceneReport};

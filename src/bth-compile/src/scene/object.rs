@@ -3,8 +3,8 @@
 use super::context::Context;
 use super::meshes::SourceMesh;
 use super::report::ObjectReport;
-use super::sources::File;
-use crate::cached::{CachedStages, ObjectKeys};
+use super::sources::{File, SourcePart};
+use crate::cached::{CachedStages, MeshSummary, ObjectKeys};
 use crate::costs;
 use crate::error::{Error, Result};
 use crate::options::CompileOptions;
@@ -45,16 +45,29 @@ pub(super) fn build(
     number: usize,
     clock: &mut Clock,
 ) -> Result<BuiltObject> {
-    let part = file.name_of(mesh.number);
+    let part = file.name_of(mesh.part);
     let rays = context.weights.as_ref().and_then(|weights| weights.get(number));
-    let Some(rays) = rays else {
-        let key = context.keys.as_ref().map(|keys| keys.of(&mesh.summary));
-        return build_or_fetch(file, mesh, (key, &part), context.options, context, clock);
+    let deforms = mesh.summary.deformation.is_some();
+    let Some(rays) = rays.filter(|_| !deforms) else {
+        let key = key(&mesh.summary, mesh.part, context);
+        let of_deforming = deforms.then(|| context.options.of_deforming());
+        let options = of_deforming.as_ref().unwrap_or(context.options);
+        return build_or_fetch(file, mesh, (key, &part), options, context, clock);
     };
     let costs = costs::CostOptions { scene: Some(rays.clone()), ..context.options.costs.clone() };
     let options = CompileOptions { costs, ..context.options.clone() };
-    let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary));
+    let key = context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(&mesh.summary, None));
     build_or_fetch(file, mesh, (key, &part), &options, context, clock)
+}
+
+/// The key of an object, if it may be kept, whose costs the scene's rays do not weight.
+pub(super) fn key(mesh: &MeshSummary, part: SourcePart, context: &Context<'_>) -> Option<Key> {
+    if mesh.deformation.is_none() {
+        return context.keys.as_ref().map(|keys| keys.of(mesh, None));
+    }
+    let options = context.options.of_deforming();
+    let clip = part.clip();
+    context.tetgen.as_ref().map(|tetgen| ObjectKeys::new(&options, tetgen).of(mesh, clip.as_ref()))
 }
 
 /// The object of a key: from the cache, else built and kept.
@@ -73,14 +86,24 @@ fn build_or_fetch(
         return Ok(found);
     }
     let triangles = clock.time("mesh", || mesh.take(file, context))?;
-    let stages = &mut CachedStages::of_object(cache, part, mesh.summary.geometry);
-    let (built, reports) = pipeline::compile_mesh(&file.full, triangles, options, stages, clock, *monitor)?;
+    if mesh.summary.deformation.is_some() {
+        pipeline::warn_of_options(part, context.options, *monitor);
+    }
+    let poses = mesh.part.clip().and_then(|clip| file.clips.poses(&clip, &triangles));
+    let (built, reports) = match poses {
+        Some(poses) => pipeline::compile_moving(triangles, &poses, options, clock, *monitor)?,
+        None => {
+            let stages = &mut CachedStages::of_object(cache, part, mesh.summary.geometry);
+            pipeline::compile_mesh(&file.full, triangles, options, stages, clock, *monitor)?
+        }
+    };
     let report = ObjectReport {
         triangles: mesh.summary.report.triangles,
         degenerate: mesh.summary.report.degenerate,
         tet_leaves: built.tet_leaves,
         tet_triangles: built.tet_triangles,
         opacity: mesh.summary.report.opacity,
+        motion: built.motion.clone(),
         ..ObjectReport::default()
     };
     let worker = reports.tets.map(|r| r.worker).filter(|w| *w != tets::WorkerStatus::NotNeeded);
@@ -88,6 +111,9 @@ fn build_or_fetch(
     let bytes = clock.time("file", || {
         let mut builder = FileBuilder::new();
         object(&mut builder, 0, &built.parts(options))?;
+        for (number, segment) in (1..).zip(&built.segment_objects) {
+            object(&mut builder, number, &segment.parts(options))?;
+        }
         Ok::<_, Error>(builder.finish())
     })?;
     drop(built);
@@ -101,7 +127,7 @@ fn build_or_fetch(
 /// An object from the cache.
 fn fetch(key: &Key, part: &str, context: &Context<'_>) -> Option<BuiltObject> {
     let record = context.cache.find(key, context.monitor)?;
-    let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() == 1)?;
+    let file = context.cache.open(&record, context.monitor).filter(|file| file.object_count() >= 1)?;
     let report = serde_json::from_value(record.report).ok()?;
     context.cache.hit(key, part);
     Some(BuiltObject { file, record: report })

@@ -8,7 +8,7 @@ use super::parallel::run_parallel;
 use super::previous::Previous;
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
-use super::sources::File;
+use super::sources::{File, SourcePart};
 use crate::error::{Error, Place, Result};
 use crate::pipeline::Clock;
 use crate::tets;
@@ -16,7 +16,7 @@ use crate::write::FileBuilder;
 use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
@@ -63,8 +63,11 @@ pub(super) fn build(
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
     let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
     // Copied objects are filled in at once, the others when they are built.
-    let mut places: Vec<Option<(ObjectSections, ObjectReport)>> = Vec::new();
+    let mut places: Vec<Option<Stored>> = Vec::new();
     let mut tasks = Vec::new();
+    // Objects that deform, whose geometry is that of an object before: numbers of both.
+    let mut copies: Vec<(usize, u32)> = Vec::new();
+    let mut deforming = HashSet::new();
     let mut taken = 0;
     for (file, parts) in sources.iter().zip(read(sources, context, clock)?) {
         if file.compiled {
@@ -88,10 +91,10 @@ pub(super) fn build(
                         (Some((file, object)), _) => {
                             taken += 1;
                             objects.note_worker(file.index.worker_of(object).clone());
-                            places.push(Some((
+                            places.push(Some(vec![(
                                 ObjectSections::InPrevious { file: file.clone(), object },
                                 file.index.report_of(object),
-                            )));
+                            )]));
                         }
                         (None, Part::Mesh(mesh)) => {
                             tasks.push(Task { file, mesh: *mesh, number, content });
@@ -105,19 +108,28 @@ pub(super) fn build(
                 }
             };
             objects.parts.push((part_hash(file, *part), format.clone(), number));
-            rows.iter().for_each(|row| objects.number[*row] = Some(number));
+            for row in rows {
+                let mut own = number;
+                // Each deformer moves an object of its own.
+                if part.deforms() && !deforming.insert(number) {
+                    own = places.len() as u32;
+                    copies.push((places.len(), number));
+                    places.push(None);
+                }
+                objects.number[*row] = Some(own);
+            }
         }
     }
     context.cache.hits("object", taken);
     for (number, content, built) in build_all(tasks, context, clock)? {
         objects.note_worker(built.record.worker.clone());
-        let made = Some((content, built.record.worker));
-        places[number] = Some((
-            ObjectSections::InFile { file: Arc::new(built.file), object: 0, made },
-            built.record.object,
-        ));
+        let made = (content, built.record.worker);
+        places[number] = Some(stored(built.file, built.record.object, made));
     }
-    (objects.stored, objects.reports) = places.into_iter().flatten().unzip();
+    for (copy, of) in copies {
+        places[copy] = places[of as usize].clone();
+    }
+    objects.fill(places);
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
         report.resident_bytes = stored.resident_bytes();
     }
@@ -133,7 +145,10 @@ pub(super) fn build(
 fn read(sources: &[File<'_>], context: &Context<'_>, clock: &mut Clock) -> Result<Vec<Vec<Part>>> {
     let mut all: Vec<Option<Vec<Part>>> =
         sources.iter().map(|file| parts_without_reading(file, context)).collect();
-    let bytes = |file: &&File<'_>| std::fs::metadata(&file.full).map_or(0, |m| m.len());
+    let bytes = |file: &&File<'_>| match &file.moving {
+        Some(moving) => moving.bytes(),
+        None => std::fs::metadata(&file.full).map_or(0, |m| m.len()),
+    };
     // Memory for the file and for the mesh that is made from it.
     let estimate = |file: &&File<'_>| bytes(file).saturating_mul(3);
     let unknown =
@@ -156,12 +171,12 @@ pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> O
         return Some(Vec::new());
     }
     let previous = context.previous.as_ref()?;
-    let part = |number: Option<u32>| {
-        let row = previous.index.part(&part_hash(file, number))?;
+    let part = |part: SourcePart| {
+        let row = previous.index.part(&part_hash(file, part))?;
         let format = previous.index.formats[row.format as usize].clone();
         previous.has(row.object).then_some(Part::InPrevious(format, row.object))
     };
-    file.parts.iter().map(|(number, _)| part(*number)).collect()
+    file.parts.iter().map(|(source, _)| part(*source)).collect()
 }
 
 /// The object in the previous file, if it has it, and the hash by which equal objects are found.
@@ -173,7 +188,7 @@ fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>
             (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
         }
         Part::Mesh(mesh) => {
-            let content = content(&mesh.summary);
+            let content = content(&mesh.summary, mesh.part);
             let old = previous.and_then(|p| Some((p, p.index.object_of(content.as_bytes())?)));
             (old.filter(|(p, object)| p.has(*object)), content)
         }
@@ -181,7 +196,7 @@ fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>
 }
 
 /// The hash that identifies a part of a source.
-fn part_hash(file: &File<'_>, part: Option<u32>) -> Hash {
+fn part_hash(file: &File<'_>, part: SourcePart) -> Hash {
     *blake3::hash(file.content(part).as_bytes()).as_bytes()
 }
 
@@ -216,7 +231,7 @@ fn build_all(
 /// Takes objects from a compiled file.
 fn copy(
     objects: &mut Objects,
-    places: &mut Vec<Option<(ObjectSections, ObjectReport)>>,
+    places: &mut Vec<Option<Stored>>,
     manifest: &Manifest,
     file: &File<'_>,
     of_content: &mut HashMap<blake3::Hash, u32>,
@@ -230,11 +245,17 @@ fn copy(
     };
     let read = Arc::new(bth_format::File::read(path).map_err(|e| unusable(&e))?);
     for (part, rows) in &file.parts {
-        let object = part.unwrap_or(0);
+        let SourcePart::Object(object) = *part else { continue };
         let view = read.check(object).map_err(|e| {
             let names: Vec<_> = rows.iter().map(|row| manifest.objects[*row].name.as_str()).collect();
             unusable(&format!("object \"{}\": {e}", names.join("\", \"")))
         })?;
+        let in_order = |(row, segment): (usize, &layout::Segment)| segment.object as usize == row;
+        let segments = read.sequence(object).segments;
+        if !segments.iter().enumerate().all(in_order) || read.check_segments().is_err() {
+            let found = format!("object {object} has segments that do not follow it");
+            return Err(unusable(&found));
+        }
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"compiled");
         for section in read.sections().filter(|s| s.entry.object == object) {
@@ -251,7 +272,14 @@ fn copy(
                 copied: true,
                 ..ObjectReport::default()
             };
-            places.push(Some((ObjectSections::InFile { file: read.clone(), object, made: None }, report)));
+            let one = |object: u32, report| {
+                (ObjectSections::InFile { file: read.clone(), object, made: None }, report)
+            };
+            let behind = (1..read.sequence(object).segments.len() as u32).map(|segment| {
+                one(object + segment, ObjectReport { copied: true, ..ObjectReport::default() })
+            });
+            let first = one(object, report);
+            places.push(Some(std::iter::once(first).chain(behind).collect()));
             places.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
@@ -259,7 +287,46 @@ fn copy(
     Ok(())
 }
 
+/// An object of a source and the objects of its segments, which follow it in the file.
+type Stored = Vec<(ObjectSections, ObjectReport)>;
+
+/// The place of a built object: the first of a file, which holds nothing but it and its segments.
+fn stored(
+    file: bth_format::File,
+    report: ObjectReport,
+    made: (blake3::Hash, Option<tets::WorkerStatus>),
+) -> Stored {
+    let file = Arc::new(file);
+    // An object with segments is not taken from the previous file, whose index has single objects.
+    let made = (file.object_count() == 1).then_some(made);
+    let segments = report.motion.as_ref().map_or(&[][..], |motion| &motion.segments);
+    let of_segment = |object: u32| ObjectReport {
+        triangles: report.triangles,
+        segment_from: segments.get(object as usize).map(|segment| segment.first),
+        ..ObjectReport::default()
+    };
+    let behind: Vec<_> = (1..file.object_count())
+        .map(|object| (ObjectSections::InFile { file: file.clone(), object, made: None }, of_segment(object)))
+        .collect();
+    let mut place = vec![(ObjectSections::InFile { file, object: 0, made }, report)];
+    place.extend(behind);
+    place
+}
+
 impl Objects {
+    /// Stores the objects of all places and numbers them; `number` and `parts` hold numbers of places before.
+    fn fill(&mut self, places: Vec<Option<Stored>>) {
+        let mut first = Vec::with_capacity(places.len());
+        for place in places {
+            first.push(self.stored.len() as u32);
+            let (stored, reports): (Vec<_>, Vec<_>) = place.into_iter().flatten().unzip();
+            self.stored.extend(stored);
+            self.reports.extend(reports);
+        }
+        self.number.iter_mut().flatten().for_each(|number| *number = first[*number as usize]);
+        self.parts.iter_mut().for_each(|(.., number)| *number = first[*number as usize]);
+    }
+
     /// Keeps the first status of a worker that was needed.
     fn note_worker(&mut self, needed: Option<tets::WorkerStatus>) {
         if self.worker.is_none() {
@@ -285,6 +352,14 @@ impl Objects {
             names.extend(stored.image_names()?);
         }
         Ok(names)
+    }
+
+    /// The DEFORMATION row of an object, if its vertices can be moved.
+    ///
+    /// # Errors
+    /// When the previous file cannot be read.
+    pub(super) fn deformation(&self, object: u32) -> Result<Option<layout::Deformation>> {
+        self.stored[object as usize].deformation()
     }
 
     /// Adds the OBJECT rows only, which suffice to place instances.

@@ -1,6 +1,6 @@
 //! Reports of a scene's compilation.
 
-use crate::pipeline::StageTime;
+use crate::pipeline::{MotionReport, StageTime};
 use crate::tets::WorkerStatus;
 use bth_import::OpacityReport;
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,12 @@ pub struct ObjectReport {
     /// Opacity of its triangles, where some are not opaque; not known of objects that were taken from an earlier file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<OpacityReport>,
+    /// What its trees cost where its vertices move by themselves; not known of objects that were taken from an earlier file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionReport>,
+    /// Seconds from which it applies, if it is a segment of the object before it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub segment_from: Option<f64>,
     /// Whether it was copied unchanged from a compiled file.
     pub copied: bool,
 }
@@ -47,6 +53,8 @@ pub struct SceneReport {
     pub cameras: u64,
     /// Lights.
     pub lights: u64,
+    /// Objects that deform.
+    pub deformers: u64,
     /// First frame.
     pub first_frame: i32,
     /// Last frame.

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use zerocopy::FromBytes;
 
 /// The sections of an object, of which every index has been checked.
+#[derive(Clone)]
 pub(super) enum ObjectSections {
     /// In a file in memory.
     InFile {
@@ -86,6 +87,21 @@ impl ObjectSections {
                 layout::Object::read_from_bytes(file.section(*object, kind::OBJECT)?.bytes).ok()
             }
             Self::InPrevious { file, object } => Some(file.index.objects[*object as usize].object),
+        }
+    }
+
+    /// Its DEFORMATION row, if its vertices can be moved.
+    ///
+    /// # Errors
+    /// When the previous file cannot be read.
+    pub(super) fn deformation(&self) -> Result<Option<layout::Deformation>> {
+        match self {
+            Self::InFile { file, object, .. } => Ok(file.deformation(*object).rows.first().copied()),
+            Self::InPrevious { file, object } => {
+                let rows = file.index.sections_of(*object);
+                let bytes = rows.iter().find(|row| row.kind == kind::DEFORMATION).map(|row| file.read(row));
+                Ok(bytes.transpose()?.and_then(|bytes| layout::Deformation::read_from_bytes(&bytes).ok()))
+            }
         }
     }
 

@@ -1,14 +1,81 @@
 //! The source files of a scene's objects.
 
+use super::clips::Clips;
+use super::moving::{Moving, unhashed};
 use crate::cached;
 use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
-use bth_import::{AlphaMode, Looks};
+use bth_import::{AlphaMode, GltfPart, Looks};
 use bth_scene::{Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The part of a source file that an object is made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum SourcePart {
+    /// The whole model.
+    Whole,
+    /// A part of a glTF file.
+    Gltf(GltfPart),
+    /// A mesh of a glTF file that a clip of the scene poses, for which its tree is built.
+    Posed(u32, Digest),
+    /// An object of a compiled file.
+    Object(u32),
+}
+
+impl SourcePart {
+    /// The part that a source of a manifest names, and that a clip may pose.
+    fn of(source: &Source, clip: Option<Digest>) -> SourcePart {
+        match *source {
+            Source::Model { mesh: None, .. } => SourcePart::Whole,
+            Source::Model { mesh: Some(mesh), .. } => SourcePart::Gltf(GltfPart::Mesh(mesh)),
+            Source::Deforming { mesh, .. } => match clip {
+                Some(clip) => SourcePart::Posed(mesh, clip),
+                None => SourcePart::Gltf(GltfPart::Deforming(mesh)),
+            },
+            Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
+            Source::Compiled { object, .. } => SourcePart::Object(object),
+            Source::Sequence { .. } | Source::Cached { .. } => SourcePart::Whole,
+        }
+    }
+
+    /// The part of a glTF file that is read for it.
+    pub(super) fn gltf(self) -> Option<GltfPart> {
+        match self {
+            SourcePart::Gltf(part) => Some(part),
+            SourcePart::Posed(mesh, _) => Some(GltfPart::Deforming(mesh)),
+            SourcePart::Whole | SourcePart::Object(_) => None,
+        }
+    }
+
+    /// The clip that poses it.
+    pub(super) fn clip(self) -> Option<Digest> {
+        match self {
+            SourcePart::Posed(_, clip) => Some(clip),
+            SourcePart::Whole | SourcePart::Gltf(_) | SourcePart::Object(_) => None,
+        }
+    }
+
+    /// Its name in keys of meshes, which do not depend on the clip.
+    pub(super) fn name(self) -> String {
+        match self {
+            SourcePart::Whole => "flat".to_owned(),
+            SourcePart::Posed(mesh, _) => SourcePart::Gltf(GltfPart::Deforming(mesh)).name(),
+            SourcePart::Gltf(GltfPart::Mesh(mesh)) => format!("mesh {mesh}"),
+            SourcePart::Gltf(GltfPart::Deforming(mesh)) => format!("deforming mesh {mesh}"),
+            SourcePart::Gltf(GltfPart::AtRest(node)) => format!("node {node} at rest"),
+            SourcePart::Object(object) => format!("object {object}"),
+        }
+    }
+
+    /// Whether its vertices can be moved, so that each deformer needs an object of its own.
+    pub(super) fn deforms(self) -> bool {
+        matches!(self, SourcePart::Gltf(GltfPart::Deforming(_)) | SourcePart::Posed(..))
+    }
+}
 
 /// A source file and its parts that are used, or a mesh in memory in the place of one.
 pub(super) struct File<'a> {
@@ -17,29 +84,33 @@ pub(super) struct File<'a> {
     /// Full path.
     pub(super) full: PathBuf,
     pub(super) compiled: bool,
-    /// Number of a mesh or object in the file (`None` for the whole file), and the manifest's objects that refer to it.
-    pub(super) parts: Vec<(Option<u32>, Vec<usize>)>,
+    /// Parts of the file, each with the manifest's objects that refer to it.
+    pub(super) parts: Vec<(SourcePart, Vec<usize>)>,
     pub(super) digest: SourceDigest,
+    /// What moves the vertices; the file is the first of several then.
+    pub(super) moving: Option<Moving>,
+    /// What poses the parts that are [`SourcePart::Posed`].
+    pub(super) clips: Arc<Clips>,
     /// What takes the place of the file's content.
     pub(super) in_memory: Option<TriangleMesh<'a>>,
 }
 
 impl File<'_> {
     /// The name of a part in keys.
-    pub(super) fn part(&self, part: Option<u32>) -> String {
-        let kind = if self.compiled { "object" } else { "mesh" };
-        part.map_or_else(|| "flat".to_owned(), |number| format!("{kind} {number}"))
+    pub(super) fn part(&self, part: SourcePart) -> String {
+        self.moving.as_ref().map_or_else(|| part.name(), Moving::part)
     }
 
     /// Identity of a part by content, which does not depend on the path of the file.
-    pub(super) fn content(&self, part: Option<u32>) -> String {
+    pub(super) fn content(&self, part: SourcePart) -> String {
         let alpha = match self.digest.looks.alpha {
             AlphaMode::None => String::new(),
             mode => format!(" {mode:?}"),
         };
         let materials = if self.digest.looks.materials { " materials" } else { "" };
+        let clip = part.clip().map_or_else(String::new, |clip| format!(" clip {}", clip.hex()));
         format!(
-            "{} {} {}{alpha}{materials}",
+            "{} {} {}{alpha}{materials}{clip}",
             self.digest.text(),
             self.part(part),
             cached::extension(&self.full)
@@ -47,7 +118,7 @@ impl File<'_> {
     }
 
     /// The name of a part in explanations of misses.
-    pub(super) fn name_of(&self, part: Option<u32>) -> String {
+    pub(super) fn name_of(&self, part: SourcePart) -> String {
         format!("{} {}", self.path, self.part(part))
     }
 }
@@ -72,22 +143,24 @@ pub(super) fn files<'a>(
     manifest: &'a Manifest,
     folder: &Path,
     used: &[bool],
-    looks: Looks,
+    (looks, clips): (Looks, Arc<Clips>),
 ) -> Result<Vec<File<'a>>> {
     let mut files: Vec<File<'a>> = Vec::new();
-    let nothing = || SourceDigest { file: Digest::of(b""), others: Vec::new(), looks };
-    let mut row_of_file: HashMap<(&str, bool, bool), usize> = HashMap::new();
-    let mut row_of_part: HashMap<(usize, Option<u32>), usize> = HashMap::new();
+    let mut row_of_file: HashMap<(&str, bool, bool, Option<usize>), usize> = HashMap::new();
+    let mut row_of_part: HashMap<(usize, SourcePart), usize> = HashMap::new();
     for (row, object) in manifest.objects.iter().enumerate().filter(|(row, _)| used[*row]) {
-        let (compiled, part) = match &object.source {
-            Source::Model { mesh, .. } => (false, *mesh),
-            Source::Compiled { object, .. } => (true, Some(*object)),
-        };
+        let part = SourcePart::of(&object.source, clips.of_object(row));
+        let compiled = matches!(part, SourcePart::Object(_));
         let path = object.source.path();
         // A glTF file as a whole and its single meshes are read in different ways, so they count as different sources.
-        let file = *row_of_file.entry((path, compiled, part.is_some())).or_insert_with(|| {
-            let full = folder.join(path);
-            files.push(File { path, full, compiled, parts: Vec::new(), digest: nothing(), in_memory: None });
+        let moving = Moving::of(manifest, &object.source, folder)?;
+        let own = moving.is_some().then_some(row);
+        let whole = part == SourcePart::Whole;
+        let file = *row_of_file.entry((path, compiled, !whole, own)).or_insert_with(|| {
+            let full = moving.as_ref().map_or_else(|| folder.join(path), |moving| moving.first().to_owned());
+            let digest = unhashed(looks);
+            let (parts, clips) = (Vec::new(), clips.clone());
+            files.push(File { path, full, compiled, parts, digest, moving, clips, in_memory: None });
             files.len() - 1
         });
         let parts = &mut files[file].parts;
@@ -98,7 +171,11 @@ pub(super) fn files<'a>(
         parts[place].1.push(row);
     }
     // The first error in the order of the files is returned, so that the message does not depend on timing.
-    let digests: Vec<_> = files.par_iter().map(|file| SourceDigest::of(&file.full, looks)).collect();
+    let digest = |file: &File<'_>| match &file.moving {
+        Some(moving) => moving.digest(looks),
+        None => SourceDigest::of(&file.full, looks),
+    };
+    let digests: Vec<_> = files.par_iter().map(digest).collect();
     for (file, digest) in files.iter_mut().zip(digests) {
         file.digest = digest?;
     }

@@ -2,8 +2,9 @@
 
 use bth_scene::{Manifest, Property, Track, Transform};
 
-/// For each node whether it may be visible. True for every node that some frame shows; also true for some that no frame
-/// shows, when a node and its parent are visible at different times.
+/// For each node whether it, or what stands at it, may be visible. True for every node that some frame shows; also true for some that no
+/// frame shows, when a node and its parent are visible at different times. Scales of zero do not hide an object with a skin,
+/// which the transform of its node does not move.
 pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
     let frames = manifest.frames;
     let range = [frames.first, frames.last].map(|f| f64::from(f) / frames.rate);
@@ -15,15 +16,22 @@ pub(super) fn visible(manifest: &Manifest, order: &[usize]) -> Vec<bool> {
             // A scale track is assumed to give the node a size at some time. Where it passes through zero between two keys,
             // it does so for an instant only.
             Property::Scale => scaled[track.node] = true,
-            Property::Translation | Property::Rotation => {}
+            Property::Translation | Property::Rotation | Property::Weights => {}
         }
     }
-    let mut visible = vec![false; manifest.nodes.len()];
+    let mut with_size = vec![false; manifest.nodes.len()];
     for &node in order {
-        let above = manifest.nodes[node].parent.is_none_or(|parent| visible[parent]);
-        visible[node] = above && shown[node] && scaled[node];
+        let parent = manifest.nodes[node].parent;
+        shown[node] &= parent.is_none_or(|parent| shown[parent]);
+        with_size[node] = scaled[node] && parent.is_none_or(|parent| with_size[parent]);
     }
-    visible
+    let mut skinned = vec![false; manifest.objects.len()];
+    let skins = manifest.deformers.iter().filter(|deformer| deformer.skin.is_some());
+    skins.for_each(|deformer| skinned[deformer.object] = true);
+    let nodes = manifest.nodes.iter().zip(shown).zip(with_size);
+    nodes
+        .map(|((node, shown), with_size)| shown && (with_size || node.object.is_some_and(|o| skinned[o])))
+        .collect()
 }
 
 fn has_size(transform: &Transform) -> bool {
@@ -37,8 +45,7 @@ fn has_size(transform: &Transform) -> bool {
 fn some_value(track: &Track, [from, to]: [f64; 2], holds: impl Fn(&[f64]) -> bool) -> bool {
     let first = track.times.partition_point(|t| *t <= from).saturating_sub(1);
     let end = track.times.partition_point(|t| *t <= to).max(first + 1);
-    let width = track.property.width();
-    track.values.chunks(width).take(end).skip(first).any(holds)
+    track.values.chunks(track.property.width().unwrap_or(1)).take(end).skip(first).any(holds)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub use groups::{GroupParts, object_names};
 pub use images::images;
 pub(crate) use images::named_images;
 pub use object::{ObjectParts, Source, object};
-pub use scene::{SceneParts, scene};
+pub use scene::{DeformerParts, SceneParts, scene};
 pub use whole::name_if_whole;
 pub(crate) use whole::{HEADER, are_zeros, name};
 
@@ -33,6 +33,7 @@ pub fn checked(bytes: &[u8]) -> Result<bth_format::File> {
     (0..file.object_count()).try_for_each(|i| file.check(i).map(drop).map_err(defect))?;
     file.check_object_names().map_err(defect)?;
     file.check_scene().map_err(defect)?;
+    file.check_segments().map_err(defect)?;
     Ok(file)
 }
 

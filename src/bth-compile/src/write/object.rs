@@ -4,7 +4,7 @@ use super::builder::defect;
 use super::{FileBuilder, GroupParts};
 use crate::error::{Error, Result};
 use bth_format::layout::*;
-use bth_import::Materials;
+use bth_import::{Deformation, Materials};
 use std::borrow::Cow;
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -51,6 +51,14 @@ pub struct ObjectParts<'a> {
     pub groups: Option<&'a GroupParts>,
     /// How the materials of the groups look, and vertex colours.
     pub materials: Option<&'a Materials>,
+    /// Seconds of the frames of a sequence; empty where the vertices do not move by themselves.
+    pub sequence_times: &'a [f64],
+    /// Positions of the frames of a sequence.
+    pub sequence_positions: &'a [[f32; 3]],
+    /// Hierarchies for ranges of time.
+    pub segments: &'a [Segment],
+    /// What moves the vertices.
+    pub deformation: Option<&'a Deformation>,
     /// Positions and attributes to keep.
     pub source: Option<Source<'a>>,
 }
@@ -124,6 +132,9 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
     if let Some(groups) = parts.groups {
         groups.write(builder, index)?;
     }
+    builder.rows(kind::SEQUENCE_TIMES, index, parts.sequence_times)?;
+    builder.rows(kind::SEQUENCE_POSITIONS, index, parts.sequence_positions)?;
+    builder.rows(kind::SEGMENTS, index, parts.segments)?;
     builder.rows(kind::OPACITY, index, parts.opacity)?;
     builder.rows(kind::OPACITY_MICRO, index, parts.opacity_micro)?;
     if let Some(materials) = parts.materials {
@@ -131,6 +142,14 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::TEXTURES, index, &materials.textures)?;
         builder.rows(kind::COLOR_CORNERS, index, &materials.color_corners)?;
         builder.rows(kind::COLORS, index, &materials.colors)?;
+    }
+    if let Some(deformation) = parts.deformation {
+        builder.rows(kind::DEFORMATION, index, std::slice::from_ref(&deformation.counts))?;
+        builder.rows(kind::JOINTS, index, &deformation.joints)?;
+        builder.rows(kind::JOINT_WEIGHTS, index, &deformation.weights)?;
+        builder.rows(kind::MORPHS, index, &deformation.morphs)?;
+        builder.rows(kind::MORPH_ROWS, index, &deformation.morph_rows)?;
+        builder.rows(kind::MORPH_DELTAS, index, &deformation.deltas)?;
     }
     Ok(())
 }

@@ -25,6 +25,21 @@ pub struct SceneParts {
     pub lights: Vec<Light>,
     /// Names of all of these.
     pub names: Vec<u8>,
+    /// Objects that deform.
+    pub deformers: DeformerParts,
+}
+
+/// The rows of deformers and their skins.
+#[derive(Clone, Debug, Default)]
+pub struct DeformerParts {
+    /// Deformers, by node.
+    pub deformers: Vec<Deformer>,
+    /// Skins.
+    pub skins: Vec<Skin>,
+    /// Joints of the skins.
+    pub joints: Vec<SkinJoint>,
+    /// Weights of morph targets.
+    pub weights: Vec<f64>,
 }
 
 /// Adds the sections of a scene; those without rows are left out.
@@ -41,5 +56,9 @@ pub fn scene<'a>(builder: &mut FileBuilder<'a>, parts: &'a SceneParts) -> Result
     builder.rows(kind::CAMERAS, NONE, &parts.cameras)?;
     builder.rows(kind::LIGHTS, NONE, &parts.lights)?;
     builder.rows(kind::NAMES, NONE, &parts.names)?;
+    builder.rows(kind::DEFORMERS, NONE, &parts.deformers.deformers)?;
+    builder.rows(kind::SKINS, NONE, &parts.deformers.skins)?;
+    builder.rows(kind::SKIN_JOINTS, NONE, &parts.deformers.joints)?;
+    builder.rows(kind::MORPH_WEIGHTS, NONE, &parts.deformers.weights)?;
     Ok(())
 }

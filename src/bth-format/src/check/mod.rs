@@ -8,6 +8,8 @@ mod adjacency;
 mod bit_set;
 mod boxes;
 mod deformable;
+mod deformation;
+mod deformers;
 mod groups;
 mod header;
 mod leaves;
@@ -16,6 +18,7 @@ mod nodes;
 mod opacity;
 mod rows;
 mod scene;
+mod sequence;
 mod sources;
 mod tet_faces;
 mod tet_leaves;
@@ -23,8 +26,10 @@ mod tracks;
 mod tree;
 
 pub(crate) use adjacency::TetAdjacency;
+pub(crate) use deformation::check as deformation;
 pub(crate) use materials::{image_names, images, materials};
 pub(crate) use scene::check as scene;
+pub(crate) use sequence::{Segmented, segments, sequence};
 
 use crate::error::Result;
 use crate::object::ObjectView;

@@ -1,5 +1,6 @@
 //! The scene sections but for tracks. Costs O(their bytes).
 
+use super::deformers::{self, DeformationOf};
 use super::rows::{RowResult, check_rows, violation};
 use super::tracks;
 use crate::error::{Code, Error, Result};
@@ -14,11 +15,12 @@ const NAME_EXPECTED: &str = "a name of at most 4096 bytes within NAMES";
 /// Checks the scene sections of a file; `objects` is the number of its objects.
 ///
 /// # Errors
-/// The first violation of `BTH-F150` to `BTH-F159`, with an offset from the start of its section.
-pub(crate) fn check(view: &SceneView<'_>, objects: u32) -> Result<()> {
+/// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`, with an offset from the start of its section.
+pub(crate) fn check(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>) -> Result<()> {
     scene_row(view)?;
     check_rows(kind::NODES, view.nodes, |row, node| self::node(view, row, node))?;
     check_rows(kind::INSTANCES, view.instances, |_, instance| self::instance(view, instance, objects))?;
+    deformers::check(view, objects, deformation)?;
     tracks::check(view)?;
     check_rows(kind::CAMERAS, view.cameras, |_, camera| self::camera(view, camera))?;
     check_rows(kind::LIGHTS, view.lights, |_, light| self::light(view, light))

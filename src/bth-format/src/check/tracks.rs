@@ -1,4 +1,4 @@
-//! Tracks and their keys: BTH-F155 to BTH-F157.
+//! Tracks and their keys: BTH-F155 to BTH-F157 and BTH-F185.
 
 use super::rows::{RowResult, Violation, violation};
 use crate::error::{Code, Error, Result};
@@ -14,7 +14,7 @@ pub(super) fn check(view: &SceneView<'_>) -> Result<()> {
         let width = property_and_interpolation(view, track)
             .and_then(|(property, interpolation)| {
                 follows(track, previous)?;
-                let width = property.width() * interpolation.values_per_key();
+                let width = width(view, track, property)? * interpolation.values_per_key();
                 ends.append(view, track, width)?;
                 Ok(width)
             })
@@ -34,8 +34,9 @@ fn property_and_interpolation(view: &SceneView<'_>, track: &Track) -> RowResult<
     let Some(property) = Property::from_code(track.property) else {
         return violation(Code::Track, at, "a known property", track.property);
     };
-    if node.flags & NODE_MATRIX != 0 && property != Property::Visible {
-        return violation(Code::Track, at, "visibility, of a node with a matrix", track.property);
+    let moves = !matches!(property, Property::Visible | Property::Weights);
+    if node.flags & NODE_MATRIX != 0 && moves {
+        return violation(Code::Track, at, "visibility or weights, of a node with a matrix", track.property);
     }
     let fits = |i: &Interpolation| property != Property::Visible || *i == Interpolation::Step;
     let Some(interpolation) = Interpolation::from_code(track.interpolation).filter(fits) else {
@@ -47,6 +48,15 @@ fn property_and_interpolation(view: &SceneView<'_>, track: &Track) -> RowResult<
         return violation(Code::Track, offset_of!(Track, reserved), "zeros", found);
     }
     Ok((property, interpolation))
+}
+
+/// BTH-F185: the numbers of a value; weights are those of the node's deformer, which has some.
+fn width(view: &SceneView<'_>, track: &Track, property: Property) -> RowResult<usize> {
+    debug_assert_eq!(Property::from_code(track.property), Some(property));
+    match view.width_of(track) {
+        0 => violation(Code::WeightTrack, 0, "weights of a node whose deformer has some", track.node),
+        width => Ok(width),
+    }
 }
 
 /// BTH-F155: tracks ascend by node and property.
@@ -119,10 +129,10 @@ fn keys(view: &SceneView<'_>, track: &Track, width: usize) -> Result<()> {
     }
     let fits = |key: &[f64]| {
         // Of a cubic rotation only the value, which stands between its tangents, has to be a quaternion.
-        let value = if width == 12 { &key[4..8] } else { key };
+        let rotation = if width == 12 { &key[4..8] } else { key };
         match Property::from_code(track.property) {
-            Some(Property::Rotation) => !is_zero(value),
-            Some(Property::Visible) => value[0] == 0.0 || value[0] == 1.0,
+            Some(Property::Rotation) => !is_zero(rotation),
+            Some(Property::Visible) => key[0] == 0.0 || key[0] == 1.0,
             _ => true,
         }
     };

@@ -11,12 +11,14 @@ pub use deformed::{DeformedObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
+use crate::deformation_view::DeformationView;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use crate::scene_view::SceneView;
+use crate::sequence_view::SequenceView;
 use buffer::{Buffer, no_memory};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -302,14 +304,30 @@ impl File {
     /// Costs O(bytes of the object).
     ///
     /// # Errors
-    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161` and `BTH-F163` to `BTH-F167`.
+    /// As [`Self::object`], `BTH-F101` to `BTH-F147`, `BTH-F149`, `BTH-F160`, `BTH-F161`, `BTH-F163` to `BTH-F167` and `BTH-F173` to
+    /// `BTH-F179`.
     pub fn check(&self, object: u32) -> Result<ObjectView<'_>> {
         let view = self.object(object)?;
         check::object(&view).map_err(|e| self.locate(e, object))?;
         let materials = self.materials(object);
         check::materials(&materials, view.materials.len(), view.header.triangles)
             .map_err(|e| self.locate(e, object))?;
+        check::sequence(&view, &self.sequence(object)).map_err(|e| self.locate(e, object))?;
+        check::deformation(&self.deformation(object), &view).map_err(|e| self.locate(e, object))?;
         Ok(view)
+    }
+
+    /// What moves the vertices of an object, whose **indices are not checked**; empty where nothing does or there is no such
+    /// object.
+    pub fn deformation(&self, object: u32) -> DeformationView<'_> {
+        DeformationView {
+            rows: self.slice(object, kind::DEFORMATION),
+            joints: self.slice(object, kind::JOINTS),
+            weights: self.slice(object, kind::JOINT_WEIGHTS),
+            morphs: self.slice(object, kind::MORPHS),
+            morph_rows: self.slice(object, kind::MORPH_ROWS),
+            deltas: self.slice(object, kind::MORPH_DELTAS),
+        }
     }
 
     /// The materials and vertex colours of an object, whose **indices are not checked**; empty where the file keeps none or
@@ -321,6 +339,32 @@ impl File {
             color_corners: self.slice(object, kind::COLOR_CORNERS),
             colors: self.slice(object, kind::COLORS),
         }
+    }
+
+    /// How the vertices of an object move by themselves, whose **indices are not checked**; empty where they do not or there is no
+    /// such object.
+    pub fn sequence(&self, object: u32) -> SequenceView<'_> {
+        SequenceView {
+            times: self.slice(object, kind::SEQUENCE_TIMES),
+            positions: self.slice(object, kind::SEQUENCE_POSITIONS),
+            segments: self.slice(object, kind::SEGMENTS),
+        }
+    }
+
+    /// Checks the segments of all objects. Costs O(bytes of the objects with segments).
+    ///
+    /// # Errors
+    /// `BTH-F193` and `BTH-F194`.
+    pub fn check_segments(&self) -> Result<()> {
+        let object =
+            |object: u32| Ok(check::Segmented { view: self.view(object)?, sequence: self.sequence(object) });
+        check::segments(self.object_count(), self.instances(), object, |object| {
+            self.slice(object, kind::SEGMENTS)
+        })
+        .map_err(|e| match e.section() {
+            Some(section) => self.locate(e, section.object),
+            None => e,
+        })
     }
 
     /// The images of all textures, whose **indices are not checked**.
@@ -398,6 +442,10 @@ impl File {
             cameras: self.slice(NONE, kind::CAMERAS),
             lights: self.slice(NONE, kind::LIGHTS),
             names: self.slice(NONE, kind::NAMES),
+            deformers: self.slice(NONE, kind::DEFORMERS),
+            skins: self.slice(NONE, kind::SKINS),
+            skin_joints: self.slice(NONE, kind::SKIN_JOINTS),
+            morph_weights: self.slice(NONE, kind::MORPH_WEIGHTS),
         })
     }
 
@@ -405,10 +453,15 @@ impl File {
     /// sections).
     ///
     /// # Errors
-    /// The first violation of `BTH-F150` to `BTH-F159`.
+    /// The first violation of `BTH-F150` to `BTH-F159` and `BTH-F180` to `BTH-F186`.
     pub fn check_scene(&self) -> Result<Option<SceneView<'_>>> {
         let Some(view) = self.scene() else { return Ok(None) };
-        check::scene(&view, self.object_count()).map_err(|e| self.locate(e, NONE))?;
+        let deformation = |object| {
+            let can_move = self.section(object, kind::LEAF_VERTICES).is_some_and(|s| s.entry.count != 0);
+            let row = self.deformation(object).rows.first().copied();
+            (row, can_move || self.object_header(object).root == NONE)
+        };
+        check::scene(&view, self.object_count(), &deformation).map_err(|e| self.locate(e, NONE))?;
         Ok(Some(view))
     }
 

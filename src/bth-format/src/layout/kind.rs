@@ -1,5 +1,5 @@
-//! Section kinds. Specification: "Kinds". Kinds 1 to 31 and 35 to 38 belong to an object, the others to the whole
-//! file.
+//! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38 and 41 to 47 belong to an object, the others to the
+//! whole file.
 
 /// One [`super::Object`].
 pub const OBJECT: u32 = 1;
@@ -40,6 +40,12 @@ pub const GROUP_RUNS: u32 = 22;
 pub const MATERIALS: u32 = 23;
 /// UTF-8 bytes of the names of groups and materials.
 pub const LABELS: u32 = 24;
+/// `f64` seconds of the frames of a sequence.
+pub const SEQUENCE_TIMES: u32 = 25;
+/// `[f32; 3]`: the positions of a sequence, by frame, then by row of `POSITIONS`.
+pub const SEQUENCE_POSITIONS: u32 = 26;
+/// [`super::Segment`]s: hierarchies of the object for ranges of time.
+pub const SEGMENTS: u32 = 27;
 /// `u32` per source triangle: a [`super::TriangleOpacity`].
 pub const OPACITY: u32 = 28;
 /// `u32`: states of micro-triangles, two bits each.
@@ -62,6 +68,18 @@ pub const COLORS: u32 = 38;
 pub const IMAGES: u32 = 39;
 /// Bytes of the image files.
 pub const IMAGE_BYTES: u32 = 40;
+/// One [`super::Deformation`]. This section and the five that follow belong to an object.
+pub const DEFORMATION: u32 = 41;
+/// `[u16; 4]`: joints that move a position, of the skin of the object's deformer.
+pub const JOINTS: u32 = 42;
+/// `[f32; 4]`: weights of the joints.
+pub const JOINT_WEIGHTS: u32 = 43;
+/// [`super::Morph`]s: of each target what it adds to positions, then what it adds to normals.
+pub const MORPHS: u32 = 44;
+/// `u32`: rows of `POSITIONS` or `NORMALS` that sparse morphs change.
+pub const MORPH_ROWS: u32 = 45;
+/// `[f32; 3]`: what morphs add at a weight of 1.
+pub const MORPH_DELTAS: u32 = 46;
 /// One [`super::Scene`]. This section and the following ones belong to the whole file.
 pub const SCENE: u32 = 48;
 /// [`super::Node`]s, parents before children.
@@ -80,20 +98,36 @@ pub const CAMERAS: u32 = 54;
 pub const LIGHTS: u32 = 55;
 /// UTF-8 bytes of the names of nodes, cameras and lights.
 pub const NAMES: u32 = 56;
+/// [`super::Deformer`]s, ascending by node.
+pub const DEFORMERS: u32 = 57;
+/// [`super::Skin`]s.
+pub const SKINS: u32 = 58;
+/// [`super::SkinJoint`]s of all skins.
+pub const SKIN_JOINTS: u32 = 59;
+/// `f64`: weights of the morph targets of all deformers, where no track gives others.
+pub const MORPH_WEIGHTS: u32 = 60;
 
 /// Whether sections of this kind are part of the scene.
 pub const fn is_scene(kind: u32) -> bool {
-    SCENE <= kind && kind <= NAMES
+    SCENE <= kind && kind <= MORPH_WEIGHTS
 }
 /// Whether sections of this kind belong to the whole file.
 pub const fn is_of_file(kind: u32) -> bool {
     (PROVENANCE <= kind && kind <= OBJECT_LABELS) || kind == IMAGES || kind == IMAGE_BYTES || is_scene(kind)
 }
+/// Whether sections of this kind say how an object's vertices move by themselves.
+pub const fn is_sequence(kind: u32) -> bool {
+    SEQUENCE_TIMES <= kind && kind <= SEGMENTS
+}
 /// Whether tracing reads sections of this kind of an object.
 pub const fn is_traced(kind: u32) -> bool {
-    is_required(kind) && kind != LEAF_VERTICES && !is_of_file(kind)
+    is_required(kind) && kind != LEAF_VERTICES && !is_sequence(kind) && !is_of_file(kind)
 }
 /// Whether sections of this kind carry [`super::SECTION_REQUIRED`]: a reader that does not know the kind must refuse the file.
 pub const fn is_required(kind: u32) -> bool {
-    (OBJECT <= kind && kind <= LEAF_VERTICES) || kind == OPACITY || kind == OPACITY_MICRO || is_scene(kind)
+    (OBJECT <= kind && kind <= LEAF_VERTICES)
+        || kind == OPACITY
+        || kind == OPACITY_MICRO
+        || is_sequence(kind)
+        || is_scene(kind)
 }

@@ -6,6 +6,7 @@
 mod assert_layout;
 mod bvh;
 mod container;
+mod deformation;
 mod grid;
 mod grid_leaves;
 mod groups;
@@ -14,10 +15,12 @@ mod materials;
 mod object;
 mod opacity;
 mod scene;
+mod sequence;
 mod tets;
 
 pub use bvh::*;
 pub use container::*;
+pub use deformation::*;
 pub use grid::*;
 pub use grid_leaves::*;
 pub use groups::*;
@@ -25,6 +28,7 @@ pub use materials::*;
 pub use object::*;
 pub use opacity::*;
 pub use scene::*;
+pub use sequence::*;
 pub use tets::*;
 
 /// No index: the reference leads nowhere.

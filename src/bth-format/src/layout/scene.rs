@@ -71,7 +71,8 @@ pub struct Track {
     pub keys: u32,
     /// Row of `TIMES` of the first key. In this section and in `VALUES`, the ranges of successive tracks follow each other.
     pub first_time: u32,
-    /// Row of `VALUES` of the first key, which has [`Property::width`] times [`Interpolation::values_per_key`] rows.
+    /// Row of `VALUES` of the first key, which has [`Property::width`] times [`Interpolation::values_per_key`] rows; of weights, those
+    /// of the node's deformer times that.
     pub first_value: u32,
     /// Zero.
     pub reserved: [u32; 2],
@@ -89,22 +90,26 @@ pub enum Property {
     Scale = 2,
     /// One number: 0 hides, 1 shows.
     Visible = 3,
+    /// The weights of the morph targets of the node's deformer.
+    Weights = 4,
 }
 
 impl Property {
     /// All of them, in order of their codes.
-    pub const ALL: [Property; 4] = [Self::Translation, Self::Rotation, Self::Scale, Self::Visible];
+    pub const ALL: [Property; 5] =
+        [Self::Translation, Self::Rotation, Self::Scale, Self::Visible, Self::Weights];
 
     /// The property with this code.
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|p| *p as u32 == code)
     }
-    /// Numbers of a value.
-    pub const fn width(self) -> usize {
+    /// Numbers of a value; `None` for weights, of which the deformer of the node has some number.
+    pub const fn width(self) -> Option<usize> {
         match self {
-            Self::Translation | Self::Scale => 3,
-            Self::Rotation => 4,
-            Self::Visible => 1,
+            Self::Translation | Self::Scale => Some(3),
+            Self::Rotation => Some(4),
+            Self::Visible => Some(1),
+            Self::Weights => None,
         }
     }
 }

@@ -3,6 +3,7 @@
 use glam::DAffine3;
 use std::collections::HashMap;
 
+use crate::deformation::RawDeformation;
 use crate::error::{Place, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
@@ -25,10 +26,35 @@ pub(super) struct PlacedMesh {
     pub(super) world: DAffine3,
 }
 
-impl PlacedMesh {
-    /// A mesh in its own space.
-    pub(super) fn alone(mesh: usize) -> Self {
-        PlacedMesh { node: None, mesh, world: DAffine3::IDENTITY }
+/// A part of a glTF document that is read as a model of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GltfPart {
+    /// A mesh by its number, in its own space.
+    Mesh(u32),
+    /// A mesh by its number, in its own space, with what moves its vertices.
+    Deforming(u32),
+    /// The mesh of a node, by the node's number, at rest: with its default morph weights, and with its joints where the nodes
+    /// place them. With a skin it is in world space, else in that of the node.
+    AtRest(u32),
+}
+
+impl GltfPart {
+    /// The mesh of the part.
+    ///
+    /// # Errors
+    /// `BTH-I012` where the node does not exist or has no mesh.
+    pub(super) fn placed(self, source: &Source<'_>, document: &GltfDocument) -> Result<PlacedMesh> {
+        let (node, mesh) = match self {
+            GltfPart::Mesh(mesh) | GltfPart::Deforming(mesh) => (None, mesh as usize),
+            GltfPart::AtRest(node) => {
+                let mesh = document.nodes.get(node as usize).and_then(|node| node.mesh);
+                let message = "it does not exist or has no mesh";
+                let part = format!("node {node}");
+                let error = || source.error_in_part(GRAPH, part, message, "name a node that has a mesh");
+                (Some(node as usize), mesh.ok_or_else(error)?)
+            }
+        };
+        Ok(PlacedMesh { node, mesh, world: DAffine3::IDENTITY })
     }
 }
 
@@ -77,28 +103,30 @@ pub(crate) fn read<'a>(source: &'a Source<'a>, wanted: Wanted) -> Result<Raw<'a>
         source.monitor.warn("animations are ignored: meshes with skins or morph targets are read at rest");
     }
     let shared = SharedMaterials::default();
-    let raw = read_placed(source, &document, binary, (wanted, &shared), &placed)?;
+    let raw = read_placed(source, &document, binary, (wanted, &shared), (&placed, false))?;
     shared.report(source);
     Ok(raw)
 }
 
-/// Reads one mesh of a document in its own space.
-pub(crate) fn read_mesh<'a>(
+/// Reads one part of a document.
+pub(crate) fn read_part<'a>(
     source: &'a Source<'a>,
     document: &GltfDocument,
     binary: Option<&[u8]>,
-    mesh: usize,
+    part: GltfPart,
     wanted: (Wanted, &SharedMaterials),
 ) -> Result<Raw<'a>> {
-    read_placed(source, document, binary, wanted, &[PlacedMesh::alone(mesh)])
+    let placed = [part.placed(source, document)?];
+    read_placed(source, document, binary, wanted, (&placed, matches!(part, GltfPart::Deforming(_))))
 }
 
+/// Reads placed meshes; those that are `deforming` without moving their vertices.
 fn read_placed<'a>(
     source: &'a Source<'a>,
     document: &GltfDocument,
     binary: Option<&[u8]>,
     (wanted, shared): (Wanted, &SharedMaterials),
-    placed: &[PlacedMesh],
+    (placed, deforming): (&[PlacedMesh], bool),
 ) -> Result<Raw<'a>> {
     let accessors = Accessors { source, document, buffers: Buffers::new(source, document, binary) };
     let no_place = Box::new(|_: RowKind, _: usize| Place::File(source.path.to_owned()));
@@ -110,6 +138,9 @@ fn read_placed<'a>(
         groups: wanted.groups.then(GroupNumbers::default),
         colors: wanted.materials,
     };
+    if deforming {
+        flattener.raw.deformation = Some(RawDeformation::default());
+    }
     for (done, mesh) in placed.iter().enumerate() {
         source.progress(source.data.len() / placed.len() * done)?;
         flattener.mesh(mesh)?;
@@ -175,7 +206,10 @@ impl Flattener<'_, '_> {
                 placed.node.map_or_else(|| format!("mesh {}", placed.mesh), |node| format!("node {node}"));
             return Err(source.error_in_part(GRAPH, part, message, "export the model again"));
         };
-        let pose = RestPose::new(&self.accessors, placed.node, placed.mesh)?;
+        let pose = match self.raw.deformation {
+            Some(_) => RestPose::default(),
+            None => RestPose::new(&self.accessors, placed.node, placed.mesh)?,
+        };
         for (index, primitive) in primitives.iter().enumerate() {
             source.monitor.check()?;
             self.primitive((placed, &pose), index, primitive)?;
@@ -209,7 +243,11 @@ impl Flattener<'_, '_> {
             primitive: index,
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
-        pose.apply(&reader, &mut triangles)?;
+        let first = [self.raw.positions.len(), self.raw.normals.len()];
+        match &mut self.raw.deformation {
+            Some(deformation) => reader.deformation(&triangles, first, deformation)?,
+            None => pose.apply(&reader, &mut triangles)?,
+        }
         let mut colors = None;
         if self.colors {
             warn_without_coordinates(&reader, &triangles);

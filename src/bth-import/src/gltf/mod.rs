@@ -7,6 +7,7 @@ pub(crate) mod accessor;
 pub(crate) mod buffer;
 mod container;
 pub(crate) mod cutout;
+mod deformation;
 pub(crate) mod document;
 mod draco;
 pub(crate) mod extensions;
@@ -23,5 +24,6 @@ mod texture_parts;
 mod transform;
 pub(crate) mod uri;
 
+pub use flatten::GltfPart;
 pub use scene::options::Chosen;
 pub use source_files::external_files;

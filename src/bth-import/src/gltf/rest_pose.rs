@@ -114,7 +114,7 @@ fn joint_transforms(accessors: &Accessors<'_>, skin: usize) -> Result<Vec<DAffin
 }
 
 /// For each node its parent, or `None` for roots.
-fn parents(document: &GltfDocument) -> Vec<Option<usize>> {
+pub(super) fn parents(document: &GltfDocument) -> Vec<Option<usize>> {
     let mut parents = vec![None; document.nodes.len()];
     for (index, node) in document.nodes.iter().enumerate() {
         for &child in &node.children {
@@ -137,7 +137,7 @@ fn to_world(accessors: &Accessors<'_>, parents: &[Option<usize>], node: usize) -
         if steps > document.nodes.len() {
             return Err(graph_error(accessors, format!("node {node}"), "it is an ancestor of itself"));
         }
-        world = transform::local(found) * world;
+        world = transform::local_of_joint(found) * world;
         next = parents[index];
     }
     Ok(world)

@@ -69,6 +69,7 @@ pub(crate) struct GltfNode {
 #[derive(Deserialize, Default)]
 #[serde(default, rename_all = "camelCase")]
 pub(crate) struct GltfSkin {
+    pub(crate) name: String,
     pub(crate) inverse_bind_matrices: Option<usize>,
     pub(crate) joints: Vec<usize>,
 }

@@ -17,6 +17,26 @@ pub(super) fn local(node: &GltfNode) -> DAffine3 {
     }
 }
 
+/// As [`local`], with a rotation that is brought to unit length, as scenes have it: the numbers of a file are rounded, and in a long
+/// chain of joints what they lack adds up.
+pub(super) fn local_of_joint(node: &GltfNode) -> DAffine3 {
+    let unit = |q: [f64; 4]| {
+        let q = DQuat::from_array(q);
+        if q.length() > 0.0 { q.normalize().to_array() } else { q.to_array() }
+    };
+    let GltfNode { matrix, translation, rotation, scale, .. } = *node;
+    local(&GltfNode { matrix, translation, rotation: rotation.map(unit), scale, ..GltfNode::default() })
+}
+
+/// The rows of a transform, applied to columns (x, y, z, 1).
+pub(super) fn rows(transform: &DAffine3) -> [[f64; 4]; 3] {
+    let (linear, moved) = (transform.matrix3, transform.translation.to_array());
+    [0, 1, 2].map(|k| {
+        let [x, y, z] = linear.row(k).to_array();
+        [x, y, z, moved[k]]
+    })
+}
+
 /// A transformed position, computed in f64 and rounded to f32 once.
 #[inline]
 pub(super) fn point(transform: &DAffine3, p: [f32; 3]) -> [f32; 3] {

@@ -112,7 +112,9 @@ fn primitives_of_gltf_are_groups() {
     let path = folder.path().join("a.glb");
     std::fs::write(&path, &bytes).unwrap();
     let wanted = Wanted { attributes: Keep::None, groups: true, materials: false, vertices: false };
-    let meshes = bth_import::import_gltf_meshes(&path, &[0, 1], wanted, &Silent).unwrap();
+    let meshes =
+        bth_import::import_gltf_parts(&path, &[0, 1].map(bth_import::GltfPart::Mesh), wanted, &Silent)
+            .unwrap();
     let of = |row: usize| shown(meshes[row].0.groups.as_ref().unwrap());
     assert_eq!(
         (of(0), of(1)),

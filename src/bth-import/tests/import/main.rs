@@ -11,6 +11,7 @@ mod off;
 mod ply;
 mod quantized;
 mod rest_pose;
+mod sequence;
 mod stl;
 mod textures;
 
@@ -125,6 +126,7 @@ fn the_report_counts_what_was_read_and_found() {
             non_manifold_edges: 1,
             components: 1,
             non_finite_unused: 1,
+            frames: 0,
             opacity: None,
         }
     );

@@ -12,6 +12,8 @@ use std::path::Path;
 pub(crate) struct ShadingGeometry<'a> {
     scene: &'a Scene,
     objects: Vec<ObjectView<'a>>,
+    /// Whether the vertices of each object can be elsewhere than in the file, so that its normals are, too.
+    deformable: Vec<bool>,
     /// The object of each instance.
     object_of: Vec<u32>,
 }
@@ -25,6 +27,7 @@ impl<'a> ShadingGeometry<'a> {
         Self {
             scene,
             objects: (0..scene.object_count()).map(|i| scene.object(i)).collect(),
+            deformable: (0..scene.object_count()).map(|i| scene.vertex_count(i).is_some()).collect(),
             object_of: (0..scene.instance_count()).map(|i| scene.object_of(i)).collect(),
         }
     }
@@ -84,9 +87,14 @@ impl<'a> ShadingGeometry<'a> {
         if object.normals.is_empty() {
             return geometric;
         }
-        let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));
-        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-        match self.to_world(hit.primitive, a * (1.0 - u - v) + b * u + c * v) {
+        let normal = if self.deformable[self.object_of[hit.primitive.instance as usize] as usize] {
+            self.scene.surface(hit).map(|surface| DVec3::from_array(surface.normal))
+        } else {
+            let [a, b, c] = corners.map(|row| to_f64(object.normals[row as usize]));
+            let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+            self.to_world(hit.primitive, a * (1.0 - u - v) + b * u + c * v)
+        };
+        match normal {
             Some(normal) if normal.dot(geometric) < 0.0 => -normal,
             Some(normal) => normal,
             None => geometric,

@@ -2,8 +2,10 @@
 
 use super::SceneBuilder;
 use crate::clock;
+use crate::deformers::Posed;
 use crate::instances::Update;
 use bth_format::Error;
+use std::collections::HashSet;
 
 impl SceneBuilder {
     /// Gives an object new positions, as [`Scene::set_positions`](crate::Scene::set_positions), which the next commit makes visible
@@ -20,6 +22,45 @@ impl SceneBuilder {
             self.deformed.push(object);
         }
         Ok(())
+    }
+
+    /// Stages the positions that sequences, skins and morph targets of files give their objects at the times of the subscenes, but for
+    /// objects to which the caller gives others. Of several subscenes of one file, which have the same objects, the one of least id
+    /// decides.
+    ///
+    /// # Errors
+    /// As [`Self::commit`]. Nothing is staged then.
+    pub(super) fn stage_poses(&mut self) -> Result<Posed, Error> {
+        let mut posed = Posed::default();
+        if self.scene.world().is_none_or(|world| world.deformers.is_empty()) {
+            return Ok(posed);
+        }
+        let mut seen = HashSet::new();
+        for subscene in self.subscenes.iter().flatten() {
+            let Some(evaluated) = subscene.evaluated().filter(|_| seen.insert(subscene.first_object)) else {
+                continue;
+            };
+            let by_caller = &self.deformed;
+            let (objects, world) = self.scene.parts_mut();
+            let file = objects.locate(subscene.first_object).map(|(file, _)| file.clone());
+            let (Some(world), Some(file)) = (world, file) else { continue };
+            let skips = |object: u32| by_caller.contains(&object);
+            match world.deformers.stage(objects, (&file, subscene.first_object), evaluated, &skips) {
+                Ok(more) => posed.extend(more),
+                Err(error) => {
+                    posed.put_back(objects);
+                    return Err(error);
+                }
+            }
+        }
+        self.deformed.extend(&posed.objects);
+        Ok(posed)
+    }
+
+    /// Forgets what [`Self::stage_poses`] has staged.
+    pub(super) fn unstage_poses(&mut self, mut posed: Posed) {
+        self.deformed.retain(|object| !posed.objects.contains(object));
+        posed.put_back(self.scene.objects_mut());
     }
 
     /// Refits the objects that get new positions, and notes that their instances have changed.

@@ -131,21 +131,23 @@ impl SceneBuilder {
     /// share the work of some thousand instances or more. The answers of queries depend on none of this.
     ///
     /// # Errors
-    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform or the world box is not
-    /// finite in `f32`. The error gives the instance. The scene is then unchanged, and so are the changes that wait for a commit:
+    /// `BTH-S001` if the transform of a visible instance cannot be inverted, `BTH-S002` if the transform, the world box or the position
+    /// of a vertex that a file's skins and morph targets move is not finite in `f32`. The error gives the instance or the node. The scene is then unchanged, and so are the changes that wait for a commit:
     /// correct the transform, or hide or remove the instance, and commit again.
     pub fn commit(&mut self) -> Result<Update, Error> {
-        let refitted = self.refit_objects();
         let mut nodes = 0;
         for subscene in self.subscenes.iter_mut().flatten() {
             let (instances, changed) = (&mut self.instances, &mut self.changed);
             let moved = |id: u32| instances[id as usize].mark(id, changed);
             nodes += subscene.evaluate(self.scene.objects(), moved);
         }
+        let posed = self.stage_poses()?;
+        let refitted = self.refit_objects();
+        let skinned = self.scene.world().map(|world| world.deformers.skinned_objects()).unwrap_or_default();
         let (scene, instances, subscenes) = (&mut self.scene, &self.instances, &self.subscenes);
         let (objects, world) = scene.objects_and_world_mut();
         let Some(world) = world else { return Ok(Update::default()) };
-        let new = |id: u32| instances[id as usize].placed_in(objects, subscenes);
+        let new = |id: u32| instances[id as usize].placed_in(objects, subscenes, &skinned);
         let update = match world.change(objects, instances.len(), &self.changed, &new) {
             Ok(update) => Update {
                 nodes,
@@ -156,6 +158,7 @@ impl SceneBuilder {
             },
             Err(failed) => {
                 self.undo_refit();
+                self.unstage_poses(posed);
                 let (code, expected, found) = failed.error.words();
                 let found = format!("{found}: {}", self.describe(failed.instance));
                 return Err(Error::of_call(code, expected, found));
@@ -169,6 +172,9 @@ impl SceneBuilder {
         }
         self.subscene_ids.commit();
         self.deformed.clear();
+        if let (_, Some(world)) = self.scene.parts_mut() {
+            world.deformers.keep(posed);
+        }
         Ok(update)
     }
 

@@ -71,10 +71,17 @@ impl Subscene {
         nodes
     }
 
-    /// The transform of a node of the file to world space as evaluated, and whether it is visible.
-    pub(super) fn node(&self, objects: &Objects, node: u32) -> (Affine, bool) {
+    /// The nodes of the file as evaluated, and the time of that; `None` for a file without scene sections.
+    pub(super) fn evaluated(&self) -> Option<(&NodeHierarchy, f64)> {
+        Some((self.hierarchy.as_ref()?, self.pose.seconds))
+    }
+
+    /// The transform of a node of the file to world space as evaluated, and whether it is visible. An object that is `skinned` is not
+    /// moved by its node.
+    pub(super) fn node(&self, objects: &Objects, node: u32, skinned: bool) -> (Affine, bool) {
         let outer = Affine::from_f32(&self.pose.transform);
         match (scene(objects, self.first_object), &self.hierarchy) {
+            (_, Some(hierarchy)) if skinned => (outer, self.pose.visible && !hierarchy.invisible(node)),
             (Some(view), Some(hierarchy)) => {
                 let inner = hierarchy.to_world(&view, node);
                 // The product with the identity may change the sign of a zero.

@@ -10,6 +10,8 @@ impl SceneBuilder {
     /// Adds an instance of each instance of a file, placed by the nodes and tracks of the file and then by `transform`, as at the
     /// first frame of the file. A file without scene sections has one instance of each object. `first_object` is what [`Self::add`]
     /// returned. Returns the id of the subscene; a file may have any number of them, each at a time of its own.
+    /// Objects that the file's skins and morph targets deform are the same in all of them and deform by the time of the one of least id: add
+    /// the file again for others.
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, or it is not the first of its file; `BTH-S005` if there are too many instances.

@@ -35,7 +35,15 @@ impl Deforming {
     /// # Errors
     /// `BTH-S006` if the object is not deformable, `BTH-O001` if there is not enough memory.
     pub(crate) fn new(file: &File, object: u32) -> Result<Deforming, Error> {
-        let object = DeformedObject::new(file, object)?;
+        Deforming::of_segment(file, object, object)
+    }
+
+    /// An object with the positions of its file and the hierarchy of a segment, which is an object of equal source.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn of_segment(file: &File, object: u32, segment: u32) -> Result<Deforming, Error> {
+        let object = DeformedObject::of_segment(file, object, segment)?;
         let view = object.view();
         let plan = RefitPlan::new(view);
         let compiled_cost = cost(&view.lines[..plan.node_lines as usize]);
@@ -63,6 +71,27 @@ impl Deforming {
         copy_positions(positions, &mut self.staged);
         self.staged_normals = Some(Vec::new());
         Ok(())
+    }
+
+    /// Memory for new positions, which are staged when all of it has been filled and [`Self::check_staged`] has been called. The
+    /// positions before the last refit, which it holds until then, are lost. Without [`Self::stage_normals_of_file`] they have the normals
+    /// of the triangles.
+    pub(crate) fn staged_mut(&mut self) -> &mut [[f32; 3]] {
+        self.staged_normals = Some(Vec::new());
+        &mut self.staged
+    }
+
+    /// Stages the normals of the file with the positions that are staged, for what turns them where it needs them.
+    pub(crate) fn stage_normals_of_file(&mut self) {
+        self.staged_normals = None;
+    }
+
+    /// Checks positions that were written to [`Self::staged_mut`], in which no zero is negative.
+    ///
+    /// # Errors
+    /// `BTH-S007` if one is not finite.
+    pub(crate) fn check_staged(&self) -> Result<(), Error> {
+        check_finite(&self.staged)
     }
 
     /// Makes positions that [`Self::stage`] has staged those of the object.

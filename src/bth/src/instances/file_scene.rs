@@ -1,5 +1,6 @@
 //! The instances of a file with scene sections at a time.
 
+use super::affine::Affine;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::world::{TransformSource, Update, World};
@@ -27,49 +28,108 @@ impl World {
         let seconds = f64::from(scene.first_frame) / scene.rate;
         let source = TransformSource::File(NodeHierarchy::new(&view));
         let mut world = World::unplaced(source, seconds, view.instances.len(), file.object_count());
-        world.place_instances(objects, seconds, true)?;
+        world.deformers.add(file, 0);
+        world.evaluate_nodes(objects, seconds, true);
+        world.place_moved(objects, (seconds, &[]), true)?;
         Ok(Some(world))
     }
 
-    /// Sets the time of a file's scene. After an error the instances are unchanged. It has no effect if the caller places the
-    /// instances.
+    /// Deforms the objects as at the first frame and places their instances again. Does nothing for a scene whose objects keep their shape.
     ///
     /// # Errors
-    /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it or the world box is not finite. The error
-    /// gives the node.
-    pub(crate) fn update(&mut self, objects: &Objects, seconds: f64) -> Result<Update> {
+    /// As [`Self::update`], and `BTH-S006` if an object cannot be given new positions.
+    pub(crate) fn deform_first(&mut self, objects: &mut Objects) -> Result<()> {
+        if !self.deformers.is_empty() {
+            self.update(objects, self.seconds)?;
+        }
+        Ok(())
+    }
+
+    /// Sets the time of a file's scene. After an error the scene is unchanged. It has no effect if the caller places the instances.
+    ///
+    /// # Errors
+    /// `BTH-S001` if the transform of a visible instance is singular, `BTH-S002` if it, the world box or the position of a vertex is not
+    /// finite. The error gives the node.
+    pub(crate) fn update(&mut self, objects: &mut Objects, seconds: f64) -> Result<Update> {
         if !matches!(self.source, TransformSource::File(_)) {
             return Ok(Update::default());
         }
-        let result = self.place_instances(objects, seconds, false);
+        let result = self.try_update(objects, seconds);
         match &result {
             Ok(_) => self.seconds = seconds,
             // The instances of the former time have been placed before, so placing them again succeeds.
-            Err(_) => drop(self.place_instances(objects, self.seconds, true)),
+            Err(_) => {
+                self.evaluate_nodes(objects, self.seconds, true);
+                drop(self.place_moved(objects, (self.seconds, &[]), true));
+            }
         }
         result
     }
 
-    /// Places the instances that moved, or with `all` every instance, and rebuilds the top level.
-    fn place_instances(&mut self, objects: &Objects, seconds: f64, all: bool) -> Result<Update> {
+    /// As [`Self::update`]; after an error the objects are unchanged, but not the nodes and placements.
+    fn try_update(&mut self, objects: &mut Objects, seconds: f64) -> Result<Update> {
+        let nodes = self.evaluate_nodes(objects, seconds, false);
+        let TransformSource::File(hierarchy) = &self.source else { return Ok(Update::default()) };
+        let deformed = self.deformers.update(objects, hierarchy, seconds)?;
+        let placed = self.place_moved(objects, (seconds, &deformed.posed.objects), false);
+        let update = match placed {
+            Ok(update) => update,
+            Err(error) => {
+                deformed.undo(objects);
+                return Err(error);
+            }
+        };
+        let (count, deformed_cost_ratio, refit) =
+            (deformed.posed.objects.len(), deformed.cost_ratio, deformed.time);
+        self.deformers.keep(deformed.posed);
+        Ok(Update { nodes, deformed: count, deformed_cost_ratio, refit, ..update })
+    }
+
+    /// Brings the nodes to a time, all of them with `all`; returns the number of those that moved.
+    fn evaluate_nodes(&mut self, objects: &Objects, seconds: f64, all: bool) -> usize {
+        match &mut self.source {
+            TransformSource::File(hierarchy) => hierarchy.update(&scene_of(objects), seconds, all),
+            TransformSource::Caller(_) => 0,
+        }
+    }
+
+    /// Places the instances that moved and those of objects that deformed, or with `all` every instance, and rebuilds the top level.
+    fn place_moved(
+        &mut self,
+        objects: &Objects,
+        (seconds, deformed): (f64, &[u32]),
+        all: bool,
+    ) -> Result<Update> {
         let view = scene_of(objects);
-        let TransformSource::File(hierarchy) = &mut self.source else { return Ok(Update::default()) };
-        let mut update = Update { nodes: hierarchy.update(&view, seconds, all), ..Update::default() };
+        let mut update = Update::default();
         for (row, instance) in view.instances.iter().enumerate() {
             let TransformSource::File(hierarchy) = &self.source else { break };
-            if !hierarchy.moved(instance.node) {
+            let is_skinned = self.deformers.is_skinned(instance.object);
+            let hidden = match is_skinned {
+                // The transform of its node has no effect, so a scale of zero does not hide it.
+                true => hierarchy.invisible(instance.node),
+                false => hierarchy.hidden(instance.node),
+            };
+            let moved = match is_skinned {
+                true => all || hidden != self.placements[row].is_none(),
+                false => hierarchy.moved(instance.node),
+            };
+            if !moved && !deformed.contains(&instance.object) {
                 continue;
             }
             self.placements[row] = None;
             update.placed += 1;
-            if hierarchy.hidden(instance.node) {
+            if hidden {
                 continue;
             }
             let object = objects.header(instance.object);
             if object.root == NONE {
                 continue;
             }
-            let world = hierarchy.to_world(&view, instance.node);
+            let world = match is_skinned {
+                true => Affine::IDENTITY,
+                false => hierarchy.to_world(&view, instance.node),
+            };
             let parts = self.parts_of(objects, instance.object);
             let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
                 let (code, expected, found) = error.words();

@@ -10,8 +10,10 @@ use bth_format::layout::*;
 
 /// Bit of a node's state: it moved, was hidden or became visible in the last update.
 const MOVED: u8 = 1;
-/// Bit of a node's state: it or an ancestor is hidden.
+/// Bit of a node's state: it or an ancestor is hidden, by its visibility or by its scale.
 const HIDDEN: u8 = 2;
+/// Bit of a node's state: it or an ancestor is hidden by its visibility.
+const INVISIBLE: u8 = 4;
 
 /// The node hierarchy at a time.
 #[derive(Debug)]
@@ -66,12 +68,13 @@ impl NodeHierarchy {
                 parent => self.state[parent as usize],
             };
             if !(all || changed || parent_state & MOVED != 0) {
-                self.state[row] &= HIDDEN;
+                self.state[row] &= HIDDEN | INVISIBLE;
                 continue;
             }
             moved += 1;
-            let hidden = parent_state & HIDDEN != 0 || !self.is_visible(view, row as u32);
-            self.state[row] = MOVED | if hidden { HIDDEN } else { 0 };
+            let invisible = parent_state & INVISIBLE != 0 || !self.is_visible(view, row as u32);
+            let hidden = invisible || parent_state & HIDDEN != 0 || !self.has_size(view, row as u32);
+            self.state[row] = MOVED | if hidden { HIDDEN } else { 0 } | if invisible { INVISIBLE } else { 0 };
             if is_parent {
                 self.to_world[parent_row] =
                     self.child_to_world(view, node.parent, &self.local(view, row as u32));
@@ -83,6 +86,11 @@ impl NodeHierarchy {
     /// Whether a node moved, was hidden or became visible in the last update.
     pub(crate) fn moved(&self, node: u32) -> bool {
         self.state[node as usize] & MOVED != 0
+    }
+
+    /// Whether the visibility of a node or of an ancestor hides it, whatever their scales are.
+    pub(crate) fn invisible(&self, node: u32) -> bool {
+        self.state[node as usize] & INVISIBLE != 0
     }
 
     /// Whether a node or an ancestor is hidden.
@@ -119,9 +127,11 @@ impl NodeHierarchy {
         }
     }
 
-    /// Whether a track of a node may have another value than at the time `previous`.
+    /// Whether a track of a node, but for that of weights, may have another value than at the time `previous`.
     fn differs(&self, view: &SceneView<'_>, node: usize, previous: f64) -> bool {
-        self.tracks_of(node).any(|i| tracks::differs(view, &view.tracks[i], previous, self.seconds))
+        let weights = Property::Weights as u32;
+        let mut tracks = self.tracks_of(node).map(|i| &view.tracks[i]).filter(|t| t.property != weights);
+        tracks.any(|track| tracks::differs(view, track, previous, self.seconds))
     }
 
     /// The transform from a node's space to its parent's, with the values of the node's tracks.
@@ -144,31 +154,35 @@ impl NodeHierarchy {
                 Some(Property::Translation) => parts[..3].copy_from_slice(&value[..3]),
                 Some(Property::Rotation) => parts[3..7].copy_from_slice(&value),
                 Some(Property::Scale) => parts[7..].copy_from_slice(&value[..3]),
-                Some(Property::Visible) | None => {}
+                Some(Property::Visible | Property::Weights) | None => {}
             }
         }
         parts
     }
 
-    /// Whether a node is visible by its flag or its track of visibility, and its scale is not zero.
+    /// Whether a node is visible by its flag or its track of visibility.
     fn is_visible(&self, view: &SceneView<'_>, row: u32) -> bool {
-        let node = &view.nodes[row as usize];
-        let value_of = |property: Property| {
-            let mut tracks = self.tracks_of(row as usize).map(|i| &view.tracks[i]);
-            let track = tracks.find(|track| track.property == property as u32)?;
-            Some(tracks::value(view, track, self.seconds))
-        };
-        let visible = match value_of(Property::Visible) {
+        match self.value_of(view, row, Property::Visible) {
             Some(value) => value[0] != 0.0,
-            None => node.flags & NODE_HIDDEN == 0,
-        };
-        visible
-            && if node.flags & NODE_MATRIX != 0 {
-                !Affine::of_matrix(node).is_zero()
-            } else {
-                let scale = [node.transform[7], node.transform[8], node.transform[9]];
-                let scale = value_of(Property::Scale).map_or(scale, |value| [value[0], value[1], value[2]]);
-                !scale.contains(&0.0)
-            }
+            None => view.nodes[row as usize].flags & NODE_HIDDEN == 0,
+        }
+    }
+
+    /// Whether the scale of a node is not zero.
+    fn has_size(&self, view: &SceneView<'_>, row: u32) -> bool {
+        let node = &view.nodes[row as usize];
+        if node.flags & NODE_MATRIX != 0 {
+            return !Affine::of_matrix(node).is_zero();
+        }
+        let scale = [node.transform[7], node.transform[8], node.transform[9]];
+        let value = self.value_of(view, row, Property::Scale);
+        !value.map_or(scale, |value| [value[0], value[1], value[2]]).contains(&0.0)
+    }
+
+    /// The value of a node's track of a property, if it has one.
+    fn value_of(&self, view: &SceneView<'_>, row: u32, property: Property) -> Option<[f64; 4]> {
+        let mut tracks = self.tracks_of(row as usize).map(|i| &view.tracks[i]);
+        let track = tracks.find(|track| track.property == property as u32)?;
+        Some(tracks::value(view, track, self.seconds))
     }
 }

@@ -23,7 +23,7 @@ mod placement;
 mod refit;
 mod scene_batch;
 mod top_level;
-mod tracks;
+pub(crate) mod tracks;
 mod traverse;
 mod visit_queue;
 mod world;

@@ -9,7 +9,7 @@ use bth_format::layout::*;
 pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 4] {
     let property = Property::from_code(track.property).unwrap_or(Property::Visible);
     let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
-    let width = property.width();
+    let width = property.width().unwrap_or(0);
     let per_key = width * interpolation.values_per_key();
     let (times, values) = view.keys(track, per_key);
     // Row 0, 1 or 2 of a key. Keys with tangents have three rows: in-tangent, value and out-tangent.
@@ -29,6 +29,30 @@ pub(crate) fn value(view: &SceneView<'_>, track: &Track, seconds: f64) -> [f64; 
         return hermite(a, row(from, 2), b, row(to, 0), part, duration);
     }
     if property == Property::Rotation { slerp(a, b, part) } else { lerp(a, b, part) }
+}
+
+/// The value of a checked track of `width` numbers at a time in seconds, each number by itself: of weights.
+pub(crate) fn values(view: &SceneView<'_>, track: &Track, width: usize, seconds: f64) -> Vec<f64> {
+    let interpolation = Interpolation::from_code(track.interpolation).unwrap_or(Interpolation::Step);
+    let per_key = width * interpolation.values_per_key();
+    let (times, values) = view.keys(track, per_key);
+    let row = |key: usize, row: usize, i: usize| values[key * per_key + row * width + i];
+    let value_row = interpolation.values_per_key() / 2;
+    let next = times.partition_point(|t| *t <= seconds);
+    if next == 0 || next == times.len() || interpolation == Interpolation::Step {
+        return (0..width).map(|i| row(next.saturating_sub(1), value_row, i)).collect();
+    }
+    let (from, to) = (next - 1, next);
+    let duration = times[to] - times[from];
+    let part = (seconds - times[from]) / duration;
+    let one = |i: usize| {
+        let (a, b) = (row(from, value_row, i), row(to, value_row, i));
+        if interpolation == Interpolation::Cubic {
+            return hermite([a; 4], [row(from, 2, i); 4], [b; 4], [row(to, 0, i); 4], part, duration)[0];
+        }
+        a + part * (b - a)
+    };
+    (0..width).map(one).collect()
 }
 
 /// Whether the value of a checked track differs between two times. The track is evaluated only if the keys around the times do
@@ -109,6 +133,10 @@ mod tests {
             cameras: &[],
             lights: &[],
             names: &[],
+            deformers: &[],
+            skins: &[],
+            skin_joints: &[],
+            morph_weights: &[],
         }
     }
 
@@ -121,7 +149,7 @@ mod tests {
         t: f64,
     ) -> Vec<f64> {
         let (track, view) = (track_of(property, interpolation, times.len() as u32), view_of(times, values));
-        value(&view, &track, t)[..property.width()].to_vec()
+        value(&view, &track, t)[..property.width().unwrap()].to_vec()
     }
 
     #[test]

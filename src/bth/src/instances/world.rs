@@ -6,6 +6,7 @@ use super::caller::CallerInstances;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement};
 use super::top_level::TopLevel;
+use crate::deformers::Deformers;
 use crate::objects::Objects;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -102,13 +103,23 @@ pub(crate) struct World {
     only_visible: Option<u32>,
     /// For each object whether a ray has been traced in it.
     traced: Vec<AtomicBool>,
+    /// What deforms the objects.
+    pub(crate) deformers: Deformers,
 }
 
 impl World {
     /// Instances that are not placed yet, of `objects` objects.
     pub(super) fn unplaced(source: TransformSource, seconds: f64, instances: usize, objects: u32) -> World {
         let (placements, top, only_visible) = (vec![None; instances], TopLevel::default(), None);
-        let mut world = World { seconds, source, placements, top, only_visible, traced: Vec::new() };
+        let mut world = World {
+            seconds,
+            source,
+            placements,
+            top,
+            only_visible,
+            traced: Vec::new(),
+            deformers: Deformers::default(),
+        };
         world.add_objects(objects);
         world
     }
@@ -155,7 +166,10 @@ impl World {
             TransformSource::File(hierarchy) => {
                 let view = super::file_scene::scene_of(objects);
                 let row = view.instances[instance as usize];
-                let to_world = hierarchy.to_world(&view, row.node);
+                let to_world = match self.deformers.is_skinned(row.object) {
+                    true => Affine::IDENTITY,
+                    false => hierarchy.to_world(&view, row.node),
+                };
                 InstanceRow { object: row.object, node: row.node, to_world }
             }
             TransformSource::Caller(caller) => caller.rows[instance as usize],
@@ -225,7 +239,7 @@ impl World {
     /// Bytes on the heap: of the instances and the top level, and of the hierarchy or the caller's transforms.
     pub(crate) fn bytes(&self) -> (usize, usize) {
         let source = match &self.source {
-            TransformSource::File(hierarchy) => hierarchy.bytes(),
+            TransformSource::File(hierarchy) => hierarchy.bytes() + self.deformers.bytes(),
             TransformSource::Caller(caller) => caller.bytes(),
         };
         (size_of_val(self.placements.as_slice()) + self.top.bytes(), source)

@@ -25,7 +25,7 @@ pub(crate) struct Compile {
     #[command(flatten)]
     pub(crate) keeping: Keeping,
     /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
-    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "strict"])]
+    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]
     pub(crate) gltf: Gltf,
@@ -74,6 +74,13 @@ pub(crate) struct Compile {
     /// source, and the object is a BVH.
     #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
     pub(crate) deformable: bool,
+    /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
+    /// the first pose.
+    #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
+    pub(crate) poses: u32,
+    /// Most ranges of time that get a tree of their own, where one tree for all poses would cost rays too much; each takes memory.
+    #[arg(long, default_value_t = 4, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub(crate) segments: u32,
     /// Leave out the positions and triangles of the source (tracing does not need them).
     #[arg(long)]
     pub(crate) no_geometry: bool,
@@ -101,13 +108,17 @@ pub(crate) struct Gltf {
     /// Scene by name or number; by default the file's own choice.
     #[arg(long, value_name = "SCENE")]
     pub(crate) scene: Option<String>,
-    /// Animation by name or number, `all` or `none`. Of two that move the same thing the first is taken.
-    #[arg(long, value_name = "ANIMATION", default_value = "all")]
-    pub(crate) animation: String,
+    /// Animation by name or number, `all` or `none`; by default the first. With `all`, of two that move the same thing the first is
+    /// taken.
+    #[arg(long, value_name = "ANIMATION")]
+    pub(crate) animation: Option<String>,
     /// Frames per second.
     #[arg(long, default_value_t = 24.0, value_parser = positive)]
     pub(crate) rate: f64,
-    /// Refuse what would be ignored: skins, morph targets, animations of other things.
+    /// Leave meshes with skins and morph targets at rest; by default they deform where an animation moves them.
+    #[arg(long)]
+    pub(crate) at_rest: bool,
+    /// Refuse what would be ignored: animations of other things than nodes and morph weights.
     #[arg(long)]
     pub(crate) strict: bool,
 }
@@ -116,15 +127,17 @@ impl Gltf {
     /// The options of the import.
     pub(crate) fn options(&self) -> bth_import::gltf::scene::ImportOptions {
         use bth_import::gltf::Chosen;
-        let animation = match self.animation.as_str() {
-            "all" => Chosen::All,
-            "none" => Chosen::None,
-            name => Chosen::One(name.to_owned()),
+        let animation = match self.animation.as_deref() {
+            None => Chosen::First,
+            Some("all") => Chosen::All,
+            Some("none") => Chosen::None,
+            Some(name) => Chosen::One(name.to_owned()),
         };
         bth_import::gltf::scene::ImportOptions {
             scene: self.scene.clone(),
             animation,
             rate: self.rate,
+            deform: !self.at_rest,
             strict: self.strict,
         }
     }
@@ -204,6 +217,7 @@ impl Compile {
             },
             geometry: !self.no_geometry,
             deformable: self.deformable,
+            motion: bth_compile::pipeline::MotionOptions { poses: self.poses, segments: self.segments },
             ..Default::default()
         };
         self.selection.apply(&mut options)?;

@@ -42,6 +42,7 @@ pub(crate) enum Command {
     Explain(Explain),
     Calibrate(Calibrate),
     Marks(Marks),
+    Positions(Positions),
     Trace(Trace),
     Completions(Completions),
     /// Print the manual page (roff).
@@ -68,10 +69,10 @@ pub(crate) struct Import {
     pub(crate) quiet: bool,
 }
 
-/// Show what a BTH file contains.
+/// Show what a BTH file contains, or of a glTF file the animations and what a scene leaves out.
 #[derive(Debug, Group)]
 pub(crate) struct Info {
-    /// The compiled file.
+    /// The compiled file, or a glTF or GLB file.
     #[arg(required_unless_present = "cpu")]
     pub(crate) file: Option<PathBuf>,
     /// Show the processor's features that tracing may use.
@@ -164,6 +165,16 @@ pub(crate) struct Marks {
     pub(crate) json: bool,
 }
 
+/// Print where the vertices of a scene are at some times, as deformed by skins and morph targets: one JSON object.
+#[derive(Debug, Group)]
+pub(crate) struct Positions {
+    /// The compiled file.
+    pub(crate) file: PathBuf,
+    /// Seconds of the animation; by default that of the first frame.
+    #[arg(long, value_name = "SECONDS", num_args = 1.., allow_negative_numbers = true, value_parser = finite)]
+    pub(crate) seconds: Vec<f64>,
+}
+
 /// Trace the rays of a .rays file and write a .hits file.
 #[derive(Debug, Group)]
 pub(crate) struct Trace {
@@ -198,6 +209,14 @@ pub(crate) struct Trace {
 pub(crate) struct Completions {
     /// The shell.
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// A finite number.
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("expected a finite number".to_owned()),
+    }
 }
 
 /// Parses a number of rounds.

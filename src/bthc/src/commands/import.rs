@@ -60,14 +60,23 @@ fn name_from(folder: &Path, model: &Path) -> Result<String, Failure> {
 }
 
 fn summary(path: &Path, report: &ImportReport) -> String {
+    format!("{}\nwrote {}\n", facts(report).render(), path.display())
+}
+
+/// What was found in a scene.
+pub(super) fn facts(report: &ImportReport) -> Table {
     let mut table = Table::default();
     table.row(["scene", &report.scene]);
     table.row(["nodes", &count(report.nodes)]);
     table.row(["instances", &count(report.instances)]);
     table.row(["objects", &count(report.objects)]);
     table.row(["animations", &report.animations.join(", ")]);
+    if !report.animations_left_out.is_empty() {
+        table.row(["animations left out", &report.animations_left_out.join(", ")]);
+    }
+    table.row(["objects that deform", &count(report.deformers)]);
     table.row(["tracks", &count(report.tracks)]);
     table.row(["cameras", &count(report.cameras)]);
     table.row(["lights", &count(report.lights)]);
-    format!("{}\nwrote {}\n", table.render(), path.display())
+    table
 }

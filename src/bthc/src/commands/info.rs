@@ -1,6 +1,7 @@
 //! `bthc info`: shows the contents of a compiled file.
 
 use super::holes::{Holes, holes};
+use super::scene::is_gltf;
 use crate::args::Info;
 use crate::failure::Failure;
 use crate::output;
@@ -10,9 +11,14 @@ use bth_format::File;
 use bth_format::error::kind_name;
 use bth_format::layout::{MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, RecordKind};
 use bth_format::object::ObjectView;
+use bth_import::gltf::scene::{self, ImportOptions};
 use serde_json::{Value, json};
+use std::path::Path;
 
 pub(crate) fn run(args: &Info) -> Result<(), Failure> {
+    if let Some(model) = args.file.as_ref().filter(|file| is_gltf(file)) {
+        return gltf(model, args.json);
+    }
     let file = args.file.as_ref().map(File::read).transpose()?;
     if args.json {
         let mut value = file.as_ref().map_or_else(|| Ok(json!({})), describe)?;
@@ -26,6 +32,22 @@ pub(crate) fn run(args: &Info) -> Result<(), Failure> {
         text.push_str(&format!("{:#}\n", cpu()));
     }
     Ok(output::text(&text)?)
+}
+
+/// Shows what of a glTF file becomes a scene by default, and what is left out.
+fn gltf(model: &Path, json: bool) -> Result<(), Failure> {
+    let options = ImportOptions::default();
+    let (manifest, report) = scene::import(model, "model", &options, &bth_import::Silent)?;
+    if json {
+        return Ok(output::json(&json!({"import": report, "last_frame": manifest.frames.last,
+            "rate": manifest.frames.rate}))?);
+    }
+    let mut facts = super::import::facts(&report);
+    facts.row(["frames", &format!("0 to {} at {}/s", manifest.frames.last, manifest.frames.rate)]);
+    for what in &report.ignored {
+        facts.row(["ignored", &what.escape_debug().to_string()]);
+    }
+    Ok(output::text(&format!("{}\n", facts.render()))?)
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -58,6 +80,7 @@ fn describe(file: &File) -> Result<Value, Failure> {
             "tets": view.records.len(), "tet_triangles": view.tet_faces.len(),
             "holes": holes(&view).map(|h| json!({"triangles": h.triangles, "opaque": h.shares[0],
                 "transparent": h.shares[1], "unknown": h.shares[2]})),
+            "frames": file.sequence(i).times.len(), "segments": segments(file, i),
             "name": file.object_name(i), "groups": groups(&view),
             "materials": (0..view.materials.len() as u32).map(|m| view.material_name(m)).collect::<Vec<_>>(),
             "parameters": materials(file, i),
@@ -71,10 +94,16 @@ fn describe(file: &File) -> Result<Value, Failure> {
         "minimum_reader_version": version(header.minimum_reader_version),
         "content_id": hex(&file.content_id()),
         "objects": (0..file.object_count()).map(object).collect::<Result<Vec<_>, _>>()?,
-        "scene": scene(file)?,
+        "scene": scene_of(file)?,
         "sections": file.sections().map(section).collect::<Vec<_>>(),
         "provenance": provenance(file),
     }))
+}
+
+/// Seconds from which the hierarchies of an object apply, and the objects that hold them; empty where one applies always.
+fn segments(file: &File, object: u32) -> Vec<Value> {
+    let rows = file.sequence(object).segments.iter();
+    rows.map(|row| json!({"first": row.first, "object": object.saturating_add(row.object)})).collect()
 }
 
 /// The groups of an object with their numbers of triangles; empty where the file keeps none.
@@ -134,7 +163,7 @@ fn groups_table(file: &File) -> Result<String, Failure> {
 }
 
 /// The scene; null without scene sections.
-fn scene(file: &File) -> Result<Value, Failure> {
+fn scene_of(file: &File) -> Result<Value, Failure> {
     let Some(view) = file.check_scene()? else { return Ok(Value::Null) };
     let scene = &view.scene[0];
     let names = |count: usize, name: &dyn Fn(u32) -> String| (0..count as u32).map(name).collect::<Vec<_>>();
@@ -142,6 +171,7 @@ fn scene(file: &File) -> Result<Value, Failure> {
         "first_frame": scene.first_frame, "last_frame": scene.last_frame, "rate": scene.rate,
         "camera": (scene.camera != NONE).then(|| view.camera_name(scene.camera)),
         "nodes": view.nodes.len(), "instances": view.instances.len(), "tracks": view.tracks.len(),
+        "deformers": view.deformers.len(),
         "keys": view.times.len(),
         "cameras": names(view.cameras.len(), &|i| view.camera_name(i).to_owned()),
         "lights": names(view.lights.len(), &|i| view.light_name(i).to_owned()),
@@ -178,6 +208,15 @@ fn summary(file: &File) -> Result<String, Failure> {
             facts.row(["  transparent", &percent(transparent)]);
             facts.row(["  unknown", &percent(unknown)]);
         }
+        let sequence = file.sequence(i);
+        if let ([first, ..], [.., last]) = (sequence.times, sequence.times) {
+            let frames = format!("{} from {first} to {last} s", sequence.times.len());
+            facts.row(["frames of its vertices", &frames]);
+        }
+        for segment in sequence.segments {
+            let of = i.saturating_add(segment.object);
+            facts.row(["tree of", &format!("object {of} from {} s", segment.first)]);
+        }
         facts.row(["tet leaves", &count(view.tet_leaves.len() as u64)]);
         facts.row(["triangles in tet leaves", &count(view.tet_faces.len() as u64)]);
         facts.row(["tetrahedra", &count(view.records.len() as u64)]);
@@ -190,6 +229,7 @@ fn summary(file: &File) -> Result<String, Failure> {
         facts.row(["nodes", &count(view.nodes.len() as u64)]);
         facts.row(["instances", &count(view.instances.len() as u64)]);
         facts.row(["tracks", &count(view.tracks.len() as u64)]);
+        facts.row(["objects that deform", &count(view.deformers.len() as u64)]);
         facts.row(["frames", &format!("{} to {} at {}/s", scene.first_frame, scene.last_frame, scene.rate)]);
         for camera in 0..view.cameras.len() as u32 {
             facts.row(["camera", &view.camera_name(camera).escape_debug().to_string()]);

@@ -15,6 +15,7 @@ mod info;
 mod job;
 mod jobs;
 mod marks;
+mod positions;
 mod scene;
 mod summary;
 mod threads;
@@ -40,6 +41,7 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
         Command::Explain(args) => explain::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Marks(args) => marks::run(&args),
+        Command::Positions(args) => positions::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Completions(args) => {
             let mut script = Vec::new();

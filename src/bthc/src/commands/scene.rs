@@ -119,6 +119,14 @@ pub(super) fn inputs(model: &Path, looks: Looks) -> Result<Vec<PathBuf>, Failure
 
 fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result<Vec<PathBuf>> {
     let mut files = vec![model.to_owned()];
+    let folder = model.parent().unwrap_or(Path::new(""));
+    for object in &manifest.objects {
+        // The files of an object without visible instances may be missing.
+        let moving = scene::moving_files(&object.source, folder).unwrap_or_default();
+        for file in moving.iter().filter(|file| file.exists()) {
+            files.extend(source::files(file, looks)?);
+        }
+    }
     let mut paths: Vec<&str> = manifest.objects.iter().map(|o| o.source.path()).collect();
     paths.sort_unstable();
     paths.dedup();
@@ -126,11 +134,35 @@ fn files(manifest: &Manifest, model: &Path, looks: Looks) -> bth_compile::Result
         // Without a leading `./`, since build systems compare names.
         let path = model.parent().unwrap_or(Path::new("")).join(path);
         // The file of an object without visible instances may be missing.
-        if path != *model && path.exists() {
+        if path != *model && path.exists() && !files.contains(&path) {
             files.extend(source::files(&path, looks)?);
         }
     }
     Ok(files)
+}
+
+/// What is known about the trees of objects whose vertices move.
+fn motion(facts: &mut Table, report: &SceneReport) {
+    let moving = report.objects.iter().filter_map(|object| Some((object, object.motion.as_ref()?)));
+    for (object, motion) in moving {
+        let name = object.names.first().map_or("an object", String::as_str).escape_debug().to_string();
+        if motion.frames > 0 {
+            let frames = format!("{}, {}", motion.frames, bytes(motion.position_bytes));
+            facts.row([format!("frames of {name}, positions"), frames].each_ref().map(String::as_str));
+        }
+        if motion.poses > 1 {
+            let label = format!("cost of rays to {name}, over trees for each pose");
+            let cost = format!("{:.2}, at most {:.2}", motion.cost_ratio, motion.worst_cost_ratio);
+            facts.row([label, cost].each_ref().map(String::as_str));
+        }
+        if let [_, later @ ..] = &motion.segments[..]
+            && !later.is_empty()
+        {
+            let times: Vec<_> = later.iter().map(|segment| format!("{:.3} s", segment.first)).collect();
+            let text = format!("{}, from {}", motion.segments.len(), times.join(", "));
+            facts.row([format!("trees of {name} for ranges of time"), text].each_ref().map(String::as_str));
+        }
+    }
 }
 
 /// The report of a compiled scene for people.
@@ -148,6 +180,7 @@ fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     let used = (manifest.objects.len() - report.unused.len()) as u64;
     row_unless_zero(&mut facts, "objects of equal geometry, stored once", used - report.objects.len() as u64);
     row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
+    row_unless_zero(&mut facts, "objects that deform", report.deformers);
     row_unless_zero(&mut facts, "tracks", report.tracks);
     row_unless_zero(&mut facts, "cameras", report.cameras);
     row_unless_zero(&mut facts, "lights", report.lights);
@@ -161,6 +194,7 @@ fn summary(manifest: &Manifest, report: &SceneReport) -> String {
         "triangles in tet leaves",
         report.objects.iter().map(|o| o.tet_triangles).sum(),
     );
+    motion(&mut facts, report);
     facts.row(["file", &bytes(report.bytes)]);
     facts.row(["traversal reads", &bytes(report.resident_bytes)]);
     let note = worker_note(report.worker.as_ref());

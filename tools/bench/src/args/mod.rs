@@ -1,6 +1,7 @@
 //! The command line: one file for the options of each command.
 
 mod accuracy;
+mod animation;
 mod compare;
 mod costs;
 mod inside;
@@ -19,6 +20,7 @@ mod stress;
 mod values;
 
 pub use accuracy::Accuracy;
+pub use animation::Animation;
 pub use compare::Compare;
 pub use costs::Costs;
 pub use inside::Inside;
@@ -79,6 +81,8 @@ pub enum Command {
     Instances(Instances),
     /// Objects that deform: new positions of all vertices, ours and Embree's.
     Refit(Refit),
+    /// Scenes whose objects deform: updates and rays over whole animations, beside trees made anew for each frame.
+    Animation(Animation),
     /// One start in a process of its own; `load` calls this.
     #[command(hide = true)]
     Probe(Probe),

@@ -66,7 +66,7 @@ impl Greedy<'_> {
             }
             done += 1;
             let node = &bvh.nodes[at as usize];
-            let area = self.planner.area(node);
+            let area = self.planner.area(at);
             if self.fits[at as usize] {
                 self.decisions[at as usize].set_role(Role::Indexed);
                 let [entry, each] = costs.indexed;
@@ -92,7 +92,7 @@ impl Greedy<'_> {
         let mut opened = Vec::new();
         while children.len() < plan.children {
             let can = |&&n: &&u32| !self.fits[n as usize] && !self.decisions[n as usize].is_cut();
-            let area = |n: u32| self.planner.area(&bvh.nodes[n as usize]);
+            let area = |n: u32| self.planner.area(n);
             let largest =
                 children.iter().filter(can).max_by(|a, b| area(**a).total_cmp(&area(**b)).then(b.cmp(a)));
             let Some(&largest) = largest else { break };

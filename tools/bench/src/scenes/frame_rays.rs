@@ -16,8 +16,8 @@ pub(super) const BOUNCES: u32 = 4;
 const SAME: f32 = 1e-4;
 
 /// Rays of one kind.
-pub(super) struct FrameRaySet {
-    pub(super) rays: Vec<Ray>,
+pub(crate) struct FrameRaySet {
+    pub(crate) rays: Vec<Ray>,
     from: Option<Vec<PrimitiveRef>>,
     coherent: bool,
     /// The answers of our plain BVH.
@@ -25,8 +25,8 @@ pub(super) struct FrameRaySet {
 }
 
 /// The rays of a frame, by [`super::SETS`].
-pub(super) struct FrameRays {
-    pub(super) sets: [FrameRaySet; 3],
+pub(crate) struct FrameRays {
+    pub(crate) sets: [FrameRaySet; 3],
 }
 
 impl FrameRaySet {
@@ -36,7 +36,7 @@ impl FrameRaySet {
         FrameRaySet { rays, from, coherent, expected }
     }
 
-    pub(super) fn batch(&self) -> Batch<'_> {
+    pub(crate) fn batch(&self) -> Batch<'_> {
         Batch { rays: &self.rays, from: self.from.as_deref(), coherent: self.coherent }
     }
 
@@ -47,11 +47,20 @@ impl FrameRaySet {
         };
         self.expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count() as u64
     }
+
+    /// Number of answers that differ in whether or where something is hit: in any bit of the distance if it has to be exact.
+    pub(crate) fn other_distances(&self, hits: &[Hit], exact: bool) -> u64 {
+        let tolerance = if exact { 0.0 } else { SAME };
+        let same = |a: &Hit, b: &Hit| {
+            a.is_hit() == b.is_hit() && (!a.is_hit() || (a.t - b.t).abs() <= tolerance * a.t.abs())
+        };
+        self.expected.iter().zip(hits).filter(|(a, b)| !same(a, b)).count() as u64
+    }
 }
 
 impl FrameRays {
     /// The rays of a scene's camera at the scene's time.
-    pub(super) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
+    pub(crate) fn of(scene: &Scene, size: (u32, u32)) -> Result<FrameRays> {
         let (camera, diagonal) = camera(scene, size)?;
         let first = FrameRaySet::of(scene, camera.rays(), None, true);
         let mut rng = Rng::new(1);

@@ -8,7 +8,9 @@ mod record;
 mod source;
 mod tables;
 
+pub(crate) use frame_rays::FrameRays;
 pub use record::{ContenderRow, SceneTimes, ScenesRecord};
+pub(crate) use source::Source;
 pub use tables::markdown;
 
 use crate::args::Scenes;
@@ -20,9 +22,7 @@ use crate::rounds::median;
 use anyhow::{Context, Result, ensure};
 use bth::rays::Hit;
 use contenders::{CONTENDERS, Frame, MovingContender};
-use frame_rays::FrameRays;
 use serde_json::json;
-use source::Source;
 
 /// Sets of rays of a frame.
 pub const SETS: [&str; 3] = ["camera", "diffuse", "later"];

@@ -11,7 +11,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
-use crate::gltf::flatten::{PlacedMesh, placed_meshes};
+use crate::gltf::flatten::{GltfPart, PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{KeptAttributes, PrimitiveReader, Triangles};
 use crate::gltf::schema::GltfDocument;
 use crate::gltf::texture_parts::TextureParts;
@@ -27,11 +27,12 @@ pub(crate) fn flat(source: &Source<'_>, mode: AlphaMode) -> Result<Cutouts> {
     Ok(placed_cutouts(source, &document, binary, mode, &[placed])?.swap_remove(0))
 }
 
-/// The cut-outs of single meshes, as [`crate::import_gltf_meshes`] reads them.
-pub(crate) fn meshes(source: &Source<'_>, mode: AlphaMode, meshes: &[u32]) -> Result<Vec<Cutouts>> {
+/// The cut-outs of parts, as [`crate::import_gltf_parts`] reads them.
+pub(crate) fn parts(source: &Source<'_>, mode: AlphaMode, parts: &[GltfPart]) -> Result<Vec<Cutouts>> {
     let supported = [SUPPORTED.as_slice(), &SCENE_EXTENSIONS].concat();
     let (document, binary) = document::read(source, &supported)?;
-    let models: Vec<_> = meshes.iter().map(|mesh| vec![PlacedMesh::alone(*mesh as usize)]).collect();
+    let model = |part: &GltfPart| Ok(vec![part.placed(source, &document)?]);
+    let models = parts.iter().map(model).collect::<Result<Vec<_>>>()?;
     placed_cutouts(source, &document, binary, mode, &models)
 }
 

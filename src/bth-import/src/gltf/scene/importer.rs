@@ -8,6 +8,8 @@ use serde::de::DeserializeOwned;
 use crate::error::{Error, Result};
 use crate::gltf::accessor::Accessors;
 use crate::gltf::document::GRAPH;
+use crate::gltf::flatten::GltfPart;
+use crate::gltf::scene::deformers::{Animated, Deforming};
 use crate::gltf::scene::options::ImportReport;
 use crate::gltf::schema::GltfDocument;
 use crate::source::{MALFORMED, Source};
@@ -27,8 +29,18 @@ pub(super) struct Importer<'a> {
     pub(super) node_names: HashSet<String>,
     /// Names of the objects so far.
     pub(super) object_names: HashSet<String>,
-    /// Row of the object of each mesh.
-    pub(super) objects: HashMap<usize, usize>,
+    /// Row of the object of each mesh, and of each node whose mesh is taken at rest.
+    pub(super) objects: HashMap<GltfPart, usize>,
+    /// Names of the skins so far.
+    pub(super) skin_names: HashSet<String>,
+    /// For each node of the document its parent.
+    pub(super) parents: Vec<Option<usize>>,
+    /// What the chosen animations change.
+    pub(super) animated: Animated,
+    /// Whether meshes that are moved deform.
+    pub(super) deform: bool,
+    /// Nodes that deform so far.
+    pub(super) deforming: Vec<Deforming>,
 }
 
 impl Importer<'_> {

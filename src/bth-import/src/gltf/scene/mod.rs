@@ -1,6 +1,7 @@
 //! A manifest from a glTF scene: nodes, animations, cameras, lights, instancing.
 
 mod cameras;
+mod deformers;
 mod importer;
 mod lights;
 mod nodes;
@@ -12,6 +13,7 @@ use std::path::Path;
 
 use bth_scene::{Frames, Manifest};
 
+use self::deformers::Animated;
 use self::importer::Importer;
 pub use self::options::{ImportOptions, ImportReport};
 use crate::error::Result;
@@ -19,6 +21,7 @@ use crate::gltf::accessor::Accessors;
 use crate::gltf::buffer::Buffers;
 use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
+use crate::gltf::rest_pose::parents;
 use crate::monitor::Monitor;
 use crate::source::{Source, read_file};
 
@@ -36,9 +39,22 @@ pub fn import(
     options: &ImportOptions,
     monitor: &dyn Monitor,
 ) -> Result<(Manifest, ImportReport)> {
-    let data = read_file(path)?;
+    import_bytes(path, &read_file(path)?, name, options, monitor)
+}
+
+/// As [`import`], from the bytes of a file, whose external buffers are in the folder of `path`.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_bytes(
+    path: &Path,
+    data: &[u8],
+    name: &str,
+    options: &ImportOptions,
+    monitor: &dyn Monitor,
+) -> Result<(Manifest, ImportReport)> {
     monitor.stage("import", Some(data.len() as u64));
-    let source = Source::new(path, &data, monitor);
+    let source = Source::new(path, data, monitor);
     // Animation pointers move what tracks cannot, so a document that requires them cannot be read.
     let known = SUPPORTED.iter().filter(|s| **s != "KHR_animation_pointer");
     let known: Vec<&str> = known.chain(&SCENE_EXTENSIONS).copied().collect();
@@ -56,9 +72,17 @@ pub fn import(
         node_names: HashSet::new(),
         object_names: HashSet::new(),
         objects: HashMap::new(),
+        skin_names: HashSet::new(),
+        parents: parents(&document),
+        animated: Animated::default(),
+        deform: options.deform,
+        deforming: Vec::new(),
     };
+    let animations = importer.animations(&options.animation)?;
+    importer.animated = Animated::of(&animations, document.nodes.len());
     importer.nodes(options)?;
-    let (tracks, last) = importer.tracks(&options.animation)?;
+    importer.deformers()?;
+    let (tracks, last) = importer.tracks(&animations)?;
     importer.manifest.tracks = tracks;
     let last = (last * options.rate).ceil().clamp(0.0, f64::from(MAX_FRAMES)) as i32;
     importer.manifest.frames = Frames { first: 0, last, rate: options.rate };
@@ -74,6 +98,7 @@ fn finish(importer: Importer<'_>) -> (Manifest, ImportReport) {
         instances: manifest.nodes.iter().filter(|n| n.object.is_some()).count() as u64,
         objects: manifest.objects.len() as u64,
         tracks: manifest.tracks.len() as u64,
+        deformers: manifest.deformers.len() as u64,
         cameras: manifest.cameras.len() as u64,
         lights: manifest.lights.len() as u64,
         ..importer.report

@@ -1,8 +1,9 @@
 //! Nodes of a glTF scene with their transforms, objects and instances.
 
-use bth_scene::{Node, Object, Transform};
+use bth_scene::{Node, Transform};
 
 use crate::error::Result;
+use crate::gltf::flatten::GltfPart;
 use crate::gltf::scene::importer::{Importer, unique};
 use crate::gltf::scene::options::ImportOptions;
 use crate::gltf::schema::{GltfNode, Instancing, LightReference, Visibility};
@@ -77,14 +78,7 @@ impl Importer<'_> {
         let transform = self.transform(node, &part)?;
         self.manifest.nodes.push(Node { name: name.clone(), parent, transform, object: None, visible });
         if let Some(mesh) = node.mesh {
-            let object = self.object(mesh, &part)?;
-            if node.skin.is_some() {
-                self.ignore(&part, "its skin is ignored: the mesh stays in its bind pose".to_owned())?;
-            }
-            match node.extensions.get("EXT_mesh_gpu_instancing") {
-                Some(value) => self.instancing(&self.typed(value, &part)?, row, object, &name, &part)?,
-                None => self.manifest.nodes[row].object = Some(object),
-            }
+            self.mesh(index, node, mesh, (row, &name))?;
         }
         if let Some(camera) = node.camera {
             self.camera(camera, row, &part)?;
@@ -96,8 +90,36 @@ impl Importer<'_> {
         Ok(())
     }
 
+    /// Places the mesh of a node.
+    fn mesh(&mut self, index: usize, node: &GltfNode, mesh: usize, (row, name): (usize, &str)) -> Result<()> {
+        let part = format!("node {index}");
+        self.check_mesh(mesh, &part)?;
+        let deforms = node.skin.is_some() || self.document.has_targets(mesh);
+        let object = match deforms {
+            true => self.deforming(index, node, mesh, row)?,
+            false => self.object(mesh, &part)?,
+        };
+        let instancing = node.extensions.get("EXT_mesh_gpu_instancing");
+        if node.skin.is_some() {
+            if instancing.is_some() {
+                let what = "its instances are ignored, since its skin places them all at the same place";
+                self.ignore(&part, what.to_owned())?;
+            }
+            match self.manifest.objects[object].source {
+                bth_scene::Source::AtRest { .. } => self.place_in_world(row, object),
+                _ => self.manifest.nodes[row].object = Some(object),
+            }
+            return Ok(());
+        }
+        match instancing {
+            Some(value) => self.instancing(&self.typed(value, &part)?, row, object, name, &part)?,
+            None => self.manifest.nodes[row].object = Some(object),
+        }
+        Ok(())
+    }
+
     /// A node's transform, checked to be finite.
-    fn transform(&self, node: &GltfNode, part: &str) -> Result<Transform> {
+    pub(super) fn transform(&self, node: &GltfNode, part: &str) -> Result<Transform> {
         let transform = match node.matrix {
             Some(m) => Transform::Matrix([0, 1, 2].map(|row| [m[row], m[row + 4], m[row + 8], m[row + 12]])),
             None => Transform::Parts {
@@ -121,24 +143,26 @@ impl Importer<'_> {
         Ok(transform)
     }
 
-    /// The row of the object of a mesh, which is added at its first use.
-    fn object(&mut self, mesh: usize, part: &str) -> Result<usize> {
-        if let Some(row) = self.objects.get(&mesh) {
+    /// Refuses meshes that do not exist.
+    fn check_mesh(&self, mesh: usize, part: &str) -> Result<()> {
+        if mesh < self.document.meshes.len() {
+            return Ok(());
+        }
+        let message = format!("expected a mesh below {}, found {mesh}", self.document.meshes.len());
+        Err(self.error(part, message))
+    }
+
+    /// The row of the object of a mesh in its own space, which is added at its first use.
+    pub(super) fn object(&mut self, mesh: usize, part: &str) -> Result<usize> {
+        self.check_mesh(mesh, part)?;
+        let key = GltfPart::Mesh(mesh as u32);
+        if let Some(row) = self.objects.get(&key) {
             return Ok(*row);
         }
-        let Some(found) = self.document.meshes.get(mesh) else {
-            let message = format!("expected a mesh below {}, found {mesh}", self.document.meshes.len());
-            return Err(self.error(part, message));
-        };
-        if self.document.has_targets(mesh) {
-            let part = format!("mesh {mesh}");
-            self.ignore(&part, "its morph targets are not animated: it stays at rest".to_owned())?;
-        }
-        let row = self.manifest.objects.len();
-        let name = unique(&mut self.object_names, &found.name, format!("mesh {mesh}"));
         let source = bth_scene::Source::Model { path: self.file.to_owned(), mesh: Some(mesh as u32) };
-        self.manifest.objects.push(Object { name, source });
-        self.objects.insert(mesh, row);
+        let name = &self.document.meshes[mesh].name;
+        let row = self.new_object(name, mesh, source);
+        self.objects.insert(key, row);
         Ok(row)
     }
 

@@ -6,8 +6,10 @@ use serde::Serialize;
 /// Which animations of a document are read.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Chosen {
-    /// All; of two that move the same property of a node, the first.
+    /// The first of the document, if it has some.
     #[default]
+    First,
+    /// All; of two that move the same property of a node, the first.
     All,
     /// None: nodes stay at rest.
     None,
@@ -24,13 +26,21 @@ pub struct ImportOptions {
     pub animation: Chosen,
     /// Frames per second.
     pub rate: f64,
-    /// Whether what would be ignored with a warning is an error: skins, morph targets, animations of other things.
+    /// Whether skins and morph targets that the animations move deform their meshes; else these stay at rest.
+    pub deform: bool,
+    /// Whether what would be ignored with a warning is an error: animations of other things than nodes and weights.
     pub strict: bool,
 }
 
 impl Default for ImportOptions {
     fn default() -> Self {
-        Self { scene: None, animation: Chosen::All, rate: Frames::default().rate, strict: false }
+        Self {
+            scene: None,
+            animation: Chosen::First,
+            rate: Frames::default().rate,
+            deform: true,
+            strict: false,
+        }
     }
 }
 
@@ -45,8 +55,12 @@ pub struct ImportReport {
     pub instances: u64,
     /// Meshes that are used.
     pub objects: u64,
-    /// Names or numbers of the animations.
+    /// Names or numbers of the animations that are read.
     pub animations: Vec<String>,
+    /// Names or numbers of the animations that are left out.
+    pub animations_left_out: Vec<String>,
+    /// Objects that deform.
+    pub deformers: u64,
     /// Animated properties of nodes.
     pub tracks: u64,
     /// Cameras.

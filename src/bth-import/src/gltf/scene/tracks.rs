@@ -11,14 +11,12 @@ use crate::gltf::schema::{Animation, Channel, Sampler};
 use crate::source::UNSUPPORTED;
 
 impl Importer<'_> {
-    /// The tracks of the chosen animations, by node and property, and the last time of any in seconds.
-    pub(super) fn tracks(&mut self, chosen: &Chosen) -> Result<(Vec<Track>, f64)> {
+    /// The tracks of animations, by node and property, and the last time of any in seconds.
+    pub(super) fn tracks(&mut self, animations: &[(usize, Animation)]) -> Result<(Vec<Track>, f64)> {
         let mut tracks: Vec<Track> = Vec::new();
         let mut taken = HashSet::new();
         let mut last = 0.0f64;
-        for (index, animation) in &self.animations(chosen)? {
-            let name = if animation.name.is_empty() { index.to_string() } else { animation.name.clone() };
-            self.report.animations.push(name);
+        for (index, animation) in animations {
             for (number, channel) in animation.channels.iter().enumerate() {
                 let part = format!("animation {index} channel {number}");
                 let Some(track) = self.track(animation, channel, &part)? else { continue };
@@ -36,14 +34,46 @@ impl Importer<'_> {
         Ok((tracks, last))
     }
 
-    /// The chosen animations with their numbers.
-    fn animations(&self, chosen: &Chosen) -> Result<Vec<(usize, Animation)>> {
+    /// The chosen animations with their numbers; the report lists these and the others.
+    pub(super) fn animations(&mut self, chosen: &Chosen) -> Result<Vec<(usize, Animation)>> {
+        let all = self.all_animations()?;
+        let name = |(index, animation): &(usize, Animation)| {
+            if animation.name.is_empty() { index.to_string() } else { animation.name.clone() }
+        };
+        let names: Vec<String> = all.iter().map(name).collect();
+        let chosen = self.choose(all, chosen)?;
+        for (index, name) in names.into_iter().enumerate() {
+            let is_chosen = chosen.iter().any(|(number, _)| *number == index);
+            let list = match is_chosen {
+                true => &mut self.report.animations,
+                false => &mut self.report.animations_left_out,
+            };
+            list.push(name);
+        }
+        Ok(chosen)
+    }
+
+    /// All animations of the document with their numbers.
+    fn all_animations(&self) -> Result<Vec<(usize, Animation)>> {
         let mut animations = Vec::new();
         for (index, value) in self.document.animations.iter().enumerate() {
             let animation: Animation = self.typed(value, &format!("animation {index}"))?;
             animations.push((index, animation));
         }
+        Ok(animations)
+    }
+
+    /// The chosen ones of all animations.
+    fn choose(
+        &self,
+        mut animations: Vec<(usize, Animation)>,
+        chosen: &Chosen,
+    ) -> Result<Vec<(usize, Animation)>> {
         match chosen {
+            Chosen::First => {
+                animations.truncate(1);
+                Ok(animations)
+            }
             Chosen::All => Ok(animations),
             Chosen::None => Ok(Vec::new()),
             Chosen::One(wanted) => {
@@ -68,6 +98,7 @@ impl Importer<'_> {
             "translation" => Property::Translation,
             "rotation" => Property::Rotation,
             "scale" => Property::Scale,
+            "weights" => Property::Weights,
             other => {
                 self.ignore(part, format!("animations of {other} are ignored"))?;
                 return Ok(None);
@@ -80,7 +111,8 @@ impl Importer<'_> {
         };
         // Nodes of other scenes have no row.
         let Some(node) = *row else { return Ok(None) };
-        if matches!(self.manifest.nodes[node].transform, Transform::Matrix(_)) {
+        let moves = property != Property::Weights;
+        if moves && matches!(self.manifest.nodes[node].transform, Transform::Matrix(_)) {
             let message = format!("its node {target} has a matrix, which cannot be animated");
             return Err(self.error(part, message));
         }
@@ -93,7 +125,20 @@ impl Importer<'_> {
             Some("CUBICSPLINE") => Interpolation::Cubic,
             Some(other) => return Err(self.error(part, format!("unknown interpolation \"{other}\""))),
         };
-        let (times, values) = self.keys(sampler, property, interpolation, part)?;
+        let deformer = |row: usize| self.manifest.deformers.iter().find(|deformer| deformer.node == row);
+        let width = match property.width() {
+            Some(width) => width,
+            // Nodes whose mesh stays at rest have no deformer, which has been said before.
+            None => match deformer(node).map_or(0, |deformer| deformer.weights.len()) {
+                0 if self.deform => {
+                    self.ignore(part, format!("node {target} has no morph targets that could be animated"))?;
+                    return Ok(None);
+                }
+                0 => return Ok(None),
+                width => width,
+            },
+        };
+        let (times, values) = self.keys(sampler, (property, width), interpolation, part)?;
         Ok(Some(Track { node, property, interpolation, times, values }))
     }
 
@@ -101,21 +146,21 @@ impl Importer<'_> {
     fn keys(
         &self,
         sampler: &Sampler,
-        property: Property,
+        (property, width): (Property, usize),
         interpolation: Interpolation,
         part: &str,
     ) -> Result<(Vec<f64>, Vec<f64>)> {
         let times: Vec<f64> = self.accessors.scalars(sampler.input)?.into_iter().map(f64::from).collect();
-        let values = if property == Property::Rotation {
-            widened(self.accessors.vectors::<4>(sampler.output)?)
-        } else {
-            widened(self.accessors.vectors::<3>(sampler.output)?)
+        let values = match property {
+            Property::Rotation => widened(self.accessors.vectors::<4>(sampler.output)?),
+            Property::Weights => self.accessors.scalars(sampler.output)?.into_iter().map(f64::from).collect(),
+            _ => widened(self.accessors.vectors::<3>(sampler.output)?),
         };
         let ascending = times.iter().all(|t| t.is_finite()) && times.windows(2).all(|w| w[0] < w[1]);
         if times.is_empty() || !ascending {
             return Err(self.error(part, "expected finite times that ascend, at least one"));
         }
-        let (width, rows) = (property.width(), interpolation.values_per_key());
+        let rows = interpolation.values_per_key();
         if values.len() != times.len() * width * rows {
             let message = format!(
                 "expected {} rows of values for {} times, found {}",

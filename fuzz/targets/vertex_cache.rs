@@ -1,0 +1,3 @@
+//! Reading vertex caches.
+#![no_main]
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| bth_fuzz::import_cache(bytes));

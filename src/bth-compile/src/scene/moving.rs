@@ -1,0 +1,101 @@
+//! Sources of meshes whose vertices move: numbered files, and models with a vertex cache.
+
+use super::context::Context;
+use super::sources::File;
+use crate::cached;
+use crate::error::Result;
+use crate::source::{SourceDigest, changed};
+use bth_files::Digest;
+use bth_import::{self as mesh, Looks, Mesh, Timing};
+use bth_scene::{Manifest, SequenceFrames, SequenceTiming, Source};
+use std::path::{Path, PathBuf};
+
+/// What moves the vertices of a source.
+pub(super) struct Moving {
+    /// The files: the frames, or a model and its vertex cache.
+    files: Vec<PathBuf>,
+    /// Whether the second file is a vertex cache.
+    is_cache: bool,
+    timing: Timing,
+}
+
+/// The files whose contents an object is made from, in order; empty for objects whose vertices do not move by themselves.
+///
+/// # Errors
+/// As [`mesh::sequence_files`].
+pub fn moving_files(source: &Source, folder: &Path) -> Result<Vec<PathBuf>> {
+    match source {
+        Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => {
+            mesh::sequence_files(&folder.join(pattern))
+        }
+        Source::Sequence { frames: SequenceFrames::Listed(files), .. } => {
+            Ok(files.iter().map(|file| folder.join(file)).collect())
+        }
+        Source::Cached { path, cache, .. } => Ok(vec![folder.join(path), folder.join(cache)]),
+        _ => Ok(Vec::new()),
+    }
+}
+
+impl Moving {
+    /// What moves the vertices of an object; `None` where nothing does.
+    ///
+    /// # Errors
+    /// As [`moving_files`].
+    pub(super) fn of(manifest: &Manifest, source: &Source, folder: &Path) -> Result<Option<Moving>> {
+        let (is_cache, SequenceTiming { rate, start }) = match source {
+            Source::Sequence { timing, .. } => (false, *timing),
+            Source::Cached { timing, .. } => (true, *timing),
+            _ => return Ok(None),
+        };
+        let timing = Timing { rate, usual_rate: manifest.frames.rate, start };
+        Ok(Some(Moving { files: moving_files(source, folder)?, is_cache, timing }))
+    }
+
+    /// The first of the files.
+    pub(super) fn first(&self) -> &Path {
+        self.files.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    /// The hashes of all files.
+    ///
+    /// # Errors
+    /// `BTH-O001` when one cannot be read.
+    pub(super) fn digest(&self, looks: Looks) -> Result<SourceDigest> {
+        let mut digest = SourceDigest::of(self.first(), looks)?;
+        for file in self.files.iter().skip(1) {
+            digest.others.push(SourceDigest::of(file, Looks::default())?.file);
+        }
+        Ok(digest)
+    }
+
+    /// What the mesh depends on besides the contents of the files.
+    pub(super) fn part(&self) -> String {
+        let kind = if self.is_cache { "vertex cache" } else { "sequence" };
+        let Timing { rate, usual_rate, start } = self.timing;
+        format!("{kind} rate {rate:?} of {usual_rate:?} start {start:?} motion {}", cached::MOTION)
+    }
+
+    /// Reads the mesh with its frames.
+    ///
+    /// # Errors
+    /// Those of the import; `BTH-O002` when a file has changed since it was hashed.
+    pub(super) fn import(&self, file: &File<'_>, context: &Context<'_>) -> Result<(Mesh, mesh::Report)> {
+        let (wanted, monitor) = (context.options.wanted(), context.monitor);
+        let read = match (self.is_cache, &self.files[..]) {
+            (true, [model, cache]) => mesh::import_vertex_cache(model, cache, &self.timing, wanted, monitor)?,
+            _ => mesh::import_sequence(&self.files, &self.timing, wanted, monitor)?,
+        };
+        let same = self.digest(file.digest.looks)? == file.digest;
+        if same { Ok(read) } else { Err(changed(self.first())) }
+    }
+
+    /// Bytes of all files.
+    pub(super) fn bytes(&self) -> u64 {
+        self.files.iter().map(|file| std::fs::metadata(file).map_or(0, |m| m.len())).sum()
+    }
+}
+
+/// The hash of nothing, for files that have not been hashed yet.
+pub(super) fn unhashed(looks: Looks) -> SourceDigest {
+    SourceDigest { file: Digest::of(b""), others: Vec::new(), looks }
+}

@@ -1,0 +1,234 @@
+//! Deformers of a manifest from the skins and morph targets of a glTF scene (glTF 2.0 specification, §3.7.2.2 and §3.7.3).
+
+use std::collections::HashMap;
+
+use bth_scene::{Deformer, Node, Skin, Source, Transform};
+
+use crate::error::{Error, Result};
+use crate::gltf::flatten::GltfPart;
+use crate::gltf::scene::importer::{Importer, unique};
+use crate::gltf::schema::{Animation, GltfNode};
+use crate::gltf::transform;
+
+/// A code for weights of joints or of morph targets that mean nothing.
+const WEIGHTS: &str = "BTH-I017";
+
+/// A node whose mesh deforms; its deformer is added when all nodes are there.
+pub(super) struct Deforming {
+    /// Number of the node in the document.
+    node: usize,
+    /// Row of the node and of its object in the manifest.
+    row: usize,
+    object: usize,
+    weights: Vec<f64>,
+}
+
+/// Which nodes the chosen animations change.
+#[derive(Default)]
+pub(super) struct Animated {
+    /// For each node of the document whether its transform changes.
+    transforms: Vec<bool>,
+    /// For each node of the document whether its morph weights change.
+    weights: Vec<bool>,
+}
+
+impl Animated {
+    /// The nodes that animations change.
+    pub(super) fn of(animations: &[(usize, Animation)], nodes: usize) -> Animated {
+        let mut animated = Animated { transforms: vec![false; nodes], weights: vec![false; nodes] };
+        for channel in animations.iter().flat_map(|(_, animation)| &animation.channels) {
+            let is_weights = channel.target.path == "weights";
+            let list = if is_weights { &mut animated.weights } else { &mut animated.transforms };
+            channel.target.node.and_then(|node| list.get_mut(node)).into_iter().for_each(|x| *x = true);
+        }
+        animated
+    }
+}
+
+impl Importer<'_> {
+    /// Places the mesh of a node that has morph targets or a skin: as an object that deforms if an animation moves it, else
+    /// as one at rest.
+    pub(super) fn deforming(
+        &mut self,
+        index: usize,
+        node: &GltfNode,
+        mesh: usize,
+        row: usize,
+    ) -> Result<usize> {
+        let part = format!("node {index}");
+        let weights = self.weights(node, mesh, &part)?;
+        let moves = self.is_moved(index, node)?;
+        let name = self.document.meshes[mesh].name.clone();
+        if moves && self.deform {
+            let source = Source::Deforming { path: self.file.to_owned(), mesh: mesh as u32 };
+            let object = self.new_object(&name, mesh, source);
+            self.deforming.push(Deforming { node: index, row, object, weights });
+            return Ok(object);
+        }
+        if moves {
+            self.ignore(&part, "its skin and morph targets are not animated: it stays at rest".to_owned())?;
+        }
+        if node.skin.is_none() && node.weights.is_none() {
+            return self.object(mesh, &part);
+        }
+        let key = GltfPart::AtRest(index as u32);
+        if let Some(object) = self.objects.get(&key) {
+            return Ok(*object);
+        }
+        let source = Source::AtRest { path: self.file.to_owned(), node: index as u32 };
+        let object = self.new_object(&name, mesh, source);
+        self.objects.insert(key, object);
+        Ok(object)
+    }
+
+    /// A node in world space for an object with a skin at rest, since the transform of its own node has no effect (§3.7.3.2).
+    pub(super) fn place_in_world(&mut self, row: usize, object: usize) {
+        let mut visible = true;
+        let mut next = Some(row);
+        while let Some(at) = next {
+            let node = &self.manifest.nodes[at];
+            visible &= node.visible;
+            next = node.parent;
+        }
+        let name = format!("{}/at rest", self.manifest.nodes[row].name);
+        let name = unique(&mut self.node_names, &name, String::new());
+        let transform = Transform::default();
+        self.manifest.nodes.push(Node { name, parent: None, transform, object: Some(object), visible });
+    }
+
+    /// A further object of the manifest.
+    pub(super) fn new_object(&mut self, name: &str, mesh: usize, source: Source) -> usize {
+        let name = unique(&mut self.object_names, name, format!("mesh {mesh}"));
+        self.manifest.objects.push(bth_scene::Object { name, source });
+        self.manifest.objects.len() - 1
+    }
+
+    /// The weights of the morph targets of a node's mesh: its own, else those of the mesh, else zeros.
+    fn weights(&self, node: &GltfNode, mesh: usize, part: &str) -> Result<Vec<f64>> {
+        let found = &self.document.meshes[mesh];
+        let targets = found.primitives.first().map_or(0, |primitive| primitive.targets.len());
+        let weights = node.weights.as_ref().or(found.weights.as_ref());
+        let weights = weights.filter(|weights| !weights.is_empty()).cloned();
+        let weights = weights.unwrap_or_else(|| vec![0.0; targets]);
+        if weights.len() != targets {
+            let message =
+                format!("expected a weight for each of {targets} morph targets, found {}", weights.len());
+            return Err(self.weight_error(part, message));
+        }
+        Ok(weights)
+    }
+
+    /// Whether the chosen animations change the weights of a node or move a joint of its skin.
+    fn is_moved(&self, index: usize, node: &GltfNode) -> Result<bool> {
+        if self.animated.weights[index] && node.mesh.is_some_and(|mesh| self.document.has_targets(mesh)) {
+            return Ok(true);
+        }
+        let Some(skin) = node.skin else { return Ok(false) };
+        let Some(found) = self.document.skins.get(skin) else {
+            return Err(self.error(format!("skin {skin}"), "it does not exist"));
+        };
+        for &joint in &found.joints {
+            if self.ancestors(joint)?.iter().any(|node| self.animated.transforms[*node]) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// A node of the document and all above it, upwards.
+    fn ancestors(&self, node: usize) -> Result<Vec<usize>> {
+        let mut path = Vec::new();
+        let mut next = Some(node);
+        while let Some(index) = next {
+            if index >= self.document.nodes.len() {
+                return Err(self.error(format!("node {index}"), "it does not exist"));
+            }
+            if path.len() > self.document.nodes.len() {
+                return Err(self.error(format!("node {node}"), "it is an ancestor of itself"));
+            }
+            path.push(index);
+            next = self.parents[index];
+        }
+        Ok(path)
+    }
+
+    /// Adds the deformers of the nodes that deform, with their skins.
+    pub(super) fn deformers(&mut self) -> Result<()> {
+        let mut skins = HashMap::new();
+        for Deforming { node, row, object, weights } in std::mem::take(&mut self.deforming) {
+            let skin = match self.document.nodes[node].skin {
+                None => None,
+                Some(number) => Some(match skins.get(&number) {
+                    Some(skin) => *skin,
+                    None => {
+                        let skin = self.skin(number)?;
+                        skins.insert(number, skin);
+                        skin
+                    }
+                }),
+            };
+            self.manifest.deformers.push(Deformer { node: row, object, skin, weights });
+        }
+        self.manifest.deformers.sort_by_key(|deformer| deformer.node);
+        Ok(())
+    }
+
+    /// Adds a skin to the manifest. Joints outside of the scene get nodes with the transforms of the document's.
+    fn skin(&mut self, number: usize) -> Result<usize> {
+        let found = &self.document.skins[number];
+        let part = format!("skin {number}");
+        if found.joints.is_empty() {
+            return Err(self.error(part, "expected at least one joint"));
+        }
+        let inverse_binds = match found.inverse_bind_matrices {
+            None => None,
+            Some(accessor) => {
+                let matrices = self.accessors.matrices(accessor)?;
+                let (joints, binds) = (found.joints.len(), matrices.len());
+                if binds < joints {
+                    let message =
+                        format!("expected an inverse bind matrix for each of {joints} joints, found {binds}");
+                    return Err(self.error(part, message));
+                }
+                Some(matrices[..joints].iter().map(transform::rows).collect::<Vec<_>>())
+            }
+        };
+        let finite = |matrix: &[[f64; 4]; 3]| matrix.as_flattened().iter().all(|x| x.is_finite());
+        if inverse_binds.as_ref().is_some_and(|all| !all.iter().all(finite)) {
+            return Err(self.error(part, "expected finite inverse bind matrices"));
+        }
+        let mut joints = Vec::with_capacity(found.joints.len());
+        for &joint in &found.joints {
+            joints.push(self.joint(joint)?);
+        }
+        let name = unique(&mut self.skin_names, &found.name, part);
+        self.manifest.skins.push(Skin { name, joints, inverse_binds });
+        Ok(self.manifest.skins.len() - 1)
+    }
+
+    /// The row of a joint's node.
+    fn joint(&mut self, joint: usize) -> Result<usize> {
+        let path = self.ancestors(joint)?;
+        let mut parent = None;
+        for &index in path.iter().rev() {
+            let row = match self.report.node_rows[index] {
+                Some(row) => row,
+                None => {
+                    let node = &self.document.nodes[index];
+                    let transform = self.transform(node, &format!("node {index}"))?;
+                    let name = unique(&mut self.node_names, &node.name, format!("node {index}"));
+                    let row = self.manifest.nodes.len();
+                    self.manifest.nodes.push(Node { name, parent, transform, object: None, visible: true });
+                    self.report.node_rows[index] = Some(row);
+                    row
+                }
+            };
+            parent = Some(row);
+        }
+        parent.ok_or_else(|| self.error(format!("node {joint}"), "it does not exist"))
+    }
+
+    fn weight_error(&self, part: &str, message: String) -> Error {
+        self.source.error_in_part(WEIGHTS, part, message, "export the model again")
+    }
+}

@@ -1,0 +1,188 @@
+//! Meshes whose vertices move: numbered files, PC2 and MDD.
+
+use super::*;
+use bth_import::{Timing, Wanted, import_sequence, import_vertex_cache, read_vertex_cache, sequence_files};
+use std::path::{Path, PathBuf};
+
+const TIMING: Timing = Timing { rate: Some(10.0), usual_rate: 24.0, start: 0.5 };
+const PLAIN: Wanted = Wanted { attributes: Keep::None, groups: false, materials: false, vertices: false };
+
+/// Two triangles whose shared edge comes as vertices of its own for each, and which part in the second frame if `lift` is not 0.
+fn frame(lift: f32) -> String {
+    format!(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 {lift}\nv 0 1 {lift}\nv 1 1 {lift}\nvt 0 0\nvn 0 0 1\n\
+         f 1/1/1 2/1/1 3/1/1\nf 4/1/1 6/1/1 5/1/1\n"
+    )
+}
+
+fn write(folder: &Path, files: &[(&str, &[u8])]) -> Vec<PathBuf> {
+    files
+        .iter()
+        .map(|(name, bytes)| {
+            let path = folder.join(name);
+            std::fs::write(&path, bytes).unwrap();
+            path
+        })
+        .collect()
+}
+
+#[test]
+fn frames_become_one_mesh_whose_vertices_are_welded_where_all_frames_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let frames = [frame(0.0), frame(-0.0), frame(0.5)];
+    write(
+        folder.path(),
+        &[
+            ("w_07.obj", frames[0].as_bytes()),
+            ("w_08.obj", frames[1].as_bytes()),
+            ("w_09.obj", frames[2].as_bytes()),
+        ],
+    );
+    let files = sequence_files(&folder.path().join("w_##.obj")).unwrap();
+    let wanted = Wanted { attributes: Keep::All, groups: true, ..PLAIN };
+    let (mesh, report) = import_sequence(&files, &TIMING, wanted, &Silent).unwrap();
+    assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+    let sequence = mesh.sequence.unwrap();
+    assert_eq!(sequence.times, [0.5, 0.5 + 1.0 / 10.0, 0.5 + 2.0 / 10.0]);
+    assert_eq!(sequence.positions[..6], mesh.positions);
+    assert_eq!(sequence.positions[6..12], mesh.positions);
+    assert_eq!(sequence.positions[15], [1.0, 0.0, 0.5]);
+    assert!(sequence.positions.as_flattened().iter().all(|x| x.to_bits() != (-0.0f32).to_bits()));
+    let attributes = mesh.attributes.unwrap();
+    assert!(attributes.normals.is_empty() && attributes.uvs == [[0.0; 2]]);
+    assert_eq!((report.format.as_str(), report.frames, report.positions_read), ("sequence of obj", 3, 6));
+    // All vertices of the source stay where they are wanted.
+    let wanted = Wanted { vertices: true, ..PLAIN };
+    let (all, _) = import_sequence(&files[..2], &TIMING, wanted, &Silent).unwrap();
+    assert_eq!((all.triangles, all.positions.len()), (vec![[0, 1, 2], [3, 5, 4]], 6));
+    // Without the third frame the shared edge is welded.
+    let (mesh, report) = import_sequence(&files[..2], &TIMING, PLAIN, &Silent).unwrap();
+    assert_eq!((mesh.triangles, report.positions), (vec![[0, 1, 2], [1, 3, 2]], 4));
+}
+
+#[test]
+fn frames_of_other_topology_are_refused_with_file_expected_and_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = frame(0.0);
+    let more = format!("{good}v 9 9 9\n");
+    let fewer = good.replace("f 1/1/1 2/1/1 3/1/1\n", "");
+    let other = good.replace("f 1/1/1 2/1/1", "f 2/1/1 1/1/1");
+    let infinite = good.replace("v 1 1 0", "v 1 inf 0");
+    let texts = [good, more, fewer, other, infinite];
+    let files: Vec<_> = (0..).zip(&texts).map(|(i, text)| (format!("{i}.obj"), text.as_bytes())).collect();
+    let files: Vec<_> = files.iter().map(|(name, bytes)| (name.as_str(), *bytes)).collect();
+    let paths = write(folder.path(), &files);
+    let error = |other: usize| {
+        let pair = [paths[0].clone(), paths[other].clone()];
+        import_sequence(&pair, &TIMING, PLAIN, &Silent).unwrap_err().to_string()
+    };
+    assert!(
+        error(1).contains("1.obj: BTH-I017: expected the faces of")
+            && error(1).contains("6 vertices; found 7")
+    );
+    assert!(error(2).contains("2.obj: BTH-I017") && error(2).contains("2 triangles; found 1"));
+    assert!(error(3).contains("triangle 0 has the vertices [0, 1, 2]; found [1, 0, 2]"), "{}", error(3));
+    assert!(error(4).contains("4.obj: vertex 5 of frame 1: BTH-I004"), "{}", error(4));
+    let glb = write(folder.path(), &[("a.glb", b"glTF")]);
+    assert!(import_sequence(&glb, &TIMING, PLAIN, &Silent).unwrap_err().to_string().contains("BTH-I006"));
+    let zero = Timing { rate: Some(f64::INFINITY), ..TIMING };
+    let same = [paths[0].clone(), paths[0].clone()];
+    let stands = import_sequence(&same, &zero, PLAIN, &Silent).unwrap_err().to_string();
+    assert!(stands.contains("frame 1: expected a finite time after 0.5 s, found 0.5 s"), "{stands}");
+}
+
+/// A PC2 file of some samples, each of one point.
+fn pc2(points: i32, samples: &[[f32; 3]], start: f32, step: f32) -> Vec<u8> {
+    let mut bytes = b"POINTCACHE2\0".to_vec();
+    bytes.extend(1i32.to_le_bytes());
+    bytes.extend(points.to_le_bytes());
+    bytes.extend(start.to_le_bytes());
+    bytes.extend(step.to_le_bytes());
+    bytes.extend((samples.len() as i32 / points.max(1)).to_le_bytes());
+    samples.as_flattened().iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    bytes
+}
+
+fn mdd(points: i32, times: &[f32], positions: &[[f32; 3]]) -> Vec<u8> {
+    let mut bytes = (times.len() as i32).to_be_bytes().to_vec();
+    bytes.extend(points.to_be_bytes());
+    times.iter().chain(positions.as_flattened()).for_each(|x| bytes.extend(x.to_be_bytes()));
+    bytes
+}
+
+#[test]
+fn vertex_caches_give_times_and_positions() {
+    let positions = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [-7.0, 8.5, 1e-20], [1e20, 0.0, -1.0]];
+    let cache = read_vertex_cache(Path::new("a"), &pc2(2, &positions, 5.0, 0.5), &TIMING, &Silent).unwrap();
+    assert_eq!((cache.points, &cache.positions[..]), (2, &positions[..]));
+    assert_eq!(cache.times, [0.5 + 5.0 / 10.0, 0.5 + 5.5 / 10.0]);
+    let untimed = Timing { rate: None, ..TIMING };
+    let cache =
+        read_vertex_cache(Path::new("a"), &mdd(2, &[0.25, 0.5], &positions), &untimed, &Silent).unwrap();
+    assert_eq!((cache.points, &cache.positions[..]), (2, &positions[..]));
+    assert_eq!(cache.times, [0.75, 1.0]);
+}
+
+#[test]
+fn bad_vertex_caches_are_refused() {
+    let untimed = Timing { rate: None, ..TIMING };
+    let error = |bytes: &[u8]| match read_vertex_cache(Path::new("a"), bytes, &untimed, &Silent) {
+        Err(error) => error.to_string(),
+        Ok(cache) => panic!("{cache:?}"),
+    };
+    let good = pc2(1, &[[0.0; 3]; 3], 0.0, 1.0);
+    for cut in 0..good.len() {
+        error(&good[..cut]);
+    }
+    let changed = |at: usize, value: i32| {
+        let mut bytes = good.clone();
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        bytes
+    };
+    assert!(error(&changed(12, 2)).contains("BTH-I006: expected version 1 of PC2, found 2"));
+    assert!(error(&changed(16, -1)).contains("BTH-I002"));
+    assert!(error(&changed(16, i32::MAX)).contains("BTH-I003"));
+    assert!(error(&changed(28, i32::MAX)).contains("BTH-I002"));
+    assert!(error(&changed(28, 0)).contains("BTH-I003"));
+    assert!(error(&pc2(1, &[], 0.0, 1.0)).contains("at least one frame"));
+    assert!(error(&pc2(1, &[[0.0; 3]; 2], 0.0, 0.0)).contains("BTH-I017: frame 1"));
+    assert!(error(&pc2(1, &[[0.0; 3]; 2], f32::NAN, 1.0)).contains("BTH-I017: frame 0"));
+    let good = mdd(1, &[0.0, 1.0], &[[0.0; 3]; 2]);
+    for cut in 0..good.len() {
+        error(&good[..cut]);
+    }
+    assert!(error(&mdd(1, &[1.0, 1.0], &[[0.0; 3]; 2])).contains("frame 1: expected a finite time after"));
+    assert!(error(&mdd(-1, &[], &[])).contains("BTH-I002"));
+    let rated = read_vertex_cache(Path::new("a"), &good, &TIMING, &Silent).unwrap_err().to_string();
+    assert!(rated.contains("leave out the rate"), "{rated}");
+}
+
+#[test]
+fn a_vertex_cache_moves_the_vertices_of_its_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = [[5.0; 3]; 6];
+    let mut moved: Vec<[f32; 3]> = (0..6).map(|i| [i as f32, (i * i) as f32, 0.0]).collect();
+    moved.splice(0..0, still);
+    let untimed = Timing { rate: None, ..TIMING };
+    let paths = write(
+        folder.path(),
+        &[
+            ("a.obj", frame(0.0).as_bytes()),
+            ("a.mdd", &mdd(6, &[0.0, 1.0], &moved)),
+            ("b.pc2", &pc2(5, &[[0.0; 3]; 5], 0.0, 1.0)),
+        ],
+    );
+    let (mesh, report) = import_vertex_cache(&paths[0], &paths[1], &untimed, PLAIN, &Silent).unwrap();
+    assert_eq!(report.format, "obj and mdd");
+    assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+    assert_eq!(mesh.positions, still);
+    assert_eq!(
+        mesh.sequence.unwrap().positions[6..],
+        [moved[6], moved[7], moved[8], moved[9], moved[11], moved[10]]
+    );
+    let error = import_vertex_cache(&paths[0], &paths[2], &untimed, PLAIN, &Silent).unwrap_err().to_string();
+    assert!(
+        error.contains("b.pc2: BTH-I017: expected the 6 vertices of") && error.contains("found 5"),
+        "{error}"
+    );
+}

@@ -1,0 +1,62 @@
+//! The pose of an object at a time: matrices of its joints, weights of its morph targets.
+
+use super::JointMatrix;
+use crate::instances::{Affine, NodeHierarchy, tracks};
+use bth_format::SceneView;
+use bth_format::layout::*;
+
+/// What deforms an object at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Pose {
+    /// Weights of the morph targets.
+    pub(crate) weights: Vec<f64>,
+    /// For each joint of the skin its matrix; `None` without a skin.
+    pub(crate) joints: Option<Vec<JointMatrix>>,
+}
+
+impl Pose {
+    /// The pose that a deformer of a checked scene gives its object, with the nodes where the hierarchy has them.
+    pub(crate) fn of(
+        view: &SceneView<'_>,
+        deformer: &Deformer,
+        hierarchy: &NodeHierarchy,
+        seconds: f64,
+    ) -> Pose {
+        let skin = view.skins.get(deformer.skin as usize);
+        let joints = skin.map(|skin| {
+            let first = skin.first_joint as usize;
+            let joints = &view.skin_joints[first..first + skin.joints as usize];
+            joints.iter().map(|joint| joint_matrix(joint, &hierarchy.to_world(view, joint.node))).collect()
+        });
+        Pose { weights: weights(view, deformer, seconds), joints }
+    }
+}
+
+impl Pose {
+    /// Bytes on the heap.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.weights.as_slice())
+            + self.joints.as_ref().map_or(0, |joints| size_of_val(joints.as_slice()))
+    }
+}
+
+/// The weights of a deformer at a time: those of its node's track, else its own.
+fn weights(view: &SceneView<'_>, deformer: &Deformer, seconds: f64) -> Vec<f64> {
+    let count = deformer.weights as usize;
+    let key = (deformer.node, Property::Weights as u32);
+    if let Ok(row) = view.tracks.binary_search_by_key(&key, |track| (track.node, track.property)) {
+        return tracks::values(view, &view.tracks[row], count, seconds);
+    }
+    view.morph_weights[deformer.first_weight as usize..][..count].to_vec()
+}
+
+/// The matrix of a joint, whose node has a transform to world space.
+fn joint_matrix(joint: &SkinJoint, to_world: &Affine) -> JointMatrix {
+    let b = &joint.inverse_bind;
+    let row = |i: usize| [b[4 * i], b[4 * i + 1], b[4 * i + 2]];
+    let bind = Affine { linear: [row(0), row(1), row(2)], translation: [b[3], b[7], b[11]] };
+    let Affine { linear, translation } = to_world.times(&bind);
+    let column = |c: usize| [linear[0][c], linear[1][c], linear[2][c], 0.0];
+    let [x, y, z] = translation;
+    [column(0), column(1), column(2), [x, y, z, 0.0]]
+}

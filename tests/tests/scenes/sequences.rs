@@ -1,0 +1,197 @@
+//! Objects whose vertices move by themselves have the answers of the same objects compiled at each time.
+
+use crate::built::compare;
+use crate::support::{manifest, options};
+use bth::Scene;
+use bth_compile::Silent;
+use bth_compile::pipeline::{CompileOptions, MotionOptions};
+use bth_compile::scene::{self, SceneReport};
+use bth_random::Rng;
+use std::path::Path;
+
+type Positions = Vec<[f32; 3]>;
+
+/// A knot that is twisted about the y axis, the more the later, by up to `turns` from end to end.
+fn frames(count: usize, turns: f32) -> (Vec<Positions>, Vec<[u32; 3]>) {
+    let knot = bth_scenes::knot::torus_knot(1200);
+    let frame = |frame: usize| {
+        let angle = std::f32::consts::TAU * turns * frame as f32 / (count - 1).max(1) as f32;
+        let twist = |p: &[f32; 3]| {
+            let (sin, cos) = (angle * p[1] / 6.0).sin_cos();
+            [p[0] * cos - p[2] * sin, p[1] + 0.0, p[0] * sin + p[2] * cos]
+        };
+        knot.positions.iter().map(twist).collect()
+    };
+    ((0..count).map(frame).collect(), knot.triangles)
+}
+
+/// Small squares on a grid of `side` times `side` places, which exchange their places between the second and the third of four frames.
+fn exchanging(side: usize) -> (Vec<Positions>, Vec<[u32; 3]>) {
+    let count = side * side;
+    let place = |number: usize| [(number % side) as f32, 0.0, (number / side) as f32];
+    let frame = |stride: usize| -> Positions {
+        (0..count)
+            .flat_map(|square| {
+                let [x, y, z] = place(square * stride % count);
+                [[x, y, z], [x + 0.8, y + 0.3, z], [x, y + 0.1, z + 0.8], [x + 0.8, y, z + 0.8]]
+            })
+            .collect()
+    };
+    let triangles =
+        (0..count as u32).flat_map(|s| [[4 * s, 4 * s + 1, 4 * s + 2], [4 * s + 1, 4 * s + 3, 4 * s + 2]]);
+    // The stride has no factor in common with the number of squares.
+    (vec![frame(1), frame(1), frame(211), frame(211)], triangles.collect())
+}
+
+fn obj(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> String {
+    let mut text = String::new();
+    for [x, y, z] in positions {
+        text += &format!("v {x:?} {y:?} {z:?}\n");
+    }
+    for [a, b, c] in triangles {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    text
+}
+
+/// A PC2 file whose sample i is at frame i / 2.
+fn pc2(frames: &[Positions]) -> Vec<u8> {
+    let mut bytes = b"POINTCACHE2\0".to_vec();
+    for word in [1i32, frames[0].len() as i32] {
+        bytes.extend(word.to_le_bytes());
+    }
+    [0.0f32, 0.5].iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    bytes.extend((frames.len() as i32).to_le_bytes());
+    frames.iter().flatten().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+    bytes
+}
+
+/// A folder with the frames as numbered OBJ files and as a PC2 file of the first one.
+fn folder(frames: &[Positions], triangles: &[[u32; 3]]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, frame) in frames.iter().enumerate() {
+        std::fs::write(folder.path().join(format!("knot_{number:03}.obj")), obj(frame, triangles)).unwrap();
+    }
+    std::fs::write(folder.path().join("knot.pc2"), pc2(frames)).unwrap();
+    folder
+}
+
+fn built(text: &str, folder: &Path, options: &CompileOptions) -> (bth_format::File, SceneReport) {
+    let (compiled, report) = scene::compile(&manifest(text), folder, Path::new("x"), options, &Silent)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
+    bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
+    (file, report)
+}
+
+/// The positions at a share of the way from one frame to the next, from the definition.
+fn between(frames: &[Positions], at: f64) -> Positions {
+    let at = at.clamp(0.0, (frames.len() - 1) as f64);
+    let (frame, share) = (at.floor() as usize, at.fract());
+    let next = &frames[(frame + 1).min(frames.len() - 1)];
+    let mix = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
+    let rows = frames[frame].iter().zip(next);
+    rows.map(|(p, q)| std::array::from_fn(|k| mix(p[k], q[k]))).collect()
+}
+
+fn check_at(scene: &Scene, positions: &[[f32; 3]], triangles: &[[u32; 3]], rng: &mut Rng) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("knot.obj"), obj(positions, triangles)).unwrap();
+    let text = format!("objects = [{{ name = \"knot\", model = \"knot.obj\" }}]\n{NODE}");
+    let (file, _) = built(&text, folder.path(), &options());
+    let fresh = bth::from_file(file).unwrap();
+    assert!(compare(&fresh, scene, 0, rng) > 100);
+}
+
+const NODE: &str = "nodes = [{ name = \"n\", object = \"knot\" }]\n";
+
+#[test]
+fn sequences_have_the_answers_of_their_frames_and_of_what_lies_between() {
+    let (frames, triangles) = frames(5, 0.4);
+    let folder = folder(&frames, &triangles);
+    let texts = [
+        "objects = [{ name = \"knot\", sequence = \"knot_###.obj\", start = 1.0 }]",
+        "objects = [{ name = \"knot\", model = \"knot_000.obj\", vertex_cache = \"knot.pc2\", rate = 4, start = 1 }]",
+    ];
+    let rng = &mut Rng::new(5);
+    for text in texts {
+        let text = format!("frames = {{ first = 0, last = 30, rate = 8 }}\n{text}\n{NODE}");
+        let (file, report) = built(&text, folder.path(), &options());
+        let motion = report.objects[0].motion.as_ref().unwrap();
+        assert_eq!((motion.frames, motion.segments.len()), (5, 1));
+        assert!((1.0..1.1).contains(&motion.cost_ratio), "{motion:?}");
+        let sequence = file.sequence(0);
+        assert_eq!(sequence.times, [1.0, 1.125, 1.25, 1.375, 1.5]);
+        let mut scene = bth::from_file(file).unwrap();
+        for seconds in [0.0, 1.0, 1.06, 1.125, 1.3, 1.49, 1.5, 9.0, -3.0, 1.2] {
+            let update = scene.set_seconds(seconds).unwrap();
+            assert_eq!(update.visible, 1);
+            check_at(&scene, &between(&frames, (seconds - 1.0) * 8.0), &triangles, rng);
+        }
+        assert_eq!(scene.set_seconds(1.2).unwrap().deformed, 0, "nothing moved");
+        assert_eq!(scene.set_frame(10).unwrap().deformed, 1);
+        check_at(&scene, &frames[2], &triangles, rng);
+    }
+}
+
+#[test]
+fn clips_that_one_topology_would_make_dear_are_divided_and_answer_the_same() {
+    let (frames, triangles) = exchanging(24);
+    let folder = folder(&frames, &triangles);
+    let text = format!(
+        "frames = {{ first = 0, last = 8, rate = 2 }}\nobjects = [{{ name = \"knot\", sequence = \"knot_###.obj\", rate = 1 }}]\n{NODE}"
+    );
+    let many = CompileOptions { motion: MotionOptions { poses: 4, segments: 4 }, ..options() };
+    let (file, report) = built(&text, folder.path(), &many);
+    let motion = report.objects[0].motion.as_ref().unwrap();
+    assert!(motion.segments.len() > 1, "{motion:?}");
+    assert_eq!(report.objects.len(), motion.segments.len());
+    assert_eq!(file.sequence(0).segments.len(), motion.segments.len());
+    let one = CompileOptions { motion: MotionOptions { poses: 4, segments: 1 }, ..options() };
+    let (_, whole) = built(&text, folder.path(), &one);
+    let whole = whole.objects[0].motion.as_ref().unwrap();
+    assert!(whole.cost_ratio > 1.3 && motion.cost_ratio < 0.9 * whole.cost_ratio, "{motion:?} {whole:?}");
+    let bytes = file.bytes().to_vec();
+    let mut scene = bth::from_file(file).unwrap();
+    let rng = &mut Rng::new(6);
+    for seconds in [0.0, 3.0, 1.0, 2.5, 1.4, 0.5, 1.6, 0.0] {
+        scene.set_seconds(seconds).unwrap();
+        assert_eq!(scene.instance(0).object, 0);
+        check_at(&scene, &between(&frames, seconds), &triangles, rng);
+    }
+    // An object with segments is copied from a compiled file with all of them.
+    std::fs::write(folder.path().join("done.bth"), &bytes).unwrap();
+    let copy = format!(
+        "objects = [{{ name = \"quad\", file = \"done.bth\" }}, {{ name = \"knot\", file = \"done.bth\" }}]\n{NODE}"
+    );
+    let (copied, _) = built(&copy, folder.path(), &options());
+    assert_eq!(
+        copied.sequence(0).segments,
+        bth_format::File::from_bytes(&bytes).unwrap().sequence(0).segments
+    );
+    let mut scene = bth::from_file(copied).unwrap();
+    scene.set_seconds(2.5).unwrap();
+    check_at(&scene, &between(&frames, 2.5), &triangles, rng);
+}
+
+#[test]
+fn a_time_that_cannot_be_shown_leaves_the_scene_as_it_was() {
+    let (mut frames, triangles) = frames(3, 0.2);
+    // Moved so far that the instance, which is scaled, leaves the range of numbers.
+    frames[2].iter_mut().for_each(|p| p[0] += 3e38);
+    let folder = folder(&frames, &triangles);
+    let text = "frames = { first = 0, last = 2, rate = 1 }\n\
+        objects = [{ name = \"knot\", sequence = \"knot_###.obj\" }]\n\
+        nodes = [{ name = \"n\", object = \"knot\", scale = [2, 1, 1] }]\n";
+    let (file, _) = built(text, folder.path(), &options());
+    let mut scene = bth::from_file(file).unwrap();
+    scene.set_frame(1).unwrap();
+    let before = (scene.instance_bounds(0), scene.positions(0).to_vec());
+    assert_eq!(scene.set_frame(2).unwrap_err().code(), bth::Code::NotFinite);
+    assert_eq!(
+        (scene.instance_bounds(0), scene.positions(0).to_vec(), scene.seconds()),
+        (before.0, before.1, 1.0)
+    );
+    assert_eq!(scene.set_seconds(1.0).unwrap().deformed, 0);
+    assert_eq!(scene.set_seconds(0.5).unwrap().deformed, 1);
+}

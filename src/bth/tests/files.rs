@@ -9,9 +9,10 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 24] = files![
+const VALID: [(&str, &[u8]); 25] = files![
     "deformable",
     "deformers",
+    "free-directions",
     "grid-16",
     "grid-21",
     "groups",

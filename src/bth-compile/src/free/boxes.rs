@@ -150,8 +150,8 @@ impl Viewer {
             }
         }
         // Nothing is seen of what is not above the plane.
-        for l in 0..WIDTH {
-            seen.range[1][l] &= if z[1].0[l] > 0.0 { u32::MAX } else { 0 };
+        for (end, height) in seen.range[1].iter_mut().zip(z[1].0) {
+            *end &= if height > 0.0 { u32::MAX } else { 0 };
         }
         seen
     }
@@ -169,11 +169,7 @@ impl Lanes {
 
     #[inline(always)]
     fn with(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
-        let mut result = self;
-        for l in 0..WIDTH {
-            result.0[l] = of(self.0[l], other.0[l]);
-        }
-        result
+        Lanes(std::array::from_fn(|l| of(self.0[l], other.0[l])))
     }
 
     #[inline(always)]
@@ -194,8 +190,8 @@ impl Lanes {
     /// Adds 1 where the number is greater than a limit.
     #[inline(always)]
     fn count_above(self, limit: f32, to: &mut [u32; WIDTH]) {
-        for l in 0..WIDTH {
-            to[l] += u32::from(self.0[l] > limit);
+        for (count, x) in to.iter_mut().zip(self.0) {
+            *count += u32::from(x > limit);
         }
     }
 }

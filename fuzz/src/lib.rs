@@ -139,7 +139,7 @@ pub fn import_scene(bytes: &[u8]) {
         Source::Model { mesh, .. } => mesh.map(GltfPart::Mesh),
         Source::Deforming { mesh, .. } => Some(GltfPart::Deforming(mesh)),
         Source::AtRest { node, .. } => Some(GltfPart::AtRest(node)),
-        Source::Compiled { .. } => None,
+        _ => None,
     };
     let parts: Vec<GltfPart> = manifest.objects.iter().filter_map(part).take(16).collect();
     let wanted = Wanted { attributes: Keep::All, groups: true, materials: true, vertices: false };

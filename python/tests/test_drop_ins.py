@@ -70,6 +70,68 @@ def test_embreex(mesh, rays):
         scene.run(*rays, query="COLOUR")
 
 
+# embreex publishes its tests only in its repository, so `python/upstream/run` runs them only where somebody put them. These are the cases
+# of theirs, in our words: a square across the x axis, a tetrahedron and a box, three rays that hit and one that does not.
+SQUARE = np.array([[7, -1, -1], [7, 1, -1], [7, -1, 1], [7, 1, 1]], np.float32)
+HALVES = np.array([[0, 1, 2], [1, 3, 2]], np.uint32)
+BOX = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 1], [1, 1, 1], [0, 1, 1], [0, 0, 1]], np.float32)
+CORNER = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+
+
+def along_x(*starts):
+    origins = np.array(starts, np.float32)
+    return origins, np.broadcast_to(np.float32([1, 0, 0]), origins.shape)
+
+
+FOUR = along_x([0.1, -0.2, 0], [0.1, 0.2, 0], [0.1, 0.3, 0], [0.1, -8.2, 0])
+
+
+def square(indexed, device=None):
+    scene = EmbreeScene(device)
+    TriangleMesh(scene, SQUARE, HALVES) if indexed else TriangleMesh(scene, SQUARE[HALVES])
+    return scene
+
+
+@pytest.mark.parametrize("indexed", [False, True])
+def test_embreex_square(indexed):
+    device = EmbreeDevice()
+    assert str(device)
+    square(indexed, device)
+    scene = square(indexed, device)
+    assert scene.run(*FOUR).tolist() == [0, 1, 1, -1]
+    assert scene.run(*FOUR, query="DISTANCE") == pytest.approx([6.9, 6.9, 6.9, 1e37])
+    occluded = scene.run(*FOUR, query="OCCLUDED")
+    assert (occluded[:3] >= 0).all() and occluded[3] == -1
+    out = scene.run(*FOUR, output=1, dists=100)
+    assert out["geomID"].tolist() == [0, 0, 0, -1] and out["primID"].tolist() == [0, 1, 1, -1]
+    assert out["tfar"] == pytest.approx([6.9, 6.9, 6.9, 100])
+    assert out["u"] == pytest.approx([0.4, 0.1, 0.15, 0]) and out["v"] == pytest.approx([0.5, 0.4, 0.35, 0])
+    assert not out["Ng"][3].any() and out["Ng"][:3].any(axis=1).all()
+
+
+def test_embreex_answers_do_not_depend_on_the_order_of_rays():
+    order = np.array([3, 0, 3, 1, 3, 2, 3])
+    scene = square(False)
+    straight, mixed = scene.run(*FOUR, output=1), scene.run(FOUR[0][order], FOUR[1][order], output=1)
+    for key in ("primID", "geomID", "u", "v", "tfar", "Ng"):
+        np.testing.assert_array_equal(straight[key][order], mixed[key])
+
+
+@pytest.mark.parametrize("corners, starts, faces, u, v", [
+    (CORNER, ([-0.1, 0.1, 0.1], [-0.1, 0.2, 0.2]), 4, [0.1, 0.2], [0.1, 0.2]),
+    (BOX, ([-0.1, 0.9, 0.1], [-0.1, 0.8, 0.2]), 12, [0.1, 0.2], [0.8, 0.6]),
+])
+def test_embreex_hits_of_elements(corners, starts, faces, u, v):
+    scene = EmbreeScene(EmbreeDevice())
+    ElementMesh(scene, corners, np.arange(len(corners), dtype=np.uint32)[None])
+    primitives = scene.run(*along_x(*starts))
+    assert primitives[0] == primitives[1] and 0 <= primitives[0] < faces
+    out = scene.run(*along_x(*starts), output=1)
+    assert out["geomID"].tolist() == [0, 0] and (out["primID"] == primitives).all()
+    assert out["tfar"] == pytest.approx([0.1, 0.1])
+    assert out["u"] == pytest.approx(u) and out["v"] == pytest.approx(v)
+
+
 @pytest.mark.parametrize("corners, element", [
     ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [0, 1, 2, 3]),
     ([(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0), (1, 0, 1), (1, 1, 1), (0, 1, 1), (0, 0, 1)], list(range(8))),

@@ -2,6 +2,7 @@
 
 mod compressed;
 mod cutouts;
+mod damaged_scenes;
 mod data;
 mod gltf;
 mod groups;

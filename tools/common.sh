@@ -25,9 +25,11 @@ have_miri() { have_nightly && cargo +nightly miri --version >/dev/null 2>&1; }
 have_fuzzer() { have_nightly && cargo fuzz --version >/dev/null 2>&1; }
 # A display without a screen, keys for it, and what the player loads to open a window.
 have_display() { command -v Xvfb >/dev/null && command -v xdotool >/dev/null; }
+# A browser without a window, for the test of the viewer page.
+have_chromium() { command -v chromium-headless-shell >/dev/null || command -v chromium >/dev/null; }
 have_venv() { command -v python3 >/dev/null && python3 -c 'import venv, ensurepip' 2>/dev/null; }
 
-# install_missing python|plain: installs the system packages that are missing, where that is possible.
+# install_missing plain|python|deep: installs the system packages that are missing, where that is possible.
 # Reports what stays missing and goes on: everything but the TetGen worker builds without them.
 install_missing() {
     local packages=()
@@ -44,6 +46,13 @@ install_missing() {
         command -v git-lfs >/dev/null || packages+=(git-lfs)
     fi
     [ "$1" = plain ] || have_display || packages+=(xvfb xdotool libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0)
+    [ "$1" = plain ] || have_chromium || packages+=(chromium-headless-shell)
+    if [ "$1" = deep ]; then
+        # What links and runs programs for AArch64.
+        command -v aarch64-linux-gnu-gcc >/dev/null || packages+=(gcc-aarch64-linux-gnu libc6-dev-arm64-cross)
+        command -v aarch64-linux-gnu-g++ >/dev/null || packages+=(g++-aarch64-linux-gnu)
+        command -v qemu-aarch64 >/dev/null || packages+=(qemu-user)
+    fi
     [ ${#packages[@]} -eq 0 ] && return 0
 
     local as_root=()
@@ -65,5 +74,6 @@ install_missing() {
     have_cxx || note "No C++ compiler: meshopt-compressed glTF files cannot be read. Install g++ or clang."
     have_tetgen || note "No TetGen: the worker is not built, and compiled files hold BVHs only."
     [ "$1" = plain ] || have_display || note "No Xvfb or no xdotool: the test of the window is skipped."
+    [ "$1" = plain ] || have_chromium || note "No Chromium: the test of the viewer page is skipped."
     [ "$1" = plain ] || have_venv || note "No python3 with venv: the Python cross-checks are skipped."
 }

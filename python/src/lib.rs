@@ -82,8 +82,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     Ok(())
 }
 
-/// Name of the instruction set that queries use: `avx512`, `avx2` or `scalar`. The environment variable BTH_ISA names another.
+/// Name of the instruction set that queries use, such as `avx512`, `sse4` or `neon`. The environment variable BTH_ISA names another.
 #[pyfunction]
 fn isa() -> String {
-    format!("{:?}", bth::Isa::chosen()).to_lowercase()
+    bth::Isa::chosen().to_string()
 }

@@ -35,7 +35,7 @@ pub mod verify;
 
 pub use deformation_view::{DeformationView, MorphDeltas};
 pub use error::{Code, Error};
-pub use file::File;
+pub use file::{File, FileMemory};
 pub use materials_view::{ImagesView, MaterialsView};
 pub use object::ObjectView;
 pub use scene_view::SceneView;

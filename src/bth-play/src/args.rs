@@ -42,8 +42,8 @@ pub(crate) struct Args {
     /// Render frames again whose pictures are there and whole.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Instruction set: scalar, avx2 or avx512. By default what BTH_ISA says, else the best of this machine. Pictures do
-    /// not depend on it.
+    /// Instruction set: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says, else the best of this
+    /// machine. Pictures do not depend on it.
     #[arg(long, value_name = "ISA")]
     pub(crate) isa: Option<bth::Isa>,
     /// Width and height of the picture.

@@ -17,6 +17,7 @@
 mod batch;
 mod builder;
 mod bvh;
+mod clock;
 mod closest;
 mod crossing;
 mod deform;

@@ -9,8 +9,9 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 22] = files![
+const VALID: [(&str, &[u8]); 24] = files![
     "deformable",
+    "deformers",
     "grid-16",
     "grid-21",
     "groups",
@@ -23,6 +24,7 @@ const VALID: [(&str, &[u8]); 22] = files![
     "scene-empty",
     "scene-moving",
     "scene-still",
+    "sequence",
     "tets-link32",
     "tets-tet16",
     "tets-tet20",

@@ -24,11 +24,9 @@ pub fn select(wanted: Option<&str>) -> Result<String> {
 /// # Errors
 /// As [`select`].
 #[allow(unsafe_code)]
-pub fn select_for_libraries(wanted: Option<&str>) -> Result<()> {
-    select(wanted)?;
-    if let Some(name) = wanted {
-        // SAFETY: called at the start of the program, before any other thread runs that could read the environment.
-        unsafe { std::env::set_var("BTH_ISA", name) };
-    }
+pub fn select_for_libraries(wanted: &str) -> Result<()> {
+    select(Some(wanted))?;
+    // SAFETY: called at the start of the program, while no other thread runs anything that could read the environment.
+    unsafe { std::env::set_var("BTH_ISA", wanted) };
     Ok(())
 }

@@ -48,6 +48,25 @@ pub struct SectionView<'a> {
     pub bytes: &'a [u8],
 }
 
+/// Memory for the bytes of a file that a caller writes there, so that they need not be copied once more ([`File::from_memory`]).
+#[derive(Debug)]
+pub struct FileMemory(buffer::Owned);
+
+impl FileMemory {
+    /// Zero bytes.
+    ///
+    /// # Errors
+    /// `BTH-O001` when there is not enough memory.
+    pub fn zeroed(length: usize) -> Result<Self> {
+        buffer::Owned::zeroed(length).map(Self).ok_or_else(|| buffer::no_memory(length as u64))
+    }
+
+    /// The bytes.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        self.0.bytes_mut()
+    }
+}
+
 impl File {
     /// Reads a file into memory and checks the header and the section table.
     ///
@@ -65,6 +84,14 @@ impl File {
     /// As [`Self::read`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         Self::new(Buffer::copy(bytes)?)
+    }
+
+    /// As [`Self::from_bytes`], without copying them.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn from_memory(memory: FileMemory) -> Result<Self> {
+        Self::new(Buffer::Owned(memory.0))
     }
 
     /// Maps a file and checks the header and the section table. Pages are read when they are used.

@@ -1,11 +1,11 @@
 //! New positions of objects in a scene builder: staged by a call, refitted by a commit.
 
 use super::SceneBuilder;
+use crate::clock;
 use crate::deformers::Posed;
 use crate::instances::Update;
 use bth_format::Error;
 use std::collections::HashSet;
-use std::time::Instant;
 
 impl SceneBuilder {
     /// Gives an object new positions, as [`Scene::set_positions`](crate::Scene::set_positions), which the next commit makes visible
@@ -69,7 +69,7 @@ impl SceneBuilder {
         if self.deformed.is_empty() {
             return update;
         }
-        let start = Instant::now();
+        let start = clock::now();
         let mut greatest: f64 = 0.0;
         for object in &self.deformed {
             if let Ok(deforming) = self.scene.objects_mut().deforming(*object) {
@@ -77,7 +77,7 @@ impl SceneBuilder {
                 greatest = greatest.max(deforming.cost_ratio());
             }
         }
-        (update.deformed_cost_ratio, update.refit) = (greatest, start.elapsed());
+        (update.deformed_cost_ratio, update.refit) = (greatest, clock::elapsed(start));
         self.forget_boxes();
         for (id, staged) in self.instances.iter_mut().enumerate() {
             if self.deformed.contains(&staged.object) {

@@ -1,10 +1,12 @@
 //! Candidates: triangles that the f32 filter does not exclude, and their decision in f64 or in exact arithmetic.
 
+use super::nodes;
 use crate::intersect::exact::{Estimate, Intersection, estimate, wide};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::line::Line;
 use crate::query::{Query, TriangleRef};
 use crate::rays::Ray;
+use crate::simd::{Scalar, Simd};
 use bth_format::layout::{Child, NONE};
 use bth_format::object::ObjectView;
 
@@ -28,15 +30,26 @@ impl Candidate {
         object: &ObjectView<'_>,
         reader: impl Reader<Output = C>,
     ) -> Option<(u32, C)> {
+        self.read_in(Scalar, object, reader)
+    }
+
+    /// As [`Self::read`], in a kernel.
+    #[inline(always)]
+    pub(crate) fn read_in<S: Simd, C>(
+        &self,
+        s: S,
+        object: &ObjectView<'_>,
+        reader: impl Reader<Output = C>,
+    ) -> Option<(u32, C)> {
         let at = self.triangle as usize;
         let (mut indexed, mut raw) = (None, None);
         match Child::from_code(self.leaf)? {
             Child::Indexed(line) => {
-                let leaf = object.indexed(line, &mut indexed);
+                let leaf = nodes::indexed(s, object, line, &mut indexed);
                 Some((leaf.first + at as u32, reader.read(leaf, at)))
             }
             Child::Raw(line) => {
-                let leaf = object.raw(line, &mut raw);
+                let leaf = nodes::raw(s, object, line, &mut raw);
                 Some((leaf.first + at as u32, reader.read(leaf, at)))
             }
             Child::Node(_) | Child::Packed(_) | Child::Tets(_) => None,

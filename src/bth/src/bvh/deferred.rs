@@ -9,7 +9,7 @@ use crate::intersect::prepare::gather_rays;
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -43,6 +43,22 @@ impl Reader for StoreCorners<'_> {
     }
 }
 
+/// [`DeferredHits::flush`] as a part of kernels.
+struct Flush<'a, 's, Q: Query> {
+    deferred: &'a mut DeferredHits,
+    object: &'a ObjectView<'a>,
+    rays: &'a [Ray],
+    sink: &'a mut Sink<'s, Q>,
+}
+
+impl<S: Simd, Q: Query> Part<S> for Flush<'_, '_, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        self.deferred.compute(s, self.object, self.rays, self.sink);
+    }
+}
+
 impl DeferredHits {
     pub(crate) fn new() -> Self {
         DeferredHits {
@@ -71,7 +87,7 @@ impl DeferredHits {
         }
         let lane = self.count % LANES;
         let reader = StoreCorners { pairs: &mut self.pairs, lane };
-        let Some((index, ())) = candidate.read(object, reader) else { return };
+        let Some((index, ())) = candidate.read_in(s, object, reader) else { return };
         self.index[lane] = index;
         self.ray[lane] = ray as u32;
         self.candidate[lane] = candidate;
@@ -90,9 +106,22 @@ impl DeferredHits {
         rays: &[Ray],
         sink: &mut Sink<'_, Q>,
     ) {
-        if self.count == 0 {
+        // An any-hit query has no pending hits.
+        if Q::ANY || self.count == 0 {
             return;
         }
+        Flush { deferred: self, object, rays, sink }.inline_or_call(s);
+    }
+
+    /// Implements [`Self::flush`].
+    #[inline(always)]
+    fn compute<S: Simd, Q: Query>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        rays: &[Ray],
+        sink: &mut Sink<'_, Q>,
+    ) {
         let all = ((1u64 << self.count) - 1) as u32;
         self.count = 0;
         // Gathering all rays here was measured to take half the time of storing each when it is added.

@@ -7,7 +7,7 @@
 //! are then all of one sign or zero, and the filter excludes only triangles with two weights of certain and opposite signs.
 
 use super::candidate::{Candidate, ReadCorners};
-use super::nodes::{Wide, indexed_leaf, prefetch};
+use super::nodes::{Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
@@ -98,12 +98,12 @@ impl Kernel for EnumerateKernel<'_> {
                 continue;
             }
             let (mut unpacked, mut unpacked_raw) = (None, None);
-            let maybe = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
+            let maybe = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
                 prepared.filter.candidates(s, leaf, slabs.first, last).maybe
             } else {
                 match Child::from_code(code) {
                     Some(Child::Raw(at)) => {
-                        let leaf = object.raw(at, &mut unpacked_raw);
+                        let leaf = raw_leaf(s, object, at, &mut unpacked_raw);
                         prepared.filter.candidates(s, leaf, slabs.first, last).maybe
                     }
                     Some(Child::Tets(row)) => {

@@ -2,9 +2,9 @@
 //! per cent.
 
 use crate::intersect::boxes::ChildBoxes;
-use crate::simd::Simd;
+use crate::simd::{Part, Simd};
 use bth_format::layout::{
-    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, WideNode,
+    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, RawLeaf, WideNode,
 };
 use bth_format::object::Unpacked;
 use bth_format::object::{NodeBase, ObjectView};
@@ -45,10 +45,51 @@ impl Nodes for Packed {
     }
 }
 
-/// The leaf with this child code if it is an indexed leaf: in place or, for objects with coordinates on a grid, unpacked into
-/// `unpacked`.
+/// Unpacking of the leaf on a grid at an index of a child code, as a part of kernels: it is long, and rarely needed.
+struct Unpack<'r, 'o, T>(&'r ObjectView<'o>, u32, &'r mut Option<Unpacked<T>>);
+
+impl<'r, S: Simd> Part<S> for Unpack<'r, '_, IndexedLeaf> {
+    type Output = &'r IndexedLeaf;
+    #[inline(always)]
+    fn run(self, _: S) -> &'r IndexedLeaf {
+        self.0.indexed(self.1, self.2)
+    }
+}
+
+impl<'r, S: Simd> Part<S> for Unpack<'r, '_, RawLeaf> {
+    type Output = &'r RawLeaf;
+    #[inline(always)]
+    fn run(self, _: S) -> &'r RawLeaf {
+        self.0.raw(self.1, self.2)
+    }
+}
+
+/// The indexed leaf at an index of a child code: in place or, for objects with coordinates on a grid, unpacked into `unpacked`.
 #[inline(always)]
-pub(crate) fn indexed_leaf<'r>(
+pub(crate) fn indexed<'r, S: Simd>(
+    s: S,
+    object: &'r ObjectView<'_>,
+    index: u32,
+    unpacked: &'r mut Option<Unpacked<IndexedLeaf>>,
+) -> &'r IndexedLeaf {
+    if object.grid.is_none() { object.indexed_leaf(index) } else { s.call(Unpack(object, index, unpacked)) }
+}
+
+/// The raw leaf at an index of a child code, as [`indexed`].
+#[inline(always)]
+pub(crate) fn raw<'r, S: Simd>(
+    s: S,
+    object: &'r ObjectView<'_>,
+    index: u32,
+    unpacked: &'r mut Option<Unpacked<RawLeaf>>,
+) -> &'r RawLeaf {
+    if object.grid.is_none() { object.raw_leaf(index) } else { s.call(Unpack(object, index, unpacked)) }
+}
+
+/// The leaf with this child code if it is an indexed leaf; as [`indexed`].
+#[inline(always)]
+pub(crate) fn indexed_leaf<'r, S: Simd>(
+    s: S,
     object: &'r ObjectView<'_>,
     node_base: NodeBase<'r>,
     code: u32,
@@ -56,7 +97,7 @@ pub(crate) fn indexed_leaf<'r>(
 ) -> Option<&'r IndexedLeaf> {
     match (node_base.indexed_leaf(code), Child::from_code(code)) {
         (Some(leaf), _) => Some(leaf),
-        (None, Some(Child::Indexed(index))) => Some(object.indexed(index, unpacked)),
+        (None, Some(Child::Indexed(index))) => Some(indexed(s, object, index, unpacked)),
         _ => None,
     }
 }

@@ -2,7 +2,7 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{Nodes, indexed_leaf, prefetch};
+use super::nodes::{Nodes, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
 use crate::intersect::boxes::ChildBoxes;
@@ -232,13 +232,13 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let (ray, mut unpacked) = (state.ray(), None);
-            let found = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
+            let found = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
                 enter_leaf(s, object, || &rays[ray], state, (leaf, code))
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
                     Some(Child::Raw(index)) => {
-                        let leaf = object.raw(index, &mut unpacked);
+                        let leaf = raw_leaf(s, object, index, &mut unpacked);
                         enter_leaf(s, object, || &rays[ray], state, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, state, top, stacks),

@@ -5,7 +5,7 @@
 //! the end.
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
-use super::nodes::{Nodes, indexed_leaf, prefetch};
+use super::nodes::{Nodes, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use crate::bvh::candidate::{Candidate, settle_one};
@@ -143,7 +143,7 @@ pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
             prefetch(s, nodes, node_base, stack.below());
         }
         let mut unpacked = None;
-        let done = if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
+        let done = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
             count.leaf();
             count.triangles(leaf.triangles);
             enter_leaf(s, object, || ray, &mut state, (leaf, code)) == LeafOutcome::Done
@@ -151,7 +151,7 @@ pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
             let mut unpacked = None;
             match Child::from_code(code) {
                 Some(Child::Raw(at)) => {
-                    let leaf = object.raw(at, &mut unpacked);
+                    let leaf = raw_leaf(s, object, at, &mut unpacked);
                     count.leaf();
                     count.triangles(leaf.triangles);
                     enter_leaf(s, object, || ray, &mut state, (leaf, code)) == LeafOutcome::Done

@@ -2,13 +2,13 @@
 
 use super::placed::PlacedObject;
 use super::search::Search;
-use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch};
+use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
 use crate::query::Nearest;
 use crate::rays::PrimitiveRef;
-use crate::simd::{Isa, Kernel, LANES, Simd};
+use crate::simd::{Isa, Kernel, LANES, Part, Simd};
 use bth_format::exact::is_zero_area;
 use bth_format::layout::{Child, NONE, RawLeaf, TetLeaf, WIDTH};
 use bth_format::object::ObjectView;
@@ -93,11 +93,13 @@ impl Kernel for WalkKernel<'_> {
                 prefetch(s, Wide, node_base, stack.below());
             }
             let (mut indexed, mut raw) = (None, None);
-            if let Some(leaf) = indexed_leaf(object, node_base, code, &mut indexed) {
+            if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut indexed) {
                 walk.leaf(s, &point, leaf, limit, search);
             } else {
                 match Child::from_code(code) {
-                    Some(Child::Raw(at)) => walk.leaf(s, &point, object.raw(at, &mut raw), limit, search),
+                    Some(Child::Raw(at)) => {
+                        walk.leaf(s, &point, raw_leaf(s, object, at, &mut raw), limit, search)
+                    }
                     Some(Child::Tets(row)) => {
                         let leaf = &object.tet_leaves[row as usize];
                         if leaf.subtree != NONE {
@@ -114,6 +116,29 @@ impl Kernel for WalkKernel<'_> {
             limit = walk.limit(search);
             code = stack.pop::<Nearest>(limit);
         }
+    }
+}
+
+/// The triangles of `valid` that may be closer than `limit` and, if all that may be closest `is_offered`, than the others.
+struct Candidates<'a, S: Simd, B> {
+    point: &'a PointLanes<S>,
+    block: &'a B,
+    valid: u32,
+    limit: f32,
+    is_offered: bool,
+}
+
+impl<S: Simd, B: CornerLanes> Part<S> for Candidates<'_, S, B> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self, s: S) -> u32 {
+        let Candidates { point, block, valid, limit, is_offered } = self;
+        if block.is_beyond(s, point, limit) {
+            return 0;
+        }
+        let bounds = TriangleLanes::new(s, &block.relative(s, point));
+        let least = if is_offered { bounds.least_upper_bound(s, valid) } else { limit };
+        bounds.candidates(s, valid, least.min(limit))
     }
 }
 
@@ -141,15 +166,10 @@ impl ObjectWalk<'_> {
         if !S::HAS_VECTORS {
             return if is_beyond_called(s, point, block, limit) { 0 } else { valid };
         }
-        if block.is_beyond(s, point, limit) {
-            return 0;
-        }
-        let bounds = TriangleLanes::new(s, &block.relative(s, point));
         // In object space, the least upper bound says nothing about which triangle is closest in world space; nor does that of a
         // triangle of zero area, which is not offered.
         let is_offered = self.placed.is_none() && !self.object.is_deformable();
-        let least = if is_offered { bounds.least_upper_bound(s, valid) } else { limit };
-        bounds.candidates(s, valid, least.min(limit))
+        Candidates { point, block, valid, limit, is_offered }.inline_or_call(s)
     }
 
     /// Offers the triangles of a leaf.

@@ -10,7 +10,7 @@
 //! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches, so no crossing is missed by
 //! tests that exclude only what the closed ray certainly does not touch; and a weight or depth of certain sign keeps it.
 
-use crate::bvh::nodes::indexed_leaf;
+use crate::bvh::nodes::{indexed_leaf, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::{ChildBoxes, FAR};
@@ -18,7 +18,7 @@ use crate::intersect::crossing::crossing;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter, cross};
 use crate::query::Any;
 use crate::rays::Ray;
-use crate::simd::{Isa, Kernel, Simd};
+use crate::simd::{Isa, Kernel, Part, Simd};
 use bth_format::layout::{Child, NONE, TetLeaf, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -65,6 +65,21 @@ struct AxisRay {
     forward: f32,
     /// Projects triangles along the axis.
     filter: TriangleFilter,
+}
+
+/// [`AxisRay::crossings`] as a part of kernels.
+struct Crossings<'a, B> {
+    ray: &'a AxisRay,
+    block: &'a B,
+    valid: u32,
+}
+
+impl<S: Simd, B: TriangleBlock> Part<S> for Crossings<'_, B> {
+    type Output = i32;
+    #[inline(always)]
+    fn run(self, s: S) -> i32 {
+        self.ray.crossings(s, self.block, self.valid)
+    }
 }
 
 impl AxisRay {
@@ -128,6 +143,12 @@ impl AxisRay {
         if !S::HAS_VECTORS {
             return decide(&self.ray, block, valid);
         }
+        Crossings { ray: self, block, valid }.inline_or_call(s)
+    }
+
+    /// The signed number of crossings with the triangles of `valid`.
+    #[inline(always)]
+    fn crossings<S: Simd, B: TriangleBlock>(&self, s: S, block: &B, valid: u32) -> i32 {
         let [a, b, c] = block.project(s, &self.filter);
         let x = s.max(s.max_abs(a[0], b[0]), s.abs(c[0]));
         let y = s.max(s.max_abs(a[1], b[1]), s.abs(c[1]));
@@ -186,12 +207,12 @@ impl AxisRay {
                 continue;
             }
             let mut unpacked = None;
-            if let Some(leaf) = indexed_leaf(object, node_base, code, &mut unpacked) {
+            if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
                 winding += self.leaf(s, leaf);
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
-                    Some(Child::Raw(at)) => winding += self.leaf(s, object.raw(at, &mut unpacked)),
+                    Some(Child::Raw(at)) => winding += self.leaf(s, raw_leaf(s, object, at, &mut unpacked)),
                     Some(Child::Tets(row)) => {
                         let leaf = &object.tet_leaves[row as usize];
                         if leaf.subtree != NONE {

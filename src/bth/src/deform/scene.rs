@@ -1,9 +1,9 @@
 //! New positions of the objects of a [`Scene`].
 
+use crate::clock;
 use crate::instances::Update;
 use crate::scene::Scene;
 use bth_format::Error;
-use std::time::Instant;
 
 impl Scene {
     /// Number of vertices that [`Self::set_positions`] expects; `None` if the object was not compiled with `--deformable`.
@@ -30,11 +30,11 @@ impl Scene {
     /// positions is wrong or one is not finite, `BTH-S002` if the world box of an instance would not be finite, `BTH-O001` if there is
     /// not enough memory. The scene is then unchanged.
     pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<Update, Error> {
-        let start = Instant::now();
+        let start = clock::now();
         let deforming = self.objects_mut().deforming(object)?;
         deforming.stage(positions)?;
         deforming.refit_staged();
-        let (refit, deformed_cost_ratio) = (start.elapsed(), deforming.cost_ratio());
+        let (refit, deformed_cost_ratio) = (clock::elapsed(start), deforming.cost_ratio());
         let (objects, world) = self.objects_and_world_mut();
         let placed = match world {
             Some(world) => world.place_again(objects, &[object]),

@@ -3,13 +3,14 @@
 use super::evaluate::{self, Vertices};
 use super::pose::Pose;
 use super::sequences::{Moved, Sequences};
+use crate::clock;
 use crate::instances::NodeHierarchy;
 use crate::objects::Objects;
 use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
 use std::collections::{HashMap, HashSet};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What deforms the objects of a scene, by their index.
 #[derive(Debug, Default)]
@@ -150,14 +151,14 @@ impl Deformers {
         let Some(file) = objects.sole_file().filter(|_| !self.is_empty()).cloned() else {
             return Ok(deformed);
         };
-        let start = Instant::now();
+        let start = clock::now();
         deformed.posed = self.stage(objects, (&file, 0), (hierarchy, seconds), &|_| false)?;
         for object in &deformed.posed.objects {
             let deforming = objects.deforming(*object)?;
             deforming.refit_staged();
             deformed.cost_ratio = deformed.cost_ratio.max(deforming.cost_ratio());
         }
-        deformed.time = start.elapsed();
+        deformed.time = clock::elapsed(start);
         Ok(deformed)
     }
 

@@ -2,11 +2,11 @@
 
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::world::{InstanceRow, TransformSource, Update, World};
+use crate::clock;
 use crate::objects::Objects;
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
 use std::sync::OnceLock;
-use std::time::Instant;
 
 /// From this number of changed instances on, they are placed by several threads.
 #[cfg(feature = "rayon")]
@@ -130,7 +130,7 @@ impl World {
 
     /// Refits the top level if the same instances are visible and its cost permits, else builds it anew.
     pub(super) fn update_top(&mut self, same_visible: bool, update: &mut Update) {
-        let start = Instant::now();
+        let start = clock::now();
         if same_visible {
             self.top.refit(&self.placements);
         }
@@ -138,7 +138,7 @@ impl World {
             self.build_top();
             update.rebuilt = true;
         }
-        (update.cost_ratio, update.top_level) = (self.top.cost_ratio(), start.elapsed());
+        (update.cost_ratio, update.top_level) = (self.top.cost_ratio(), clock::elapsed(start));
     }
 
     /// Computes the placements of changed instances.
@@ -166,7 +166,7 @@ impl World {
         new: &impl Fn(u32) -> NewInstance,
         placed: &mut [Result<Option<Placement>, PlacementError>],
     ) {
-        // Its loops are of four f64, so AVX-512 would not make it faster.
+        // Its loops are of four f64, so AVX-512 would not make it faster, and registers of 128 bits hardly.
         Isa::chosen().min(Isa::Avx2).run(PlaceKernel { world: self, objects, changed, new, placed });
     }
 
@@ -220,7 +220,7 @@ impl<N: Fn(u32) -> NewInstance> Kernel for PlaceKernel<'_, N> {
     fn run<S: Simd>(self, _: S) {
         // The loops of a placement are vectorized with the registers of the instruction set.
         for (&instance, placed) in self.changed.iter().zip(self.placed) {
-            *placed = self.world.place(self.objects, &(self.new)(instance), S::HAS_VECTORS);
+            *placed = self.world.place(self.objects, &(self.new)(instance), S::INLINES_PARTS);
         }
     }
 }

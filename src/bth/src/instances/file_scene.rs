@@ -4,12 +4,12 @@ use super::affine::Affine;
 use super::hierarchy::NodeHierarchy;
 use super::placement::{PartBoxes, Placement, PlacementError};
 use super::world::{TransformSource, Update, World};
+use crate::clock;
 use crate::objects::Objects;
 use bth_format::SceneView;
 use bth_format::error::{Code, Error, Result};
 use bth_format::file::File;
 use bth_format::layout::*;
-use std::time::Instant;
 
 /// The scene sections of a scene that is a file with such sections.
 pub(super) fn scene_of(objects: &Objects) -> SceneView<'_> {
@@ -142,9 +142,9 @@ impl World {
             self.placements[row] = Some(placement);
         }
         if update.placed > 0 {
-            let start = Instant::now();
+            let start = clock::now();
             self.build_top();
-            (update.rebuilt, update.top_level) = (true, start.elapsed());
+            (update.rebuilt, update.top_level) = (true, clock::elapsed(start));
         }
         update.visible = self.placements.iter().flatten().count();
         Ok(update)

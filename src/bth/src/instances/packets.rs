@@ -9,11 +9,12 @@ use super::traverse::limit;
 use crate::bvh::packet::bounds::PacketBounds;
 use crate::bvh::packet::coherence::{PacketBackoff, Span, is_same_octant};
 use crate::bvh::packet::entry::{GROUPS, MIN_RAYS, PACKET};
-use crate::bvh::packet::frustum::Frustum;
-use crate::bvh::packet::ray_group::RayGroup;
+use crate::bvh::packet::frustum::{Frustum, FrustumOf};
+use crate::bvh::packet::ray_group::{PrepareGroup, RayGroup};
+use crate::bvh::packet::traverse::rays_meeting;
 use crate::bvh::stack::BOTTOM;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::WIDTH;
 use bth_format::object::ObjectBounds;
 
@@ -125,11 +126,12 @@ impl TopLevelPackets {
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
-            if !group.prepare::<Frustum<S, false>>(s, bounds, &rays[i * LANES..end]) {
+            let rays = &rays[i * LANES..end];
+            if !PrepareGroup::<S, Frustum<S, false>>::of(group, bounds, rays).inline_or_call(s) {
                 return Listed::Incoherent;
             }
         }
-        let frustum = Frustum::<S, false>::new(s, bounds, &span, groups);
+        let frustum = FrustumOf::<S, false> { bounds, span: &span, groups }.inline_or_call(s);
         let all = u64::MAX >> (PACKET - rays.len());
         let begin = self.items.len();
         let mut stack = [0; MAX_STACKED_NODES];
@@ -148,11 +150,7 @@ impl TopLevelPackets {
                     continue;
                 }
                 let corners = frustum.corners(node, slot);
-                let mut hit_rays = 0;
-                for (i, group) in groups.iter().enumerate() {
-                    hit_rays |= u64::from(group.may_enter::<Frustum<S, false>>(s, corners)) << (i * LANES);
-                }
-                let rays = hit_rays & all;
+                let rays = rays_meeting::<S, Frustum<S, false>>(s, groups, all, corners) & all;
                 if rays == 0 {
                     continue;
                 }

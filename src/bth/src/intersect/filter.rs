@@ -20,7 +20,7 @@
 use crate::intersect::boxes::RaySlabs;
 use crate::intersect::line::Line;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::{IndexedLeaf, Object, RawLeaf, WIDTH};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -105,7 +105,10 @@ impl<S: Simd> Candidates<S> {
 }
 
 /// Projected corners of sixteen triangles: `[corner][x, y, depth]`.
-pub(crate) type Corners<S> = [[<S as Simd>::F; 3]; 3];
+pub(crate) type Corners<S> = [[<S as Lanewise>::F; 3]; 3];
+
+/// Projected points of a leaf: x, y and depth of each.
+pub(crate) type PointRows = [[f32; 4]; WIDTH];
 
 /// The triangles of a leaf, in either of the leaf's record formats. Indices of triangles are taken modulo [`WIDTH`].
 pub(crate) trait TriangleBlock {
@@ -129,6 +132,15 @@ pub(crate) trait TriangleBlock {
     fn coordinate(&self, triangle: usize, corner: usize, axis: usize) -> f32;
     /// Projects the corners of all triangles.
     fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S>;
+    /// Projects the points of the leaf, if its triangles refer to them by index.
+    fn project_points<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Option<PointRows>;
+    /// As [`Self::project`], for a piece of the triangles, given the projected points.
+    fn project_piece<L: Lanewise>(
+        &self,
+        l: L,
+        filter: &TriangleFilter,
+        points: Option<&PointRows>,
+    ) -> Corners<L>;
 }
 
 /// For each lane the point whose index stands in `row`, out of sixteen points.
@@ -140,19 +152,19 @@ fn lookup_points<S: Simd>(s: S, [x, y, depth]: [S::F; 3], row: &[u8; WIDTH]) -> 
 
 /// Twice the signed area of the triangle (origin, p, q) in the plane of projection.
 #[inline(always)]
-pub(crate) fn cross<S: Simd>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
+pub(crate) fn cross<S: Lanewise>(s: S, p: [S::F; 3], q: [S::F; 3]) -> S::F {
     s.fnma(p[1], q[0], s.mul(p[0], q[1]))
 }
 
 /// The greatest |x| or |y| of the three corners.
 #[inline(always)]
-fn greatest_coordinate<S: Simd>(s: S, [a, b, c]: &Corners<S>) -> S::F {
+fn greatest_coordinate<S: Lanewise>(s: S, [a, b, c]: &Corners<S>) -> S::F {
     s.max(s.max(s.max_abs(a[0], a[1]), s.max_abs(b[0], b[1])), s.max_abs(c[0], c[1]))
 }
 
 /// |x| + |y| of a projected point.
 #[inline(always)]
-pub(crate) fn l1_norm<S: Simd>(s: S, p: [S::F; 3]) -> S::F {
+pub(crate) fn l1_norm<S: Lanewise>(s: S, p: [S::F; 3]) -> S::F {
     s.add(s.abs(p[0]), s.abs(p[1]))
 }
 
@@ -171,11 +183,38 @@ impl TriangleBlock for IndexedLeaf {
     }
     #[inline(always)]
     fn project<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Corners<S> {
+        if S::PIECES > 1 {
+            let mut rows = [[0.0; 4]; WIDTH];
+            s.store_rows(filter.project(s, &self.vertex), &mut rows);
+            return self.project_piece(s, filter, Some(&rows));
+        }
         let points = filter.project(s, &self.vertex);
         [
             lookup_points(s, points, &self.corner[0]),
             lookup_points(s, points, &self.corner[1]),
             lookup_points(s, points, &self.corner[2]),
+        ]
+    }
+    #[inline(always)]
+    fn project_points<S: Simd>(&self, s: S, filter: &TriangleFilter) -> Option<PointRows> {
+        let mut rows = [[0.0; 4]; WIDTH];
+        for i in 0..S::PIECES {
+            // A piece without a vertex is left out.
+            if lanes_of_piece::<S>(i).trailing_zeros() >= self.vertices {
+                break;
+            }
+            let piece = s.piece(i);
+            piece.store_rows(filter.project(piece, &self.vertex), &mut rows);
+        }
+        Some(rows)
+    }
+    #[inline(always)]
+    fn project_piece<L: Lanewise>(&self, l: L, _: &TriangleFilter, points: Option<&PointRows>) -> Corners<L> {
+        let points = points.expect("the points of this leaf were projected");
+        [
+            l.lookup_rows(points, &self.corner[0]),
+            l.lookup_rows(points, &self.corner[1]),
+            l.lookup_rows(points, &self.corner[2]),
         ]
     }
 }
@@ -199,6 +238,18 @@ impl TriangleBlock for RawLeaf {
             filter.project(s, &self.corner[0]),
             filter.project(s, &self.corner[1]),
             filter.project(s, &self.corner[2]),
+        ]
+    }
+    #[inline(always)]
+    fn project_points<S: Simd>(&self, _: S, _: &TriangleFilter) -> Option<PointRows> {
+        None
+    }
+    #[inline(always)]
+    fn project_piece<L: Lanewise>(&self, l: L, filter: &TriangleFilter, _: Option<&PointRows>) -> Corners<L> {
+        [
+            filter.project(l, &self.corner[0]),
+            filter.project(l, &self.corner[1]),
+            filter.project(l, &self.corner[2]),
         ]
     }
 }
@@ -226,7 +277,7 @@ impl TriangleFilter {
 
     /// Projects sixteen points, given as rows of x, y and z, to x, y and depth.
     #[inline(always)]
-    fn project<S: Simd>(&self, s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
+    fn project<S: Lanewise>(&self, s: S, rows: &[[f32; WIDTH]; 3]) -> [S::F; 3] {
         let depth = s.fma(s.load(&rows[self.axis[2] as usize]), s.splat(self.forward), s.splat(self.start));
         let x = s.sub(s.load(&rows[self.axis[0] as usize]), s.splat(self.origin[0]));
         let y = s.sub(s.load(&rows[self.axis[1] as usize]), s.splat(self.origin[1]));
@@ -242,23 +293,7 @@ impl TriangleFilter {
         first: f32,
         limit: f32,
     ) -> Candidates<S> {
-        if S::HAS_VECTORS {
-            self.candidates_inlined(s, block, first, limit)
-        } else {
-            self.candidates_called(s, block, first, limit)
-        }
-    }
-
-    /// [`Self::candidates`] as a function of its own: unrolled in every scalar kernel it would be half of their code.
-    #[inline(never)]
-    fn candidates_called<S: Simd, B: TriangleBlock>(
-        &self,
-        s: S,
-        block: &B,
-        first: f32,
-        limit: f32,
-    ) -> Candidates<S> {
-        self.candidates_inlined(s, block, first, limit)
+        CandidatesOf { filter: self, block, first, limit }.inline_or_call(s)
     }
 
     #[inline(always)]
@@ -270,27 +305,90 @@ impl TriangleFilter {
         limit: f32,
     ) -> Candidates<S> {
         let corners = block.project(s, self);
-        let greatest = greatest_coordinate(s, &corners);
-        let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
-        let sides = sides(s, &corners, error);
-        // At most as many triangles as lanes, even if an unchecked file has a greater count.
-        let valid = 1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH);
+        let sides = self.sides(s, &corners);
+        let (valid, error) = (valid_triangles(block), sides.error);
         // In most leaves that a ray enters, all triangles are missed: then depths need not be computed.
         if valid & !s.mask_bits(sides.missed) == 0 {
             return Candidates { maybe: 0, sure: 0, nearest: error, farthest: error };
         }
-        let tested = sides.bound_depths(s, &corners, s.splat(first), s.splat(limit));
+        let tested = self.bound_depths(s, sides, &corners, (first, limit));
         let maybe = valid & !s.mask_bits(tested.excluded);
-        let in_range =
-            s.and(s.le(s.splat(self.first), tested.nearest), s.le(tested.farthest, s.splat(self.last)));
-        let sure = maybe & s.mask_bits(s.and(tested.certain, in_range));
+        let sure = maybe & s.mask_bits(tested.certain);
         Candidates { maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
     }
+
+    /// The sides on which the ray passes the edges of triangles.
+    #[inline(always)]
+    fn sides<S: Lanewise>(&self, s: S, corners: &Corners<S>) -> Sides<S> {
+        let greatest = greatest_coordinate(s, corners);
+        let error = s.fma(greatest, s.splat(self.error_slope), s.splat(self.error_floor));
+        sides(s, corners, error)
+    }
+
+    /// As [`Sides::bound_depths`]; certain are only hits within the ray's range.
+    #[inline(always)]
+    fn bound_depths<S: Lanewise>(
+        &self,
+        s: S,
+        sides: Sides<S>,
+        corners: &Corners<S>,
+        (first, limit): (f32, f32),
+    ) -> FilteredTriangles<S> {
+        let tested = sides.bound_depths(s, corners, s.splat(first), s.splat(limit));
+        let in_range =
+            s.and(s.le(s.splat(self.first), tested.nearest), s.le(tested.farthest, s.splat(self.last)));
+        FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
+    }
+}
+
+/// [`TriangleFilter::candidates`] as a part of kernels.
+struct CandidatesOf<'a, B> {
+    filter: &'a TriangleFilter,
+    block: &'a B,
+    first: f32,
+    limit: f32,
+}
+
+impl<S: Simd, B: TriangleBlock> Part<S> for CandidatesOf<'_, B> {
+    type Output = Candidates<S>;
+    #[inline(always)]
+    fn run(self, s: S) -> Candidates<S> {
+        let CandidatesOf { filter, block, first, limit } = self;
+        if S::PIECES == 1 {
+            return filter.candidates_inlined(s, block, first, limit);
+        }
+        let valid = valid_triangles(block);
+        let (mut maybe, mut sure, mut nearest, mut farthest) = (0, 0, [0.0; LANES], [0.0; LANES]);
+        let points = block.project_points(s, filter);
+        for i in 0..S::PIECES {
+            let (valid, p) = (valid & lanes_of_piece::<S>(i), s.piece(i));
+            if valid == 0 {
+                break;
+            }
+            let corners = block.project_piece(p, filter, points.as_ref());
+            let sides = filter.sides(p, &corners);
+            if valid & !p.mask_bits(sides.missed) == 0 {
+                continue;
+            }
+            let tested = filter.bound_depths(p, sides, &corners, (first, limit));
+            maybe |= valid & !p.mask_bits(tested.excluded);
+            sure |= valid & p.mask_bits(tested.certain);
+            p.store(tested.nearest, &mut nearest);
+            p.store(tested.farthest, &mut farthest);
+        }
+        Candidates { maybe, sure: sure & maybe, nearest: s.load(&nearest), farthest: s.load(&farthest) }
+    }
+}
+
+/// The triangles of a leaf, a bit each: at most as many as lanes, even if an unchecked file has a greater count.
+#[inline(always)]
+fn valid_triangles(block: &impl TriangleBlock) -> u32 {
+    1u32.wrapping_shl(block.triangles()).wrapping_sub(1) & (u32::MAX >> WIDTH)
 }
 
 /// Result of the filter for sixteen pairs of a line and a triangle.
 #[derive(Clone, Copy)]
-pub(crate) struct FilteredTriangles<S: Simd> {
+pub(crate) struct FilteredTriangles<S: Lanewise> {
     /// Pairs that certainly miss, or whose hit certainly lies out of the range of depths.
     pub(crate) excluded: S::M,
     /// Pairs that certainly hit, within the range of depths or outside of it.
@@ -311,7 +409,7 @@ pub(crate) fn error_coefficients(reach: f32) -> [f32; 2] {
 
 /// Bound of the error of weights, 4δ(M + δ), from the greatest |x| + |y| (`l1_norm`) and |depth| of the projected corners.
 #[inline(always)]
-pub(crate) fn error<S: Simd>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
+pub(crate) fn error<S: Lanewise>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S::F) -> S::F {
     let reach = s.add(l1_norm, greatest_depth);
     const DELTA: f32 = F32_PROJECTION_ERROR as f32;
     // A little more than 4, to cover the roundings of δ itself.
@@ -320,7 +418,7 @@ pub(crate) fn error<S: Simd>(s: S, l1_norm: S::F, greatest_depth: S::F, floor: S
 
 /// Sides on which sixteen lines pass the edges of their triangles.
 #[derive(Clone, Copy)]
-struct Sides<S: Simd> {
+struct Sides<S: Lanewise> {
     /// Weights of the three corners: twice the signed areas opposite to them, not normalized.
     weight: [S::F; 3],
     /// Bound of the error of the weights.
@@ -334,7 +432,7 @@ struct Sides<S: Simd> {
 /// Tests sixteen triangles for hits at depths from `first` to `limit`. `error` bounds the error of the weights, see the
 /// head of this file.
 #[inline(always)]
-pub(crate) fn test_triangles<S: Simd>(
+pub(crate) fn test_triangles<S: Lanewise>(
     s: S,
     corners: Corners<S>,
     error: S::F,
@@ -345,7 +443,7 @@ pub(crate) fn test_triangles<S: Simd>(
 }
 
 #[inline(always)]
-fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
+fn sides<S: Lanewise>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
     let weight = [cross(s, b, c), cross(s, c, a), cross(s, a, b)];
     let minus_error = s.sub(s.splat(0.0), error);
     let least = s.min(s.min(weight[0], weight[1]), weight[2]);
@@ -356,7 +454,7 @@ fn sides<S: Simd>(s: S, &[a, b, c]: &Corners<S>, error: S::F) -> Sides<S> {
     Sides { weight, error, missed, certain }
 }
 
-impl<S: Simd> Sides<S> {
+impl<S: Lanewise> Sides<S> {
     /// Bounds the depths of the hits and compares them with the range from `first` to `limit`.
     #[inline(always)]
     fn bound_depths(self, s: S, [a, b, c]: &Corners<S>, first: S::F, limit: S::F) -> FilteredTriangles<S> {

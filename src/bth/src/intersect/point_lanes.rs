@@ -11,7 +11,7 @@
 //! the triangle, |q| is an upper bound.
 
 use super::boxes::{ChildBoxes, FAR};
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 
 const _: () = assert!(WIDTH == LANES);
@@ -77,22 +77,27 @@ pub(crate) struct PointLanes<S: Simd> {
     origin: [f32; 3],
 }
 
+/// [`PointLanes::children`] as a part of kernels.
+struct Children<'a, S: Simd, B> {
+    point: &'a PointLanes<S>,
+    node: &'a B,
+    limit: f32,
+}
+
+impl<S: Simd, B: ChildBoxes> Part<S> for Children<'_, S, B> {
+    type Output = (u32, S::F);
+    #[inline(always)]
+    fn run(self, s: S) -> (u32, S::F) {
+        self.point.children_inlined(s, self.node, self.limit)
+    }
+}
+
 impl<S: Simd> PointLanes<S> {
     /// The children of a node that may contain a point whose squared distance, scaled, is at most `limit`, as bits, and lower
     /// bounds of the scaled squared distances. Empty slots may be among them.
     #[inline(always)]
     pub(crate) fn children<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
-        if S::HAS_VECTORS {
-            self.children_inlined(s, node, limit)
-        } else {
-            self.children_called(s, node, limit)
-        }
-    }
-
-    /// [`Self::children`] as a function of its own, because unrolled in scalar kernels it would take much code.
-    #[inline(never)]
-    fn children_called<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
-        self.children_inlined(s, node, limit)
+        Children { point: self, node, limit }.inline_or_call(s)
     }
 
     #[inline(always)]
@@ -133,7 +138,14 @@ fn common_bounds<S: Simd>(s: S, points: &[[S::F; 3]]) -> TriangleLanes<S> {
     let zero = s.splat(0.0);
     let (mut q, mut square) = ([zero; 3], zero);
     for k in 0..3 {
-        q[k] = s.lookup(points[0][k], s.splat_u(0));
+        q[k] = if S::PIECES == 1 {
+            s.lookup(points[0][k], s.splat_u(0))
+        } else {
+            // A lookup in several registers takes longer than a store and a load.
+            let mut lanes = [0.0; LANES];
+            s.store(points[0][k], &mut lanes);
+            s.splat(lanes[0])
+        };
         square = s.fma(q[k], q[k], square);
     }
     let (mut support, mut reach) = (square, zero);
@@ -149,6 +161,14 @@ impl CornerLanes for IndexedLeaf {
     fn relative<S: Simd>(&self, s: S, point: &PointLanes<S>) -> [[S::F; 3]; 3] {
         let vertex = point.relative(s, &self.vertex);
         let mut corners = [vertex; 3];
+        if S::PIECES > 1 {
+            let mut rows = [[0.0; 4]; WIDTH];
+            s.store_rows(vertex, &mut rows);
+            for c in 0..3 {
+                corners[c] = s.lookup_rows(&rows, &self.corner[c]);
+            }
+            return corners;
+        }
         for c in 0..3 {
             let at = s.load_bytes(&self.corner[c]);
             for k in 0..3 {

@@ -4,11 +4,12 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{self, MIN_MEASURED_RAYS, Strategy};
+use super::strategy::{MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::packet;
 use crate::bvh::single::TetOutcome;
+use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
 use crate::query::{AnswerLanes, Any, Nearest, Query};
@@ -111,7 +112,7 @@ pub(crate) fn trace_batch<Q: Query>(
         Hinted::Measured if measured => choice.next(),
         Hinted::Measured => choice.best(),
     };
-    let start = if measured { strategy::now() } else { None };
+    let start = if measured { clock::now() } else { None };
     trace_with(object, rays, from.filter(|_| strategy == Strategy::Tets), scratch, sink);
     if let Some(start) = start {
         let seconds_per_ray = start.elapsed().as_secs_f64() / rays.len() as f64;
@@ -205,15 +206,15 @@ fn trace_hinted<Q: Query>(
 
 /// Whether a ray that starts on a known triangle may be faster through tetrahedra than through the BVH, if there is one.
 ///
-/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not; for other rays [`strategy`]
-/// chooses by measured time. No answer depends on this.
+/// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled;
+/// for other rays [`super::strategy`] chooses by measured time. No answer depends on this.
 fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     /// Greatest length of an any-hit ray that may gain, relative to the longest side of the object's box.
     const SHORT: f32 = 0.3;
     if !has_subtrees(object) {
         return true;
     }
-    if Isa::chosen() == Isa::Scalar {
+    if !Isa::chosen().walks_tets() {
         return false;
     }
     if !Q::ANY {
@@ -240,7 +241,7 @@ fn walk_tets<Q: Query>(
         let leaves = vec![sole_leaf; rays.len()];
         let mut batch =
             WalkBatch::new(object, records, WalkRays { rays, faces, leaves: &leaves }, queries, walks);
-        // In scalar code no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
+        // Where no walks are compiled, no ray is walked here, and `walks` stays `NotWalked`: rays are faster through the BVH.
         let _ = Isa::chosen().run_wide(&mut batch);
     }
 }

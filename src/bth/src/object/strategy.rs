@@ -5,8 +5,6 @@
 //! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
 //! that grow while it remains the slower one; in the long run it gets one batch in 256.
 
-use std::time::Instant;
-
 /// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Strategy {
@@ -116,11 +114,6 @@ impl Default for StrategyTable {
     fn default() -> Self {
         StrategyTable([(0, StrategyChoice::new()); Self::ROWS])
     }
-}
-
-/// The current time; `None` on targets without a clock, where [`Instant::now`] panics.
-pub(crate) fn now() -> Option<Instant> {
-    if cfg!(all(target_family = "wasm", target_os = "unknown")) { None } else { Some(Instant::now()) }
 }
 
 #[cfg(test)]

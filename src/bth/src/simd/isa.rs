@@ -1,11 +1,11 @@
 //! Choice of the instruction set of the kernels: detected once, or set by environment variable or call.
 
-use super::{Kernel, Scalar};
+use super::{Kernel, Simd};
 use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Environment variable with the name of the instruction set to use in place of the best: `scalar`, `avx2` or `avx512`.
+/// Environment variable with the name of the instruction set to use in place of the best: a name of [`Isa::ALL`].
 const ISA_VARIABLE: &str = "BTH_ISA";
 
 /// An instruction set for which kernels are compiled. Answers have the same bits on all of them.
@@ -13,6 +13,12 @@ const ISA_VARIABLE: &str = "BTH_ISA";
 pub enum Isa {
     /// The baseline of the compilation target.
     Scalar,
+    /// SSE4.1 (with SSSE3 and POPCNT), on x86-64.
+    Sse4,
+    /// NEON, on every AArch64.
+    Neon,
+    /// SIMD128 of WebAssembly, in modules that are compiled for it.
+    Simd128,
     /// AVX2 and FMA (x86-64-v3).
     Avx2,
     /// AVX-512 F, BW, CD, DQ and VL (x86-64-v4).
@@ -32,7 +38,10 @@ impl fmt::Display for IsaError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             IsaError::Unknown(name) => {
-                write!(f, "unknown instruction set {name:?}: expected scalar, avx2 or avx512")
+                write!(
+                    f,
+                    "unknown instruction set {name:?}: expected scalar, sse4, neon, simd128, avx2 or avx512"
+                )
             }
             IsaError::Missing(isa) => {
                 write!(f, "this machine does not have {isa}; the best is {}", Isa::best())
@@ -47,6 +56,9 @@ impl fmt::Display for Isa {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Isa::Scalar => "scalar",
+            Isa::Sse4 => "sse4",
+            Isa::Neon => "neon",
+            Isa::Simd128 => "simd128",
             Isa::Avx2 => "avx2",
             Isa::Avx512 => "avx512",
         })
@@ -66,33 +78,91 @@ impl FromStr for Isa {
 /// 0 as long as none is chosen, else the index in [`Isa::ALL`] plus one.
 static CHOSEN_ISA: AtomicU8 = AtomicU8::new(0);
 const SCALAR: u8 = Isa::Scalar as u8 + 1;
+const SSE4: u8 = Isa::Sse4 as u8 + 1;
+const NEON: u8 = Isa::Neon as u8 + 1;
+const SIMD128: u8 = Isa::Simd128 as u8 + 1;
 const AVX2: u8 = Isa::Avx2 as u8 + 1;
 
+/// Evaluates the expression with the token of an instruction set with vectors, if it is compiled for this target and this machine has
+/// it.
+macro_rules! with_vectors {
+    ($isa:expr, $simd:ident => $do:expr) => {
+        match $isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Sse4 => {
+                if let Some($simd) = super::quads::sse4::Sse4::detect() {
+                    $do;
+                }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => {
+                if let Some($simd) = super::avx2::Avx2::detect() {
+                    $do;
+                }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => {
+                if let Some($simd) = super::avx512::Avx512::detect() {
+                    $do;
+                }
+            }
+            #[cfg(target_arch = "aarch64")]
+            Isa::Neon => {
+                let $simd = super::quads::neon::Neon::new();
+                $do;
+            }
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Isa::Simd128 => {
+                let $simd = super::quads::simd128::Simd128::new();
+                $do;
+            }
+            _ => {}
+        }
+    };
+}
+
 /// Runs a kernel in scalar code. Not inlined, so that callers of [`Isa::run`] stay small.
+#[cfg(not(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128")))]
 #[inline(never)]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run(Scalar)
+    kernel.run(super::Scalar)
+}
+
+/// A module of WebAssembly for browsers that is compiled for SIMD128 has no scalar kernels, which would be half of its size.
+#[cfg(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))]
+fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
+    super::quads::simd128::Simd128::new().run(kernel)
 }
 
 impl Isa {
     /// All instruction sets, from the least to the most capable.
-    pub const ALL: [Isa; 3] = [Isa::Scalar, Isa::Avx2, Isa::Avx512];
+    pub const ALL: [Isa; 6] = [Isa::Scalar, Isa::Sse4, Isa::Neon, Isa::Simd128, Isa::Avx2, Isa::Avx512];
 
     /// Whether this machine has the instruction set.
     pub fn is_available(self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        return match self {
-            Isa::Scalar => true,
-            Isa::Avx2 => super::avx2::Avx2::detect().is_some(),
-            Isa::Avx512 => super::avx512::Avx512::detect().is_some(),
-        };
-        #[cfg(not(target_arch = "x86_64"))]
-        return self == Isa::Scalar;
+        struct Nothing;
+        impl Kernel for Nothing {
+            type Output = ();
+            #[inline(always)]
+            fn run<S: Simd>(self, _: S) {}
+        }
+        match self {
+            // See `run_scalar`.
+            Isa::Scalar => {
+                !cfg!(all(target_arch = "wasm32", target_os = "unknown", target_feature = "simd128"))
+            }
+            _ => self.run_wide(Nothing).is_ok(),
+        }
     }
 
     /// The most capable instruction set of this machine.
     pub fn best() -> Isa {
         Isa::ALL.into_iter().rev().find(|isa| isa.is_available()).unwrap_or(Isa::Scalar)
+    }
+
+    /// Whether walks of batches through tetrahedra are compiled for it. With 128 bits they would be a fifth of its code.
+    pub(crate) fn walks_tets(self) -> bool {
+        matches!(self, Isa::Avx2 | Isa::Avx512)
     }
 
     /// Uses this instruction set for all tracing in this process from now on.
@@ -114,6 +184,9 @@ impl Isa {
         match CHOSEN_ISA.load(Ordering::Relaxed) {
             0 => Isa::choose_first(),
             SCALAR => Isa::Scalar,
+            SSE4 => Isa::Sse4,
+            NEON => Isa::Neon,
+            SIMD128 => Isa::Simd128,
             AVX2 => Isa::Avx2,
             _ => Isa::Avx512,
         }
@@ -144,20 +217,7 @@ impl Isa {
     #[inline(always)]
     pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
-        #[cfg(target_arch = "x86_64")]
-        match self {
-            Isa::Scalar => {}
-            Isa::Avx2 => {
-                if let Some(simd) = super::avx2::Avx2::detect() {
-                    return simd.run(kernel);
-                }
-            }
-            Isa::Avx512 => {
-                if let Some(simd) = super::avx512::Avx512::detect() {
-                    return simd.run(kernel);
-                }
-            }
-        }
+        with_vectors!(self, simd => return simd.run(kernel));
         run_scalar(kernel)
     }
 
@@ -165,20 +225,7 @@ impl Isa {
     /// are no faster than other code without vectors: they are not compiled to scalar code.
     #[inline(always)]
     pub(crate) fn run_wide<K: Kernel>(self, kernel: K) -> Result<K::Output, K> {
-        #[cfg(target_arch = "x86_64")]
-        match self {
-            Isa::Scalar => {}
-            Isa::Avx2 => {
-                if let Some(simd) = super::avx2::Avx2::detect() {
-                    return Ok(simd.run(kernel));
-                }
-            }
-            Isa::Avx512 => {
-                if let Some(simd) = super::avx512::Avx512::detect() {
-                    return Ok(simd.run(kernel));
-                }
-            }
-        }
+        with_vectors!(self, simd => return Ok(simd.run(kernel)));
         Err(kernel)
     }
 }

@@ -14,6 +14,12 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod isa;
+#[cfg(any(
+    target_arch = "x86_64",
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
+mod quads;
 mod scalar;
 #[cfg(test)]
 mod tests;
@@ -36,24 +42,27 @@ pub(crate) trait Part<S> {
     type Output;
     /// Must be `#[inline(always)]`.
     fn run(self, simd: S) -> Self::Output;
+    /// Runs the part within the kernel, or calls it: see [`Simd::INLINES_PARTS`].
+    #[inline(always)]
+    fn inline_or_call(self, simd: S) -> Self::Output
+    where
+        Self: Sized,
+        S: Simd,
+    {
+        if S::INLINES_PARTS { self.run(simd) } else { simd.call(self) }
+    }
 }
 
-/// Operations on vectors of sixteen lanes. Where masks are given as bits, bit i stands for lane i.
-pub(crate) trait Simd: Copy + 'static {
+/// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a [piece](Simd::Piece), some of the sixteen;
+/// arrays always have sixteen elements, of which a piece reads and writes its own. Where masks are given as bits, bit i stands for lane
+/// i of sixteen.
+pub(crate) trait Lanewise: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
     /// u32 lanes.
     type U: Copy;
     /// A mask: a truth value for each lane.
     type M: Copy;
-
-    /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
-    const HAS_VECTORS: bool = true;
-
-    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set share: for parts that many
-    /// kernels need and that run long beside a call.
-    fn call<P: Part<Self>>(self, part: P) -> P::Output;
-
     fn splat(self, x: f32) -> Self::F;
     fn load(self, from: &[f32; LANES]) -> Self::F;
     fn store(self, a: Self::F, to: &mut [f32; LANES]);
@@ -78,6 +87,92 @@ pub(crate) trait Simd: Copy + 'static {
     fn le(self, a: Self::F, b: Self::F) -> Self::M;
     /// `a` where the mask is set, else `b`.
     fn select(self, m: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    fn splat_u(self, x: u32) -> Self::U;
+    fn load_u(self, from: &[u32; LANES]) -> Self::U;
+    /// Loads bytes, each zero-extended to a lane.
+    fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
+    /// Transposes three vectors to the first three elements of rows, for [`Self::lookup_rows`].
+    #[inline(always)]
+    fn store_rows(self, columns: [Self::F; 3], rows: &mut [[f32; 4]; LANES]) {
+        for k in 0..3 {
+            let mut lanes = [0.0; LANES];
+            self.store(columns[k], &mut lanes);
+            for i in 0..LANES {
+                rows[i][k] = lanes[i];
+            }
+        }
+    }
+    /// The first three elements of the rows whose indices, modulo 16, stand in `at`.
+    #[inline(always)]
+    fn lookup_rows(self, rows: &[[f32; 4]; LANES], at: &[u8; LANES]) -> [Self::F; 3] {
+        let mut out = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            for k in 0..3 {
+                out[k][i] = rows[usize::from(at[i]) % LANES][k];
+            }
+        }
+        [self.load(&out[0]), self.load(&out[1]), self.load(&out[2])]
+    }
+    fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
+    fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
+    /// a + b, wrapping, where the mask is set, else `a`.
+    fn add_where(self, a: Self::U, m: Self::M, b: Self::U) -> Self::U;
+    fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
+    fn shl_u<const K: u32>(self, a: Self::U) -> Self::U;
+    fn eq_u(self, a: Self::U, b: Self::U) -> Self::M;
+    /// a < b, unsigned.
+    fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
+    fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
+    /// The bits of f32 lanes.
+    fn bits(self, a: Self::F) -> Self::U;
+    /// f32 lanes from their bits.
+    fn floats(self, a: Self::U) -> Self::F;
+    /// Converts values below 2^24 to f32.
+    fn numbers(self, a: Self::U) -> Self::F;
+    /// The mask of the sixteen lowest bits.
+    fn mask(self, bits: u32) -> Self::M;
+    /// The bits of a mask; bits from the sixteenth on are 0.
+    fn mask_bits(self, m: Self::M) -> u32;
+    fn and(self, a: Self::M, b: Self::M) -> Self::M;
+    fn or(self, a: Self::M, b: Self::M) -> Self::M;
+    /// a and not b.
+    fn and_not(self, a: Self::M, b: Self::M) -> Self::M;
+}
+
+/// Operations on vectors of sixteen lanes across lanes and with memory.
+pub(crate) trait Simd: Lanewise {
+    /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
+    const HAS_VECTORS: bool = true;
+    /// Whether kernels contain their larger parts. Otherwise they call them ([`Self::call`]), because unrolled in every kernel, with
+    /// several registers for each vector, these would be the largest part of the library.
+    const INLINES_PARTS: bool = true;
+    /// The lanes of one register, where a vector fills several. Parts that are called treat one piece after the other where they can:
+    /// all their variables are then in registers, and pieces without work are left out.
+    type Piece: Lanewise;
+    /// Number of pieces. Piece i holds the i-th of as many equal parts of the lanes.
+    const PIECES: usize;
+    fn piece(self, i: usize) -> Self::Piece;
+    /// The lanes of a piece.
+    fn pick(piece: Self::Piece, a: &Self::F) -> <Self::Piece as Lanewise>::F;
+    /// Replaces the lanes of a piece.
+    fn put(piece: Self::Piece, to: &mut Self::F, a: <Self::Piece as Lanewise>::F);
+    /// Transposes sixteen vectors of a piece to rows, and stores the row of each lane as row `line` of its record.
+    fn store_transposed<const N: usize>(
+        piece: Self::Piece,
+        columns: [<Self::Piece as Lanewise>::F; LANES],
+        to: &mut [[[f32; LANES]; N]; LANES],
+        line: usize,
+    );
+    /// As [`Self::put`].
+    fn put_mask(piece: Self::Piece, to: &mut Self::M, m: <Self::Piece as Lanewise>::M);
+    /// As [`Self::pick`].
+    fn pick_mask(piece: Self::Piece, m: &Self::M) -> <Self::Piece as Lanewise>::M;
+
+    /// Runs a part of a kernel as a function of its own, which all kernels of the instruction set share: for parts that many
+    /// kernels need and that run long beside a call.
+    fn call<P: Part<Self>>(self, part: P) -> P::Output;
     /// Lane `at[i] % 16` of the table.
     fn lookup(self, table: Self::F, at: Self::U) -> Self::F;
     /// The least of all lanes, none of which may be NaN.
@@ -121,23 +216,6 @@ pub(crate) trait Simd: Copy + 'static {
     /// Assigns the elements of `from` in order to the lanes whose mask is set, from `from[0]` on; the other lanes are those of
     /// `a`.
     fn expand(self, a: Self::F, m: Self::M, from: &[f32; LANES]) -> Self::F;
-
-    fn splat_u(self, x: u32) -> Self::U;
-    fn load_u(self, from: &[u32; LANES]) -> Self::U;
-    /// Loads bytes, each zero-extended to a lane.
-    fn load_bytes(self, from: &[u8; LANES]) -> Self::U;
-    fn store_u(self, a: Self::U, to: &mut [u32; LANES]);
-    fn add_u(self, a: Self::U, b: Self::U) -> Self::U;
-    /// a + b, wrapping, where the mask is set, else `a`.
-    fn add_where(self, a: Self::U, m: Self::M, b: Self::U) -> Self::U;
-    fn and_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn or_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn xor_u(self, a: Self::U, b: Self::U) -> Self::U;
-    fn shl_u<const K: u32>(self, a: Self::U) -> Self::U;
-    fn eq_u(self, a: Self::U, b: Self::U) -> Self::M;
-    /// a < b, unsigned.
-    fn lt_u(self, a: Self::U, b: Self::U) -> Self::M;
-    fn select_u(self, m: Self::M, a: Self::U, b: Self::U) -> Self::U;
     /// As [`Self::lookup`].
     fn lookup_u(self, table: Self::U, at: Self::U) -> Self::U;
     /// Whether [`Self::lookup_f64`] compiles to a few instructions.
@@ -164,22 +242,6 @@ pub(crate) trait Simd: Copy + 'static {
     fn gather_pair(self, m: Self::M, from: &[[u32; 2]], at: Self::U) -> (Self::U, Self::U);
     /// As [`Self::expand`].
     fn expand_u(self, a: Self::U, m: Self::M, from: &[u32; LANES]) -> Self::U;
-    /// The bits of f32 lanes.
-    fn bits(self, a: Self::F) -> Self::U;
-    /// f32 lanes from their bits.
-    fn floats(self, a: Self::U) -> Self::F;
-    /// Converts values below 2^24 to f32.
-    fn numbers(self, a: Self::U) -> Self::F;
-
-    /// The mask of the sixteen lowest bits.
-    fn mask(self, bits: u32) -> Self::M;
-    /// The bits of a mask; bits from the sixteenth on are 0.
-    fn mask_bits(self, m: Self::M) -> u32;
-    fn and(self, a: Self::M, b: Self::M) -> Self::M;
-    fn or(self, a: Self::M, b: Self::M) -> Self::M;
-    /// a and not b.
-    fn and_not(self, a: Self::M, b: Self::M) -> Self::M;
-
     /// Stores the lanes whose bit is set, in order, from `to[0]` on, and returns their number. The rest of `to` is undefined.
     fn compress(self, bits: u32, a: Self::U, to: &mut [u32; LANES]) -> usize;
     /// As [`Self::compress`].
@@ -210,10 +272,8 @@ pub(crate) trait Simd: Copy + 'static {
     }
     /// Removes the entries whose key exceeds the limit from `codes` and `keys`, keeping the order, and returns how many remain.
     fn keep_up_to(self, codes: &mut [u32], keys: &mut [f32], limit: f32) -> usize;
-
     /// Transposes: lane k of row i becomes lane i of row k.
     fn transpose(self, rows: [Self::F; LANES]) -> [Self::F; LANES];
-
     /// Lane i of the result is the least lane of row i; no lane may be NaN.
     #[inline(always)]
     fn least_of_each(self, rows: [Self::F; LANES]) -> Self::F {
@@ -227,14 +287,61 @@ pub(crate) trait Simd: Copy + 'static {
         }
         columns[0]
     }
-
     /// Prefetches a cache line; any address is allowed.
     fn prefetch<T>(self, address: *const T);
 }
 
+/// The lanes of a [piece](Simd::Piece), a bit each.
+#[inline(always)]
+pub(crate) fn lanes_of_piece<S: Simd>(i: usize) -> u32 {
+    let lanes = LANES / S::PIECES;
+    (0xffff >> (LANES - lanes)) << (i * lanes)
+}
+
+/// Defines the one piece of an instruction set whose vectors are not treated in pieces.
+macro_rules! one_piece {
+    () => {
+        type Piece = Self;
+        const PIECES: usize = 1;
+        #[inline(always)]
+        fn piece(self, _: usize) -> Self {
+            self
+        }
+        #[inline(always)]
+        fn pick(_: Self, a: &Self::F) -> Self::F {
+            *a
+        }
+        #[inline(always)]
+        fn put(_: Self, to: &mut Self::F, a: Self::F) {
+            *to = a;
+        }
+        #[inline(always)]
+        fn store_transposed<const N: usize>(
+            piece: Self,
+            columns: [Self::F; LANES],
+            to: &mut [[[f32; LANES]; N]; LANES],
+            line: usize,
+        ) {
+            let rows = piece.transpose(columns);
+            for lane in 0..LANES {
+                piece.store(rows[lane], &mut to[lane][line]);
+            }
+        }
+        #[inline(always)]
+        fn put_mask(_: Self, to: &mut Self::M, m: Self::M) {
+            *to = m;
+        }
+        #[inline(always)]
+        fn pick_mask(_: Self, m: &Self::M) -> Self::M {
+            *m
+        }
+    };
+}
+use one_piece;
+
 /// Panics unless the indices of all lanes of the mask are below `len` and below 2^31, because gathers have signed 32-bit indices.
 #[inline(always)]
-#[cfg(target_arch = "x86_64")]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 fn assert_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
     let len = u32::try_from(len).unwrap_or(u32::MAX).min(1 << 31);
     let outside = s.and_not(m, s.lt_u(at, s.splat_u(len)));
@@ -244,7 +351,7 @@ fn assert_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) {
 /// The indices of the lanes of the mask, and 0 for the other lanes, so that every lane has a valid index of a slice of length
 /// `len`. Panics if the slice is empty, and as [`assert_indices`].
 #[inline(always)]
-#[cfg(target_arch = "x86_64")]
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))]
 fn valid_indices<S: Simd>(s: S, m: S::M, at: S::U, len: usize) -> [u32; LANES] {
     assert!(len > 0, "rows of nothing");
     assert_indices(s, m, at, len);

@@ -4,7 +4,7 @@
 //! that are faster only with vectors are not compiled for it ([`Simd::HAS_VECTORS`]): unrolled, they would be the largest part
 //! of the library.
 
-use super::{LANES, Part, Simd};
+use super::{LANES, Lanewise, Part, Simd, one_piece};
 use std::array::from_fn;
 
 /// The token of scalar code, which runs on every machine.
@@ -210,17 +210,10 @@ fn floats(a: U) -> F {
     zerocopy::transmute!(a)
 }
 
-impl Simd for Scalar {
+impl Lanewise for Scalar {
     type F = F;
     type U = U;
     type M = M;
-    const HAS_VECTORS: bool = false;
-
-    #[inline(never)]
-    fn call<P: Part<Self>>(self, part: P) -> P::Output {
-        part.run(self)
-    }
-
     methods! {
         add(a: F, b: F) -> F;
         sub(a: F, b: F) -> F;
@@ -234,7 +227,6 @@ impl Simd for Scalar {
         max_abs(a: F, b: F) -> F;
         lt(a: F, b: F) -> M;
         le(a: F, b: F) -> M;
-        least(a: F) -> f32;
         add_u(a: U, b: U) -> U;
         add_where(a: U, m: M, b: U) -> U;
         and_u(a: U, b: U) -> U;
@@ -246,7 +238,6 @@ impl Simd for Scalar {
         numbers(a: U) -> F;
         mask_bits(m: M) -> u32;
     }
-
     #[inline(always)]
     fn splat(self, x: f32) -> F {
         [x; LANES]
@@ -263,27 +254,6 @@ impl Simd for Scalar {
     fn select(self, m: M, a: F, b: F) -> F {
         floats(select_u(&m, &words(a), &words(b)))
     }
-    #[inline(always)]
-    fn lookup(self, table: F, at: U) -> F {
-        floats(lookup(&words(table), &at))
-    }
-    #[inline(always)]
-    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
-        columns(&m, from, &row)
-    }
-    #[inline(always)]
-    fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
-        columns(&m, from, &row)
-    }
-    #[inline(always)]
-    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
-        columns_of_all(rows)
-    }
-    #[inline(always)]
-    fn expand(self, a: F, m: M, from: &F) -> F {
-        floats(expand(&words(a), &m, &words(*from)))
-    }
-
     #[inline(always)]
     fn splat_u(self, x: u32) -> U {
         [x; LANES]
@@ -305,22 +275,6 @@ impl Simd for Scalar {
         shl(&a, K)
     }
     #[inline(always)]
-    fn lookup_u(self, table: U, at: U) -> U {
-        lookup(&table, &at)
-    }
-    #[inline(always)]
-    fn gather_u(self, m: M, from: &[u32], at: U) -> U {
-        gather(&m, from, &at)
-    }
-    #[inline(always)]
-    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
-        gather_pair(&m, from, &at)
-    }
-    #[inline(always)]
-    fn expand_u(self, a: U, m: M, from: &U) -> U {
-        expand(&a, &m, from)
-    }
-    #[inline(always)]
     fn bits(self, a: F) -> U {
         words(a)
     }
@@ -328,7 +282,6 @@ impl Simd for Scalar {
     fn floats(self, a: U) -> F {
         floats(a)
     }
-
     #[inline(always)]
     fn mask(self, bits: u32) -> M {
         mask(bits)
@@ -345,7 +298,57 @@ impl Simd for Scalar {
     fn and_not(self, a: M, b: M) -> M {
         and_not_u(&a, &b)
     }
+}
 
+impl Simd for Scalar {
+    one_piece!();
+
+    const HAS_VECTORS: bool = false;
+    const INLINES_PARTS: bool = false;
+
+    methods! {
+        least(a: F) -> f32;
+    }
+    #[inline(never)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        part.run(self)
+    }
+    #[inline(always)]
+    fn lookup(self, table: F, at: U) -> F {
+        floats(lookup(&words(table), &at))
+    }
+    #[inline(always)]
+    fn rows4(self, m: M, from: &[[f32; 4]], row: U) -> [F; 4] {
+        columns(&m, from, &row)
+    }
+    #[inline(always)]
+    fn rows8(self, m: M, from: &[[u32; 8]], row: U) -> [U; 8] {
+        columns(&m, from, &row)
+    }
+    #[inline(always)]
+    fn columns8(self, rows: &[[u32; 8]; LANES]) -> [U; 8] {
+        columns_of_all(rows)
+    }
+    #[inline(always)]
+    fn expand(self, a: F, m: M, from: &F) -> F {
+        floats(expand(&words(a), &m, &words(*from)))
+    }
+    #[inline(always)]
+    fn lookup_u(self, table: U, at: U) -> U {
+        lookup(&table, &at)
+    }
+    #[inline(always)]
+    fn gather_u(self, m: M, from: &[u32], at: U) -> U {
+        gather(&m, from, &at)
+    }
+    #[inline(always)]
+    fn gather_pair(self, m: M, from: &[[u32; 2]], at: U) -> (U, U) {
+        gather_pair(&m, from, &at)
+    }
+    #[inline(always)]
+    fn expand_u(self, a: U, m: M, from: &U) -> U {
+        expand(&a, &m, from)
+    }
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut U) -> usize {
         compress(bits, &a, to)

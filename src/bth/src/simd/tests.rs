@@ -100,6 +100,15 @@ impl Kernel for AllOperations<'_> {
             *row = s.sub(s.splat(i as f32 - 8.0), s.lookup(*row, s.add_u(x, s.splat_u(i as u32))));
         }
         turned.extend(u(s.bits(s.least_of_each(signed))));
+        let rows = [bytes, bytes.map(|x| x / 3), bytes.map(|x| x.wrapping_mul(7))]
+            .map(|row| row.map(|x| x % LANES as u8));
+        let mut points = [[0.0; 4]; LANES];
+        s.store_rows([a, b, s.add(a, b)], &mut points);
+        for row in &rows {
+            for x in s.lookup_rows(&points, row) {
+                turned.extend(f(x));
+            }
+        }
         let zero = s.splat(0.0);
         for column in s.rows4(mask, table.as_chunks().0, s.and_u(x, s.splat_u(7))) {
             turned.extend(f(s.select(mask, column, zero)));

@@ -121,6 +121,10 @@ impl<Q: Query + Copy> Kernel for &mut WalkBatch<'_, Q> {
     /// Walks all rays of the batch.
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
+        // See `Isa::walks_tets`.
+        if !S::INLINES_PARTS {
+            return;
+        }
         let records = self.walks.records;
         let vertices = vertices(self.walks.object);
         let mut queue = PreparedQueue::new();

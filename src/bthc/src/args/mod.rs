@@ -17,8 +17,8 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(name = "bthc", version, disable_version_flag = true, arg_required_else_help = true, after_help = EXIT_CODES, max_term_width = 100)]
 pub(crate) struct Args {
-    /// Instruction set for tracing: scalar, avx2 or avx512. By default what BTH_ISA says, else the best of this
-    /// machine. Answers do not depend on it.
+    /// Instruction set for tracing: scalar, sse4, neon, simd128, avx2 or avx512. By default what BTH_ISA says, else the
+    /// best of this machine. Answers do not depend on it.
     #[arg(long, global = true, value_name = "ISA")]
     pub(crate) isa: Option<bth::Isa>,
     /// Print the version and end.

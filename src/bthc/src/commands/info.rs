@@ -249,6 +249,7 @@ fn summary(file: &File) -> Result<String, Failure> {
 fn cpu() -> Value {
     #[cfg(target_arch = "x86_64")]
     let features = json!({
+        "sse4.1": is_x86_feature_detected!("sse4.1"),
         "avx2": is_x86_feature_detected!("avx2"),
         "fma": is_x86_feature_detected!("fma"),
         "avx512f": is_x86_feature_detected!("avx512f"),

@@ -31,8 +31,8 @@ pub struct Compare {
     /// Only these ray sets.
     #[arg(long = "set", value_name = "NAME,…", default_value = "", hide_default_value = true)]
     pub sets: Names,
-    /// Vector instructions of both builds; the best that the machine has when absent.
-    #[arg(long, value_name = "NAME")]
+    /// Vector instructions of both builds, or of the old and the new one; the best that the machine has when absent.
+    #[arg(long, value_name = "NAME[,NAME]")]
     pub isa: Option<String>,
     /// A set is slower when its mean over the models is certainly (95 %) greater by more than this, such as `1%`.
     #[arg(long, value_name = "P%", default_value = "1%", value_parser = share)]

@@ -51,6 +51,11 @@ impl Build {
         }
     }
 
+    /// Whether the builds were loaded from two files: each has its own choice of instruction set.
+    pub(super) fn is_other_than(&self, other: &Build) -> bool {
+        self.nearest as usize != other.nearest as usize
+    }
+
     /// Opens a compiled file with this build.
     ///
     /// # Errors

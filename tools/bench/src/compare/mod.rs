@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::rays::{self, Finder, RaySet};
 use crate::rounds::quartiles;
 use anyhow::{Context, Result, bail, ensure};
-use bth::rays::Hit;
+use bth::rays::{Hit, Ray};
 use std::io::Write;
 
 /// Seconds of CPU time that a turn takes at least; small sets are traced several times a turn, as the clock is too coarse for
@@ -35,8 +35,20 @@ pub fn run(arguments: &Compare) -> Result<Verdict> {
     if let Some(name) = arguments.sets.unknown(&rays::NAMES).first() {
         bail!("--set {name}: there are {}", rays::NAMES.join(", "));
     }
-    isa::select_for_libraries(arguments.isa.as_deref())?;
+    let names = arguments.isa.as_deref().map(|names| names.split_once(',').unwrap_or((names, names)));
     let [old, new] = [Build::load(&arguments.old)?, Build::load(&arguments.new)?];
+    if let Some((first, second)) = names {
+        let any_model = CompiledModel::load("torus-knot:320")?;
+        for (build, isa) in [(&old, first), (&new, second)] {
+            isa::select_for_libraries(isa)?;
+            // A build reads the environment when it traces for the first time.
+            build.open(&any_model.file)?.any(&[Ray::new([0.0; 3], [1.0; 3])], &mut [false], 1);
+        }
+        ensure!(
+            first == second || old.is_other_than(&new),
+            "two instruction sets need two files: copy the library"
+        );
+    }
     let progress = Progress::new();
     let mut comparison = Comparison { batch: arguments.batch, worse: arguments.worse, models: Vec::new() };
     for which in &arguments.models {

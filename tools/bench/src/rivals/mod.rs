@@ -20,11 +20,12 @@ pub struct Rival {
 }
 
 /// All rivals, in the order of the tables.
-pub const RIVALS: [Rival; 9] = [
+pub const RIVALS: [Rival; 10] = [
     Rival { name: embree::NAME, build: |m, n, t| embree::contender(m, n, &embree::DEFAULT, t) },
     Rival { name: "embree robust", build: |m, n, t| embree::contender(m, n, &embree::ROBUST, t) },
     Rival { name: "embree compact", build: |m, n, t| embree::contender(m, n, &embree::COMPACT, t) },
     Rival { name: "embree hq packet16", build: |m, n, t| embree::contender(m, n, &embree::PACKETS, t) },
+    Rival { name: "embree sse4.2", build: |m, n, t| embree::contender(m, n, &embree::SSE4, t) },
     Rival { name: "tinybvh bvh8 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Eight) },
     Rival { name: "tinybvh bvh4 hq", build: |m, n, _| tinybvh::contender(m, n, tinybvh::Width::Four) },
     Rival { name: "obvhs cwbvh", build: |m, n, _| obvhs::cwbvh(m, n) },

@@ -5,7 +5,7 @@ use super::coherence::Span;
 use super::ray_group::RayGroup;
 use crate::intersect::boxes::{self, PAD};
 use crate::intersect::prepare;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 use bth_format::object::ObjectBounds;
 
@@ -122,6 +122,21 @@ impl<S: Simd, const POINT: bool> Frustum<S, POINT> {
             frustum.lower[j] = pad + addend[1];
         }
         frustum
+    }
+}
+
+/// [`Frustum::new`] as a part of kernels.
+pub(crate) struct FrustumOf<'a, S: Simd, const POINT: bool> {
+    pub(crate) bounds: &'a ObjectBounds,
+    pub(crate) span: &'a Span,
+    pub(crate) groups: &'a [RayGroup<S>],
+}
+
+impl<S: Simd, const POINT: bool> Part<S> for FrustumOf<'_, S, POINT> {
+    type Output = Frustum<S, POINT>;
+    #[inline(always)]
+    fn run(self, s: S) -> Frustum<S, POINT> {
+        Frustum::new(s, self.bounds, self.span, self.groups)
     }
 }
 

@@ -7,18 +7,18 @@
 
 use super::bounds::PacketBounds;
 use super::hit_cache::{HitCache, UNCACHED};
-use super::leaf_mesh::{Leaf, LeafMesh};
+use super::leaf_mesh::{Leaf, LeafMesh, Outside};
 use super::points::{
     CornerSource, POINTS, ProjectedMaxima, ProjectedOnDemand, ProjectedPoints, RelativePoints,
 };
-use super::ray_group::RayGroup;
+use super::ray_group::{RayGroup, RayLimits};
 use super::single_rays::{FEW_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
-use crate::intersect::filter;
+use crate::intersect::filter::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
 use crate::query::Query;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::{NONE, WIDTH};
 use bth_format::object::ObjectView;
 
@@ -66,6 +66,77 @@ impl UncachedHits {
     }
 }
 
+/// The rays of a group that may hit a triangle, a bit each.
+struct RayTest<S: Simd> {
+    /// Rays that do not certainly miss it.
+    maybe: u32,
+    /// Rays that certainly hit it within their range.
+    sure: u32,
+    /// Lower bounds of the depths of the hits.
+    nearest: S::F,
+    /// Upper bounds of the depths of the hits.
+    farthest: S::F,
+}
+
+/// Rays that certainly miss a triangle; `error` bounds the errors of its weights.
+#[inline(always)]
+fn missed<S: Lanewise>(s: S, [a, b, c]: &Corners<S>, error: S::F) -> S::M {
+    let weight = [filter::cross(s, *b, *c), filter::cross(s, *c, *a), filter::cross(s, *a, *b)];
+    let least = s.min(s.min(weight[0], weight[1]), weight[2]);
+    let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
+    s.and(s.lt(least, s.sub(s.splat(0.0), error)), s.lt(error, greatest))
+}
+
+impl<S: Lanewise> RayLimits<S> {
+    /// Tests rays against a triangle, with the error bound of the triangle itself.
+    #[inline(always)]
+    fn test(&self, s: S, [a, b, c]: Corners<S>) -> FilteredTriangles<S> {
+        let norm = s.max(s.max(filter::l1_norm(s, a), filter::l1_norm(s, b)), filter::l1_norm(s, c));
+        let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
+        let error = filter::error(s, norm, depth, s.splat(f32::MIN_POSITIVE));
+        let tested = filter::test_triangles(s, [a, b, c], error, self.first, self.limit);
+        let in_range = s.and(s.le(self.certain[0], tested.nearest), s.le(tested.farthest, self.certain[1]));
+        FilteredTriangles { certain: s.and(tested.certain, in_range), ..tested }
+    }
+}
+
+/// The test of the active rays of a group against a triangle, as a part of kernels.
+struct TestRays<'a, S: Simd, C> {
+    group: &'a RayGroup<S>,
+    corners: &'a C,
+    /// Indices of the triangle's points.
+    points: [usize; 3],
+    /// Bound of the errors of weights.
+    error: &'a S::F,
+    active: u32,
+}
+
+impl<S: Simd, C: CornerSource<S>> Part<S> for TestRays<'_, S, C> {
+    type Output = RayTest<S>;
+    #[inline(always)]
+    fn run(self, s: S) -> RayTest<S> {
+        let TestRays { group, corners, points: [a, b, c], error, active } = self;
+        let (mut maybe, mut sure, mut nearest, mut farthest) = (0, 0, [0.0; LANES], [0.0; LANES]);
+        for i in 0..S::PIECES {
+            let (active, p) = (active & lanes_of_piece::<S>(i), s.piece(i));
+            if active == 0 {
+                continue;
+            }
+            let corners =
+                [corners.corner_of_piece(p, a), corners.corner_of_piece(p, b), corners.corner_of_piece(p, c)];
+            if active & !p.mask_bits(missed(p, &corners, S::pick(p, error))) == 0 {
+                continue;
+            }
+            let tested = group.limits_of_piece(p).test(p, corners);
+            maybe |= active & !p.mask_bits(tested.excluded);
+            sure |= active & p.mask_bits(tested.certain);
+            p.store(tested.nearest, &mut nearest);
+            p.store(tested.farthest, &mut farthest);
+        }
+        RayTest { maybe, sure: sure & maybe, nearest: s.load(&nearest), farthest: s.load(&farthest) }
+    }
+}
+
 impl<Q: Query> PacketRays<'_, Q> {
     /// Intersects the rays whose bit is set with the triangles of a leaf. Returns whether any has a nearer hit than before. It is a
     /// part of the kernel of packets and inlined into it: the parameters are variables of its caller.
@@ -93,7 +164,8 @@ impl<Q: Query> PacketRays<'_, Q> {
             }
         }
         let count = leaf.block.triangles().min(WIDTH as u32);
-        let triangles = !leaf.block.outside(s, bounds) & ((1 << count) - 1);
+        let outside = Outside { bounds, block: leaf.block }.inline_or_call(s);
+        let triangles = !outside & ((1 << count) - 1);
         let (mut used, mut remaining) = (0u64, triangles);
         while remaining != 0 {
             let [a, b, c] = leaf.block.points_of(remaining.trailing_zeros() as usize);
@@ -220,36 +292,33 @@ impl<Q: Query> PacketRays<'_, Q> {
         mut triangles: u32,
         mut active: u32,
     ) -> bool {
-        let floor = s.splat(f32::MIN_POSITIVE);
-        let minus_error = s.sub(s.splat(0.0), error);
         let mut nearer = false;
         while triangles != 0 {
             let triangle = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let [a, b, c] = leaf.block.points_of(triangle as usize);
-            let (a, b, c) = (corners.corner(s, a), corners.corner(s, b), corners.corner(s, c));
-            let weight = [filter::cross(s, b, c), filter::cross(s, c, a), filter::cross(s, a, b)];
-            let least = s.min(s.min(weight[0], weight[1]), weight[2]);
-            let greatest = s.max(s.max(weight[0], weight[1]), weight[2]);
-            let missed = s.mask_bits(s.and(s.lt(least, minus_error), s.lt(error, greatest)));
-            if active & !missed == 0 {
+            let RayTest { maybe, sure, nearest, farthest } = if S::INLINES_PARTS {
+                let corners = [corners.corner(s, a), corners.corner(s, b), corners.corner(s, c)];
+                if active & !s.mask_bits(missed(s, &corners, error)) == 0 {
+                    continue;
+                }
+                let tested = group.limits().test(s, corners);
+                let maybe = active & !s.mask_bits(tested.excluded);
+                let sure = maybe & s.mask_bits(tested.certain);
+                RayTest { maybe, sure, nearest: tested.nearest, farthest: tested.farthest }
+            } else {
+                s.call(TestRays { group: &*group, corners, points: [a, b, c], error: &error, active })
+            };
+            if !S::INLINES_PARTS && maybe == 0 {
                 continue;
             }
-            let norm = s.max(s.max(filter::l1_norm(s, a), filter::l1_norm(s, b)), filter::l1_norm(s, c));
-            let depth = s.max_abs(s.max_abs(a[2], b[2]), c[2]);
-            let error = filter::error(s, norm, depth, floor);
-            let tested = filter::test_triangles(s, [a, b, c], error, group.first, group.limit);
-            let maybe = active & !s.mask_bits(tested.excluded);
-            let in_range =
-                s.and(s.le(group.certain[0], tested.nearest), s.le(tested.farthest, group.certain[1]));
-            let sure = maybe & s.mask_bits(s.and(tested.certain, in_range));
             let candidate = Candidate { leaf: leaf.code, triangle };
             let clear = if Q::ANY {
                 self.alive &= !(u64::from(sure) << (at * LANES));
                 active &= !sure;
                 sure
             } else {
-                let clear = sure & s.mask_bits(s.lt(tested.farthest, group.nearest));
+                let clear = sure & s.mask_bits(s.lt(farthest, group.nearest));
                 let m = s.mask(clear);
                 if clear != 0 {
                     let cache_index = &mut cache_indices[triangle as usize % WIDTH];
@@ -259,7 +328,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                         *cache_index = self.hit_cache.add(leaf, triangle) as u8;
                     }
                     let pending = u32::from(*cache_index);
-                    group.accept(s, m, [tested.nearest, tested.farthest], pending);
+                    group.accept(s, m, [nearest, farthest], pending);
                     if pending == UNCACHED {
                         group.store_uncached(s, m, leaf, triangle);
                     }

@@ -3,7 +3,7 @@
 use super::bounds::PacketBounds;
 use super::points::RelativePoints;
 use crate::intersect::filter::TriangleBlock;
-use crate::simd::Simd;
+use crate::simd::{Part, Simd};
 use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
 
 /// A leaf's record and its child code.
@@ -30,6 +30,20 @@ pub(crate) trait LeafMesh: TriangleBlock {
     fn relative<S: Simd>(&self, s: S, origin: [f32; 3], points: &mut RelativePoints);
     /// The triangles whose corners all lie beyond the same side of the bounds, a bit each: all rays miss them.
     fn outside<S: Simd, H: PacketBounds<S>>(&self, s: S, bounds: &H) -> u32;
+}
+
+/// [`LeafMesh::outside`] as a part of kernels.
+pub(crate) struct Outside<'a, H, B> {
+    pub(crate) bounds: &'a H,
+    pub(crate) block: &'a B,
+}
+
+impl<S: Simd, H: PacketBounds<S>, B: LeafMesh> Part<S> for Outside<'_, H, B> {
+    type Output = u32;
+    #[inline(always)]
+    fn run(self, s: S) -> u32 {
+        self.block.outside(s, self.bounds)
+    }
 }
 
 /// The lanes in which the three words have a bit in common.

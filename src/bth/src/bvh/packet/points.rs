@@ -3,7 +3,7 @@
 use super::bounds::FrustumView;
 use super::projection::Projection;
 use crate::intersect::exact_lanes::F32Lanes;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::layout::WIDTH;
 
 /// Greatest number of points of a leaf.
@@ -26,7 +26,7 @@ impl ProjectedPoints {
     }
 
     #[inline(always)]
-    fn get<S: Simd>(&self, s: S, i: usize) -> [S::F; 3] {
+    fn get<S: Lanewise>(&self, s: S, i: usize) -> [S::F; 3] {
         let [x, y, depth] = &self.0[i];
         [s.load(x), s.load(y), s.load(depth)]
     }
@@ -75,12 +75,18 @@ impl RelativePoints {
 pub(crate) trait CornerSource<S: Simd> {
     /// x, y and depth of a point in the projections along sixteen rays.
     fn corner(&self, s: S, point: usize) -> [S::F; 3];
+    /// As [`Self::corner`], along the rays of a piece.
+    fn corner_of_piece(&self, piece: S::Piece, point: usize) -> [<S::Piece as Lanewise>::F; 3];
 }
 
 impl<S: Simd> CornerSource<S> for ProjectedPoints {
     #[inline(always)]
     fn corner(&self, s: S, point: usize) -> [S::F; 3] {
         self.get(s, point)
+    }
+    #[inline(always)]
+    fn corner_of_piece(&self, piece: S::Piece, point: usize) -> [<S::Piece as Lanewise>::F; 3] {
+        self.get(piece, point)
     }
 }
 
@@ -95,6 +101,11 @@ impl<S: Simd> CornerSource<S> for ProjectedOnDemand<'_, S> {
     fn corner(&self, s: S, point: usize) -> [S::F; 3] {
         let [x, y, z] = self.rows;
         self.projection.of_relative(s, [s.splat(x[point]), s.splat(y[point]), s.splat(z[point])])
+    }
+    #[inline(always)]
+    fn corner_of_piece(&self, p: S::Piece, point: usize) -> [<S::Piece as Lanewise>::F; 3] {
+        let [x, y, z] = self.rows;
+        self.projection.pick(p).of_relative(p, [p.splat(x[point]), p.splat(y[point]), p.splat(z[point])])
     }
 }
 

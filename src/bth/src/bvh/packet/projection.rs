@@ -1,11 +1,11 @@
 //! The projection of points along sixteen rays.
 
-use crate::simd::Simd;
+use crate::simd::{Lanewise, Simd};
 
 /// The projection along sixteen rays, one in each lane, onto the plane that is perpendicular to the axis of the direction's greatest
 /// |component|.
 #[derive(Clone, Copy)]
-pub(crate) struct Projection<S: Simd> {
+pub(crate) struct Projection<S: Lanewise> {
     /// Origins of the rays in the plane.
     pub(crate) origin: [S::F; 2],
     /// Slopes of the rays: change of the plane's coordinates per unit of depth.
@@ -16,7 +16,7 @@ pub(crate) struct Projection<S: Simd> {
     pub(crate) start: S::F,
 }
 
-impl<S: Simd> Projection<S> {
+impl<S: Lanewise> Projection<S> {
     /// Projects a point whose coordinates are in the order of the axes. The two coordinates in the plane are negated, which does not
     /// change any weight.
     #[inline(always)]
@@ -38,5 +38,19 @@ impl<S: Simd> Projection<S> {
     #[inline(always)]
     pub(crate) fn of_relative(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         [s.fnma(self.shear[0], z, x), s.fnma(self.shear[1], z, y), s.mul(z, self.forward)]
+    }
+}
+
+impl<S: Simd> Projection<S> {
+    /// The projection along the rays of a piece.
+    #[inline(always)]
+    pub(crate) fn pick(&self, piece: S::Piece) -> Projection<S::Piece> {
+        let Projection { origin: [x, y], shear, forward, start } = self;
+        Projection {
+            origin: [S::pick(piece, x), S::pick(piece, y)],
+            shear: [S::pick(piece, &shear[0]), S::pick(piece, &shear[1])],
+            forward: S::pick(piece, forward),
+            start: S::pick(piece, start),
+        }
     }
 }

@@ -12,9 +12,10 @@ use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
+use std::marker::PhantomData;
 
 /// Sixteen rays and their hits so far. Fields whose names occur in [`prepare::PreparedLanes`] have the meaning documented there.
 #[derive(Clone, Copy)]
@@ -53,6 +54,65 @@ pub(crate) struct RayGroup<S: Simd> {
     index: S::U,
     /// For an uncached pending hit the corners (`[corner][axis]`).
     corner: [[S::F; 3]; 3],
+}
+
+/// Limits of the depths of hits of rays, one in each lane.
+pub(crate) struct RayLimits<S: Lanewise> {
+    /// Least depth of hits in the ray's range.
+    pub(crate) first: S::F,
+    /// Upper limit of the depths of hits that can still change the result.
+    pub(crate) limit: S::F,
+    /// Least and greatest depth between which a hit is certainly in the ray's range.
+    pub(crate) certain: [S::F; 2],
+}
+
+/// What the box test needs of rays, one in each lane.
+struct GroupSlabs<S: Lanewise> {
+    reciprocal: [S::F; 3],
+    near_addend: [S::F; 3],
+    far_addend: [S::F; 3],
+    negative: [S::M; 3],
+    /// Least and greatest depth.
+    depths: [S::F; 2],
+}
+
+impl<S: Lanewise> GroupSlabs<S> {
+    /// Implements [`RayGroup::may_enter`].
+    #[inline(always)]
+    fn may_enter(&self, s: S, corners: [[f32; 3]; 2], (mixed_octants, common_origin): (bool, bool)) -> u32 {
+        let [mut enter, mut leave] = self.depths;
+        for k in 0..3 {
+            let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
+            if mixed_octants {
+                (near, far) = (s.select(self.negative[k], far, near), s.select(self.negative[k], near, far));
+            }
+            (near, far) = if common_origin {
+                (s.mul(near, self.reciprocal[k]), s.mul(far, self.reciprocal[k]))
+            } else {
+                (
+                    s.fma(near, self.reciprocal[k], self.near_addend[k]),
+                    s.fma(far, self.reciprocal[k], self.far_addend[k]),
+                )
+            };
+            enter = s.max(near, enter);
+            leave = s.min(far, leave);
+        }
+        s.mask_bits(s.le(enter, leave))
+    }
+}
+
+/// [`Simd::pick`] of three vectors.
+#[inline(always)]
+fn pick3<S: Simd>(p: S::Piece, [x, y, z]: &[S::F; 3]) -> [<S::Piece as Lanewise>::F; 3] {
+    [S::pick(p, x), S::pick(p, y), S::pick(p, z)]
+}
+
+/// [`Simd::put`] of three vectors.
+#[inline(always)]
+fn put3<S: Simd>(p: S::Piece, to: &mut [S::F; 3], from: [<S::Piece as Lanewise>::F; 3]) {
+    for k in 0..3 {
+        S::put(p, &mut to[k], from[k]);
+    }
 }
 
 impl<S: Simd> RayGroup<S> {
@@ -115,7 +175,7 @@ impl<S: Simd> RayGroup<S> {
 
     /// Prepares the first sixteen of the rays; unused lanes repeat the last ray. Returns false if a ray cannot be prepared in f32.
     #[inline(always)]
-    pub(crate) fn prepare<H: PacketBounds<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
+    fn prepare<H: PacketBounds<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
         let mut field = match rays.first_chunk() {
             Some(rays) => prepare::load_rays(s, rays),
             None => {
@@ -141,51 +201,91 @@ impl<S: Simd> RayGroup<S> {
         self.nearest = s.splat(f32::INFINITY);
         self.pending = s.splat_u(NONE);
         // `set_prepared` is called in both branches: joining the results first would pass them through memory.
-        match self.common {
-            Some(common) => self.set_prepared::<H>(s, prepare::prepare_lanes(s, bounds, field, &common)),
-            None => self.set_prepared::<H>(s, prepare::prepare_lanes(s, bounds, field, &self.mixed)),
+        let mut ready = true;
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            let field = prepare::pick_rays::<S>(p, &field);
+            let usable = match self.common {
+                Some(common) => self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &common)),
+                None => {
+                    let axes = self.mixed.pick(p);
+                    self.set_prepared::<H>(p, prepare::prepare_lanes(p, bounds, field, &axes))
+                }
+            };
+            ready &= usable == lanes_of_piece::<S>(i);
         }
+        ready
     }
 
-    /// Stores prepared rays; false if one of them is not usable.
+    /// Stores prepared rays of a piece; returns those that are usable, a bit each.
     #[inline(always)]
-    fn set_prepared<H: PacketBounds<S>>(&mut self, s: S, lanes: prepare::PreparedLanes<S>) -> bool {
-        self.reciprocal = lanes.reciprocal;
+    fn set_prepared<H: PacketBounds<S>>(
+        &mut self,
+        p: S::Piece,
+        lanes: prepare::PreparedLanes<S::Piece>,
+    ) -> u32 {
+        put3::<S>(p, &mut self.reciprocal, lanes.reciprocal);
         if !H::COMMON_ORIGIN {
-            self.reach = lanes.reach;
-            self.negative = lanes.negative;
-            self.near_addend = lanes.near_addend;
-            self.far_addend = lanes.far_addend;
+            S::put(p, &mut self.reach, lanes.reach);
+            for k in 0..3 {
+                S::put_mask(p, &mut self.negative[k], lanes.negative[k]);
+            }
+            put3::<S>(p, &mut self.near_addend, lanes.near_addend);
+            put3::<S>(p, &mut self.far_addend, lanes.far_addend);
         }
-        self.scale = lanes.scale;
-        [self.first, self.limit] = lanes.depths;
-        self.certain = lanes.certain;
-        let prepare::PreparedLanes { origin, shear, forward, start, .. } = lanes;
-        (self.projection.shear, self.projection.forward) = (shear, forward);
+        S::put(p, &mut self.scale, lanes.scale);
+        S::put(p, &mut self.first, lanes.depths[0]);
+        S::put(p, &mut self.limit, lanes.depths[1]);
+        for k in 0..2 {
+            S::put(p, &mut self.certain[k], lanes.certain[k]);
+            S::put(p, &mut self.projection.shear[k], lanes.shear[k]);
+        }
+        S::put(p, &mut self.projection.forward, lanes.forward);
         if !H::COMMON_ORIGIN {
-            (self.projection.origin, self.projection.start) = (origin, start);
+            for k in 0..2 {
+                S::put(p, &mut self.projection.origin[k], lanes.origin[k]);
+            }
+            S::put(p, &mut self.projection.start, lanes.start);
         }
-        s.mask_bits(lanes.usable) == 0xffff
+        p.mask_bits(lanes.usable)
     }
 
-    /// The prepared rays, for groups whose rays do not have the same origin.
+    /// The prepared rays of a piece, for groups whose rays do not have the same origin.
     #[inline(always)]
-    pub(crate) fn lanes(&self, s: S) -> prepare::PreparedLanes<S> {
+    pub(crate) fn lanes(&self, p: S::Piece) -> prepare::PreparedLanes<S::Piece> {
+        let slabs = self.slabs_of_piece(p);
+        let projection = self.projection.pick(p);
         prepare::PreparedLanes {
-            reciprocal: self.reciprocal,
-            near_addend: self.near_addend,
-            far_addend: self.far_addend,
-            negative: self.negative,
-            scale: self.scale,
-            depths: [self.first, self.limit],
-            certain: self.certain,
-            axis: self.mixed.axes(s),
-            origin: self.projection.origin,
-            shear: self.projection.shear,
-            forward: self.projection.forward,
-            start: self.projection.start,
-            reach: self.reach,
-            usable: s.mask(0xffff),
+            reciprocal: slabs.reciprocal,
+            near_addend: slabs.near_addend,
+            far_addend: slabs.far_addend,
+            negative: slabs.negative,
+            scale: S::pick(p, &self.scale),
+            depths: slabs.depths,
+            certain: [S::pick(p, &self.certain[0]), S::pick(p, &self.certain[1])],
+            axis: self.mixed.pick(p).axes(p),
+            origin: projection.origin,
+            shear: projection.shear,
+            forward: projection.forward,
+            start: projection.start,
+            reach: S::pick(p, &self.reach),
+            usable: p.mask(0xffff),
+        }
+    }
+
+    /// The limits of the depths of hits.
+    #[inline(always)]
+    pub(crate) fn limits(&self) -> RayLimits<S> {
+        RayLimits { first: self.first, limit: self.limit, certain: self.certain }
+    }
+
+    /// As [`Self::limits`], of the rays of a piece.
+    #[inline(always)]
+    pub(crate) fn limits_of_piece(&self, p: S::Piece) -> RayLimits<S::Piece> {
+        RayLimits {
+            first: S::pick(p, &self.first),
+            limit: S::pick(p, &self.limit),
+            certain: [S::pick(p, &self.certain[0]), S::pick(p, &self.certain[1])],
         }
     }
 
@@ -193,24 +293,32 @@ impl<S: Simd> RayGroup<S> {
     /// false), the corners are that at which rays enter the box and that at which they leave, else the lower and the upper one.
     #[inline(always)]
     pub(crate) fn may_enter<H: PacketBounds<S>>(&self, s: S, corners: [[f32; 3]; 2]) -> u32 {
-        let (mut enter, mut leave) = (self.first, self.limit);
-        for k in 0..3 {
-            let (mut near, mut far) = (s.splat(corners[0][k]), s.splat(corners[1][k]));
-            if H::MIXED_OCTANTS {
-                (near, far) = (s.select(self.negative[k], far, near), s.select(self.negative[k], near, far));
-            }
-            (near, far) = if H::COMMON_ORIGIN {
-                (s.mul(near, self.reciprocal[k]), s.mul(far, self.reciprocal[k]))
-            } else {
-                (
-                    s.fma(near, self.reciprocal[k], self.near_addend[k]),
-                    s.fma(far, self.reciprocal[k], self.far_addend[k]),
-                )
-            };
-            enter = s.max(near, enter);
-            leave = s.min(far, leave);
+        let slabs = GroupSlabs {
+            reciprocal: self.reciprocal,
+            near_addend: self.near_addend,
+            far_addend: self.far_addend,
+            negative: self.negative,
+            depths: [self.first, self.limit],
+        };
+        slabs.may_enter(s, corners, (H::MIXED_OCTANTS, H::COMMON_ORIGIN))
+    }
+
+    /// As [`Self::may_enter`], for the rays of a piece.
+    #[inline(always)]
+    pub(crate) fn piece_may_enter<H: PacketBounds<S>>(&self, p: S::Piece, corners: [[f32; 3]; 2]) -> u32 {
+        self.slabs_of_piece(p).may_enter(p, corners, (H::MIXED_OCTANTS, H::COMMON_ORIGIN))
+    }
+
+    #[inline(always)]
+    fn slabs_of_piece(&self, p: S::Piece) -> GroupSlabs<S::Piece> {
+        let [x, y, z] = &self.negative;
+        GroupSlabs {
+            reciprocal: pick3::<S>(p, &self.reciprocal),
+            near_addend: pick3::<S>(p, &self.near_addend),
+            far_addend: pick3::<S>(p, &self.far_addend),
+            negative: [S::pick_mask(p, x), S::pick_mask(p, y), S::pick_mask(p, z)],
+            depths: [S::pick(p, &self.first), S::pick(p, &self.limit)],
         }
-        s.mask_bits(s.le(enter, leave))
     }
 
     /// Computes the pending hits. Without any, only the bit masks of `intersections` are cleared.
@@ -263,5 +371,44 @@ impl<S: Simd> RayGroup<S> {
         let index = s.select_u(uncached, self.index, s.lookup_u(s.load_u(&hit_cache.index), self.pending));
         s.store_u(s.gather_u(s.mask(lanes), ids, index), &mut intersections.triangle);
         intersections.compute(s, lanes, &pairs);
+    }
+}
+
+/// [`RayGroup::prepare`] as a part of kernels.
+pub(crate) struct PrepareGroup<'a, S: Simd, H> {
+    group: &'a mut RayGroup<S>,
+    bounds: &'a ObjectBounds,
+    rays: &'a [Ray],
+    packet: PhantomData<H>,
+}
+
+impl<'a, S: Simd, H> PrepareGroup<'a, S, H> {
+    #[inline(always)]
+    pub(crate) fn of(group: &'a mut RayGroup<S>, bounds: &'a ObjectBounds, rays: &'a [Ray]) -> Self {
+        PrepareGroup { group, bounds, rays, packet: PhantomData }
+    }
+}
+
+impl<S: Simd, H: PacketBounds<S>> Part<S> for PrepareGroup<'_, S, H> {
+    type Output = bool;
+    #[inline(always)]
+    fn run(self, s: S) -> bool {
+        self.group.prepare::<H>(s, self.bounds, self.rays)
+    }
+}
+
+/// [`RayGroup::intersect`] as a part of kernels.
+pub(crate) struct IntersectGroup<'a, 'c, S: Simd, H> {
+    pub(crate) group: &'a RayGroup<S>,
+    pub(crate) cached: &'a mut CachedHits<'c>,
+    pub(crate) intersections: &'a mut Intersections,
+    pub(crate) packet: PhantomData<H>,
+}
+
+impl<S: Simd, H: PacketBounds<S>> Part<S> for IntersectGroup<'_, '_, S, H> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        self.group.intersect::<H>(s, self.cached, self.intersections);
     }
 }

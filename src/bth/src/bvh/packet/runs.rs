@@ -4,13 +4,14 @@
 use super::bounds::PacketBounds;
 use super::coherence::{PacketBackoff, Span, is_same_octant};
 use super::entry::{MIN_RAYS, PACKET};
-use super::frustum::Frustum;
+use super::frustum::{Frustum, FrustumOf};
+use super::ray_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -222,7 +223,8 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     if !prepare::<S, Q, Frustum<S, POINT>>(s, bounds, packets, rays) {
         return PacketOutcome::Refused;
     }
-    let frustum = Frustum::<S, POINT>::new(s, bounds, span, &packets.groups[..rays.len().div_ceil(LANES)]);
+    let groups = &packets.groups[..rays.len().div_ceil(LANES)];
+    let frustum = FrustumOf::<S, POINT> { bounds, span, groups }.inline_or_call(s);
     packets.buffers.hit_cache.clear(s, POINT);
     packets.trace(s, object, &frustum, rays, sink)
 }
@@ -237,7 +239,7 @@ fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
 ) -> bool {
     let mut ready = true;
     for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
-        ready &= group.prepare::<H>(s, bounds, rays);
+        ready &= PrepareGroup::<S, H>::of(group, bounds, rays).inline_or_call(s);
     }
     ready
 }

@@ -9,7 +9,7 @@ use super::ray_group::RayGroup;
 use crate::intersect::exact_lanes::F32Lanes;
 use crate::intersect::filter::{Candidates, TriangleBlock};
 use crate::intersect::prepare::{Prepared, PreparedRay};
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{WIDTH, WideNode};
 
 /// Greatest number of rays of a group that are tested one at a time in a leaf, by measurement.
@@ -25,6 +25,30 @@ pub(crate) struct SingleRays {
     depths: [[F32Lanes; 2]; GROUPS],
     /// A bit for each converted group.
     ready: u32,
+}
+
+/// The conversion of a group, as a part of kernels.
+struct Convert<'a, S: Simd> {
+    group: &'a RayGroup<S>,
+    prepared: &'a mut Prepared,
+    depths: &'a mut [F32Lanes; 2],
+    for_boxes: bool,
+}
+
+impl<S: Simd> Part<S> for Convert<'_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        let Convert { group, prepared, depths, for_boxes } = self;
+        let lines = if for_boxes { 0..2 } else { 1..2 };
+        prepared.clear();
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            prepared.write::<S>(p, &group.lanes(p), p.splat_u(0), lines.clone());
+        }
+        s.store(group.first, &mut depths[0]);
+        s.store(group.limit, &mut depths[1]);
+    }
 }
 
 impl SingleRays {
@@ -46,10 +70,13 @@ impl SingleRays {
     fn convert<S: Simd>(&mut self, s: S, group: &RayGroup<S>, at: usize, for_boxes: bool) {
         if self.ready >> at & 1 == 0 {
             self.ready |= 1 << at;
-            let lines = if for_boxes { 0..2 } else { 1..2 };
-            self.group[at % GROUPS].write(s, &group.lanes(s), s.splat_u(0), lines);
-            s.store(group.first, &mut self.depths[at % GROUPS][0]);
-            s.store(group.limit, &mut self.depths[at % GROUPS][1]);
+            let convert = Convert {
+                group,
+                prepared: &mut self.group[at % GROUPS],
+                depths: &mut self.depths[at % GROUPS],
+                for_boxes,
+            };
+            convert.inline_or_call(s);
         }
     }
 
@@ -115,6 +142,7 @@ impl SingleRays {
 mod tests {
     use super::*;
     use crate::bvh::packet::entry::PACKET;
+    use crate::bvh::packet::ray_group::PrepareGroup;
     use crate::bvh::packet::segment_box::SegmentBox;
     use crate::rays::Ray;
     use crate::simd::{Isa, Kernel};
@@ -131,7 +159,7 @@ mod tests {
             let Children(rays, node, tested) = self;
             let mut groups = [RayGroup::vacant(s); GROUPS];
             for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
-                assert!(group.prepare::<SegmentBox<S>>(s, &ObjectBounds::around(8.0), rays));
+                assert!(PrepareGroup::<S, SegmentBox<S>>::of(group, &ObjectBounds::around(8.0), rays).run(s));
             }
             let groups = &groups[..rays.len().div_ceil(LANES)];
             let (mut single_rays, mut entries) = (SingleRays::NONE, [StackEntry::default(); WIDTH]);

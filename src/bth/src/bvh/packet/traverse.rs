@@ -11,19 +11,20 @@ use super::hit_cache::{CachedHits, HitCache};
 use super::leaf::PacketRays;
 use super::leaf_mesh::Leaf;
 use super::points::{ProjectedPoints, RelativePoints};
-use super::ray_group::RayGroup;
+use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::{FEW_OF_PACKET, SingleRays};
-use crate::bvh::nodes::{Wide, prefetch};
+use crate::bvh::nodes::{self, Wide, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd, lanes_of_piece};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
 use bth_format::limits::MAX_DEPTH;
 use bth_format::object::ObjectView;
 use std::any::Any;
+use std::marker::PhantomData;
 
 /// Memory of packets, kept from one batch to the next.
 #[derive(Debug)]
@@ -138,19 +139,20 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
                     top += if H::MIXED_OCTANTS && mask.count_ones() <= FEW_OF_PACKET {
                         rays.single_rays.children(s, groups, mask, (line, node), entries)
                     } else {
-                        children::<S, H, Q>(s, bounds, groups, mask, (line, node), limit, entries)
+                        let (rays, node, query) = (mask, (line, node), PhantomData::<Q>);
+                        Children { bounds, groups, rays, node, limit, entries, query }.inline_or_call(s)
                     };
                 }
                 Some(Child::Indexed(line)) => {
                     let mut unpacked = None;
-                    let leaf = Leaf { block: object.indexed(line, &mut unpacked), code };
+                    let leaf = Leaf { block: nodes::indexed(s, object, line, &mut unpacked), code };
                     if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
                 }
                 Some(Child::Raw(line)) => {
                     let mut unpacked = None;
-                    let leaf = Leaf { block: object.raw(line, &mut unpacked), code };
+                    let leaf = Leaf { block: nodes::raw(s, object, line, &mut unpacked), code };
                     if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
                         limit = farthest_limit(s, groups);
                     }
@@ -227,6 +229,47 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     written
 }
 
+/// [`children`] as a part of kernels.
+struct Children<'a, S: Simd, H, Q> {
+    bounds: &'a H,
+    groups: &'a [RayGroup<S>],
+    rays: u64,
+    node: (u32, &'a WideNode),
+    limit: f32,
+    entries: &'a mut [StackEntry; WIDTH],
+    query: PhantomData<Q>,
+}
+
+impl<S: Simd, H: PacketBounds<S>, Q: Query> Part<S> for Children<'_, S, H, Q> {
+    type Output = usize;
+    #[inline(always)]
+    fn run(self, s: S) -> usize {
+        let Children { bounds, groups, rays, node, limit, entries, .. } = self;
+        children::<S, H, Q>(s, bounds, groups, rays, node, limit, entries)
+    }
+}
+
+/// [`meeting`] as a part of kernels: the corners of the child's box, the groups, and the rays that are tested.
+struct Meeting<'a, S: Simd, H>([[f32; 3]; 2], &'a [RayGroup<S>], u64, PhantomData<H>);
+
+impl<S: Simd, H: PacketBounds<S>> Part<S> for Meeting<'_, S, H> {
+    type Output = u64;
+    #[inline(always)]
+    fn run(self, s: S) -> u64 {
+        let Meeting(corners, groups, rays, _) = self;
+        let mut meets = 0;
+        for (g, group) in groups.iter().enumerate() {
+            for i in 0..S::PIECES {
+                if rays >> (g * LANES) & u64::from(lanes_of_piece::<S>(i)) != 0 {
+                    let bits = group.piece_may_enter::<H>(s.piece(i), corners);
+                    meets |= u64::from(bits) << (g * LANES);
+                }
+            }
+        }
+        meets
+    }
+}
+
 /// The rays that may meet the box of a child, a bit each. Only groups with a bit in `rays` are tested.
 #[inline(always)]
 fn meeting<S: Simd, H: PacketBounds<S>>(
@@ -237,7 +280,20 @@ fn meeting<S: Simd, H: PacketBounds<S>>(
     node: &WideNode,
     slot: u32,
 ) -> u64 {
-    let corners = bounds.corners(node, slot as usize % WIDTH);
+    rays_meeting::<S, H>(s, groups, rays, bounds.corners(node, slot as usize % WIDTH))
+}
+
+/// As [`meeting`], given the corners of the box ([`PacketBounds::corners`]).
+#[inline(always)]
+pub(crate) fn rays_meeting<S: Simd, H: PacketBounds<S>>(
+    s: S,
+    groups: &[RayGroup<S>],
+    rays: u64,
+    corners: [[f32; 3]; 2],
+) -> u64 {
+    if !S::INLINES_PARTS {
+        return s.call(Meeting(corners, groups, rays, PhantomData::<H>));
+    }
     let mut meets = 0;
     for (i, group) in groups.iter().enumerate() {
         if rays >> (i * LANES) & 0xffff != 0 {
@@ -276,7 +332,8 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         origin_terms,
     };
     for (group, intersections) in groups.iter().zip(&mut *intersections) {
-        group.intersect::<H>(s, &mut cached, intersections);
+        let (cached, packet) = (&mut cached, PhantomData::<H>);
+        IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
     }
     for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {
         let queried = (rays.queried >> (i * LANES)) as u32 & 0xffff;

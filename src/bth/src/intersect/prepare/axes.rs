@@ -1,11 +1,11 @@
 //! Axes of projection of sixteen rays.
 
-use crate::simd::Simd;
+use crate::simd::{Lanewise, Simd};
 
 /// The axes of projection of sixteen rays: of each ray the axis z of its direction's greatest |component|, and for the plane of
 /// projection the next axis and the one after it in cyclic order. [`Line`](crate::intersect::line::Line) swaps the plane's axes
 /// of rays with a negative z, to keep the orientation; the conservative tests do not depend on the orientation.
-pub(crate) trait Axes<S: Simd> {
+pub(crate) trait Axes<S: Lanewise> {
     /// Permutes x, y and z of points to the coordinates along the plane's two axes and along the third axis.
     fn permute(&self, s: S, point: [S::F; 3]) -> [S::F; 3];
     /// Indices of the axes, in the same order.
@@ -14,12 +14,12 @@ pub(crate) trait Axes<S: Simd> {
 
 /// Axes of rays whose greatest |components| may lie along different axes. Where neither bit is set, the axis is z.
 #[derive(Clone, Copy)]
-pub(crate) struct MixedAxes<S: Simd> {
+pub(crate) struct MixedAxes<S: Lanewise> {
     pub(crate) is_x: S::M,
     pub(crate) is_y: S::M,
 }
 
-impl<S: Simd> MixedAxes<S> {
+impl<S: Lanewise> MixedAxes<S> {
     #[inline(always)]
     pub(crate) fn of(s: S, [x, y, z]: [S::F; 3]) -> Self {
         let size = [s.abs(x), s.abs(y), s.abs(z)];
@@ -27,7 +27,7 @@ impl<S: Simd> MixedAxes<S> {
         MixedAxes { is_x, is_y: s.and_not(s.lt(size[2], size[1]), is_x) }
     }
 
-    /// The axes if they are the same for all rays.
+    /// The axes if they are the same for all of sixteen rays.
     #[inline(always)]
     pub(crate) fn common(&self, s: S) -> Option<CommonAxis> {
         match (s.mask_bits(self.is_x), s.mask_bits(self.is_y)) {
@@ -49,7 +49,7 @@ impl<S: Simd> MixedAxes<S> {
     }
 }
 
-impl<S: Simd> Axes<S> for MixedAxes<S> {
+impl<S: Lanewise> Axes<S> for MixedAxes<S> {
     #[inline(always)]
     fn permute(&self, s: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         [self.select(s, [y, z, x]), self.select(s, [z, x, y]), self.select(s, [x, y, z])]
@@ -57,6 +57,14 @@ impl<S: Simd> Axes<S> for MixedAxes<S> {
     #[inline(always)]
     fn axes(&self, s: S) -> [S::U; 3] {
         [self.select_u(s, [1, 2, 0]), self.select_u(s, [2, 0, 1]), self.select_u(s, [0, 1, 2])]
+    }
+}
+
+impl<S: Simd> MixedAxes<S> {
+    /// The axes of the rays of a piece.
+    #[inline(always)]
+    pub(crate) fn pick(&self, p: S::Piece) -> MixedAxes<S::Piece> {
+        MixedAxes { is_x: S::pick_mask(p, &self.is_x), is_y: S::pick_mask(p, &self.is_y) }
     }
 }
 
@@ -74,7 +82,7 @@ impl CommonAxis {
     }
 }
 
-impl<S: Simd> Axes<S> for CommonAxis {
+impl<S: Lanewise> Axes<S> for CommonAxis {
     #[inline(always)]
     fn permute(&self, _: S, [x, y, z]: [S::F; 3]) -> [S::F; 3] {
         match self.0 {

@@ -5,7 +5,7 @@ use super::{HitProgress, LARGEST, PreparedRay, ROUND_UP, SMALLEST};
 use crate::intersect::boxes;
 use crate::intersect::filter;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise, Simd};
 use bth_format::object::ObjectBounds;
 use std::mem::offset_of;
 
@@ -30,8 +30,18 @@ fn floats<S: Simd>(s: S, words: [S::U; 8]) -> [S::F; 8] {
     out
 }
 
-/// The fields of [`PreparedRay`] for sixteen rays, from which [`PreparedLanes::rows`] computes the records.
-pub(crate) struct PreparedLanes<S: Simd> {
+/// The floats of the rays of a piece.
+#[inline(always)]
+pub(crate) fn pick_rays<S: Simd>(p: S::Piece, field: &[S::F; 8]) -> [<S::Piece as Lanewise>::F; 8] {
+    let mut out = [p.splat(0.0); 8];
+    for k in 0..8 {
+        out[k] = S::pick(p, &field[k]);
+    }
+    out
+}
+
+/// The fields of [`PreparedRay`] for sixteen rays or a piece of them, from which [`PreparedLanes::rows`] computes the records.
+pub(crate) struct PreparedLanes<S: Lanewise> {
     pub(crate) reciprocal: [S::F; 3],
     pub(crate) near_addend: [S::F; 3],
     pub(crate) far_addend: [S::F; 3],
@@ -55,7 +65,7 @@ pub(crate) struct PreparedLanes<S: Simd> {
 
 /// Prepares sixteen rays for an object of these bounds, given the floats of the rays ([`gather_rays`]).
 #[inline(always)]
-pub(crate) fn prepare_lanes<S: Simd>(
+pub(crate) fn prepare_lanes<S: Lanewise>(
     s: S,
     bounds: &ObjectBounds,
     field: [S::F; 8],
@@ -134,7 +144,7 @@ macro_rules! row {
     ($($field:tt)*) => { offset_of!(PreparedRay, $($field)*) / size_of::<f32>() };
 }
 
-impl<S: Simd> PreparedLanes<S> {
+impl<S: Lanewise> PreparedLanes<S> {
     /// The words of sixteen [`PreparedRay`]s, a vector for each word; `at` holds the indices of the rays in the batch.
     #[inline(always)]
     pub(super) fn rows(&self, s: S, at: S::U) -> [S::F; 2 * LANES] {

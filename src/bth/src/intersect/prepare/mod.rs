@@ -10,12 +10,12 @@ mod lanes;
 mod tests;
 
 pub(crate) use self::axes::{Axes, CommonAxis, MixedAxes};
-pub(crate) use self::lanes::{PreparedLanes, gather_rays, load_rays, prepare_lanes};
+pub(crate) use self::lanes::{PreparedLanes, gather_rays, load_rays, pick_rays, prepare_lanes};
 use crate::intersect::boxes::{self, RaySlabs};
 use crate::intersect::filter::{self, TriangleFilter};
 use crate::intersect::line::Line;
 use crate::rays::Ray;
-use crate::simd::{LANES, Part, Simd};
+use crate::simd::{LANES, Lanewise, Part, Simd};
 use bth_format::layout::{NONE, Object};
 use bth_format::object::ObjectBounds;
 use glam::{Vec3A, Vec4};
@@ -186,8 +186,13 @@ impl<S: Simd> Part<S> for Fill<'_> {
         let Fill { prepared, bounds, rays, at, count } = self;
         let used = s.mask(((1u64 << count) - 1) as u32);
         let field = gather_rays(s, used, rays, s.load_u(at));
-        let lanes = prepare_lanes(s, bounds, field, &MixedAxes::of(s, [field[4], field[5], field[6]]));
-        prepared.write(s, &lanes, s.load_u(at), 0..2);
+        prepared.clear();
+        for i in 0..S::PIECES {
+            let p = s.piece(i);
+            let field = pick_rays::<S>(p, &field);
+            let lanes = prepare_lanes(p, bounds, field, &MixedAxes::of(p, [field[4], field[5], field[6]]));
+            prepared.write::<S>(p, &lanes, p.load_u(at), 0..2);
+        }
         prepared.ready &= s.mask_bits(used);
     }
 }
@@ -227,21 +232,30 @@ impl Prepared {
         s.call(Fill { prepared: self, bounds, rays, at, count });
     }
 
-    /// Stores rays that are prepared in lanes; `at` holds their indices in the batch. Only the cache lines in `lines`, a part of
-    /// 0..2, are stored.
+    /// Makes all lanes vacant.
     #[inline(always)]
-    pub(crate) fn write<S: Simd>(&mut self, s: S, lanes: &PreparedLanes<S>, at: S::U, lines: Range<usize>) {
-        let words = lanes.rows(s, at);
+    pub(crate) fn clear(&mut self) {
+        self.ready = 0;
+    }
+
+    /// Stores rays that are prepared in the vacant lanes of a piece; `at` holds their indices in the batch. Only the cache lines in
+    /// `lines`, a part of 0..2, are stored.
+    #[inline(always)]
+    pub(crate) fn write<S: Simd>(
+        &mut self,
+        p: S::Piece,
+        lanes: &PreparedLanes<S::Piece>,
+        at: <S::Piece as Lanewise>::U,
+        lines: Range<usize>,
+    ) {
+        let words = lanes.rows(p, at);
         for line in lines {
-            let mut rows = [s.splat(0.0); LANES];
+            let mut columns = [p.splat(0.0); LANES];
             for i in 0..LANES {
-                rows[i] = words[line * LANES + i];
+                columns[i] = words[line * LANES + i];
             }
-            let rows = s.transpose(rows);
-            for lane in 0..LANES {
-                s.store(rows[lane], &mut self.rays[lane][line]);
-            }
+            S::store_transposed(p, columns, &mut self.rays, line);
         }
-        self.ready = s.mask_bits(lanes.usable);
+        self.ready |= p.mask_bits(lanes.usable);
     }
 }

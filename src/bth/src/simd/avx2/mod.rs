@@ -9,7 +9,7 @@ mod rows;
 
 use self::packing::{compression, expansion};
 use self::rows::{IN_ORDER, columns8, transpose4, transpose8};
-use super::{Kernel, LANES, Part, Simd, assert_indices, scalar, valid_indices};
+use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, scalar, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -110,17 +110,10 @@ fn split_mut<T>(to: &mut [T; LANES]) -> [*mut T; 2] {
     [low.as_mut_ptr(), high.as_mut_ptr()]
 }
 
-impl Simd for Avx2 {
+impl Lanewise for Avx2 {
     type F = F;
     type U = U;
     type M = M;
-
-    #[inline(always)]
-    fn call<P: Part<Self>>(self, part: P) -> P::Output {
-        // SAFETY: self proves that the machine has the features that `part_entry` enables.
-        unsafe { part_entry(self, part) }
-    }
-
     halves! {
         add(a: F, b: F) -> F = _mm256_add_ps(a, b);
         sub(a: F, b: F) -> F = _mm256_sub_ps(a, b);
@@ -153,7 +146,6 @@ impl Simd for Avx2 {
         or(a: M, b: M) -> M = _mm256_or_si256(a, b);
         and_not(a: M, b: M) -> M = _mm256_andnot_si256(b, a);
     }
-
     #[inline(always)]
     fn splat(self, x: f32) -> F {
         // SAFETY: registers only.
@@ -206,6 +198,48 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
+    fn shl_u<const K: u32>(self, a: U) -> U {
+        // SAFETY: registers only.
+        unsafe {
+            // The count is passed in a register, because an immediate would have to be an i32 constant.
+            let count = _mm_cvtsi32_si128(K as i32);
+            [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
+        }
+    }
+    #[inline(always)]
+    fn mask(self, bits: u32) -> M {
+        // SAFETY: registers only.
+        unsafe {
+            let test =
+                |bit: __m256i| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), bit), bit);
+            [
+                test(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)),
+                test(_mm256_setr_epi32(1 << 8, 2 << 8, 4 << 8, 8 << 8, 16 << 8, 32 << 8, 64 << 8, 128 << 8)),
+            ]
+        }
+    }
+    #[inline(always)]
+    fn mask_bits(self, m: M) -> u32 {
+        // SAFETY: registers only.
+        let (low, high) = unsafe {
+            (
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[0])) as u32,
+                _mm256_movemask_ps(_mm256_castsi256_ps(m[1])) as u32,
+            )
+        };
+        low | high << 8
+    }
+}
+
+impl Simd for Avx2 {
+    one_piece!();
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        // SAFETY: self proves that the machine has the features that `part_entry` enables.
+        unsafe { part_entry(self, part) }
+    }
+    #[inline(always)]
     fn lookup(self, table: F, at: U) -> F {
         [self.lookup_half(table, at[0]), self.lookup_half(table, at[1])]
     }
@@ -221,15 +255,6 @@ impl Simd for Avx2 {
             let m = _mm_min_ps(_mm256_castps256_ps128(m), _mm256_extractf128_ps::<1>(m));
             let m = _mm_min_ps(m, _mm_movehl_ps(m, m));
             _mm_cvtss_f32(_mm_min_ss(m, _mm_shuffle_ps::<1>(m, m)))
-        }
-    }
-    #[inline(always)]
-    fn shl_u<const K: u32>(self, a: U) -> U {
-        // SAFETY: registers only.
-        unsafe {
-            // The count is passed in a register, because an immediate would have to be an i32 constant.
-            let count = _mm_cvtsi32_si128(K as i32);
-            [_mm256_sll_epi32(a[0], count), _mm256_sll_epi32(a[1], count)]
         }
     }
     #[inline(always)]
@@ -300,31 +325,6 @@ impl Simd for Avx2 {
     fn expand_u(self, a: U, m: M, from: &[u32; LANES]) -> U {
         self.bits(self.expand(self.floats(a), m, &from.map(f32::from_bits)))
     }
-
-    #[inline(always)]
-    fn mask(self, bits: u32) -> M {
-        // SAFETY: registers only.
-        unsafe {
-            let test =
-                |bit: __m256i| _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), bit), bit);
-            [
-                test(_mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128)),
-                test(_mm256_setr_epi32(1 << 8, 2 << 8, 4 << 8, 8 << 8, 16 << 8, 32 << 8, 64 << 8, 128 << 8)),
-            ]
-        }
-    }
-    #[inline(always)]
-    fn mask_bits(self, m: M) -> u32 {
-        // SAFETY: registers only.
-        let (low, high) = unsafe {
-            (
-                _mm256_movemask_ps(_mm256_castsi256_ps(m[0])) as u32,
-                _mm256_movemask_ps(_mm256_castsi256_ps(m[1])) as u32,
-            )
-        };
-        low | high << 8
-    }
-
     #[inline(always)]
     fn compress(self, bits: u32, a: U, to: &mut [u32; LANES]) -> usize {
         let mut floats = [0.0; LANES];

@@ -1,7 +1,7 @@
 //! Transposition of rows of a few words to vectors of sixteen lanes.
 
 use super::{Avx2, U};
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise};
 use std::arch::x86_64::*;
 
 /// Transposes four by four lanes within each half.

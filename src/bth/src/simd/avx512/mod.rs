@@ -9,7 +9,7 @@ mod sort;
 
 use self::rows::{COLUMNS5, ROWS5, columns8, concat_quarters, transpose4};
 use self::sort::{keys_with_lanes, nearest_of_four, store_far_to_near};
-use super::{Kernel, LANES, Part, Simd, assert_indices, valid_indices};
+use super::{Kernel, LANES, Lanewise, Part, Simd, assert_indices, one_piece, valid_indices};
 use std::arch::x86_64::*;
 use std::sync::LazyLock;
 
@@ -67,17 +67,10 @@ macro_rules! intrinsics {
     )* };
 }
 
-impl Simd for Avx512 {
+impl Lanewise for Avx512 {
     type F = __m512;
     type U = __m512i;
     type M = __mmask16;
-
-    #[inline(always)]
-    fn call<P: Part<Self>>(self, part: P) -> P::Output {
-        // SAFETY: self proves that the machine has the features that `part_entry` enables.
-        unsafe { part_entry(self, part) }
-    }
-
     intrinsics! {
         splat(x: f32) -> __m512 = _mm512_set1_ps(x);
         add(a: __m512, b: __m512) -> __m512 = _mm512_add_ps(a, b);
@@ -94,8 +87,6 @@ impl Simd for Avx512 {
         lt(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
         le(a: __m512, b: __m512) -> u16 = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b);
         select(m: u16, a: __m512, b: __m512) -> __m512 = _mm512_mask_mov_ps(b, m, a);
-        lookup(table: __m512, at: __m512i) -> __m512 = _mm512_permutexvar_ps(at, table);
-        least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
         splat_u(x: u32) -> __m512i = _mm512_set1_epi32(x as i32);
         add_u(a: __m512i, b: __m512i) -> __m512i = _mm512_add_epi32(a, b);
         add_where(a: __m512i, m: u16, b: __m512i) -> __m512i = _mm512_mask_add_epi32(a, m, a, b);
@@ -105,12 +96,10 @@ impl Simd for Avx512 {
         eq_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmpeq_epi32_mask(a, b);
         lt_u(a: __m512i, b: __m512i) -> u16 = _mm512_cmplt_epu32_mask(a, b);
         select_u(m: u16, a: __m512i, b: __m512i) -> __m512i = _mm512_mask_mov_epi32(b, m, a);
-        lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
         bits(a: __m512) -> __m512i = _mm512_castps_si512(a);
         floats(a: __m512i) -> __m512 = _mm512_castsi512_ps(a);
         numbers(a: __m512i) -> __m512 = _mm512_cvtepi32_ps(a);
     }
-
     #[inline(always)]
     fn load(self, from: &[f32; LANES]) -> __m512 {
         // SAFETY: sixteen readable floats; unaligned loads.
@@ -140,6 +129,42 @@ impl Simd for Avx512 {
     fn shl_u<const K: u32>(self, a: __m512i) -> __m512i {
         // SAFETY: registers only.
         unsafe { _mm512_slli_epi32::<K>(a) }
+    }
+    #[inline(always)]
+    fn mask(self, bits: u32) -> u16 {
+        bits as u16
+    }
+    #[inline(always)]
+    fn mask_bits(self, m: u16) -> u32 {
+        m.into()
+    }
+    #[inline(always)]
+    fn and(self, a: u16, b: u16) -> u16 {
+        a & b
+    }
+    #[inline(always)]
+    fn or(self, a: u16, b: u16) -> u16 {
+        a | b
+    }
+    #[inline(always)]
+    fn and_not(self, a: u16, b: u16) -> u16 {
+        a & !b
+    }
+}
+
+impl Simd for Avx512 {
+    one_piece!();
+
+    intrinsics! {
+        lookup(table: __m512, at: __m512i) -> __m512 = _mm512_permutexvar_ps(at, table);
+        least(a: __m512) -> f32 = _mm512_reduce_min_ps(a);
+        lookup_u(table: __m512i, at: __m512i) -> __m512i = _mm512_permutexvar_epi32(at, table);
+    }
+
+    #[inline(always)]
+    fn call<P: Part<Self>>(self, part: P) -> P::Output {
+        // SAFETY: self proves that the machine has the features that `part_entry` enables.
+        unsafe { part_entry(self, part) }
     }
     #[inline(always)]
     fn rows4(self, m: u16, from: &[[f32; 4]], row: __m512i) -> [__m512; 4] {
@@ -246,28 +271,6 @@ impl Simd for Avx512 {
         // SAFETY: as `expand`.
         unsafe { _mm512_mask_expand_epi32(a, m, self.load_u(from)) }
     }
-
-    #[inline(always)]
-    fn mask(self, bits: u32) -> u16 {
-        bits as u16
-    }
-    #[inline(always)]
-    fn mask_bits(self, m: u16) -> u32 {
-        m.into()
-    }
-    #[inline(always)]
-    fn and(self, a: u16, b: u16) -> u16 {
-        a & b
-    }
-    #[inline(always)]
-    fn or(self, a: u16, b: u16) -> u16 {
-        a | b
-    }
-    #[inline(always)]
-    fn and_not(self, a: u16, b: u16) -> u16 {
-        a & !b
-    }
-
     #[inline(always)]
     fn compress(self, bits: u32, a: __m512i, to: &mut [u32; LANES]) -> usize {
         // SAFETY: all sixteen lanes are stored to an array of sixteen.

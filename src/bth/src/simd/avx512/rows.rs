@@ -1,7 +1,7 @@
 //! Transposition of rows of a few words to vectors of sixteen lanes, and back.
 
 use super::Avx512;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Lanewise};
 use std::arch::x86_64::*;
 
 /// Concatenates four registers of four lanes.

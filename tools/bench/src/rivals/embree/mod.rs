@@ -23,6 +23,8 @@ pub struct Variant {
     geometry_quality: c_int,
     flags: c_int,
     packets: bool,
+    /// The instruction set that the library may use; the best of the machine if absent.
+    isa: Option<&'static str>,
 }
 
 const QUALITY_LOW: c_int = 0;
@@ -34,22 +36,29 @@ const FLAG_COMPACT: c_int = 2;
 const FLAG_ROBUST: c_int = 4;
 
 /// The library's defaults; one ray a call.
-pub const DEFAULT: Variant =
-    Variant { quality: QUALITY_MEDIUM, geometry_quality: QUALITY_MEDIUM, flags: 0, packets: false };
+pub const DEFAULT: Variant = Variant {
+    quality: QUALITY_MEDIUM,
+    geometry_quality: QUALITY_MEDIUM,
+    flags: 0,
+    packets: false,
+    isa: None,
+};
 /// The robust mode, which has no high quality; one ray a call.
 pub const ROBUST: Variant = Variant { flags: FLAG_ROBUST, ..DEFAULT };
 /// The mode that saves memory; one ray a call.
 pub const COMPACT: Variant = Variant { flags: FLAG_COMPACT, ..DEFAULT };
 /// What the library advises for scenes that change often: dynamic and of low quality; one ray a call.
 pub const DYNAMIC: Variant =
-    Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, packets: false };
+    Variant { quality: QUALITY_LOW, geometry_quality: QUALITY_LOW, flags: FLAG_DYNAMIC, ..DEFAULT };
 /// What the library advises for vertices that move a little: a dynamic scene whose geometries are refitted; one ray a call. Only
 /// scenes of low quality heed the quality of their geometries; others build anew. The first build of a geometry that is
 /// refitted is one of medium quality.
 pub const REFIT: Variant = Variant { geometry_quality: QUALITY_REFIT, ..DYNAMIC };
 /// High quality (spatial splits); 16 rays a call.
 pub const PACKETS: Variant =
-    Variant { quality: QUALITY_HIGH, geometry_quality: QUALITY_HIGH, flags: 0, packets: true };
+    Variant { quality: QUALITY_HIGH, geometry_quality: QUALITY_HIGH, packets: true, ..DEFAULT };
+/// The defaults on a machine without AVX; one ray a call.
+pub const SSE4: Variant = Variant { isa: Some("sse4.2"), ..DEFAULT };
 
 /// Loads the library, so that the time of a build does not include loading it.
 ///

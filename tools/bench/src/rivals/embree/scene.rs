@@ -118,7 +118,8 @@ impl EmbreeScene {
         ensure!(meshes.iter().all(fits), "a triangle uses a position that does not exist");
         let allocated = Box::new(AtomicI64::new(0));
         let total: *const AtomicI64 = &raw const *allocated;
-        let config = std::ffi::CString::new(format!("threads={threads}"))?;
+        let isa = variant.isa.map_or_else(String::new, |isa| format!(",max_isa={isa}"));
+        let config = std::ffi::CString::new(format!("threads={threads}{isa}"))?;
         // SAFETY: the counter lives in the `EmbreeScene` until after the device is released: moving a `Box` does not move what
         // it points to.
         let device = unsafe {

@@ -1,0 +1,82 @@
+// Builds the package: bth.wasm from src/, and viewer.html, one page with everything in it.
+//
+//   node build.mjs [FOLDER]    FOLDER is where they go; by default dist/. Needs Rust with the target wasm32-unknown-unknown.
+import { execFileSync } from "node:child_process";
+import { copyFileSync, mkdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = dirname(fileURLToPath(import.meta.url)), root = resolve(here, "../..");
+const out = resolve(process.argv[2] ?? join(here, "dist"));
+/** Bytes at most. */
+const MOST_WASM = 750_000, MOST_PAGE = 1_500_000;
+
+/** Compiles the module; returns its path. Artifacts with SIMD128 have a folder of their own, as in tools/check/targets. */
+function compileModule() {
+    const target = join(process.env.CARGO_TARGET_DIR ?? join(root, "target"), "simd128");
+    const arguments_ = ["build", "-p", "bth-js", "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
+    const RUSTFLAGS = `${process.env.RUSTFLAGS ?? ""} -C target-feature=+simd128`;
+    // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
+    execFileSync("cargo", [...arguments_, "--features", "bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, RUSTFLAGS } });
+    return join(target, "wasm32-unknown-unknown/wasm/bth_js.wasm");
+}
+
+/** A module without its custom sections: the names of functions, which are a fifteenth of it, and what compiled it. */
+function stripped(module) {
+    const parts = [module.subarray(0, 8)];
+    for (let at = 8; at < module.length; ) {
+        const id = module[at];
+        let length = 0, end = at + 1, shift = 0;
+        do length += (module[end] & 127) * 2 ** shift, (shift += 7);
+        while (module[end++] & 128);
+        end += length;
+        if (id !== 0) parts.push(module.subarray(at, end));
+        at = end;
+    }
+    return Buffer.concat(parts);
+}
+
+/** The modules that a module needs, one after the other, as one script. Names at the top of the modules differ. */
+function joined(path, seen = new Set()) {
+    if (seen.has(path)) return "";
+    seen.add(path);
+    const text = readFileSync(path, "utf8");
+    const imports = [...text.matchAll(/^import .* from "(\.[^"]+)";\n/gm)];
+    const needed = imports.map(([, from]) => joined(resolve(dirname(path), from), seen)).join("");
+    const own = text.replace(/^import .* from "\.[^"]+";\n/gm, "").replace(/^export /gm, "");
+    // Workers of pages that are opened as files cannot be modules, which alone know their address.
+    return needed + own.replaceAll("import.meta.url", "location.href");
+}
+
+/** A script as a string in a script of a page. */
+const quoted = (script) => JSON.stringify(script).replaceAll("</", "<\\/").replaceAll("<!--", "<\\!--");
+
+function page(wasm) {
+    const worker = joined(join(here, "viewer/worker.js")), main = joined(join(here, "viewer/main.js"));
+    const script = `
+const WORKER = ${quoted(worker)};
+const WASM = "${wasm.toString("base64")}";
+let url = null, compiled = null;
+function workerUrl() {
+    return (url ??= URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" })));
+}
+function compiledModule() {
+    return (compiled ??= WebAssembly.compile(Uint8Array.from(atob(WASM), (c) => c.charCodeAt(0))));
+}
+${main.replaceAll("</script", "<\\/script")}`;
+    const template = readFileSync(join(here, "viewer/page.html"), "utf8");
+    return template.replace("<!-- scripts -->", () => `<script type="module">${script}</script>`);
+}
+
+function keep(name, bytes, most) {
+    writeFileSync(join(out, name), bytes);
+    const size = statSync(join(out, name)).size;
+    console.log(`${name}: ${size} bytes of at most ${most}`);
+    if (size > most) process.exitCode = 1;
+}
+
+mkdirSync(out, { recursive: true });
+const wasm = stripped(readFileSync(compileModule()));
+keep("bth.wasm", wasm, MOST_WASM);
+keep("viewer.html", page(wasm), MOST_PAGE);
+for (const name of ["index.js", "index.d.ts", "package.json"]) copyFileSync(join(here, name), join(out, name));

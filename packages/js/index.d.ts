@@ -1,0 +1,110 @@
+/** A module of WebAssembly with the library, for one thread. */
+export class Bth {
+    private constructor();
+    /** The compiled module. Send it to workers, and `load` it there. */
+    readonly module: WebAssembly.Module;
+    /** Whether the module has vector instructions (SIMD128). */
+    readonly simd: boolean;
+    /**
+     * Opens a compiled file, of which it keeps a copy. All indices are checked, so that no file can make tracing unsafe.
+     * @throws BthError with a code of the specification if the file is damaged, too new, or too large for the memory.
+     */
+    open(file: ArrayBuffer | ArrayBufferView): Scene;
+}
+
+/**
+ * Loads the library.
+ * @param source bth.wasm: its URL, a response with it, its bytes, or a module that is already compiled; by default the file that lies
+ * beside this one.
+ */
+export function load(
+    source?: string | URL | Response | Promise<Response> | BufferSource | WebAssembly.Module,
+): Promise<Bth>;
+
+/** What the library refuses. */
+export class BthError extends Error {
+    /** The stable code of the error, such as "BTH-F001"; empty if it has none. */
+    readonly code: string;
+}
+
+/**
+ * An open file. Rays are a Float32Array of eight numbers each: origin x, y, z, least t, direction x, y, z, greatest t, in world
+ * space. Directions need not be normalized; t is in units of their length. About a thousand coherent rays that are adjacent, such as
+ * a tile of a picture, are traced fastest. Answers are exact, and the same bits as on every other machine.
+ */
+export interface Scene {
+    /** Number of objects. */
+    readonly objects: number;
+    /** Number of instances; without scene sections that of objects. */
+    readonly instances: number;
+    /** Number of triangles of all objects. */
+    readonly triangles: number;
+    /** First and last frame, and frames per second; null if the file is a model. */
+    readonly frames: { first: number; last: number; rate: number } | null;
+    /** Box in world space that contains what can be seen at the scene's time; null if that is nothing. */
+    readonly bounds: { lower: Vector; upper: Vector } | null;
+    /** The scene's time in seconds. @throws BthError if an instance cannot be placed at that time; the scene is then unchanged. */
+    seconds: number;
+    /** The nearest hit of each ray. */
+    nearest(rays: Float32Array): Hits;
+    /** For each ray 1 if it hits anything, else 0. */
+    any(rays: Float32Array): Uint8Array;
+    /** What the search for the nearest hit of each ray visits. */
+    steps(rays: Float32Array): Steps;
+    /** The surface at hits of this scene at its present time. */
+    surface(hits: Hits): Surface;
+    /** Frees the scene's memory. All other methods throw from then on. */
+    close(): void;
+}
+
+export type Vector = [x: number, y: number, z: number];
+
+/** Nearest hits, each array with one element for each ray. */
+export class Hits {
+    constructor(count: number);
+    /** Number of rays. */
+    readonly count: number;
+    /** t of the hit; infinite for a miss. */
+    readonly t: Float32Array;
+    /** Barycentric weight of the triangle's second vertex. */
+    readonly u: Float32Array;
+    /** Barycentric weight of the triangle's third vertex. */
+    readonly v: Float32Array;
+    /** Index of the instance; 0xffffffff for a miss. */
+    readonly instance: Uint32Array;
+    /** Index of the triangle in the source file; 0xffffffff for a miss. */
+    readonly triangle: Uint32Array;
+}
+
+/** Numbers of nodes, leaves, triangles and tetrahedra that each ray visits. */
+export interface Steps {
+    readonly count: number;
+    readonly nodes: Uint32Array;
+    readonly leaves: Uint32Array;
+    readonly triangles: Uint32Array;
+    readonly tets: Uint32Array;
+}
+
+/**
+ * The surface at each hit. A miss has NaN and 0xffffffff, and so has what the file does not keep: positions of a file compiled with
+ * `--no-geometry`, texture coordinates without `--attributes`, materials without `--names` or `--materials`.
+ */
+export interface Surface {
+    readonly count: number;
+    /** Points in world space, 3 numbers a hit. */
+    readonly position: Float32Array;
+    /** Normals of the source, interpolated, in world space; those of the triangles where it has none. Length 1. */
+    readonly normal: Float32Array;
+    /** Normals of the triangles' planes, in world space. Length 1. */
+    readonly geometricNormal: Float32Array;
+    /** Texture coordinates, 2 numbers a hit. */
+    readonly uv: Float32Array;
+    /** Linear red, green, blue and alpha: the material's factor times the colour at the vertices, without textures; else 1. */
+    readonly color: Float32Array;
+    /** Index of the object. */
+    readonly object: Uint32Array;
+    /** Index of the group of triangles; 0 if the file keeps no groups. */
+    readonly group: Uint32Array;
+    /** Index of the object's material. */
+    readonly material: Uint32Array;
+}

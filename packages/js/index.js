@@ -1,0 +1,247 @@
+// Traces rays through compiled BTH files. The module of WebAssembly that does the work is bth.wasm; its functions are those of src/.
+
+/** Rays that are copied to the module at a time: they stay in the caches. */
+const CHUNK = 4096;
+/** Numbers of a ray: origin, tmin, direction, tmax. */
+const RAY = 8;
+/** Columns of the results of the module's functions. */
+const HIT_COLUMNS = 5, STEP_COLUMNS = 4, SURFACE_COLUMNS = 18;
+/** Words of memory that a chunk needs at most: hits and their surfaces. */
+const WORDS = CHUNK * (HIT_COLUMNS + SURFACE_COLUMNS);
+
+/** What the library refuses: `code` is that of the error, such as "BTH-F001", or "" where it has none. */
+export class BthError extends Error {
+    constructor(message) {
+        super(message);
+        this.name = "BthError";
+        this.code = /BTH-[A-Z]\d+/.exec(message)?.[0] ?? "";
+    }
+}
+
+/** Loads the module; see index.d.ts. */
+export async function load(source = new URL("./bth.wasm", import.meta.url)) {
+    const module = source instanceof WebAssembly.Module ? source : await compile(await source);
+    const { exports } = await WebAssembly.instantiate(module, {});
+    return new Bth(exports, module);
+}
+
+async function compile(source) {
+    if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return WebAssembly.compile(source);
+    if (typeof Response !== "undefined" && source instanceof Response) return WebAssembly.compileStreaming(source);
+    const url = new URL(source, import.meta.url);
+    if (url.protocol === "file:" && typeof process === "object") {
+        const { readFile } = await import("node:fs/promises");
+        return WebAssembly.compile(await readFile(url));
+    }
+    return WebAssembly.compileStreaming(fetch(url));
+}
+
+/** A loaded module. */
+export class Bth {
+    #wasm;
+
+    constructor(wasm, module) {
+        this.#wasm = wasm;
+        /** The compiled module, which workers can be sent. */
+        this.module = module;
+        this.simd = wasm.bth_has_vectors() === 1;
+        // Rays, results and room for 14 numbers of 8 bytes.
+        this.memory = { rays: wasm.bth_words(CHUNK * RAY), results: wasm.bth_words(WORDS), numbers: wasm.bth_words(28) };
+    }
+
+    open(file) {
+        const bytes = ArrayBuffer.isView(file)
+            ? new Uint8Array(file.buffer, file.byteOffset, file.byteLength)
+            : new Uint8Array(file);
+        const memory = this.#wasm.bth_file_new(bytes.length);
+        if (memory === 0) throw this.#error();
+        new Uint8Array(this.#wasm.memory.buffer, this.#wasm.bth_file_bytes(memory) >>> 0, bytes.length).set(bytes);
+        const scene = this.#wasm.bth_open(memory);
+        if (scene === 0) throw this.#error();
+        return new Scene(this.#wasm, this.memory, scene, () => this.#error());
+    }
+
+    #error() {
+        const at = this.#wasm.bth_error() >>> 0;
+        const bytes = new Uint8Array(this.#wasm.memory.buffer, at, this.#wasm.bth_error_length());
+        return new BthError(new TextDecoder().decode(bytes));
+    }
+}
+
+/** An open file. */
+class Scene {
+    #wasm;
+    #memory;
+    #scene;
+    #error;
+
+    constructor(wasm, memory, scene, error) {
+        this.#wasm = wasm;
+        this.#memory = memory;
+        this.#scene = scene;
+        this.#error = error;
+        const numbers = this.#describe();
+        this.objects = numbers[0];
+        this.instances = numbers[1];
+        this.triangles = numbers[2];
+        this.frames = numbers[9] === 1 ? { first: numbers[10], last: numbers[11], rate: numbers[12] } : null;
+    }
+
+    get bounds() {
+        const numbers = this.#describe();
+        if (Number.isNaN(numbers[3])) return null;
+        return { lower: [...numbers.subarray(3, 6)], upper: [...numbers.subarray(6, 9)] };
+    }
+
+    get seconds() {
+        return this.#describe()[13];
+    }
+
+    set seconds(seconds) {
+        if (this.#wasm.bth_set_seconds(this.#open(), seconds) === 0) throw this.#error();
+    }
+
+    nearest(rays) {
+        const count = countOf(rays);
+        const hits = new Hits(count);
+        const columns = [hits.t, hits.u, hits.v, hits.instance, hits.triangle];
+        this.#inChunks(rays, count, (from, n) => {
+            this.#wasm.bth_nearest(this.#scene, this.#memory.rays, n, this.#memory.results);
+            this.#columns(columns, this.#memory.results, from, n);
+        });
+        return hits;
+    }
+
+    any(rays) {
+        const count = countOf(rays);
+        const found = new Uint8Array(count);
+        this.#inChunks(rays, count, (from, n) => {
+            this.#wasm.bth_any(this.#scene, this.#memory.rays, n, this.#memory.results);
+            found.set(new Uint8Array(this.#wasm.memory.buffer, this.#memory.results, n), from);
+        });
+        return found;
+    }
+
+    steps(rays) {
+        const count = countOf(rays);
+        const steps = new Steps(count);
+        const columns = [steps.nodes, steps.leaves, steps.triangles, steps.tets];
+        this.#inChunks(rays, count, (from, n) => {
+            this.#wasm.bth_steps(this.#scene, this.#memory.rays, n, this.#memory.results);
+            this.#columns(columns, this.#memory.results, from, n);
+        });
+        return steps;
+    }
+
+    surface(hits) {
+        const scene = this.#open();
+        const surface = new Surface(hits.count);
+        const { results } = this.#memory;
+        const surfaces = results + 4 * CHUNK * HIT_COLUMNS;
+        const columns = [hits.t, hits.u, hits.v, hits.instance, hits.triangle];
+        for (let from = 0; from < hits.count; from += CHUNK) {
+            const n = Math.min(CHUNK, hits.count - from);
+            columns.forEach((column, k) => {
+                const of = column instanceof Float32Array ? Float32Array : Uint32Array;
+                new of(this.#wasm.memory.buffer, results + 4 * n * k, n).set(column.subarray(from, from + n));
+            });
+            this.#wasm.bth_surface(scene, results, n, surfaces);
+            const words = (k) => new Float32Array(this.#wasm.memory.buffer, surfaces + 4 * n * k, n);
+            const { position, normal, geometricNormal, uv, color } = surface;
+            interleave([0, 1, 2].map(words), position, from);
+            interleave([3, 4, 5].map(words), normal, from);
+            interleave([6, 7, 8].map(words), geometricNormal, from);
+            interleave([9, 10].map(words), uv, from);
+            interleave([11, 12, 13, 14].map(words), color, from);
+            this.#columns([surface.object, surface.group, surface.material], surfaces + 4 * n * 15, from, n);
+        }
+        return surface;
+    }
+
+    close() {
+        if (this.#scene !== 0) this.#wasm.bth_close(this.#scene);
+        this.#scene = 0;
+    }
+
+    /** The address of the scene. */
+    #open() {
+        if (this.#scene === 0) throw new BthError("the scene is closed");
+        return this.#scene;
+    }
+
+    #describe() {
+        this.#wasm.bth_describe(this.#open(), this.#memory.numbers);
+        return new Float64Array(this.#wasm.memory.buffer.slice(this.#memory.numbers, this.#memory.numbers + 112));
+    }
+
+    /** Copies a chunk of rays after the other to the module, and calls `trace` with the index of its first ray and its length. */
+    #inChunks(rays, count, trace) {
+        this.#open();
+        for (let from = 0; from < count; from += CHUNK) {
+            const n = Math.min(CHUNK, count - from);
+            const to = new Float32Array(this.#wasm.memory.buffer, this.#memory.rays, n * RAY);
+            to.set(rays.subarray(from * RAY, (from + n) * RAY));
+            trace(from, n);
+        }
+    }
+
+    /** Copies columns of `n` words from the module to arrays, from an index on. */
+    #columns(arrays, address, from, n) {
+        arrays.forEach((array, k) => {
+            const of = array instanceof Float32Array ? Float32Array : Uint32Array;
+            array.set(new of(this.#wasm.memory.buffer, address + 4 * n * k, n), from);
+        });
+    }
+}
+
+/** Number of rays in an array. */
+function countOf(rays) {
+    if (!(rays instanceof Float32Array) || rays.length % RAY !== 0) {
+        throw new TypeError("rays: expected a Float32Array of eight numbers a ray (origin, tmin, direction, tmax)");
+    }
+    return rays.length / RAY;
+}
+
+/** Element k of the vector of hit i is element i of column k. */
+function interleave(columns, to, from) {
+    const width = columns.length;
+    columns.forEach((column, k) => {
+        for (let i = 0; i < column.length; i++) to[(from + i) * width + k] = column[i];
+    });
+}
+
+/** Hits, an array for each of their numbers. */
+export class Hits {
+    constructor(count) {
+        this.count = count;
+        this.t = new Float32Array(count);
+        this.u = new Float32Array(count);
+        this.v = new Float32Array(count);
+        this.instance = new Uint32Array(count);
+        this.triangle = new Uint32Array(count);
+    }
+}
+
+class Steps {
+    constructor(count) {
+        this.count = count;
+        this.nodes = new Uint32Array(count);
+        this.leaves = new Uint32Array(count);
+        this.triangles = new Uint32Array(count);
+        this.tets = new Uint32Array(count);
+    }
+}
+
+class Surface {
+    constructor(count) {
+        this.count = count;
+        this.position = new Float32Array(3 * count);
+        this.normal = new Float32Array(3 * count);
+        this.geometricNormal = new Float32Array(3 * count);
+        this.uv = new Float32Array(2 * count);
+        this.color = new Float32Array(4 * count);
+        this.object = new Uint32Array(count);
+        this.group = new Uint32Array(count);
+        this.material = new Uint32Array(count);
+    }
+}

@@ -1,0 +1,145 @@
+// The package in node: answers beside those of bthc, errors, what a file holds.
+//
+//   DIST=FOLDER BTHC=PROGRAM BTH_SCENES=PROGRAM node --test package.test.mjs
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join, resolve } from "node:path";
+import { after, before, test } from "node:test";
+import { fileURLToPath, pathToFileURL } from "node:url";
+
+const here = dirname(fileURLToPath(import.meta.url)), conformance = resolve(here, "../../../format-spec/conformance");
+const { BTHC, BTH_SCENES } = process.env;
+const { load, BthError } = await import(pathToFileURL(join(resolve(process.env.DIST), "index.js")));
+
+let folder, bth;
+before(async () => {
+    folder = mkdtempSync(join(tmpdir(), "bth-js-"));
+    bth = await load();
+});
+after(() => rmSync(folder, { recursive: true }));
+
+/** Numbers from 0 to 1 by a linear congruential generator (Numerical Recipes). */
+function numbers(seed) {
+    let state = seed >>> 0;
+    return () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+}
+
+/** Rays from around a box into it; some along axes, some short, some invalid. */
+function raysInto(bounds, count, seed) {
+    const random = numbers(seed), rays = new Float32Array(8 * count);
+    const { lower, upper } = bounds ?? { lower: [-1, -1, -1], upper: [1, 1, 1] };
+    const point = (k, grow) => {
+        const side = upper[k] - lower[k] || 1;
+        return lower[k] - grow * side + random() * (1 + 2 * grow) * side;
+    };
+    for (let i = 0; i < count; i++) {
+        const from = [0, 1, 2].map((k) => point(k, 1)), to = [0, 1, 2].map((k) => point(k, 0));
+        const direction = to.map((x, k) => x - from[k]);
+        if (i % 7 === 0) direction.fill(0, 0, 2);
+        rays.set([...from, i % 5 === 0 ? 0.25 : 0, ...direction, i % 3 === 0 ? Infinity : 2 * random()], 8 * i);
+    }
+    rays[8 * 3] = NaN;
+    rays.fill(0, 8 * 4 + 4, 8 * 4 + 7);
+    return rays;
+}
+
+/** The answers of bthc to rays, from a file of rays in a file of hits: columns of the bits of t, u and v, and of triangles. */
+function native(file, rays, any) {
+    const [from, to] = [join(folder, "rays"), join(folder, "hits")];
+    const header = Buffer.alloc(16);
+    header.write("RAYS");
+    header.writeUInt32LE(1, 4);
+    header.writeUInt32LE(rays.length / 8, 8);
+    writeFileSync(from, Buffer.concat([header, new Uint8Array(rays.buffer)]));
+    execFileSync(BTHC, ["trace", file, from, "-o", to, ...(any ? ["--any"] : [])]);
+    const bytes = readFileSync(to);
+    const words = new Uint32Array(bytes.buffer.slice(bytes.byteOffset + 16, bytes.byteOffset + bytes.length));
+    const column = (k) => words.filter((_, i) => i % 4 === k);
+    return { t: column(0), u: column(1), v: column(2), triangle: column(3) };
+}
+
+const bits = (array) => new Uint32Array(array.buffer);
+
+function sameAnswers(file, count, seed) {
+    const scene = bth.open(readFileSync(file));
+    const rays = raysInto(scene.bounds, count, seed);
+    const hits = scene.nearest(rays), expected = native(file, rays, false);
+    for (const name of ["t", "u", "v", "triangle"]) {
+        assert.deepEqual(bits(hits[name]), expected[name], `${file}: ${name}`);
+    }
+    const found = native(file, rays, true).triangle.map((triangle) => Number(triangle === 0));
+    assert.deepEqual([...scene.any(rays)], [...found], `${file}: any`);
+    assert.equal(scene.steps(rays).count, count);
+    scene.close();
+    return hits.t.filter((t) => t < Infinity).length;
+}
+
+test("vector instructions are used", () => assert.equal(bth.simd, true));
+
+test("answers to conformance files have the bits of bthc", () => {
+    let hits = 0;
+    for (const name of readdirSync(join(conformance, "valid"))) hits += sameAnswers(join(conformance, "valid", name), 300, 1);
+    assert.ok(hits > 1000, `${hits} hits`);
+});
+
+test("answers to a model of 20,000 triangles have the bits of bthc, over several chunks", () => {
+    const [model, file] = [join(folder, "gyroid.ply"), join(folder, "gyroid.bth")];
+    execFileSync(BTH_SCENES, ["make", "gyroid", "--faces", "20000", "-o", model]);
+    execFileSync(BTHC, ["compile", model, "-o", file, "--quality", "fast", "--quiet"]);
+    assert.ok(sameAnswers(file, 10_000, 2) > 3000);
+});
+
+test("damaged files are refused with the code of the specification", () => {
+    const names = readdirSync(join(conformance, "invalid")).filter((name) => name.endsWith(".bth"));
+    let refused = 0;
+    for (const name of names) {
+        const code = `BTH-${name.split(/[-.]/)[0]}`;
+        try {
+            bth.open(readFileSync(join(conformance, "invalid", name))).close();
+        } catch (error) {
+            assert.ok(error instanceof BthError, `${name}: ${error}`);
+            assert.equal(error.code, code, `${name}: ${error.message}`);
+            refused++;
+        }
+    }
+    // The others break what only `bthc verify` looks at.
+    assert.ok(refused > names.length / 2, `${refused} of ${names.length}`);
+    assert.throws(() => bth.open(new ArrayBuffer(0)), BthError);
+});
+
+test("the surface at a hit", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
+    const hits = scene.nearest(Float32Array.of(0.25, 0.25, 1, 0, 0, 0, -1, Infinity, 9, 9, 1, 0, 0, 0, -1, Infinity));
+    const surface = scene.surface(hits);
+    assert.ok(hits.t[0] < Infinity && hits.t[1] === Infinity);
+    const position = [0.25, 0.25, 1 - hits.t[0]];
+    for (let k = 0; k < 3; k++) assert.ok(Math.abs(surface.position[k] - position[k]) < 1e-6);
+    assert.equal(Math.abs(surface.geometricNormal[2]), 1);
+    assert.deepEqual([...surface.color.subarray(0, 4)], [1, 1, 1, 1]);
+    assert.ok(Number.isNaN(surface.position[3]) && surface.object[1] === 0xffffffff);
+});
+
+test("a scene moves when its time is set", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/scene-moving.bth")));
+    assert.ok(scene.frames.last > scene.frames.first);
+    const first = scene.bounds;
+    scene.seconds = scene.frames.last / scene.frames.rate;
+    assert.notDeepEqual(scene.bounds, first);
+    assert.equal(bth.open(readFileSync(join(conformance, "valid/triangle.bth"))).frames, null);
+});
+
+test("arguments of the wrong kind and closed scenes are errors", () => {
+    const scene = bth.open(readFileSync(join(conformance, "valid/triangle.bth")));
+    assert.throws(() => scene.nearest(new Float32Array(9)), TypeError);
+    assert.throws(() => scene.any([0, 0, 0, 0, 0, 0, 1, 1]), TypeError);
+    scene.close();
+    scene.close();
+    assert.throws(() => scene.nearest(new Float32Array(8)), BthError);
+});
+
+test("a compiled module and bytes can be loaded", async () => {
+    assert.ok((await load(bth.module)).simd);
+    assert.ok((await load(readFileSync(join(process.env.DIST, "bth.wasm")))).simd);
+});

@@ -1,0 +1,266 @@
+// The page: opens files, turns the camera, and lets workers refine the picture while nothing changes.
+
+import { cameraOf, contains, firstView, shifted, turned, zoomed, directionThrough } from "./camera.js";
+import { Picture } from "./picture.js";
+import { Pool } from "./pool.js";
+import { add, length } from "./vectors.js";
+
+/** Pixels of a tile's side, and how many pixels of the picture one of a coarse picture covers. */
+const TILE = 64, COARSE = 4;
+/** What the address of the page asks for: `?file=URL`, where it is served, and `?samples=N`. */
+const asked = new URLSearchParams(location.search);
+/** Samples of a pixel after which the picture is done. */
+const SAMPLES = { shaded: 64, normals: 16, ao: 64, steps: 4 };
+const samplesFor = (mode) => Math.max(1, Number(asked.get("samples")) || SAMPLES[mode]);
+
+const element = (id) => document.getElementById(id);
+const canvas = element("picture"), status = element("status"), message = element("message");
+
+/** What is shown: the workers, what the file holds, the view and the mode. */
+const shown = { pool: null, content: null, name: "", view: null, mode: "shaded", up: "y" };
+/** Grows with every change, so that work for an older state is dropped. */
+let state = 0;
+let picture = null;
+let settled = false;
+/** Functions that wait for the picture to be done. */
+let waiting = [];
+
+/** Opens a file; says what is wrong if it cannot be opened, and then keeps what was shown. */
+export async function open(file, name) {
+    say("Opening …");
+    try {
+        const opened = await Pool.open(workerUrl(), await compiledModule(), file);
+        shown.pool?.end();
+        Object.assign(shown, opened, { name });
+        if (!opened.content.bounds) throw new Error("there is nothing to see in this file");
+        say("");
+        showTime();
+        reset();
+    } catch (error) {
+        say(`${name}: ${error.message}`);
+        throw error;
+    }
+}
+
+export function setMode(mode) {
+    shown.mode = mode;
+    for (const button of document.querySelectorAll("[data-mode]")) {
+        button.setAttribute("aria-pressed", String(button.dataset.mode === mode));
+    }
+    changed();
+}
+
+/** Resolves when the picture has all its samples. */
+export function whenSettled() {
+    return settled ? Promise.resolve() : new Promise((resolve) => waiting.push(resolve));
+}
+
+function say(text) {
+    message.textContent = text || (shown.content ? "" : "Drop a .bth file here");
+    message.hidden = message.textContent === "";
+}
+
+function reset() {
+    shown.view = firstView(shown.content.bounds, shown.up);
+    changed();
+}
+
+/** Starts the picture anew. */
+function changed() {
+    state++;
+    settled = false;
+    if (!shown.pool?.size || !shown.view) return;
+    refine(state);
+}
+
+const diagonalOf = ({ lower, upper }) => length(add(upper, lower, -1));
+
+/** Shows a coarse picture, then adds samples until there are enough or something changes. */
+async function refine(of) {
+    await new Promise(requestAnimationFrame);
+    const stopped = () => of !== state;
+    if (stopped()) return;
+    const { width, height } = pixels();
+    if (picture === null || picture.width !== width || picture.height !== height) picture = new Picture(canvas, width, height);
+    const { bounds } = shown.content;
+    const camera = cameraOf(shown.view, width / height);
+    const common = {
+        camera, bounds, mode: shown.mode, size: { width, height }, diagonal: diagonalOf(bounds), inside: contains(bounds, camera.eye),
+    };
+    const start = performance.now();
+    try {
+        let fresh = false;
+        await shown.pool.work(jobs(common, COARSE, 0), stopped, (job, { picture: colors }) => {
+            if (!fresh) picture.restart();
+            fresh = true;
+            picture.showCoarse(job, colors);
+        });
+        for (let sample = 0; sample < samplesFor(common.mode) && !stopped(); sample++) {
+            await shown.pool.work(jobs(common, 1, sample), stopped, (job, { picture: colors }) => picture.add(job, colors));
+            if (!stopped()) report(sample + 1, performance.now() - start, common);
+        }
+    } catch (error) {
+        if (!stopped()) say(error.message);
+    }
+    if (stopped()) return;
+    settled = true;
+    for (const resolve of waiting.splice(0)) resolve();
+}
+
+/** The tiles of a picture, from its middle outwards. */
+function jobs(common, step, sample) {
+    const { width, height } = common.size, side = TILE * step, list = [];
+    for (let top = 0; top < height; top += side) {
+        for (let left = 0; left < width; left += side) {
+            const tile = {
+                left, top,
+                width: Math.ceil(Math.min(side, width - left) / step),
+                height: Math.ceil(Math.min(side, height - top) / step),
+            };
+            const away = Math.hypot(left + side / 2 - width / 2, top + side / 2 - height / 2);
+            list.push({ away, job: { ...common, tile, step, sample } });
+        }
+    }
+    return list.sort((a, b) => a.away - b.away).map(({ job }) => job);
+}
+
+/** The size of the picture: that of the window, in pixels of the screen. */
+function pixels() {
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    return { width: Math.max(1, Math.round(innerWidth * ratio)), height: Math.max(1, Math.round(innerHeight * ratio)) };
+}
+
+function report(samples, milliseconds, { mode, size }) {
+    const { content, pool, name } = shown;
+    const number = (x) => x.toLocaleString("en");
+    const rate = (samples * size.width * size.height) / milliseconds / 1000;
+    const parts = [
+        name,
+        `${number(content.triangles)} triangles`,
+        content.instances > 1 ? `${number(content.instances)} instances` : "",
+        `${samples} of ${samplesFor(mode)} samples`,
+        `${rate.toFixed(2)} million pixels a second`,
+        `${pool.size} ${pool.size === 1 ? "worker" : "workers"}`,
+        mode === "steps" ? `brightest: ${picture.mostSteps} steps` : "",
+    ];
+    status.textContent = parts.filter(Boolean).join(" · ");
+}
+
+/** Shows the slider of time for scenes of several frames. */
+function showTime() {
+    const { frames } = shown.content;
+    const slider = element("time");
+    slider.parentElement.hidden = !frames || frames.first === frames.last;
+    if (frames) Object.assign(slider, { min: frames.first, max: frames.last, value: frames.first, step: 1 });
+}
+
+async function setFrame(frame) {
+    const { frames } = shown.content;
+    state++;
+    try {
+        const { bounds } = await shown.pool.askAll("seconds", { seconds: frame / frames.rate });
+        if (bounds) shown.content.bounds = bounds;
+        say("");
+    } catch (error) {
+        say(error.message);
+    }
+    changed();
+}
+
+/** Looks from now on at what is under a point of the window. */
+async function lookAt(x, y) {
+    const camera = cameraOf(shown.view, innerWidth / innerHeight);
+    const direction = directionThrough(camera, (2 * x) / innerWidth - 1, 1 - (2 * y) / innerHeight);
+    const hit = await shown.pool.ask("pick", { ray: Float32Array.of(...camera.eye, 0, ...direction, Infinity) });
+    if (hit.t === Infinity) return;
+    shown.view = { ...shown.view, target: add(camera.eye, direction, hit.t) };
+    shown.view.distance = hit.t;
+    status.textContent = `instance ${hit.instance}, triangle ${hit.triangle}, t ${hit.t}`;
+    changed();
+}
+
+// Files: dropped, chosen, or named in the address.
+addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("over");
+});
+addEventListener("dragleave", () => document.body.classList.remove("over"));
+addEventListener("drop", (event) => {
+    event.preventDefault();
+    document.body.classList.remove("over");
+    openFile(event.dataTransfer.files[0]);
+});
+element("file").addEventListener("change", (event) => openFile(event.target.files[0]));
+async function openFile(file) {
+    // `open` has said what is wrong.
+    if (file) await file.arrayBuffer().then((bytes) => open(bytes, file.name)).catch(() => {});
+}
+const named = asked.get("file");
+if (named) {
+    fetch(named)
+        .then((response) => (response.ok ? response.arrayBuffer() : Promise.reject(new Error(`${response.status} ${response.statusText}`))))
+        .then((bytes) => open(bytes, named.split("/").pop()))
+        .catch((error) => say(`${named}: ${error.message}`));
+}
+
+// The pointer: one button turns, the other or Shift shifts, two fingers zoom and shift, the wheel zooms.
+const pointers = new Map();
+canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, event);
+});
+canvas.addEventListener("pointermove", (event) => {
+    const before = pointers.get(event.pointerId);
+    if (!before || !shown.view) return;
+    const dx = event.clientX - before.clientX, dy = event.clientY - before.clientY;
+    if (pointers.size === 2) {
+        const [other] = [...pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+        const apart = (at) => Math.hypot(at.clientX - other.clientX, at.clientY - other.clientY);
+        shown.view = zoomed(shifted(shown.view, -dx / innerHeight / 2, dy / innerHeight / 2), apart(before) / Math.max(apart(event), 1));
+    } else if (event.shiftKey || event.buttons !== 1) {
+        shown.view = shifted(shown.view, -dx / innerHeight, dy / innerHeight);
+    } else {
+        shown.view = turned(shown.view, (-4 * dx) / innerHeight, (4 * dy) / innerHeight);
+    }
+    pointers.set(event.pointerId, event);
+    changed();
+});
+for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
+canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+canvas.addEventListener("dblclick", (event) => shown.view && lookAt(event.clientX, event.clientY));
+canvas.addEventListener(
+    "wheel",
+    (event) => {
+        event.preventDefault();
+        if (shown.view) shown.view = zoomed(shown.view, Math.exp(event.deltaY * 0.001));
+        changed();
+    },
+    { passive: false },
+);
+
+// Buttons and keys.
+for (const button of document.querySelectorAll("[data-mode]")) {
+    button.addEventListener("click", () => setMode(button.dataset.mode));
+}
+const actions = {
+    1: () => setMode("shaded"),
+    2: () => setMode("normals"),
+    3: () => setMode("ao"),
+    4: () => setMode("steps"),
+    u: () => {
+        shown.up = shown.up === "y" ? "z" : "y";
+        if (shown.content) reset();
+    },
+    r: () => shown.content && reset(),
+};
+addEventListener("keydown", (event) => {
+    if (!event.ctrlKey && !event.metaKey && !event.altKey) actions[event.key.toLowerCase()]?.();
+});
+element("up").addEventListener("click", actions.u);
+element("reset").addEventListener("click", actions.r);
+element("time").addEventListener("input", (event) => setFrame(Number(event.target.value)));
+addEventListener("resize", changed);
+
+// For tests, and for pages that show a file of their own.
+window.viewer = { open, setMode, whenSettled };
+say("");

@@ -1,0 +1,239 @@
+// The colours of a tile of the picture in each mode.
+
+import { directionThrough, onGround } from "./camera.js";
+import { add, blend, cosineDirection, dot, length, mix, perpendicular, samplePoint, scale, unit } from "./vectors.js";
+
+/** Distance from a surface at which secondary rays start, relative to the diagonal of the scene: more than the rounding of points. */
+const OFFSET = 2e-5;
+/** Ambient-occlusion rays of a sample in mode shaded and in mode ao. */
+const AMBIENT_RAYS = 2, AO_RAYS = 4;
+/** Length of ambient-occlusion rays relative to the diagonal of the scene, of pictures from outside and from inside. */
+const OPEN_OUTSIDE = 0.5, OPEN_INSIDE = 0.08;
+/** Radius of the key light at distance 1, which decides how soft its shadows are. */
+const KEY_RADIUS = 0.16;
+
+// Light of the studio: linear red, green and blue.
+const CLAY = [0.57, 0.515, 0.465];
+const KEY = [1.15, 1.08, 0.97];
+const FILL = [0.12, 0.145, 0.19];
+const SKY = [0.33, 0.37, 0.43];
+const BOUNCE = [0.22, 0.2, 0.18];
+const BACKGROUND_TOP = [0.52, 0.56, 0.62];
+const BACKGROUND_BOTTOM = [0.8, 0.81, 0.82];
+const DARK = [0.02, 0.02, 0.02];
+
+/**
+ * The colours of a tile, three numbers a pixel, row by row; in mode steps the first is the number of steps. A job has the camera, the
+ * mode, the size of the whole picture, the tile (left, top, width, height), the distance of its pixels in those of the picture
+ * (`step`), the number of the sample, the scene's bounds and whether the camera is inside them.
+ */
+export function shadeTile(scene, job) {
+    const samples = samplesOf(job);
+    const shade = { shaded, normals, ao: ambientOcclusion, steps }[job.mode];
+    const colors = shade(scene, job, samples);
+    const { width, height } = job.tile;
+    const picture = new Float32Array(3 * width * height);
+    samples.forEach(({ x, y }, i) => picture.set(colors[i], 3 * (y * width + x)));
+    return picture;
+}
+
+/** The samples of a tile in blocks of 8 by 8 pixels, which are traced together. */
+function samplesOf({ camera, size, tile, step, sample }) {
+    const samples = [];
+    for (let y0 = 0; y0 < tile.height; y0 += 8) {
+        for (let x0 = 0; x0 < tile.width; x0 += 8) {
+            for (let y = y0; y < Math.min(y0 + 8, tile.height); y++) {
+                for (let x = x0; x < Math.min(x0 + 8, tile.width); x++) {
+                    const column = tile.left + x * step, row = tile.top + y * step;
+                    const pixel = mix(mix(column) ^ row);
+                    const [dx, dy] = samplePoint(pixel, 0, sample);
+                    const h = (2 * (column + dx * step)) / size.width - 1, v = 1 - (2 * (row + dy * step)) / size.height;
+                    samples.push({ x, y, pixel, h, v, direction: directionThrough(camera, h, v) });
+                }
+            }
+        }
+    }
+    return samples;
+}
+
+/** Rays that are traced together. */
+class Rays {
+    constructor(capacity) {
+        this.numbers = new Float32Array(8 * capacity);
+        this.count = 0;
+    }
+    push(origin, direction, tmax) {
+        const { numbers } = this, at = 8 * this.count++;
+        for (let k = 0; k < 3; k++) {
+            numbers[at + k] = origin[k];
+            numbers[at + 4 + k] = direction[k];
+        }
+        numbers[at + 7] = tmax;
+    }
+    get used() {
+        return this.numbers.subarray(0, 8 * this.count);
+    }
+}
+
+function cameraRays(camera, samples) {
+    const rays = new Rays(samples.length);
+    for (const { direction } of samples) rays.push(camera.eye, direction, Infinity);
+    return rays.used;
+}
+
+const vector = (array, i) => [array[3 * i], array[3 * i + 1], array[3 * i + 2]];
+
+/** What the camera rays hit: for each sample the point and its normals on the side of the camera, or null. */
+function visiblePoints(scene, camera, samples) {
+    const rays = cameraRays(camera, samples);
+    const hits = scene.nearest(rays);
+    const surface = scene.surface(hits);
+    return samples.map(({ direction }, i) => {
+        if (hits.t[i] === Infinity) return null;
+        let geometric = vector(surface.geometricNormal, i), normal = vector(surface.normal, i);
+        // A file without vertices has no normals: surfaces then face the camera.
+        if (Number.isNaN(geometric[0])) geometric = normal = scale(direction, -1);
+        if (dot(geometric, direction) > 0) geometric = scale(geometric, -1);
+        if (dot(normal, geometric) < 0) normal = scale(normal, -1);
+        const color = [surface.color[4 * i], surface.color[4 * i + 1], surface.color[4 * i + 2]];
+        const hasColor = surface.material[i] !== 0xffffffff || color[0] !== 1 || color[1] !== 1 || color[2] !== 1;
+        return {
+            point: add(camera.eye, direction, hits.t[i]),
+            geometric,
+            normal,
+            color: hasColor && !Number.isNaN(color[0]) ? color : CLAY,
+        };
+    });
+}
+
+/** A point just above a surface. Far from the origin the spacing of f32 numbers exceeds the relative distance. */
+function above(point, normal, diagonal) {
+    const greatest = Math.max(Math.abs(point[0]), Math.abs(point[1]), Math.abs(point[2]));
+    return add(point, normal, Math.max(OFFSET * diagonal, greatest * 2 ** -21));
+}
+
+function normals(scene, { camera }, samples) {
+    const shade = (along) => 0.5 + 0.5 * along;
+    return visiblePoints(scene, camera, samples).map((at) => {
+        if (at === null) return DARK;
+        const { normal } = at;
+        return [shade(dot(normal, camera.right)), shade(dot(normal, camera.up)), shade(-dot(normal, camera.forward))];
+    });
+}
+
+function steps(scene, { camera }, samples) {
+    const { nodes, leaves, tets } = scene.steps(cameraRays(camera, samples));
+    return samples.map((_, i) => [nodes[i] + leaves[i] + tets[i], 0, 0]);
+}
+
+function ambientOcclusion(scene, job, samples) {
+    const points = visiblePoints(scene, job.camera, samples);
+    const rays = new Rays(AO_RAYS * samples.length);
+    points.forEach((at, i) => {
+        if (at !== null) pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AO_RAYS);
+    });
+    const blocked = scene.any(rays.used);
+    let next = 0;
+    return points.map((at) => {
+        if (at === null) return DARK;
+        const open = 1 - mean(blocked, next, AO_RAYS);
+        next += AO_RAYS;
+        return [0.9 * open, 0.9 * open, 0.9 * open];
+    });
+}
+
+/** Adds rays over the hemisphere above a point. */
+function pushAmbient(rays, { diagonal, inside, sample }, point, normal, pixel, count) {
+    const origin = above(point, normal, diagonal);
+    for (let ray = 0; ray < count; ray++) {
+        const at = samplePoint(pixel, 2, sample * count + ray);
+        rays.push(origin, cosineDirection(normal, at), diagonal * (inside ? OPEN_INSIDE : OPEN_OUTSIDE));
+    }
+}
+
+const mean = (values, from, count) => {
+    let sum = 0;
+    for (let i = 0; i < count; i++) sum += values[from + i];
+    return sum / count;
+};
+
+/** A matte model under a soft key light and a fill light, with ambient occlusion, on a ground that only catches shadows. */
+function shaded(scene, job, samples) {
+    const { camera, diagonal, inside, bounds } = job;
+    const lights = studio(job);
+    const ground = inside ? null : dot(camera.vertical, camera.vertical.map((x, k) => (x < 0 ? bounds.upper[k] : bounds.lower[k])));
+    const center = scale(add(bounds.lower, bounds.upper), 0.5);
+    const points = visiblePoints(scene, camera, samples).map((at, i) => {
+        if (at !== null || ground === null) return at;
+        const point = onGround(camera, samples[i].direction, ground);
+        if (point === null) return null;
+        const away = add(point, center, -1);
+        const flat = length(add(away, camera.vertical, -dot(away, camera.vertical))) / diagonal;
+        // Beyond a few diagonals the shadow is too faint to be seen.
+        if (flat > 3) return null;
+        return { point, geometric: camera.vertical, normal: camera.vertical, shadow: Math.exp(-((flat / 1.1) ** 2)) };
+    });
+    const each = 1 + AMBIENT_RAYS;
+    const rays = new Rays(each * samples.length);
+    points.forEach((at, i) => {
+        if (at === null) return;
+        at.toKey = pushKey(rays, lights, job, at, samples[i].pixel);
+        pushAmbient(rays, job, at.point, at.geometric, samples[i].pixel, AMBIENT_RAYS);
+    });
+    const blocked = scene.any(rays.used);
+    let next = 0;
+    return points.map((at, i) => {
+        const behind = background(samples[i]);
+        if (at === null) return behind;
+        const key = 1 - blocked[next], open = 1 - mean(blocked, next + 1, AMBIENT_RAYS);
+        next += each;
+        if (at.shadow !== undefined) return scale(behind, 1 - at.shadow * (0.62 * (1 - open) + 0.3 * (1 - key)));
+        return shoulder(lit(at, lights, camera, samples[i].direction, key, open));
+    });
+}
+
+/** The lights of a camera: the key light is far away, or beside the camera in a room. */
+function studio({ camera, inside }) {
+    const { right, up, forward, vertical } = camera;
+    const direction = add(add(scale(forward, -0.45), right, -0.55), vertical, 0.85);
+    const fill = unit(add(add(scale(right, 0.85), forward, -0.5), vertical, 0.1));
+    return { fill, key: inside ? null : unit(direction), lamp: add(camera.eye, up, 0.001) };
+}
+
+/** Adds the ray to the key light; returns its unit direction without the light's radius. */
+function pushKey(rays, lights, { diagonal, sample }, at, pixel) {
+    const toLamp = add(lights.lamp, at.point, -1);
+    const toKey = lights.key ?? unit(toLamp);
+    const distance = lights.key === null ? length(toLamp) * 0.999 : 4 * diagonal;
+    const [x, y] = samplePoint(pixel, 1, sample);
+    const [tangent, bitangent] = perpendicular(toKey);
+    const radius = KEY_RADIUS * Math.sqrt(y), angle = 2 * Math.PI * x;
+    const spread = add(scale(tangent, radius * Math.cos(angle)), bitangent, radius * Math.sin(angle));
+    rays.push(above(at.point, at.geometric, diagonal), unit(add(toKey, spread)), distance);
+    return toKey;
+}
+
+/** The light that leaves a point towards the camera; `key` and `open` are the visible shares of key light and hemisphere. */
+function lit(at, { fill }, camera, direction, key, open) {
+    const facing = Math.max(dot(at.normal, at.toKey), 0);
+    const fromFill = Math.max(dot(at.normal, fill), 0) * (0.4 + 0.6 * open);
+    const ambient = blend(BOUNCE, SKY, dot(at.normal, camera.vertical) * 0.5 + 0.5);
+    // A weak specular term (Blinn) shows curvature in the lit parts.
+    const half = unit(add(at.toKey, direction, -1));
+    const gloss = 0.06 * key * Math.max(dot(at.normal, half), 0) ** 24;
+    const channel = (k) => at.color[k] * (KEY[k] * key * facing + FILL[k] * fromFill + ambient[k] * open) + KEY[k] * gloss;
+    return [channel(0), channel(1), channel(2)];
+}
+
+/** A vertical gradient with a slight vignette. */
+function background({ h, v }) {
+    const part = v * 0.5 + 0.5;
+    const color = blend(BACKGROUND_BOTTOM, BACKGROUND_TOP, part * part * (3 - 2 * part));
+    return scale(color, 1 - 0.1 * (h * h + v * v));
+}
+
+/** Keeps bright colours below 1, smoothly. */
+function shoulder(color) {
+    const channel = (x) => (x < 0.7 ? x : 0.7 + 0.3 * (1 - Math.exp(-(x - 0.7) / 0.3)));
+    return [channel(color[0]), channel(color[1]), channel(color[2])];
+}

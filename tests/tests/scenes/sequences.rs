@@ -6,7 +6,9 @@ use bth::Scene;
 use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, MotionOptions};
 use bth_compile::scene::{self, SceneReport};
+use bth_import::gltf::scene::{ImportOptions, import};
 use bth_random::Rng;
+use serde_json::json;
 use std::path::Path;
 
 type Positions = Vec<[f32; 3]>;
@@ -194,4 +196,131 @@ fn a_time_that_cannot_be_shown_leaves_the_scene_as_it_was() {
     );
     assert_eq!(scene.set_seconds(1.0).unwrap().deformed, 0);
     assert_eq!(scene.set_seconds(0.5).unwrap().deformed, 1);
+}
+
+#[test]
+fn subscenes_move_vertices_and_change_trees_as_their_file_does() {
+    let (frames, triangles) = exchanging(24);
+    let folder = folder(&frames, &triangles);
+    let text = format!(
+        "frames = {{ first = 0, last = 8, rate = 2 }}\nobjects = [{{ name = \"knot\", sequence = \"knot_###.obj\", rate = 1 }}]\n{NODE}"
+    );
+    let many = CompileOptions { motion: MotionOptions { poses: 4, segments: 4 }, ..options() };
+    let (file, report) = built(&text, folder.path(), &many);
+    assert!(report.objects[0].motion.as_ref().unwrap().segments.len() > 1);
+    let mut alone = bth::from_file(file).unwrap();
+    let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let mut builder = bth::SceneBuilder::new();
+    let first = builder.add(&alone);
+    let whole = builder.subscene(first, &identity).unwrap();
+    let rng = &mut Rng::new(8);
+    for seconds in [0.0, 2.5, 1.4, 3.0] {
+        builder.set_subscene_seconds(whole, seconds).unwrap();
+        builder.commit().unwrap();
+        alone.set_seconds(seconds).unwrap();
+        assert_eq!(builder.scene().positions(first), alone.positions(0), "{seconds}");
+        assert!(compare(&alone, builder.scene(), 0, rng) > 100);
+        assert_eq!(builder.commit().unwrap().deformed, 0, "nothing moved");
+    }
+    // A commit that fails leaves positions and trees as they were.
+    builder.set_subscene_seconds(whole, 0.0).unwrap();
+    builder.set_subscene_transform(whole, &[0.0; 12]).unwrap();
+    assert_eq!(builder.commit().unwrap_err().code(), bth::Code::Singular);
+    assert!(compare(&alone, builder.scene(), 0, rng) > 100);
+    builder.set_subscene_transform(whole, &identity).unwrap();
+    assert_eq!(builder.commit().unwrap().deformed, 1);
+    alone.set_seconds(0.0).unwrap();
+    assert!(compare(&alone, builder.scene(), 0, rng) > 100);
+    // What the caller gives counts until the time changes.
+    let given: Vec<_> = alone.positions(0).iter().map(|[x, y, z]| [*x, *y + 5.0, *z]).collect();
+    builder.set_positions(first, &given).unwrap();
+    builder.commit().unwrap();
+    assert_eq!(builder.scene().positions(first), given);
+    builder.set_subscene_seconds(whole, 2.5).unwrap();
+    builder.commit().unwrap();
+    alone.set_seconds(2.5).unwrap();
+    assert!(compare(&alone, builder.scene(), 0, rng) > 100);
+}
+
+/// A folder with a glTF file whose one morph target makes squares exchange their places between 1.4 and 1.6 s.
+fn morphing(side: usize) -> tempfile::TempDir {
+    let (frames, triangles) = exchanging(side);
+    let (base, other) = (&frames[0], &frames[2]);
+    let deltas: Vec<_> = base.iter().zip(other).map(|(a, b)| [0, 1, 2].map(|k| b[k] - a[k])).collect();
+    let mut bytes: Vec<u8> = Vec::new();
+    let mut views = Vec::new();
+    let mut add = |part: Vec<u8>| {
+        views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": part.len()}));
+        bytes.extend(part);
+    };
+    let floats = |rows: &[f32]| rows.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    add(floats(base.as_flattened()));
+    add(floats(deltas.as_flattened()));
+    add(triangles.iter().flatten().flat_map(|row| row.to_le_bytes()).collect());
+    add(floats(&[0.0, 1.4, 1.6, 3.0]));
+    add(floats(&[0.0, 0.0, 1.0, 1.0]));
+    let bound = |greatest: bool, rows: &[[f32; 3]]| {
+        [0, 1, 2].map(|k| {
+            let values = rows.iter().map(|p| p[k]);
+            if greatest { values.fold(f32::MIN, f32::max) } else { values.fold(f32::MAX, f32::min) }
+        })
+    };
+    let accessor = |view: u32, component: u32, count: usize, shape: &str| json!({"bufferView": view, "componentType": component, "count": count, "type": shape});
+    let mut accessors = [
+        accessor(0, 5126, base.len(), "VEC3"),
+        accessor(1, 5126, base.len(), "VEC3"),
+        accessor(2, 5125, 3 * triangles.len(), "SCALAR"),
+        accessor(3, 5126, 4, "SCALAR"),
+        accessor(4, 5126, 4, "SCALAR"),
+    ];
+    for (accessor, rows) in accessors.iter_mut().zip([&base[..], &deltas[..]]) {
+        accessor["min"] = json!(bound(false, rows));
+        accessor["max"] = json!(bound(true, rows));
+    }
+    let primitive = json!({"attributes": {"POSITION": 0}, "indices": 2, "targets": [{"POSITION": 1}]});
+    let text = json!({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}], "accessors": accessors, "bufferViews": views,
+        "buffers": [{"uri": "data.bin", "byteLength": bytes.len()}],
+        "animations": [{
+            "samplers": [{"input": 3, "output": 4}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]
+        }]
+    });
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.gltf"), text.to_string()).unwrap();
+    std::fs::write(folder.path().join("data.bin"), bytes).unwrap();
+    folder
+}
+
+#[test]
+fn objects_that_a_file_deforms_get_trees_for_their_poses_and_answer_the_same() {
+    let folder = morphing(24);
+    let (manifest, _) =
+        import(&folder.path().join("a.gltf"), "a.gltf", &ImportOptions::default(), &Silent).unwrap();
+    let compiled = |poses: u32, segments: u32| {
+        let options = CompileOptions { motion: MotionOptions { poses, segments }, ..options() };
+        let (compiled, report) =
+            scene::compile(&manifest, folder.path(), Path::new("x"), &options, &Silent).unwrap();
+        let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
+        bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
+        (file, report)
+    };
+    let (_, still) = compiled(1, 1);
+    assert!(still.objects[0].motion.is_none(), "the tree is for the positions at rest");
+    let (_, one) = compiled(4, 1);
+    let (file, many) = compiled(4, 4);
+    let [one, many] = [&one, &many].map(|report| report.objects[0].motion.as_ref().unwrap());
+    assert!(many.segments.len() > 1 && many.cost_ratio < 0.9 * one.cost_ratio, "{many:?} {one:?}");
+    let triangles = file.object(0).unwrap().triangles.to_vec();
+    let mut scene = bth::from_file(file).unwrap();
+    let rng = &mut Rng::new(9);
+    for seconds in [0.0, 2.5, 1.45, 1.55, 3.0, 0.5, 2.9] {
+        scene.set_seconds(seconds).unwrap();
+        let positions = scene.positions(0).to_vec();
+        check_at(&scene, &positions, &triangles, rng);
+    }
+    let positions = scene.positions(0).to_vec();
+    scene.set_seconds(f64::from(2.8f32)).unwrap();
+    assert_eq!(scene.positions(0), positions, "the weights are the same from 1.6 s on");
 }

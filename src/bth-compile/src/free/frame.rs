@@ -125,7 +125,8 @@ pub(super) fn bins(columns: [u32; 2], rows: [u32; 2]) -> BinSet {
     };
     const SIDE: u32 = FREE_SIDE as u32;
     let of_row = (2u32 << columns[1]) - (1 << columns[0]);
-    let in_rows = FIRST & (1 << (SIDE * (rows[1] + 1))) - 1 & !((1 << (SIDE * rows[0])) - 1);
+    let before = |row: u32| (1 << (SIDE * row)) - 1;
+    let in_rows = FIRST & before(rows[1] + 1) & !before(rows[0]);
     in_rows * BinSet::from(of_row)
 }
 

@@ -134,7 +134,8 @@ fn reach(tree: &BinaryBvh, relative: f64) -> f32 {
     let Some(root) = tree.nodes.first() else { return 0.0 };
     let square = |k: usize| (f64::from(root.upper[k]) - f64::from(root.lower[k])).powi(2);
     let reach = (relative * (0..3).map(square).sum::<f64>().sqrt()) as f32;
-    if FREE_REACH_RANGE[0] <= reach && reach <= FREE_REACH_RANGE[1] { reach } else { 0.0 }
+    let [least, most] = FREE_REACH_RANGE;
+    if (least..=most).contains(&reach) { reach } else { 0.0 }
 }
 
 /// Shares of free directions, by area and cosine.

@@ -119,9 +119,9 @@ fn check(mesh: &Mesh, rays: usize, seed: u64) -> usize {
 fn rays_in_free_directions_meet_nothing() {
     let mut used = 0;
     for seed in 0..12 {
-        used += check(&terraces(6, seed), 3000, seed);
-        used += check(&soup(60, seed), 3000, seed);
-        used += check(&patch(seed, 12), 3000, seed);
+        used += check(&terraces(6, seed), 4000, seed);
+        used += check(&soup(60, seed), 4000, seed);
+        used += check(&patch(seed, 12), 4000, seed);
     }
     used += check(&sphere(10, [0.0; 3]), 4000, 1);
     used += check(&sphere(9, [1000.0, -50.0, 3.0]), 4000, 2);
@@ -130,11 +130,18 @@ fn rays_in_free_directions_meet_nothing() {
 
 #[test]
 fn a_convex_solid_is_free_outside() {
-    for (triangle, bins) in free_of(&sphere(12, [0.0; 3])).bins.iter().enumerate() {
-        let bins = FreeDirections { place: NONE, bins: *bins }.bins();
-        // Boxes reach beyond the solid, and block what is close to the horizon.
-        assert!((bins.0 & FreeBins::ALL).count_ones() >= 100 && bins.0 & !FreeBins::ALL == 0, "{triangle}");
-    }
+    let free = free_of(&sphere(12, [0.0; 3]));
+    let open: Vec<u32> = (0..free.bins.len())
+        .map(|triangle| {
+            let bins = free.bins(triangle).0;
+            assert_eq!(bins & !FreeBins::ALL, 0, "{triangle}: of the front, and at any distance");
+            bins.count_ones()
+        })
+        .collect();
+    // Boxes reach beyond the solid, and what is small for its distance blocks bins close to the horizon without a proof.
+    let all = open.iter().filter(|bins| **bins == FreeBins::ALL.count_ones()).count();
+    assert!(all * 3 >= open.len() * 2, "{all} of {} triangles are free in all directions", open.len());
+    assert!(open.iter().all(|bins| bins * 3 >= FreeBins::ALL.count_ones() * 2), "{open:?}");
 }
 
 #[test]

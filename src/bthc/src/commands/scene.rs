@@ -77,7 +77,7 @@ pub(super) fn compile(
     report.json["scene"] = outcome.report;
     report.json["import"] = json!(import);
     if let Some(built) = &outcome.built {
-        report.text = format!("{}{}", summary(&manifest, built), report.text);
+        report.text = format!("{}{}", summary(built), report.text);
     }
     Ok(report)
 }
@@ -166,7 +166,7 @@ fn motion(facts: &mut Table, report: &SceneReport) {
 }
 
 /// The report of a compiled scene for people.
-fn summary(manifest: &Manifest, report: &SceneReport) -> String {
+fn summary(report: &SceneReport) -> String {
     let mut stages = Table::default();
     for stage in &report.seconds {
         stages.row([stage.name, &seconds(stage.seconds)]);
@@ -177,8 +177,9 @@ fn summary(manifest: &Manifest, report: &SceneReport) -> String {
     facts.row(["nodes", &count(report.nodes)]);
     facts.row(["instances", &count(report.instances)]);
     facts.row(["objects", &count(report.objects.len() as u64)]);
-    let used = (manifest.objects.len() - report.unused.len()) as u64;
-    row_unless_zero(&mut facts, "objects of equal geometry, stored once", used - report.objects.len() as u64);
+    // Objects of later ranges of time have no name of their own.
+    let stored_once = report.objects.iter().map(|object| object.names.len().saturating_sub(1) as u64).sum();
+    row_unless_zero(&mut facts, "objects of equal geometry, stored once", stored_once);
     row_unless_zero(&mut facts, "objects that nobody sees, left out", report.unused.len() as u64);
     row_unless_zero(&mut facts, "objects that deform", report.deformers);
     row_unless_zero(&mut facts, "tracks", report.tracks);

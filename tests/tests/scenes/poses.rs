@@ -1,6 +1,7 @@
 //! World matrices agree with an independent reader of glTF.
 
 use crate::support::{animated, compiled, imported};
+use bth_scene::Property;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -48,7 +49,9 @@ fn world_matrices_are_those_of_an_independent_reader() {
             moved |= !first.is_empty() && first != all;
             first = all;
         }
-        assert_eq!(moved, !manifest.tracks.is_empty(), "{} moves", path.display());
+        // Weights of morph targets move vertices, not nodes.
+        let moves = manifest.tracks.iter().any(|track| track.property != Property::Weights);
+        assert_eq!(moved, moves, "{} moves", path.display());
     }
     println!("{compared} matrices compared");
 }

@@ -15,6 +15,7 @@ def compile(
     tets=None, subtrees=None, compact=None, geometry=None, names=None, materials=None, estimator=None, select=None, optimize_for=None,
     profile=None, max_bytes_per_triangle=None, budget=None, probe=None, min_tet_triangles=None, c_tet=None, for_scene=None,
     tet_deadline=None, tet_memory=None, flatten=None, scene=None, animation=None, rate=None, at_rest=None, strict=None,
+    deformable=None, poses=None, segments=None, free_directions=None, free_reach=None,
     cache=None, cache_size=None, shared_cache=None, memory=None, threads=None, progress=None,
 ):
     """Compiles a model and returns its scene.
@@ -29,6 +30,7 @@ def compile(
 
     All other options are those of `bthc compile`. `structure` is 'bvh' by default, since the package has no worker for tetrahedra.
     attributes ('normals', 'all'), alpha ('mask', 'blend'), names and materials (True) keep what models in files have of these.
+    deformable: keeps what `Scene.set_positions` needs. free_directions ('auto', 'all') keeps in which directions rays from a triangle meet nothing.
     """
     options = {name: value for name, value in locals().items() if name != "model" and value is not None}
     if isinstance(model, (str, os.PathLike)):

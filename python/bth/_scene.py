@@ -4,8 +4,10 @@ import io
 import math
 import os
 
-from . import _native
-from ._contents import Contents
+import numpy as np
+
+from . import _arrays, _native
+from ._contents import Contents, _index
 from ._point_queries import PointQueries
 from ._ray_queries import RayQueries
 
@@ -28,10 +30,14 @@ def load(data):
     return Scene(_native.load(data))
 
 
-def _restore(data, seconds, masks):
+def _restore(data, seconds, masks, deformed):
     scene = load(data)
     if scene.seconds != seconds:
         scene.seconds = seconds
+    for obj, positions in deformed:
+        # Those of files that move vertices follow from the time.
+        if scene.vertices(obj).tobytes() != positions.tobytes():
+            scene.set_positions(positions, obj)
     if any(masks):
         _native.set_masks(scene._native, masks)
     return scene
@@ -40,9 +46,10 @@ def _restore(data, seconds, masks):
 class Scene(RayQueries, PointQueries, Contents):
     """An open scene.
 
-    Any number of threads may query it at once. Changes (the time, masks) wait until no query of another thread uses it, so that each
+    Any number of threads may query it at once. Changes (the time, positions, masks) wait until no query of another thread uses it, so that each
     query sees the scene as it was before or as it is after. A filter, or the handler of a signal that interrupts a query, may query the
-    scene, but not change it. Copies and pickles have the file, the time and the masks.
+    scene, but not change it. Copies and pickles have the file, the time,
+    positions and the masks.
     """
 
     __slots__ = ("_native", "__weakref__")
@@ -102,14 +109,34 @@ class Scene(RayQueries, PointQueries, Contents):
         """Sets the time to that of a frame."""
         self._native.set_frame(frame)
 
+    # Deformation.
+
+    def vertex_count(self, obj=0):
+        """Number of positions that `set_positions` takes; None for an object that cannot be deformed."""
+        return self._native.vertex_count(_index(obj, "obj"))
+
+    def set_positions(self, positions, obj=0):
+        """Gives an object new positions, (n, 3) in its space: one for each vertex of its source, in the source's order. They are rounded to
+        float32. The object must be compiled with `deformable=True`.
+
+        All queries then answer for the new positions, as exactly as before. Returns how much rays are expected to cost, relative to the
+        pose that was compiled.
+        """
+        positions = _arrays.vectors(positions, "positions")
+        if positions.ndim != 2:
+            raise ValueError(f"positions: expected the shape (n, 3), got {positions.shape}")
+        with np.errstate(over="ignore"):
+            positions = np.require(positions, np.float32, "CA")
+        return self._native.set_positions(_index(obj, "obj"), positions)
+
     # Life.
 
     def to_bytes(self):
-        """The bytes of the compiled file. Time and masks are not part of them."""
+        """The bytes of the compiled file. Time, new positions and masks are not part of them."""
         return self._native.to_bytes()
 
     def save(self, path):
-        """Writes the compiled file; it appears whole or not at all. Time and masks are not part of it."""
+        """Writes the compiled file; it appears whole or not at all. Time, new positions and masks are not part of it."""
         path = os.fspath(path)
         part = f"{path}.{os.getpid()}.part"
         with io.open(part, "xb") as file:
@@ -132,7 +159,8 @@ class Scene(RayQueries, PointQueries, Contents):
         self.close()
 
     def __reduce__(self):
-        return _restore, (self.to_bytes(), self.seconds, _native.masks(self._native))
+        deformed = [(obj, self.vertices(obj)) for obj in self._native.deformed()]
+        return _restore, (self.to_bytes(), self.seconds, _native.masks(self._native), deformed)
 
     def __repr__(self):
         if self.closed:

@@ -1,7 +1,7 @@
 //! The options of a compilation, as keywords of Python.
 
 use bth_compile::pipeline::{CompileOptions, Structure};
-use bth_compile::{bvh, coordinates, costs};
+use bth_compile::{bvh, coordinates, costs, free};
 use bth_format::layout::{GridBits, RecordKind};
 use bth_import::{AlphaMode, Keep};
 use pyo3::exceptions::PyValueError;
@@ -108,8 +108,10 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: materials || keywords.value("names")?.unwrap_or(false),
         materials,
+        deformable: keywords.value("deformable")?.unwrap_or(false),
         ..CompileOptions::default()
     };
+    motion_and_free(keywords, &mut options)?;
     selection(keywords, &mut options)?;
     if let Some(seconds) = keywords.within("tet_deadline", 1..=86_400)? {
         options.tets.deadline = std::time::Duration::from_secs(seconds);
@@ -122,6 +124,24 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         options.objects_memory = mib << 20;
     }
     Ok(options)
+}
+
+/// Trees of what moves, and free directions.
+fn motion_and_free(keywords: &Keywords<'_, '_>, options: &mut CompileOptions) -> PyResult<()> {
+    if let Some(poses) = keywords.within("poses", 1..=16)? {
+        options.motion.poses = poses as u32;
+    }
+    if let Some(segments) = keywords.within("segments", 1..=64)? {
+        options.motion.segments = segments as u32;
+    }
+    let keep = [("none", free::KeepFree::None), ("auto", free::KeepFree::Auto), ("all", free::KeepFree::All)];
+    if let Some(keep) = keywords.choice("free_directions", &keep)? {
+        options.free.keep = keep;
+    }
+    if let Some(reach) = keywords.positive("free_reach")? {
+        options.free.reach = reach;
+    }
+    Ok(())
 }
 
 fn coordinates(keywords: &Keywords<'_, '_>) -> PyResult<coordinates::CoordinateOptions> {

@@ -3,7 +3,7 @@
 use crate::errors::format_error;
 use crate::shared::{Handle, OpenScene};
 use numpy::ndarray::{Array2, Array3};
-use numpy::{IntoPyArray, PyArray2, PyArray3};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -123,6 +123,41 @@ impl NativeScene {
     fn set_frame(&self, py: Python<'_>, frame: i32) -> PyResult<()> {
         let updated = self.get()?.change(py, |scene| scene.set_frame(frame))?;
         updated.map(drop).map_err(|e| format_error(&e))
+    }
+
+    /// Number of vertices of an object that can be given new positions.
+    fn vertex_count(&self, py: Python<'_>, object: u32) -> PyResult<Option<usize>> {
+        self.with(py, |scene| {
+            crate::parts::check_index("object", object, scene.object_count())?;
+            Ok(scene.vertex_count(object))
+        })?
+    }
+
+    /// Gives an object new positions, rows of three; returns the expected cost of rays relative to that of the compiled pose.
+    fn set_positions(
+        &self,
+        py: Python<'_>,
+        object: u32,
+        positions: PyReadonlyArray2<'_, f32>,
+    ) -> PyResult<f64> {
+        let (rows, _) = positions.as_slice()?.as_chunks::<3>();
+        let rows = rows.to_vec();
+        self.get()?.change(py, |scene| {
+            crate::parts::check_index("object", object, scene.object_count())?;
+            let update = scene.set_positions(object, &rows).map_err(|e| format_error(&e))?;
+            Ok(update.deformed_cost_ratio)
+        })?
+    }
+
+    /// Objects whose positions are not those of the file, by their index.
+    fn deformed(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
+        self.with(py, |scene| {
+            let is_deformed = |object: &u32| {
+                let of_file = scene.file().object(*object).expect("an object of the file");
+                !std::ptr::eq(scene.object(*object).positions, of_file.positions)
+            };
+            (0..scene.object_count()).filter(is_deformed).collect()
+        })
     }
 
     /// For each instance the 3×4 matrix that transforms its object's space to world space, its object, and whether it is visible.

@@ -18,8 +18,6 @@ PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs" / "reference.md"
 OTHERS = {
     "jobs", "dry-run", "depfile", "format", "watch", "shard", "json", "quiet", "in-cache", "no-cache", "cache-dir", "no-geometry",
     "help", "version", "isa",
-    # The package has no call for new positions, and no keywords yet for how what moves is compiled and for free directions.
-    "deformable", "poses", "segments", "free-directions", "free-reach",
 }
 OURS = {"cache", "geometry", "progress"}
 
@@ -42,7 +40,8 @@ def path(tmp_path):
 @pytest.mark.skipif(not BTHC.exists(), reason=f"there is no {BTHC}")
 @pytest.mark.parametrize("options", [
     {}, {"names": True, "attributes": "all"}, {"attributes": "normals", "geometry": False}, {"coordinates": 16, "boxes": 8},
-    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"max_bytes_per_triangle": 500.0, "memory": 100},
+    {"max_error": "0.01%"}, {"quality": "best", "threads": 1}, {"alpha": "blend"}, {"deformable": True, "poses": 2, "segments": 1},
+    {"free_directions": "all", "free_reach": 0.25}, {"max_bytes_per_triangle": 500.0, "memory": 100},
 ])
 def test_bytes_of_the_program(path, options):
     command = [BTHC, "compile", path, "-o", path.with_suffix(".bth"), "--structure", "bvh", "--no-cache", "--quiet"]

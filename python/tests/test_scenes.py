@@ -272,3 +272,52 @@ def test_names_in_memory(mesh):
     scene = bth.compile_scene([mesh, sphere(3, 5)], names=True)
     assert scene.instance_names == ["instance 0", "instance 1"] and scene.object_names == ["mesh 0", "mesh 1"]
     assert (scene.nearest([0, 0, 5], [0.01, 0.01, -1]).object_name == "mesh 0").all()
+
+
+def _twisted(vertices, by):
+    """Vertices, turned about the last axis by an angle that grows along it."""
+    x, y, z = vertices.T
+    sin, cos = np.sin(by * z), np.cos(by * z)
+    return np.stack([x * cos - y * sin, x * sin + y * cos, z], axis=1).astype(np.float32)
+
+
+def test_new_positions(mesh, rays):
+    vertices, faces = np.asarray(mesh[0], np.float32), mesh[1]
+    scene = bth.compile(mesh, deformable=True)
+    assert scene.vertex_count() == len(vertices) and (scene.vertices() == vertices).all()
+    for by in (0.5, 2.0):
+        moved = _twisted(vertices, by)
+        assert scene.set_positions(moved.astype(float)) > 0
+        fresh = bth.compile((moved, faces))
+        for name in ("t", "u", "v", "triangle"):
+            assert getattr(scene.nearest(*rays), name).tobytes() == getattr(fresh.nearest(*rays), name).tobytes()
+        assert (scene.vertices() == moved).all() and (scene.bounds == fresh.bounds).all()
+        for again in (copy.copy(scene), copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
+            assert again.nearest(*rays).t.tobytes() == scene.nearest(*rays).t.tobytes()
+    # What is refused changes nothing.
+    before = scene.nearest(*rays).t.tobytes()
+    bad = moved.copy()
+    bad[3, 1] = np.nan
+    for positions, error, obj in [
+        (bad, bth.Error, 0), (moved[1:], bth.Error, 0), (moved * 1e300, bth.Error, 0), (moved[:, :2], ValueError, 0), (moved[None], ValueError, 0),
+        (moved[0], ValueError, 0), (["a"], TypeError, 0), (moved, IndexError, 1), (moved, IndexError, -1),
+    ]:
+        with pytest.raises(error):
+            scene.set_positions(positions, obj)
+    assert scene.nearest(*rays).t.tobytes() == before
+    assert scene.set_positions(np.asfortranarray(vertices)[::1]) == pytest.approx(1)
+    still = bth.compile(mesh)
+    assert still.vertex_count() is None
+    with pytest.raises(bth.Error, match="BTH-S006"):
+        still.set_positions(vertices)
+    with pytest.raises(bth.Error, match="BTH-L033"):
+        bth.compile(mesh, deformable=True, free_directions="all")
+
+
+def test_new_positions_of_one_object_of_a_scene(mesh):
+    vertices = np.asarray(mesh[0], np.float32)
+    scene = bth.compile_scene([mesh, (vertices * 2, mesh[1])], [0, 1], [np.eye(4)] * 2, deformable=True)
+    boxes = [scene.object_bounds(obj).copy() for obj in (0, 1)]
+    scene.set_positions(scene.vertices(1) + 5, 1)
+    assert (scene.object_bounds(0) == boxes[0]).all() and (scene.object_bounds(1) == boxes[1] + 5).all()
+    assert (pickle.loads(pickle.dumps(scene)).object_bounds(1) == boxes[1] + 5).all()

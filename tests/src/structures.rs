@@ -3,6 +3,7 @@
 use bth::Scene;
 use bth_compile::Silent;
 use bth_compile::coordinates::Boxes;
+use bth_compile::free::KeepFree;
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
 use bth_format::layout::RecordKind;
 use bth_scenes::Model;
@@ -44,7 +45,13 @@ pub fn every_structure(model: &Model, whole: bool) -> Vec<Traced> {
     let bvh = options(Structure::Bvh, RecordKind::Link32, false);
     let mut packed = bvh.clone();
     packed.coordinates.boxes = Boxes::Bytes;
-    let mut wanted = vec![("bvh".to_string(), bvh), ("bvh of packed nodes".to_string(), packed)];
+    let mut free = bvh.clone();
+    free.free.keep = KeepFree::All;
+    let mut wanted = vec![
+        ("bvh".to_string(), bvh),
+        ("bvh of packed nodes".to_string(), packed),
+        ("bvh with free directions".to_string(), free),
+    ];
     if crate::worker().is_some() {
         for record in RecordKind::ALL {
             wanted.push((format!("bth {}", record.name()), options(Structure::Bth, record, false)));

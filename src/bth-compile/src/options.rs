@@ -106,6 +106,7 @@ impl CompileOptions {
             deformable: true,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
+            free: free::FreeOptions::default(),
             ..self.clone()
         }
     }
@@ -133,6 +134,8 @@ impl CompileOptions {
             "leaving out the geometry of the source"
         } else if self.structure == Structure::Tets {
             "tetrahedralizations"
+        } else if self.free.keep != free::KeepFree::None {
+            "free directions"
         } else {
             return Ok(());
         };

@@ -207,7 +207,9 @@ fn options_that_exclude_each_other_are_an_error() {
     let no_geometry = CompileOptions { geometry: false, ..deformable() };
     let mut boxes = deformable();
     boxes.coordinates.boxes = bth_compile::coordinates::Boxes::Bytes;
-    for options in [tets, no_geometry, boxes] {
+    let mut free = deformable();
+    free.free.keep = bth_compile::free::KeepFree::All;
+    for options in [tets, no_geometry, boxes, free] {
         let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");

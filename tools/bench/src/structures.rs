@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use bth::Scene;
 use bth::rays::{Hit, PrimitiveRef};
 use bth_compile::coordinates::{self, Boxes};
+use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{self, CompileOptions, Structure};
 use bth_format::layout::{GridBits, RecordKind};
 use std::sync::Arc;
@@ -23,14 +24,21 @@ pub struct Kind {
     record: RecordKind,
     bits: Option<GridBits>,
     boxes: Boxes,
+    free: KeepFree,
 }
 
-const LINK32: Kind =
-    Kind { name: "", structure: Structure::Tets, record: RecordKind::Link32, bits: None, boxes: Boxes::F32 };
+const LINK32: Kind = Kind {
+    name: "",
+    structure: Structure::Tets,
+    record: RecordKind::Link32,
+    bits: None,
+    boxes: Boxes::F32,
+    free: KeepFree::None,
+};
 
 /// The structures. The default file comes first, then the plain BVH, which also finds the hits that secondary rays start
 /// from.
-pub const KINDS: [Kind; 7] = [
+pub const KINDS: [Kind; 8] = [
     Kind { name: "bth", structure: Structure::Bth, ..LINK32 },
     Kind { name: "bvh", structure: Structure::Bvh, ..LINK32 },
     Kind { name: "tets link32", ..LINK32 },
@@ -38,6 +46,7 @@ pub const KINDS: [Kind; 7] = [
     Kind { name: "tets tet20", record: RecordKind::Tet20, ..LINK32 },
     Kind { name: "tets tet16", record: RecordKind::Tet16, ..LINK32 },
     Kind { name: "bvh 8-bit boxes", structure: Structure::Bvh, boxes: Boxes::Bytes, ..LINK32 },
+    Kind { name: "bvh free", structure: Structure::Bvh, free: KeepFree::All, ..LINK32 },
 ];
 
 /// The default file.
@@ -62,9 +71,9 @@ impl Kind {
         self.structure == Structure::Tets
     }
 
-    /// Whether it can hold tetrahedra, to which hints matter.
+    /// Whether it can hold tetrahedra or free directions, to which hints matter.
     fn takes_hints(&self) -> bool {
-        self.structure != Structure::Bvh
+        self.structure != Structure::Bvh || self.free != KeepFree::None
     }
 
     /// Names of the ways to trace it.
@@ -87,6 +96,7 @@ impl Kind {
                 boxes: self.boxes,
             },
             keep_subtrees: !self.is_tets(),
+            free: FreeOptions { keep: self.free, ..FreeOptions::default() },
             ..CompileOptions::default()
         }
     }

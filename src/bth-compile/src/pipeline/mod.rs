@@ -140,7 +140,7 @@ fn free_directions(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Option<free::Free>, Option<free::FreeReport>)> {
-    let is_wanted = options.free.keep != free::KeepFree::None && !options.deformable;
+    let is_wanted = options.free.keep != free::KeepFree::None;
     if !is_wanted || options.structure == Structure::Tets {
         return Ok((None, None));
     }

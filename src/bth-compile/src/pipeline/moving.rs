@@ -6,6 +6,7 @@ use super::report::TetReports;
 use super::{Clock, StageReports};
 use crate::bvh::{self, Costs, PoseOptions, Poses};
 use crate::error::Result;
+use crate::free;
 use crate::monitor::Monitor;
 use crate::options::{CompileOptions, Structure};
 use bth_format::SequenceView;
@@ -89,6 +90,7 @@ pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dy
         (options.structure == Structure::Tets, "nothing is tetrahedralized"),
         (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
         (!options.geometry, "the geometry of the source stays"),
+        (options.free.keep != free::KeepFree::None, "no free directions are kept"),
     ];
     let set_aside: Vec<_> =
         without_effect.into_iter().filter_map(|(differs, what)| differs.then_some(what)).collect();

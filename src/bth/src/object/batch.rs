@@ -7,7 +7,7 @@ use super::single;
 use super::strategy::{HintUse, MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::nodes::{Nodes, Packed, Wide};
-use crate::bvh::packet;
+use crate::bvh::packet::{self, Packets};
 use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::free;
@@ -333,24 +333,8 @@ fn in_packets<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) -> usize {
-    Isa::chosen().run_wide(PacketKernel { object, rays, scratch, sink }).unwrap_or(0)
-}
-
-/// The kernel of [`in_packets`].
-struct PacketKernel<'a, 's, Q: Query> {
-    object: &'a ObjectView<'a>,
-    rays: &'a [Ray],
-    scratch: &'a mut Scratch,
-    sink: &'a mut Sink<'s, Q>,
-}
-
-impl<Q: Query> Kernel for PacketKernel<'_, '_, Q> {
-    type Output = usize;
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> usize {
-        let packets = &mut self.scratch.packets;
-        packet::trace(s, self.object, self.rays, packets, packet::MINIMUM_USE, self.sink).rays
-    }
+    let (scratch, least) = (&mut scratch.packets, packet::MINIMUM_USE);
+    Isa::chosen().run_wide(Packets { object, rays, scratch, least, sink }).map_or(0, |count| count.rays)
 }
 
 /// Traces rays through the BVH: interleaved, or in scalar code one after the other.

@@ -41,7 +41,7 @@ pub enum KeepFree {
     /// Not at all.
     #[default]
     None,
-    /// Where enough directions are free.
+    /// Where enough directions are free, at all distances.
     Auto,
     /// Always.
     All,
@@ -89,6 +89,8 @@ pub struct FreeReport {
     pub free: f64,
     /// Share of those that certainly meet nothing within the reach, where no more is known.
     pub free_nearby: f64,
+    /// As `free`, where each triangle counts the same: the outside of the walls of a room may be most of its area.
+    pub free_by_triangle: f64,
     /// The reach in object space.
     pub reach: f64,
     /// Whether they are kept.
@@ -102,9 +104,14 @@ impl FreeReport {
     pub fn is_worthwhile(&self, keep: KeepFree) -> bool {
         match keep {
             KeepFree::None => false,
-            KeepFree::Auto => self.free + self.free_nearby >= LEAST_SHARE,
+            KeepFree::Auto => self.certain_share() >= LEAST_SHARE,
             KeepFree::All => true,
         }
+    }
+
+    /// The share of free directions from whatever triangles rays start on.
+    fn certain_share(&self) -> f64 {
+        self.free.min(self.free_by_triangle)
     }
 }
 
@@ -133,7 +140,7 @@ pub fn find(
         let samples: Vec<Range<usize>> =
             (0..rows).step_by(EVERY).map(|first| first..rows.min(first + SAMPLED)).collect();
         let report = report(mesh, tree, &decide(&around, &samples, monitor, |_| ())?, reach);
-        if report.free + report.free_nearby < CLEARLY * LEAST_SHARE {
+        if report.certain_share() < CLEARLY * LEAST_SHARE {
             return Ok((free, report));
         }
     }
@@ -173,18 +180,21 @@ fn reach(tree: &BinaryBvh, relative: f64) -> f32 {
 
 /// Shares of free directions of rows of the order of the BVH, by area and cosine.
 fn report(mesh: &Mesh, tree: &BinaryBvh, decided: &[(usize, FreeBins)], reach: f32) -> FreeReport {
-    let (mut area, mut shares) = (0.0, [0.0; 2]);
+    let (mut area, mut shares, mut by_triangle) = (0.0, [0.0; 2], 0.0);
     for (row, bins) in decided {
         let corners = crate::vectors::corners(mesh, tree.order[*row]);
         let size = crate::vectors::double_area(corners).length();
         area += size;
-        shares[usize::from(bins.is_nearby())] += size * share(bins.0 & FreeBins::ALL);
+        let free = share(bins.0 & FreeBins::ALL);
+        shares[usize::from(bins.is_nearby())] += size * free;
+        by_triangle += if bins.is_nearby() { 0.0 } else { free };
     }
     let [free, free_nearby] = shares.map(|sum| if area > 0.0 { (sum / area).min(1.0) } else { 0.0 });
     FreeReport {
         triangles: tree.order.len() as u64,
         free,
         free_nearby,
+        free_by_triangle: by_triangle / (decided.len() as f64).max(1.0),
         reach: f64::from(reach),
         kept: false,
         seconds: 0.0,

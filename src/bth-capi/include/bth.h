@@ -431,8 +431,15 @@ size_t bth_vertex_count(const bth_scene *scene, uint32_t object);
  * unchanged. */
 int32_t bth_set_positions(bth_scene *scene, uint32_t object, const float *positions, size_t count, bth_update *update);
 
-/* As bth_set_positions, for an object of a builder. The next commit makes the positions visible. */
+/* As bth_set_positions, with positions on the straight lines between those at two times, ends[0] and ends[1], at `share` of the way,
+ * from 0 to 1: for motion blur. A coordinate is (1 - share) * a + share * b in double precision, rounded once. */
+int32_t bth_set_positions_between(bth_scene *scene, uint32_t object, const float *const ends[2], size_t count, double share,
+                                  bth_update *update);
+
+/* As bth_set_positions and bth_set_positions_between, for an object of a builder. The next commit makes the positions visible. */
 int32_t bth_builder_set_positions(bth_builder *builder, uint32_t object, const float *positions, size_t count);
+int32_t bth_builder_set_positions_between(bth_builder *builder, uint32_t object, const float *const ends[2], size_t count,
+                                          double share);
 
 /* Makes all changes since the last commit visible. `update` may be null. If a visible instance cannot be placed, returns
  * BTH_ERROR_SCENE, and the text of the error gives the instance. The scene is then unchanged, and the changes still wait: correct the

@@ -4,6 +4,9 @@
 //! The tree is the same at both times, so that box i of a node at a time lies within the interpolation of its boxes at both: the
 //! interpolation of lower (upper) ends is at most (at least) the interpolated coordinate of each vertex.
 
+// Rows of coordinates are loops over lanes by index.
+#![allow(clippy::needless_range_loop)]
+
 use bth::Scene;
 use bth::rays::Ray;
 use bth_format::layout::{

@@ -292,8 +292,8 @@ fn per_ray(
             }
         });
         let by_ray = Clock::ThreadCpu.time(|| {
-            for ray in 0..rays.len() {
-                distances[1][ray] = nearest(&moving, ray, &mut visits[1]);
+            for (ray, distance) in distances[1].iter_mut().enumerate() {
+                *distance = nearest(&moving, ray, &mut visits[1]);
             }
         });
         seconds = [seconds[0].min(by_time), seconds[1].min(by_ray)];

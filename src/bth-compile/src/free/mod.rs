@@ -8,6 +8,9 @@
 //! A proof for each pair of bin and triangle would take too long: nodes of the BVH are left out by conservative tests of boxes, what is
 //! small for its distance blocks without a proof, and bins that are blocked are not asked again.
 
+// Kernels loop over lanes by index: closures could be compiled as functions without the kernel's instruction set.
+#![allow(clippy::needless_range_loop)]
+
 mod frame;
 mod meet;
 mod places;

@@ -25,7 +25,7 @@ pub(crate) struct Compile {
     #[command(flatten)]
     pub(crate) keeping: Keeping,
     /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
-    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "strict"])]
+    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "rigid_parts", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]
     pub(crate) gltf: Gltf,
@@ -126,6 +126,10 @@ pub(crate) struct Gltf {
     /// Leave meshes with skins and morph targets at rest; by default they deform where an animation moves them.
     #[arg(long)]
     pub(crate) at_rest: bool,
+    /// Make instances of the parts of skinned meshes that one joint moves rigidly: updates of the time only place them, but rays that
+    /// have to enter several instances are slower. See docs/scenes.md.
+    #[arg(long, conflicts_with = "at_rest")]
+    pub(crate) rigid_parts: bool,
     /// Refuse what would be ignored: animations of other things than nodes and morph weights.
     #[arg(long)]
     pub(crate) strict: bool,
@@ -146,6 +150,7 @@ impl Gltf {
             animation,
             rate: self.rate,
             deform: !self.at_rest,
+            rigid_parts: self.rigid_parts,
             strict: self.strict,
         }
     }

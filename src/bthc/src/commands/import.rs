@@ -5,6 +5,7 @@ use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
+use super::summary::row_unless_zero;
 use crate::table::{Table, count};
 use bth_compile::write;
 use bth_import::gltf::scene::{self, ImportReport};
@@ -75,6 +76,7 @@ pub(super) fn facts(report: &ImportReport) -> Table {
         table.row(["animations left out", &report.animations_left_out.join(", ")]);
     }
     table.row(["objects that deform", &count(report.deformers)]);
+    row_unless_zero(&mut table, "instances of parts that move rigidly", report.rigid_parts);
     table.row(["tracks", &count(report.tracks)]);
     table.row(["cameras", &count(report.cameras)]);
     table.row(["lights", &count(report.lights)]);

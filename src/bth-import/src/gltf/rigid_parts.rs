@@ -88,16 +88,12 @@ struct Vertices {
 }
 
 impl Vertices {
-    /// Adds a primitive of which nothing is read.
-    fn add_nothing(&mut self) {
-        self.triangles.push(Vec::new());
-    }
-
-    /// Adds the vertices and triangles of a primitive.
+    /// Adds the vertices and triangles of a primitive, which may have none that are read.
     fn add(&mut self, reader: &PrimitiveReader<'_, '_>) -> Result<()> {
-        let Some(kept) = reader.kept(Keep::None)? else { return Ok(self.add_nothing()) };
+        self.triangles.push(Vec::new());
+        let Some(kept) = reader.kept(Keep::None)? else { return Ok(()) };
         if reader.points_or_lines(&kept)?.is_some() {
-            return Ok(self.add_nothing());
+            return Ok(());
         }
         let first = self.joints.len() as u32;
         let triangles = reader.read(&kept, first as usize)?;
@@ -122,7 +118,9 @@ impl Vertices {
             let key = position.map(|x| (x + 0.0).to_bits());
             self.places.push(*self.numbers.entry(key).or_insert(next));
         }
-        self.triangles.push(triangles.corners.iter().map(|t| t.map(|row| first + row)).collect());
+        if let Some(own) = self.triangles.last_mut() {
+            own.extend(triangles.corners.iter().map(|triangle| triangle.map(|row| first + row)));
+        }
         Ok(())
     }
 }

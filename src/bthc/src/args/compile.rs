@@ -80,7 +80,7 @@ pub(crate) struct Compile {
     pub(crate) compact: bool,
     /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
     /// source, and the object is a BVH.
-    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
+    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
     /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
     /// the first pose.

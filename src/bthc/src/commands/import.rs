@@ -1,11 +1,11 @@
 //! `bthc import`: writes a scene manifest for a glTF file.
 
 use super::scene::{folder, is_gltf};
+use super::summary::row_unless_zero;
 use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
-use super::summary::row_unless_zero;
 use crate::table::{Table, count};
 use bth_compile::write;
 use bth_import::gltf::scene::{self, ImportReport};

@@ -93,7 +93,13 @@ impl Importer<'_> {
         let name = unique(&mut self.node_names, &name, String::new());
         let visible = self.chain(deformer.node).all(|node| node.visible);
         let transform = inverse_bind.map_or_else(Transform::default, Transform::Matrix);
-        self.manifest.nodes.push(Node { name, parent: Some(parent), transform, object: Some(object), visible });
+        self.manifest.nodes.push(Node {
+            name,
+            parent: Some(parent),
+            transform,
+            object: Some(object),
+            visible,
+        });
     }
 
     /// A node of the manifest and all above it, upwards.
@@ -108,7 +114,8 @@ impl Importer<'_> {
     fn can_be_placed(&self, skin: usize, joint: usize) -> bool {
         let skin = &self.manifest.skins[skin];
         let Some(&row) = skin.joints.get(joint) else { return false };
-        let mut bounds = skin.inverse_binds.as_ref().map_or(Some(Bounds::IDENTITY), |all| Bounds::of(&all[joint]));
+        let mut bounds =
+            skin.inverse_binds.as_ref().map_or(Some(Bounds::IDENTITY), |all| Bounds::of(&all[joint]));
         let mut next = Some(row);
         while let Some(row) = next {
             let node = &self.manifest.nodes[row];
@@ -143,7 +150,8 @@ impl Importer<'_> {
         self.object_names.remove(&name);
         let nodes = self.manifest.nodes.iter_mut().filter_map(|node| node.object.as_mut());
         let deformers = self.manifest.deformers.iter_mut().map(|deformer| &mut deformer.object);
-        for object in nodes.chain(deformers).chain(self.objects.values_mut()).filter(|object| **object > row) {
+        for object in nodes.chain(deformers).chain(self.objects.values_mut()).filter(|object| **object > row)
+        {
             *object -= 1;
         }
     }
@@ -244,7 +252,9 @@ mod tests {
     fn bounds_are_those_of_all_factors_and_matrices() {
         let turned = [[0.0, -2.0, 0.0, 9.0], [2.0, 0.0, 0.0, 9.0], [0.0, 0.0, 2.0, 9.0]];
         let bounds = Bounds::of(&turned).unwrap();
-        assert!((bounds.norm - 2.0).abs() < 0.03 && (bounds.inverse - 0.5).abs() < 0.01 && bounds.are_usable());
+        assert!(
+            (bounds.norm - 2.0).abs() < 0.03 && (bounds.inverse - 0.5).abs() < 0.01 && bounds.are_usable()
+        );
         assert!(Bounds::of(&[[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]).is_none());
         let scales = Bounds::of_scales(&[1.0, 2.0, 3.0, 0.5, 1.0, 1.0]).unwrap();
         assert_eq!((scales.norm, scales.inverse, scales.mirrors), (3.0, 2.0, false));

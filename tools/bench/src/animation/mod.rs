@@ -147,9 +147,10 @@ fn trace(trees: &Trees, frame_rays: &FrameRays, rounds: usize, sums: &mut [(f64,
     let contenders = trees.contenders();
     for (k, set) in frame_rays.sets.iter().enumerate() {
         let mut times = vec![Vec::new(); contenders.len()];
-        // A round before those that count warms up.
+        // A round before those that count warms up. Each contender follows each other one in turn, since what ran before leaves caches to it.
         for round in 0..=rounds {
-            for (row, contender) in contenders.iter().enumerate() {
+            for row in turns(round, contenders.len()) {
+                let contender = contenders[row];
                 let mut hits = vec![Hit::MISS; set.rays.len()];
                 let seconds = Clock::ThreadCpu.time(|| contender.nearest(set.batch(), &mut hits));
                 if round == 0 {
@@ -163,6 +164,14 @@ fn trace(trees: &Trees, frame_rays: &FrameRays, rounds: usize, sums: &mut [(f64,
             sum.1[k] += median(times).unwrap_or(f64::NAN);
         }
     }
+}
+
+/// The order of contenders in a round: from another one on in each, and backwards in every other one.
+fn turns(round: usize, count: usize) -> impl Iterator<Item = usize> {
+    (0..count).map(move |turn| {
+        let turn = if round.is_multiple_of(2) { turn } else { count - 1 - turn };
+        (round / 2 + turn) % count
+    })
 }
 
 /// The times of updates from the first frame's pose to each frame, and the greatest cost ratio.

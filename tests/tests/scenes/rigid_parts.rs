@@ -291,6 +291,35 @@ fn a_mesh_of_rigid_parts_alone_never_deforms() {
 }
 
 #[test]
+fn subscenes_of_rigid_parts_have_times_of_their_own() {
+    let rigid = document().edit(|d| {
+        d["skins"][0]["joints"] = json!([1, 2, 2, 2]);
+        d["meshes"][0]["primitives"] = json!([d["meshes"][0]["primitives"][0]]);
+    });
+    let mut file = scene(&rigid, true);
+    let mut builder = bth::SceneBuilder::new();
+    let first = builder.add(&file);
+    let at = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    for (x, seconds) in [(0.0, 0.5), (50.0, 3.0)] {
+        let subscene = builder.subscene(first, &at(x)).unwrap();
+        builder.set_subscene_seconds(subscene, seconds).unwrap();
+    }
+    let update = builder.commit().unwrap();
+    let parts = file.instance_count();
+    assert_eq!((update.deformed, update.visible), (0, 2 * parts as usize));
+    for (number, (x, seconds)) in [(0.0, 0.5), (50.0, 3.0)].into_iter().enumerate() {
+        file.set_seconds(seconds).unwrap();
+        for part in 0..parts {
+            let mut expected = file.instance(part).to_world;
+            expected[0][3] += x;
+            let found = builder.scene().instance(number as u32 * parts + part).to_world;
+            let differ = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-12 * (1.0 + b.abs());
+            assert!(!found.as_flattened().iter().zip(expected.as_flattened()).any(differ), "{found:?}");
+        }
+    }
+}
+
+#[test]
 fn parts_that_an_instance_cannot_show_stay_in_the_object_that_deforms() {
     let left = |edit: &dyn Fn(&mut Value)| {
         let (manifest, report) = parted(&document().edit(|d| edit(d)));

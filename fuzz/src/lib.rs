@@ -170,6 +170,10 @@ fn check(mesh: &Mesh) {
         materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len())
     );
     assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
+    assert!([0, mesh.triangles.len()].contains(&materials.second_corners.len()));
+    let rows = materials.second_uvs.len();
+    assert!(materials.second_corners.as_flattened().iter().all(|row| (*row as usize) < rows));
+    assert!(materials.second_uvs.as_flattened().iter().all(|x| x.is_finite()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));

@@ -26,7 +26,7 @@ const TETS: &str = "1";
 const COLLAPSE: &str = "1";
 const OPACITY: &str = "1";
 const NAMES: &str = "1";
-const MATERIALS: &str = "1";
+const MATERIALS: &str = "2";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";

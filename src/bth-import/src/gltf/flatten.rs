@@ -273,15 +273,28 @@ impl Flattener<'_, '_> {
             Some(deformation) => reader.deformation(&triangles, first, deformation)?,
             None => pose.apply(&reader, &mut triangles)?,
         }
-        let mut colors = None;
+        let (mut colors, mut second_uvs) = (None, None);
         if self.colors {
             warn_without_coordinates(&reader, &triangles);
             colors = vertex_colors(&reader, &triangles)?;
+            second_uvs = second_coordinates(&reader, &triangles)?;
         }
         self.start_group(placed.mesh, index, primitive.material);
         let world = if pose.is_skinned() { DAffine3::IDENTITY } else { placed.world };
-        self.append_colors(colors.as_deref(), &triangles.corners, transform::is_mirrored(&world));
+        let mirrored = transform::is_mirrored(&world);
+        self.append_colors(colors.as_deref(), &triangles.corners, mirrored);
+        self.append_second_uvs(second_uvs.as_deref(), &triangles.corners, mirrored);
         self.append(&triangles, &world)
+    }
+
+    /// Adds the second set of texture coordinates, as bits, of the corners of a primitive's triangles, which will be appended next.
+    fn append_second_uvs(&mut self, uvs: Option<&[[u32; 2]]>, corners: &[[u32; 3]], mirrored: bool) {
+        let Some(uvs) = uvs else { return };
+        let recorder = &mut self.raw.materials.second_uvs;
+        let rows: Vec<u32> = uvs.iter().map(|uv| recorder.row(*uv)).collect();
+        let turned = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        let corners = corners.iter().map(|triangle| turned(triangle).map(|row| rows[row as usize]));
+        recorder.add(self.raw.triangles.len(), corners, [0; 2]);
     }
 
     /// Adds the colours of the corners of a primitive's triangles, which will be appended next.
@@ -364,6 +377,30 @@ fn vertex_colors(reader: &PrimitiveReader<'_, '_>, triangles: &Triangles) -> Res
         return Ok(colors.map(|colors| colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()));
     }
     reader.optional::<4>(triangles, "COLOR_0")
+}
+
+/// The bits of the texture coordinates of a primitive's vertices that a texture of its material has beside those that are kept for
+/// all purposes, if there is such a texture.
+fn second_coordinates(
+    reader: &PrimitiveReader<'_, '_>,
+    triangles: &Triangles,
+) -> Result<Option<Vec<[u32; 2]>>> {
+    let (source, document) = (reader.accessors.source, reader.accessors.document);
+    let material = reader.primitive.material.and_then(|number| document.materials.get(number));
+    let Some(set) = material.and_then(materials::second_set) else { return Ok(None) };
+    let name = format!("TEXCOORD_{set}");
+    let Some(uvs) = reader.optional::<2>(triangles, &name)? else {
+        source.monitor.warn(&format!("{}: it has no {name}; (0, 0) is taken everywhere", reader.part));
+        return Ok(None);
+    };
+    if let Some(row) = uvs.iter().position(|uv| !uv.iter().all(|x| x.is_finite())) {
+        let message = format!("expected a finite texture coordinate, found {:?}", uvs[row]);
+        let part = format!("{} {name} row {row}", reader.part);
+        let hint = "export the model again, or compile without --materials";
+        return Err(source.error_in_part("BTH-I008", part, message, hint));
+    }
+    // Adding 0 turns -0 into 0.
+    Ok(Some(uvs.into_iter().map(|uv| uv.map(|x| (x + 0.0).to_bits())).collect()))
 }
 
 /// Warns if the material of a primitive has a base colour texture and the primitive no coordinates for it.

@@ -13,7 +13,7 @@ use crate::isa;
 use crate::output::{Head, Record as Page};
 use crate::progress::Progress;
 use crate::rounds::median;
-use crate::scenes::{FrameRays, Source};
+use crate::scenes::{FrameRays, Source, compiled};
 use anyhow::{Result, ensure};
 use bth::rays::Hit;
 use bth_compile::pipeline::MotionOptions;
@@ -97,8 +97,7 @@ pub fn run(arguments: &Animation) -> Result<()> {
 
 fn scene(source: &Source, arguments: &Animation, progress: &Progress) -> Result<AnimationTimes> {
     progress.show(format!("{}: compiling", source.name));
-    let mut shown =
-        contenders::compiled(source, MotionOptions { poses: arguments.poses, segments: arguments.segments })?;
+    let mut shown = compiled(source, MotionOptions { poses: arguments.poses, segments: arguments.segments })?;
     let frames = source.frames(arguments.frames);
     let rounds = if arguments.run.quick { 1 } else { arguments.rounds };
     let mut updates = Vec::new();

@@ -68,19 +68,31 @@ fn trace_from<Q: Query>(
         match rest {
             None => trace_batch(object, rays, from, scratch, &mut sink),
             // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
-            Some(rest) if Q::ANY => {
-                let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
-                let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
-                let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
-                let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
-                trace_batch(object, &rest_rays, None, scratch, &mut sink);
-                for (ray, found) in rest.iter().zip(found) {
-                    answers[*ray as usize] = found;
-                }
-            }
+            Some(rest) if Q::ANY => trace_gathered::<Q>(object, (rays, rest), instance, scratch, answers),
             Some(rest) => trace_rest(object, rays, rest, scratch, &mut sink),
         }
     });
+}
+
+/// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers
+/// are misses before.
+fn trace_gathered<Q: Query>(
+    object: &ObjectView<'_>,
+    (rays, rest): (&[Ray], &[u32]),
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let mut gathered = std::mem::take(&mut scratch.gathered);
+    gathered.clear();
+    gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
+    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+    trace_batch(object, &gathered, None, scratch, &mut sink);
+    // No ray is before its place among those that are left, so the last answers can move first.
+    for (i, &ray) in rest.iter().enumerate().rev() {
+        answers.swap(i, ray as usize);
+    }
+    scratch.gathered = gathered;
 }
 
 /// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.

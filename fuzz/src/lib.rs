@@ -130,14 +130,16 @@ pub fn import(format: &str, bytes: &[u8]) {
 /// also those that deform.
 pub fn import_scene(bytes: &[u8]) {
     let path = Path::new("/nonexistent/fuzz/model.gltf");
-    let options = ImportOptions { animation: Chosen::All, ..ImportOptions::default() };
+    let rigid_parts = bytes.len() % 2 == 1;
+    let options = ImportOptions { animation: Chosen::All, rigid_parts, ..ImportOptions::default() };
     let Ok((manifest, _)) = scene::import_bytes(path, bytes, "model.gltf", &options, &Silent) else { return };
     let text = manifest.to_toml();
     let again = bth_scene::parse(&text, Path::new("fuzz.manifest"));
     assert!(again.expect("what is written can be read") == manifest, "{text}");
     let part = |object: &bth_scene::Object| match object.source {
         Source::Model { mesh, .. } => mesh.map(GltfPart::Mesh),
-        Source::Deforming { mesh, .. } => Some(GltfPart::Deforming(mesh)),
+        Source::Deforming { mesh, without, .. } => Some(GltfPart::Deforming { mesh, without }),
+        Source::RigidPart { mesh, joint, .. } => Some(GltfPart::Rigid { mesh, joint }),
         Source::AtRest { node, .. } => Some(GltfPart::AtRest(node)),
         _ => None,
     };
@@ -146,7 +148,7 @@ pub fn import_scene(bytes: &[u8]) {
     let Ok(meshes) = import_gltf_parts_bytes(path, bytes, &parts, wanted, &Silent) else { return };
     for ((mesh, _), part) in meshes.iter().zip(&parts) {
         check(mesh);
-        assert_eq!(mesh.deformation.is_some(), matches!(part, GltfPart::Deforming(_)));
+        assert_eq!(mesh.deformation.is_some(), matches!(part, GltfPart::Deforming { .. }));
     }
 }
 
@@ -168,6 +170,10 @@ fn check(mesh: &Mesh) {
         materials.color_corners.as_flattened().iter().all(|row| (*row as usize) < materials.colors.len())
     );
     assert!([0, mesh.triangles.len()].contains(&materials.color_corners.len()));
+    assert!([0, mesh.triangles.len()].contains(&materials.second_corners.len()));
+    let rows = materials.second_uvs.len();
+    assert!(materials.second_corners.as_flattened().iter().all(|row| (*row as usize) < rows));
+    assert!(materials.second_uvs.as_flattened().iter().all(|x| x.is_finite()));
     if let Some(attributes) = &mesh.attributes {
         let rows = attributes.normals.len().max(attributes.uvs.len());
         assert!(attributes.corners.as_flattened().iter().all(|row| (*row as usize) < rows));

@@ -20,7 +20,7 @@ def compile(
     min_tet_triangles: int | None = None, c_tet: float | None = None, for_scene: bool | None = None,
     tet_deadline: int | None = None, tet_memory: int | None = None, flatten: bool | None = None,
     scene: str | None = None, animation: str | None = None, rate: float | None = None, at_rest: bool | None = None,
-    strict: bool | None = None,
+    rigid_parts: bool | None = None, strict: bool | None = None,
     deformable: bool | None = None, poses: int | None = None, segments: int | None = None,
     free_directions: Literal["none", "auto", "all"] | None = None, free_reach: float | None = None,
     cache: bool | str | PathLike[str] | None = None, cache_size: int | str | None = None,

@@ -49,6 +49,11 @@ class _OnTriangles:
         return self._field("texcoord")
 
     @property
+    def second_texcoord(self):
+        """The same for a second set of texture coordinates, that of textures whose `uv_set` is 1; NaN for a miss and where the file keeps none (see the option `materials`)."""
+        return self._field("second_texcoord")
+
+    @property
     def vertex_color(self):
         """Vertex colors interpolated, (..., 4) float32: linear red, green, blue and alpha; NaN for a miss and where the file keeps none (see the option `materials`)."""
         return self._field("vertex_color")
@@ -224,6 +229,7 @@ FIELDS = {
     "shading_normal": (np.float64, (3,), 0),
     "object_shading_normal": (np.float64, (3,), 0),
     "texcoord": (np.float32, (2,), np.nan),
+    "second_texcoord": (np.float32, (2,), np.nan),
     "vertex_color": (np.float32, (4,), np.nan),
     "object": (np.uint32, (), NONE),
     "group": (np.uint32, (), NONE),
@@ -239,6 +245,7 @@ class SurfacePoints:
     geometric_normal, object_geometric_normal: unit normals of the triangles' planes, float64.
     shading_normal, object_shading_normal: the source's normals interpolated, float64; the geometric ones where the file keeps none.
     texcoord: texture coordinates interpolated, float32; NaN where the file keeps none.
+    second_texcoord: the same for a second set, that of textures whose `uv_set` is 1.
     vertex_color: linear red, green, blue and alpha interpolated, float32; NaN where the file keeps none.
     object, group, material: indices; material is bth.NONE where there is none.
     opacity: as in bth.Opacity.
@@ -254,6 +261,7 @@ class SurfacePoints:
         self.shading_normal = fields["shading_normal"]
         self.object_shading_normal = fields["object_shading_normal"]
         self.texcoord = fields["texcoord"]
+        self.second_texcoord = fields["second_texcoord"]
         self.vertex_color = fields["vertex_color"]
         self.object = fields["object"]
         self.group = fields["group"]

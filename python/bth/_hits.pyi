@@ -23,6 +23,7 @@ class SurfacePoints:
     shading_normal: NDArray[np.float64]
     object_shading_normal: NDArray[np.float64]
     texcoord: NDArray[np.float32]
+    second_texcoord: NDArray[np.float32]
     vertex_color: NDArray[np.float32]
     object: NDArray[np.uint32]
     group: NDArray[np.uint32]
@@ -39,6 +40,8 @@ class _OnTriangles:
     def shading_normal(self) -> NDArray[np.float64]: ...
     @property
     def texcoord(self) -> NDArray[np.float32]: ...
+    @property
+    def second_texcoord(self) -> NDArray[np.float32]: ...
     @property
     def vertex_color(self) -> NDArray[np.float32]: ...
     @property

@@ -37,6 +37,7 @@ class Texture:
     data: the image file (PNG, JPEG or WebP), bytes. Red, green and blue of its texels are sRGB, alpha is linear.
     wrap: for u and for v "repeat", "mirror" or "clamp".
     nearest: whether the nearest texel is taken; else four are interpolated, after they have been made linear.
+    uv_set: the set of its texture coordinates: 0 for `texcoord` of hits, 1 for `second_texcoord`.
     transform: (2, 3) float32, from (u, v, 1) to coordinates of the image; (0, 0) is its upper left corner, (1, 1) its lower right one.
     """
 
@@ -44,10 +45,11 @@ class Texture:
     data: bytes
     wrap: tuple
     nearest: bool
+    uv_set: int
     transform: np.ndarray
 
     def coordinates(self, texcoord):
-        """Coordinates of the image at texture coordinates (..., 2), of the same shape and float64."""
+        """Coordinates of the image at texture coordinates (..., 2) of its set, of the same shape and float64."""
         transform = self.transform.astype(np.float64)
         return np.asarray(texcoord, np.float64) @ transform[:, :2].T + transform[:, 2]
 
@@ -58,5 +60,5 @@ def material(row):
 
 
 def texture(row):
-    image, data, wrap, nearest, transform = row
-    return Texture(image, data, wrap, nearest, np.array(transform, np.float32))
+    *rest, transform = row
+    return Texture(*rest, np.array(transform, np.float32))

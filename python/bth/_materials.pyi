@@ -24,6 +24,7 @@ class Texture:
     data: bytes
     wrap: tuple[_Wrap, _Wrap]
     nearest: bool
+    uv_set: int
     transform: NDArray[np.float32]
     def coordinates(self, texcoord: ArrayLike) -> NDArray[np.float64]: ...
 

@@ -43,6 +43,14 @@ def _restore(data, seconds, masks, deformed):
     return scene
 
 
+def _positions(values, name):
+    values = _arrays.vectors(values, name)
+    if values.ndim != 2:
+        raise ValueError(f"{name}: expected the shape (n, 3), got {values.shape}")
+    with np.errstate(over="ignore"):
+        return np.require(values, np.float32, "CA")
+
+
 class Scene(RayQueries, PointQueries, Contents):
     """An open scene.
 
@@ -122,12 +130,13 @@ class Scene(RayQueries, PointQueries, Contents):
         All queries then answer for the new positions, as exactly as before. Returns how much rays are expected to cost, relative to the
         pose that was compiled.
         """
-        positions = _arrays.vectors(positions, "positions")
-        if positions.ndim != 2:
-            raise ValueError(f"positions: expected the shape (n, 3), got {positions.shape}")
-        with np.errstate(over="ignore"):
-            positions = np.require(positions, np.float32, "CA")
-        return self._native.set_positions(_index(obj, "obj"), positions)
+        return self._native.set_positions(_index(obj, "obj"), _positions(positions, "positions"))
+
+    def set_positions_between(self, open, close, share, obj=0):
+        """Gives an object positions on the straight lines between those at two times, at `share` of the way from `open` to `close`, from
+        0 to 1: for motion blur. The rest is as for `set_positions`."""
+        ends = _positions(open, "open"), _positions(close, "close")
+        return self._native.set_positions_between(_index(obj, "obj"), *ends, float(share))
 
     # Life.
 

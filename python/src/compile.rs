@@ -69,6 +69,7 @@ fn gltf_options(keywords: &Keywords<'_, '_>) -> PyResult<ImportOptions> {
         animation,
         rate,
         deform: !keywords.value("at_rest")?.unwrap_or(false),
+        rigid_parts: keywords.value("rigid_parts")?.unwrap_or(false),
         strict: keywords.value("strict")?.unwrap_or(false),
     })
 }

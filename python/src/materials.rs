@@ -9,8 +9,8 @@ use pyo3::types::PyBytes;
 /// Name, base colour, its texture, emission, its texture, what alpha means, cutoff, whether double-sided, whether unlit.
 type MaterialRow = (String, [f32; 4], Option<u32>, [f32; 3], Option<u32>, &'static str, f32, bool, bool);
 
-/// Image, bytes of its file, wrap modes, whether the nearest texel is taken, rows of the transform.
-type TextureRow<'py> = (u32, Bound<'py, PyBytes>, (&'static str, &'static str), bool, [[f32; 3]; 2]);
+/// Image, bytes of its file, wrap modes, whether the nearest texel is taken, set of coordinates, rows of the transform.
+type TextureRow<'py> = (u32, Bound<'py, PyBytes>, (&'static str, &'static str), bool, u32, [[f32; 3]; 2]);
 
 fn row(scene: &Scene, object: u32, material: u32) -> Option<MaterialRow> {
     let look = scene.material(object, material)?;
@@ -63,7 +63,8 @@ pub(crate) fn textures<'py>(
     };
     let row = |texture: bth::Texture<'_>| {
         let [u, v] = texture.wrap.map(wrap);
-        (texture.image, PyBytes::new(py, texture.bytes), (u, v), texture.nearest, texture.transform)
+        let bytes = PyBytes::new(py, texture.bytes);
+        (texture.image, bytes, (u, v), texture.nearest, texture.uv_set, texture.transform)
     };
     Ok((0..scene.texture_count(object)).filter_map(|k| scene.texture(object, k)).map(row).collect())
 }

@@ -149,6 +149,24 @@ impl NativeScene {
         })?
     }
 
+    /// As `set_positions`, at a share of the way from the positions of `open` to those of `close`.
+    fn set_positions_between(
+        &self,
+        py: Python<'_>,
+        object: u32,
+        open: PyReadonlyArray2<'_, f32>,
+        close: PyReadonlyArray2<'_, f32>,
+        share: f64,
+    ) -> PyResult<f64> {
+        let [open, close] =
+            [open.as_slice()?, close.as_slice()?].map(|rows| rows.as_chunks::<3>().0.to_vec());
+        self.get()?.change(py, |scene| {
+            crate::parts::check_index("object", object, scene.object_count())?;
+            let update = scene.set_positions_between(object, [&open, &close], share);
+            Ok(update.map_err(|e| format_error(&e))?.deformed_cost_ratio)
+        })?
+    }
+
     /// Objects whose positions are not those of the file, by their index.
     fn deformed(&self, py: Python<'_>) -> PyResult<Vec<u32>> {
         self.with(py, |scene| {

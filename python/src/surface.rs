@@ -110,6 +110,8 @@ pub(crate) struct SurfaceArrays<'py> {
     #[pyo3(item)]
     texcoord: Option<PyReadwriteArray1<'py, f32>>,
     #[pyo3(item)]
+    second_texcoord: Option<PyReadwriteArray1<'py, f32>>,
+    #[pyo3(item)]
     vertex_color: Option<PyReadwriteArray1<'py, f32>>,
     #[pyo3(item)]
     object: Option<PyReadwriteArray1<'py, u32>>,
@@ -126,6 +128,7 @@ struct Columns<'a> {
     /// Position, geometric normal and shading normal, each in world space and in that of the object.
     vectors: [Option<&'a mut [f64]>; 6],
     texcoord: Option<&'a mut [f32]>,
+    second_texcoord: Option<&'a mut [f32]>,
     vertex_color: Option<&'a mut [f32]>,
     /// Object, group and material.
     parts: [Option<&'a mut [u32]>; 3],
@@ -152,6 +155,7 @@ impl SurfaceArrays<'_> {
                 column(&mut self.object_shading_normal, count * 3)?,
             ],
             texcoord: column(&mut self.texcoord, count * 2)?,
+            second_texcoord: column(&mut self.second_texcoord, count * 2)?,
             vertex_color: column(&mut self.vertex_color, count * 4)?,
             parts: [
                 column(&mut self.object, count)?,
@@ -181,6 +185,7 @@ impl<'a> Columns<'a> {
         Columns {
             vectors: self.vectors.each_mut().map(|v| v.as_mut().map(|v| split_off(v, rows * 3))),
             texcoord: self.texcoord.as_mut().map(|t| split_off(t, rows * 2)),
+            second_texcoord: self.second_texcoord.as_mut().map(|t| split_off(t, rows * 2)),
             vertex_color: self.vertex_color.as_mut().map(|c| split_off(c, rows * 4)),
             parts: self.parts.each_mut().map(|p| p.as_mut().map(|p| split_off(p, rows))),
             opacity: self.opacity.as_mut().map(|o| split_off(o, rows)),
@@ -204,6 +209,11 @@ impl<'a> Columns<'a> {
             && let Some(color) = scene.vertex_color(hit)
         {
             put(&mut self.vertex_color, row, color);
+        }
+        if self.second_texcoord.is_some()
+            && let Some(uv) = scene.texture_coordinates(hit, 1)
+        {
+            put(&mut self.second_texcoord, row, uv);
         }
         let Some(surface) = with_surface.then(|| scene.surface(hit)).flatten() else { return };
         let vectors = [

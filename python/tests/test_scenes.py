@@ -306,6 +306,13 @@ def test_new_positions(mesh, rays):
             scene.set_positions(positions, obj)
     assert scene.nearest(*rays).t.tobytes() == before
     assert scene.set_positions(np.asfortranarray(vertices)[::1]) == pytest.approx(1)
+    for share in (0, 0.3, 1):
+        assert scene.set_positions_between(vertices, moved, share) > 0
+        assert (scene.vertices() == ((1 - share) * vertices.astype(float) + share * moved.astype(float)).astype(np.float32)).all()
+    for given, error in [((vertices, moved, 1.1), bth.Error), ((vertices, moved, np.nan), bth.Error), ((vertices, moved[1:], 1), bth.Error), ((bad, moved, 1), bth.Error), ((vertices, moved[0], 0), ValueError)]:
+        with pytest.raises(error):
+            scene.set_positions_between(*given)
+    assert (scene.vertices() == moved).all()
     still = bth.compile(mesh)
     assert still.vertex_count() is None
     with pytest.raises(bth.Error, match="BTH-S006"):

@@ -4,7 +4,7 @@
 #include <string.h>
 
 _Static_assert(sizeof(bth_material_look) == 48, "material");
-_Static_assert(sizeof(bth_texture_image) == 40 + 2 * sizeof(size_t), "texture");
+_Static_assert(sizeof(bth_texture_image) == 48 + 2 * sizeof(size_t), "texture");
 
 int main(int argc, char **argv) {
     bth_scene *scene;
@@ -23,8 +23,8 @@ int main(int argc, char **argv) {
     bth_texture_image image;
     for (uint32_t texture = 0; texture < bth_texture_count(scene, 0); texture++) {
         if (bth_texture(scene, 0, texture, &image) != BTH_OK) return 2;
-        printf("texture of image %u: %zu bytes, %d, wrap %u %u nearest %u transform %g %g %g %g %g %g\n", image.image, image.length,
-               memcmp(image.bytes, "\x89PNG", 4), image.wrap[0], image.wrap[1], image.nearest, image.transform[0][0],
+        printf("texture of image %u: %zu bytes, %d, wrap %u %u nearest %u set %u transform %g %g %g %g %g %g\n", image.image, image.length,
+               memcmp(image.bytes, "\x89PNG", 4), image.wrap[0], image.wrap[1], image.nearest, image.uv_set, image.transform[0][0],
                image.transform[0][1], image.transform[0][2], image.transform[1][0], image.transform[1][1], image.transform[1][2]);
     }
     bth_ray ray = {{0.25f, 0.25f, 3}, 0, {0, 0, -1}, 1e30f};
@@ -34,6 +34,12 @@ int main(int argc, char **argv) {
     int32_t code = bth_vertex_color(scene, &hit, color);
     if (code == BTH_OK) printf("color %.3g %.3g %.3g %.3g\n", color[0], color[1], color[2], color[3]);
     else printf("error %d %s\n", code, bth_last_error());
+    float uv[2];
+    for (uint32_t set = 0; set < 2; set++)
+        if (bth_texture_coordinates(scene, &hit, set, uv) == BTH_OK) printf("set %u: %.3g %.3g\n", set, uv[0], uv[1]);
+    if (bth_texture_coordinates(scene, &miss, 0, uv) != BTH_ERROR_ARGUMENT || bth_texture_coordinates(scene, &hit, 2, uv) != BTH_ERROR_ARGUMENT ||
+        bth_texture_coordinates(scene, NULL, 0, uv) != BTH_ERROR_ARGUMENT)
+        return 9;
     if (bth_vertex_color(scene, &miss, color) != BTH_ERROR_ARGUMENT || bth_vertex_color(scene, NULL, color) != BTH_ERROR_ARGUMENT) return 3;
     if (bth_material(scene, 0, 1000, &look) != BTH_ERROR_ARGUMENT || !strstr(bth_last_error(), "1000")) return 4;
     if (bth_material(scene, BTH_NONE, 0, &look) != BTH_ERROR_ARGUMENT || bth_material(NULL, 0, 0, &look) != BTH_ERROR_ARGUMENT) return 5;

@@ -64,7 +64,15 @@ int main(int argc, char **argv) {
     for (int i = 0; i < 4; i++) moved[3 * i + 2] = -1;
     const bth_update update = elastic.set_positions(0, moved.data(), 4);
     CHECK(update.deformed == 1 && update.deformed_cost_ratio == 1 && update.visible == 1 && elastic.nearest(down).t == 3);
+    const bth_update half = elastic.set_positions_between(0, positions.data(), moved.data(), 4, 0.5);
+    CHECK(half.deformed == 1 && elastic.nearest(down).t == 2.5);
+    const float *const unknown[2] = {positions.data(), nullptr};
+    CHECK(bth_set_positions_between(elastic.get(), 0, unknown, 4, 0.5, nullptr) == BTH_ERROR_ARGUMENT);
+    const float *const ends[2] = {positions.data(), moved.data()};
+    CHECK(bth_set_positions_between(elastic.get(), 0, ends, 4, 1.5, nullptr) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_set_positions_between(elastic.get(), 0, ends, 4, 1, nullptr) == BTH_OK && elastic.nearest(down).t == 3);
     moved[5] = NAN;
+    CHECK(bth_set_positions_between(elastic.get(), 0, ends, 4, 0.5, nullptr) == BTH_ERROR_ARGUMENT);
     CHECK(bth_set_positions(elastic.get(), 0, moved.data(), 4, nullptr) == BTH_ERROR_ARGUMENT);
     CHECK(bth_set_positions(elastic.get(), 0, positions.data(), 3, nullptr) == BTH_ERROR_ARGUMENT);
     CHECK(bth_set_positions(elastic.get(), 1, positions.data(), 4, nullptr) == BTH_ERROR_ARGUMENT);
@@ -87,6 +95,11 @@ int main(int argc, char **argv) {
     bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
     CHECK(placed.t == 3 && bth_builder_set_positions(builder, 5, moved.data(), 4) == BTH_ERROR_ARGUMENT);
     CHECK(bth_builder_set_positions(builder, object, nullptr, 4) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_positions_between(builder, object, unknown, 4, 0.5) == BTH_ERROR_ARGUMENT);
+    CHECK(bth_builder_set_positions_between(builder, object, ends, 4, 0.25) == BTH_OK);
+    CHECK(bth_builder_commit(builder, &commit) == BTH_OK);
+    bth_nearest(bth_builder_scene(builder), &down, nullptr, &placed, 1);
+    CHECK(placed.t == 2.25);
     bth_builder_free(builder);
 
     int caught = 0;

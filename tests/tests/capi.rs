@@ -157,10 +157,17 @@ fn a_c_program_reads_how_surfaces_look() {
     let expected = format!(
         "material 0.5 0.25 1 1 emissive 2 1 0 alpha 0 0 flags 1 textures 0 -1\n\
         material 1 1 1 0.5 emissive 0 0 0 alpha 2 0 flags 1 textures -1 -1\n\
-        texture of image 0: {} bytes, 0, wrap 0 0 nearest 0 transform 1 0 0 0 -1 1\ncolor 1 0 0 1\n",
+        texture of image 0: {} bytes, 0, wrap 0 0 nearest 0 set 0 transform 1 0 0 0 -1 1\ncolor 1 0 0 1\nset 0: 0.25 0.25\n",
         grey.len()
     );
     assert_eq!(kept, expected);
+    let second =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../format-spec/conformance/valid/second-uvs.bth");
+    let output = run(&program, &[second.to_str().expect("UTF-8")], "");
+    let found = String::from_utf8_lossy(&output.stdout);
+    assert!(found.contains("nearest 0 set 0 ") && found.contains("nearest 0 set 1 "), "{found}");
+    // A quarter of the way from (0.5, 0.25) to (-1, 2).
+    assert!(found.ends_with("set 0: 0.25 0.25\nset 1: 0.125 0.688\n"), "{found}");
     let names = shown(CompileOptions { names: true, ..CompileOptions::default() });
     let error =
         "error -7 bth_material: the file keeps only the names of materials; compile it with --materials\n";

@@ -75,7 +75,7 @@ fn byte_tables_are_those_of_the_structures() {
         Material { name name_length reserved }
         ObjectName { name name_length }
         MaterialParameters { base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved }
-        Texture { image wrap filter transform reserved }
+        Texture { image wrap filter transform uv_set reserved }
         Image { name first length }
         FreeDirections { place bins }
         FreeReach { reach reserved }

@@ -1,4 +1,5 @@
-"""Materials, textures, vertex colors and images (format-spec/README.md, "Materials") and F149 and F160 to F162."""
+"""Materials, textures, vertex colors, second sets of texture coordinates and images (format-spec/README.md, "Materials"), F149, F160 to F162,
+F220 and F221."""
 
 import math
 import struct
@@ -11,7 +12,7 @@ Parameters = namedtuple(
     "Parameters",
     "base_color emissive alpha_cutoff alpha_mode flags base_color_texture emissive_texture reserved",
 )
-Texture = namedtuple("Texture", "image wrap filter transform reserved")
+Texture = namedtuple("Texture", "image wrap filter transform uv_set reserved")
 Image = namedtuple("Image", "name first length")
 
 
@@ -28,9 +29,11 @@ class MaterialsView:
         rows = view.rows(c.MATERIAL_PARAMETERS, "<8f8I")
         self.parameters = [Parameters(r[:4], r[4:7], r[7], *r[8:12], r[12:]) for r in rows]
         rows = view.rows(c.TEXTURES, "<16s3I6f3I")
-        self.textures = [Texture(r[0], r[1:3], r[3], r[4:10], r[10:]) for r in rows]
+        self.textures = [Texture(r[0], r[1:3], r[3], r[4:10], r[10], r[11:]) for r in rows]
         self.color_corners = view.rows(c.COLOR_CORNERS, "<3I")
         self.colors = view.rows(c.COLORS, "<4H")
+        self.second_corners = view.rows(c.SECOND_CORNERS, "<3I")
+        self.second_uvs = view.rows(c.SECOND_UVS, "<2f")
 
     def describe(self):
         """Counts, as a JSON-able value."""
@@ -38,10 +41,11 @@ class MaterialsView:
             "parameters": len(self.parameters),
             "textures": len(self.textures),
             "vertex_colors": len(self.colors),
+            "second_uvs": len(self.second_uvs),
         }
 
     def check(self):
-        """F149, F160 and F161."""
+        """F149, F160, F161, F220 and F221."""
 
         def need(condition, number, message, kind):
             if not condition:
@@ -58,11 +62,16 @@ class MaterialsView:
             need(good, "F149", f"{p}", c.MATERIAL_PARAMETERS)
         for t in self.textures:
             good = max(t.wrap) <= 2 and t.filter <= 1 and all(map(math.isfinite, t.transform))
-            need(good and not any(t.reserved), "F160", f"{t}", c.TEXTURES)
-        corners = self.color_corners
-        need(len(corners) in (0, self.view.triangles), "F161", f"{len(corners)} rows", c.COLOR_CORNERS)
-        for corner in corners:
-            need(max(corner) < len(self.colors), "F161", f"row {max(corner)}", c.COLOR_CORNERS)
+            need(good and t.uv_set <= 1 and not any(t.reserved), "F160", f"{t}", c.TEXTURES)
+        for corners, rows, number, kind in (
+            (self.color_corners, self.colors, "F161", c.COLOR_CORNERS),
+            (self.second_corners, self.second_uvs, "F220", c.SECOND_CORNERS),
+        ):
+            need(len(corners) in (0, self.view.triangles), number, f"{len(corners)} rows", kind)
+            for corner in corners:
+                need(max(corner) < len(rows), number, f"row {max(corner)}", kind)
+        for uv in self.second_uvs:
+            need(all(map(math.isfinite, uv)), "F221", f"{uv}", c.SECOND_UVS)
 
 
 def check_images(container, materials):

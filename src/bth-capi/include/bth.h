@@ -325,11 +325,13 @@ typedef struct {
     const uint8_t *bytes;  /* the image file: PNG, JPEG or WebP; valid until the scene is closed. Red, green and blue of its texels are
                               sRGB, alpha is linear. */
     size_t length;         /* number of bytes */
-    float transform[2][3]; /* rows of the transform from (u, v, 1), where u and v are those of bth_surface_point, to coordinates of the
+    float transform[2][3]; /* rows of the transform from (u, v, 1), where u and v are those of its set, to coordinates of the
                               image: (0, 0) is its upper left corner, (1, 1) its lower right one */
     uint32_t image;        /* equal for textures of the same image of a file */
     uint32_t wrap[2];      /* BTH_WRAP_... for u and for v */
     uint32_t nearest;      /* 1: the nearest texel is taken; 0: four are interpolated, after they have been made linear */
+    uint32_t uv_set;       /* 0: u and v are those of bth_surface_point; 1: those of a second set, see bth_texture_coordinates */
+    uint32_t reserved;     /* 0 */
 } bth_texture_image;
 
 /* Stores how a material of an object looks in *look. Returns BTH_OK; BTH_ERROR_MISSING if the file keeps no more of it than its name;
@@ -341,6 +343,10 @@ uint32_t bth_texture_count(const bth_scene *scene, uint32_t object);
 
 /* Stores a texture of an object in *image. Returns BTH_OK, or BTH_ERROR_ARGUMENT if there is no such object or texture. */
 int32_t bth_texture(const bth_scene *scene, uint32_t object, uint32_t texture, bth_texture_image *image);
+
+/* Stores the texture coordinates of a set at a hit of this scene, interpolated; those of set 0 are in bth_surface_point, too. Returns
+ * BTH_OK; BTH_ERROR_MISSING if the file keeps none of this set for the triangle; BTH_ERROR_ARGUMENT for a miss or a set above 1. */
+int32_t bth_texture_coordinates(const bth_scene *scene, const bth_hit *hit, uint32_t uv_set, float uv[2]);
 
 /* Stores the vertex color at a hit of this scene, interpolated: linear red, green, blue and alpha. Returns BTH_OK; BTH_ERROR_MISSING if
  * the file keeps none for the triangle; BTH_ERROR_ARGUMENT for a miss. */
@@ -431,8 +437,15 @@ size_t bth_vertex_count(const bth_scene *scene, uint32_t object);
  * unchanged. */
 int32_t bth_set_positions(bth_scene *scene, uint32_t object, const float *positions, size_t count, bth_update *update);
 
-/* As bth_set_positions, for an object of a builder. The next commit makes the positions visible. */
+/* As bth_set_positions, with positions on the straight lines between those at two times, ends[0] and ends[1], at `share` of the way,
+ * from 0 to 1: for motion blur. A coordinate is (1 - share) * a + share * b in double precision, rounded once. */
+int32_t bth_set_positions_between(bth_scene *scene, uint32_t object, const float *const ends[2], size_t count, double share,
+                                  bth_update *update);
+
+/* As bth_set_positions and bth_set_positions_between, for an object of a builder. The next commit makes the positions visible. */
 int32_t bth_builder_set_positions(bth_builder *builder, uint32_t object, const float *positions, size_t count);
+int32_t bth_builder_set_positions_between(bth_builder *builder, uint32_t object, const float *const ends[2], size_t count,
+                                          double share);
 
 /* Makes all changes since the last commit visible. `update` may be null. If a visible instance cannot be placed, returns
  * BTH_ERROR_SCENE, and the text of the error gives the instance. The scene is then unchanged, and the changes still wait: correct the

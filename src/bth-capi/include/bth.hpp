@@ -113,6 +113,15 @@ public:
         return update;
     }
 
+    /* The same with positions at a share of the way between those at two times; see bth_set_positions_between. */
+    bth_update set_positions_between(std::uint32_t object, const float *open, const float *close, std::size_t count,
+                                     double share) {
+        bth_update update;
+        const float *const ends[2] = {open, close};
+        check(bth_set_positions_between(get(), object, ends, count, share, &update));
+        return update;
+    }
+
     std::size_t vertex_count(std::uint32_t object) const noexcept { return bth_vertex_count(get(), object); }
 
     double seconds() const noexcept { return bth_seconds(get()); }

@@ -2,7 +2,7 @@
 
 use crate::builder::{UpdateC, with};
 use crate::{ERROR_ARGUMENT, ERROR_INTERNAL, OK, code_of, fail};
-use runtime::{Scene, SceneBuilder};
+use runtime::{Error, Scene, SceneBuilder, Update};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Number of vertices of an object; see `bth.h`.
@@ -35,8 +35,39 @@ pub unsafe extern "C" fn bth_set_positions(
     else {
         return fail(ERROR_ARGUMENT, format!("{NAME}: scene and positions must not be null"));
     };
+    // SAFETY: the contract of `finish` is part of that of this function.
+    unsafe { finish(NAME, update, || scene.set_positions(object, positions)) }
+}
+
+/// Gives an object positions between those at two times; see `bth.h`.
+///
+/// # Safety
+/// As [`bth_set_positions`]; `ends` is null or points to two pointers, each of them as `positions` there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_set_positions_between(
+    scene: *mut Scene,
+    object: u32,
+    ends: *const [*const [f32; 3]; 2],
+    count: usize,
+    share: f64,
+    update: *mut UpdateC,
+) -> i32 {
+    const NAME: &str = "bth_set_positions_between";
+    // SAFETY: by contract they are null or valid, and the scene is not used by another call at the same time.
+    let (Some(scene), Some(ends)) = (unsafe { scene.as_mut() }, unsafe { both(ends, count) }) else {
+        return fail(ERROR_ARGUMENT, format!("{NAME}: scene and positions must not be null"));
+    };
+    // SAFETY: the contract of `finish` is part of that of this function.
+    unsafe { finish(NAME, update, || scene.set_positions_between(object, ends, share)) }
+}
+
+/// Calls a function and hands its result on to C.
+///
+/// # Safety
+/// `update` is null or valid for writes.
+unsafe fn finish(name: &str, update: *mut UpdateC, change: impl FnOnce() -> Result<Update, Error>) -> i32 {
     // A panic must not unwind into C.
-    match catch_unwind(AssertUnwindSafe(|| scene.set_positions(object, positions))) {
+    match catch_unwind(AssertUnwindSafe(change)) {
         Ok(Ok(done)) => {
             if !update.is_null() {
                 // SAFETY: it is not null, so it is valid for writes by the contract of this function.
@@ -44,8 +75,8 @@ pub unsafe extern "C" fn bth_set_positions(
             }
             OK
         }
-        Ok(Err(error)) => fail(code_of(&error), format!("{NAME}: {error}")),
-        Err(_) => fail(ERROR_INTERNAL, format!("{NAME}: internal error")),
+        Ok(Err(error)) => fail(code_of(&error), format!("{name}: {error}")),
+        Err(_) => fail(ERROR_INTERNAL, format!("{name}: internal error")),
     }
 }
 
@@ -68,6 +99,38 @@ pub unsafe extern "C" fn bth_builder_set_positions(
     };
     // SAFETY: the contract of `with` is part of that of this function.
     unsafe { with(builder, NAME, |builder| builder.set_positions(object, positions)) }
+}
+
+/// Stages positions of an object of a builder between those at two times; see `bth.h`.
+///
+/// # Safety
+/// As [`bth_builder_set_positions`]; `ends` is null or points to two pointers, each of them as `positions` there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_builder_set_positions_between(
+    builder: *mut SceneBuilder,
+    object: u32,
+    ends: *const [*const [f32; 3]; 2],
+    count: usize,
+    share: f64,
+) -> i32 {
+    const NAME: &str = "bth_builder_set_positions_between";
+    // SAFETY: the contract of `both` is part of that of this function.
+    let Some(ends) = (unsafe { both(ends, count) }) else {
+        return fail(ERROR_ARGUMENT, format!("{NAME}: positions must not be null"));
+    };
+    // SAFETY: the contract of `with` is part of that of this function.
+    unsafe { with(builder, NAME, |builder| builder.set_positions_between(object, ends, share)) }
+}
+
+/// Positions at two times from C; `None` if a pointer is null.
+///
+/// # Safety
+/// `ends` is null or points to two pointers, each of which is as [`slice`] expects it.
+unsafe fn both<'a>(ends: *const [*const [f32; 3]; 2], count: usize) -> Option<[&'a [[f32; 3]]; 2]> {
+    // SAFETY: by contract it is null or valid for reads.
+    let [open, close] = *unsafe { ends.as_ref() }?;
+    // SAFETY: the contract of `slice` is part of that of this function.
+    Some([unsafe { slice(open, count) }?, unsafe { slice(close, count) }?])
 }
 
 /// Positions from C; `None` if the pointer is null.

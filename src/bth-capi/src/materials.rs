@@ -31,10 +31,12 @@ pub struct TextureC {
     image: u32,
     wrap: [u32; 2],
     nearest: u32,
+    uv_set: u32,
+    reserved: u32,
 }
 
 const _: () = assert!(size_of::<MaterialC>() == 48);
-const _: () = assert!(size_of::<TextureC>() == 40 + 2 * size_of::<usize>());
+const _: () = assert!(size_of::<TextureC>() == 48 + 2 * size_of::<usize>());
 
 impl MaterialC {
     fn new(material: &runtime::Material) -> Self {
@@ -129,10 +131,39 @@ pub unsafe extern "C" fn bth_texture(
             image: found.image,
             wrap: found.wrap.map(wrap),
             nearest: u32::from(found.nearest),
+            uv_set: found.uv_set,
+            reserved: 0,
         })
     };
     // SAFETY: the contract of `store` is part of that of this function.
     unsafe { store("bth_texture", scene, image, find) }
+}
+
+/// The texture coordinates of a set at a hit; see `bth.h`.
+///
+/// # Safety
+/// `scene` is null or open; `hit` is null or valid for reads; `uv` is null or points to two numbers that are valid for writes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn bth_texture_coordinates(
+    scene: *const Scene,
+    hit: *const Hit,
+    uv_set: u32,
+    uv: *mut [f32; 2],
+) -> i32 {
+    // SAFETY: by contract it is null or valid for reads.
+    let Some(hit) = (unsafe { hit.as_ref() }) else {
+        return fail(ERROR_ARGUMENT, "bth_texture_coordinates: hit must not be null".into());
+    };
+    let find = |scene: &Scene| {
+        let instance = hit.primitive.instance;
+        if instance >= scene.instance_count() || uv_set > 1 {
+            return Err((ERROR_ARGUMENT, format!("there is no instance {instance} or no set {uv_set}")));
+        }
+        let nothing = || (ERROR_MISSING, format!("the file keeps no set {uv_set} for the triangle"));
+        scene.texture_coordinates(hit, uv_set).ok_or_else(nothing)
+    };
+    // SAFETY: the contract of `store` is part of that of this function.
+    unsafe { store("bth_texture_coordinates", scene, uv, find) }
 }
 
 /// The vertex colour at a hit; see `bth.h`.

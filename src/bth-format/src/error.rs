@@ -109,7 +109,7 @@ codes! {
     TrackKeys "F157" "Times of a track are finite and ascend strictly; values are finite, quaternions are not zero, and visibility is 0 or 1."
     Camera "F158" "A camera's node and projection exist; its size, aspect, near and far are finite and in the ranges of the table of Camera; its reserved fields are zero."
     Light "F159" "A light's node and kind exist; its color, intensity, range and angles are finite and in the ranges of the table of Light; its reserved fields are zero."
-    Texture "F160" "Wrap modes and filter of a texture are known, its transform is finite, and its reserved fields are zero."
+    Texture "F160" "Wrap modes, filter and set of texture coordinates of a texture are known, its transform is finite, and its reserved fields are zero."
     Colors "F161" "COLOR_CORNERS has as many rows as the object has triangles, or none, and its rows lie within COLORS."
     Images "F162" "IMAGES ascend strictly by name; the ranges of successive images follow each other, are not empty and together cover IMAGE_BYTES; the image of each texture is the name of one of them."
 
@@ -142,6 +142,8 @@ codes! {
     SequencePositions "F192" "Positions of SEQUENCE_POSITIONS are finite; those of the first time are POSITIONS, bit for bit."
     Segments "F193" "SEGMENTS is empty or has at least two rows; their times are finite and ascend strictly, the first row and no other is of the object itself, and reserved fields are zero."
     SegmentObjects "F194" "The objects of SEGMENTS exist; each but the first is in one row of one object, has neither SEGMENTS nor SEQUENCE_TIMES and no instance; all are deformable and have equal POSITIONS and TRIANGLES, bit for bit."
+    SecondCorners "F220" "SECOND_CORNERS has as many rows as the object has triangles, or none, and its rows lie within SECOND_UVS."
+    SecondUvs "F221" "Coordinates of SECOND_UVS are finite."
 
     LeafSource "F201" "A triangle of a leaf has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
     FaceSource "F202" "A constrained face has the corners of its source triangle, bit for bit; on a grid the points nearest to them."
@@ -375,6 +377,8 @@ pub fn kind_name(code: u32) -> &'static str {
         kind::TEXTURES => "TEXTURES",
         kind::COLOR_CORNERS => "COLOR_CORNERS",
         kind::COLORS => "COLORS",
+        kind::SECOND_CORNERS => "SECOND_CORNERS",
+        kind::SECOND_UVS => "SECOND_UVS",
         kind::IMAGES => "IMAGES",
         kind::IMAGE_BYTES => "IMAGE_BYTES",
         kind::DEFORMATION => "DEFORMATION",

@@ -13,6 +13,10 @@ pub struct MaterialsView<'a> {
     pub color_corners: &'a [[u32; 3]],
     /// Vertex colours: linear red, green, blue and alpha; 65,535 stands for 1.
     pub colors: &'a [[u16; 4]],
+    /// Per source triangle its rows of `second_uvs`, or empty.
+    pub second_corners: &'a [[u32; 3]],
+    /// A second set of texture coordinates.
+    pub second_uvs: &'a [[f32; 2]],
 }
 
 /// The images of a file.
@@ -28,13 +32,14 @@ impl MaterialsView<'_> {
     /// The interpolated vertex colour at barycentric coordinates (weights of the second and third corner) of a triangle; `None`
     /// where it has none.
     pub fn color_at(&self, triangle: u32, u: f32, v: f32) -> Option<[f32; 4]> {
-        let rows = self.color_corners.get(triangle as usize)?;
-        let [a, b, c] = rows.map(|row| self.colors.get(row as usize).copied());
-        let (corners, weights) = ([a?, b?, c?], [1.0 - f64::from(u) - f64::from(v), u.into(), v.into()]);
-        let sum = |k: usize| {
-            corners.iter().zip(weights).map(|(color, w): (_, f64)| f64::from(color[k]) * w).sum::<f64>()
-        };
-        Some([0, 1, 2, 3].map(|k| (sum(k) / f64::from(u16::MAX)) as f32))
+        let color = interpolated(self.color_corners, self.colors, triangle, (u, v))?;
+        Some(color.map(|x| (x / f64::from(u16::MAX)) as f32))
+    }
+
+    /// The interpolated texture coordinates of the second set at barycentric coordinates of a triangle; `None` where it has none.
+    pub fn second_uv_at(&self, triangle: u32, u: f32, v: f32) -> Option<[f32; 2]> {
+        let uv = interpolated(self.second_corners, self.second_uvs, triangle, (u, v))?;
+        Some(uv.map(|x| x as f32))
     }
 }
 
@@ -51,4 +56,18 @@ impl<'a> ImagesView<'a> {
         let (first, length) = (usize::try_from(image.first).ok()?, usize::try_from(image.length).ok()?);
         self.bytes.get(first..first.checked_add(length)?)
     }
+}
+
+/// The interpolation of rows at barycentric coordinates (weights of the second and third corner) of a triangle, whose corners have
+/// rows of their own; `None` where it has none.
+fn interpolated<T: Copy + Into<f64>, const N: usize>(
+    corners: &[[u32; 3]],
+    rows: &[[T; N]],
+    triangle: u32,
+    (u, v): (f32, f32),
+) -> Option<[f64; N]> {
+    let [a, b, c] = corners.get(triangle as usize)?.map(|row| rows.get(row as usize).copied());
+    let (corners, weights) = ([a?, b?, c?], [1.0 - f64::from(u) - f64::from(v), u.into(), v.into()]);
+    let at = |k: usize| corners.iter().zip(weights).map(|(row, w): (_, f64)| row[k].into() * w).sum();
+    Some(std::array::from_fn(at))
 }

@@ -9,6 +9,7 @@
 mod attributes;
 mod cutout;
 mod deformation;
+mod disjoint_sets;
 pub mod error;
 pub mod gltf;
 mod groups;

@@ -1,9 +1,11 @@
-//! How the materials of a mesh look, as the sections of a compiled file have it: parameters, textures and vertex colours.
+//! How the materials of a mesh look, as the sections of a compiled file have it: parameters, textures, vertex colours, and a
+//! second set of texture coordinates.
 
 use crate::cutout::AlphaMode;
 use bth_format::file::hash128;
-use bth_format::layout::{MaterialParameters, NONE, Texture};
+use bth_format::layout::{MaterialParameters, NONE, Texture, UV_SET_SECOND};
 use std::collections::HashMap;
+use std::hash::Hash;
 
 /// The materials of a mesh's groups, and the colours of its vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +18,10 @@ pub struct Materials {
     pub color_corners: Vec<[u32; 3]>,
     /// Distinct vertex colours, linear red, green, blue and alpha; 65,535 stands for 1.
     pub colors: Vec<[u16; 4]>,
+    /// Per triangle rows of `second_uvs`; empty where no texture has coordinates of a second set.
+    pub second_corners: Vec<[u32; 3]>,
+    /// Distinct texture coordinates of the second set.
+    pub second_uvs: Vec<[f32; 2]>,
 }
 
 /// What of a model's looks is read, for which files besides the model itself are needed.
@@ -72,10 +78,11 @@ pub(crate) struct MaterialRecorder {
     textures: Vec<Texture>,
     rows: HashMap<TextureKey, u32>,
     pub(crate) colors: ColorRecorder,
+    pub(crate) second_uvs: CornerRecorder<[u32; 2]>,
 }
 
 /// What makes two textures equal.
-type TextureKey = ([u8; 16], [u32; 2], u32, [u32; 6]);
+type TextureKey = ([u8; 16], [u32; 2], [u32; 2], [u32; 6]);
 
 impl MaterialRecorder {
     /// The row of a texture, which is added if there is none like it.
@@ -83,7 +90,8 @@ impl MaterialRecorder {
         let mut bits = [0; 6];
         bits.iter_mut().zip(texture.transform.as_flattened()).for_each(|(to, x)| *to = x.to_bits());
         let next = self.textures.len() as u32;
-        let row = *self.rows.entry((texture.image, texture.wrap, texture.filter, bits)).or_insert(next);
+        let key = (texture.image, texture.wrap, [texture.filter, texture.uv_set], bits);
+        let row = *self.rows.entry(key).or_insert(next);
         if row == next {
             self.textures.push(texture);
         }
@@ -92,18 +100,20 @@ impl MaterialRecorder {
 
     /// The materials of a mesh of so many triangles. `kept` are the numbers of the materials that its groups have, in order.
     pub(crate) fn finish(self, kept: &[u32], triangles: usize) -> Materials {
-        let Self { parameters, textures, colors, .. } = self;
+        let Self { parameters, textures, colors, second_uvs, .. } = self;
         let parameters: Vec<_> = match parameters.is_empty() {
             true => Vec::new(),
             false => kept.iter().map(|row| parameters.get(*row as usize).copied().unwrap_or(PLAIN)).collect(),
         };
-        let (color_corners, colors) = colors.finish(triangles);
-        used_textures(Materials { parameters, textures, color_corners, colors })
+        let (color_corners, colors) = colors.0.finish(triangles, color(WHITE));
+        let (second_corners, second_uvs) = second_uvs.finish(triangles, [0; 2]);
+        let second_uvs = second_uvs.into_iter().map(|bits| bits.map(f32::from_bits)).collect();
+        used(Materials { parameters, textures, color_corners, colors, second_corners, second_uvs })
     }
 }
 
-/// The materials without the textures that none of them refers to.
-fn used_textures(mut materials: Materials) -> Materials {
+/// The materials without the textures that none of them refers to, and without a second set of coordinates that no texture has.
+fn used(mut materials: Materials) -> Materials {
     let mut rows = HashMap::new();
     let mut used = Vec::new();
     for parameters in &mut materials.parameters {
@@ -117,28 +127,73 @@ fn used_textures(mut materials: Materials) -> Materials {
         }
     }
     materials.textures = used;
+    if materials.textures.iter().all(|texture| texture.uv_set != UV_SET_SECOND) {
+        (materials.second_corners, materials.second_uvs) = (Vec::new(), Vec::new());
+    }
     materials
 }
 
-/// Collects vertex colours; each different one stands once.
-#[derive(Debug, Default)]
-pub(crate) struct ColorRecorder {
+/// Collects what the corners of triangles have; each different one stands once.
+#[derive(Debug)]
+pub(crate) struct CornerRecorder<T> {
     corners: Vec<[u32; 3]>,
-    colors: Vec<[u16; 4]>,
-    rows: HashMap<[u16; 4], u32>,
+    values: Vec<T>,
+    rows: HashMap<T, u32>,
+}
+
+impl<T> Default for CornerRecorder<T> {
+    fn default() -> Self {
+        Self { corners: Vec::new(), values: Vec::new(), rows: HashMap::new() }
+    }
+}
+
+impl<T: Copy + Eq + Hash> CornerRecorder<T> {
+    /// The row of a value.
+    pub(crate) fn row(&mut self, value: T) -> u32 {
+        let next = self.values.len() as u32;
+        let row = *self.rows.entry(value).or_insert(next);
+        if row == next {
+            self.values.push(value);
+        }
+        row
+    }
+
+    /// Adds the rows of the corners of triangles from the triangle `first` on; those before without rows have `absent`.
+    pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>, absent: T) {
+        self.fill(first, absent);
+        self.corners.extend(corners);
+    }
+
+    fn fill(&mut self, triangles: usize, absent: T) {
+        if self.corners.len() < triangles {
+            let row = self.row(absent);
+            self.corners.resize(triangles, [row; 3]);
+        }
+    }
+
+    fn finish(mut self, triangles: usize, absent: T) -> (Vec<[u32; 3]>, Vec<T>) {
+        if self.corners.is_empty() {
+            return (Vec::new(), Vec::new());
+        }
+        self.fill(triangles, absent);
+        (self.corners, self.values)
+    }
+}
+
+/// Collects vertex colours.
+#[derive(Debug, Default)]
+pub(crate) struct ColorRecorder(CornerRecorder<[u16; 4]>);
+
+/// A colour as files have it. What is no number counts as 1; other numbers are clamped to 0 and 1.
+fn color(color: [f32; 4]) -> [u16; 4] {
+    let unit = |x: f32| if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) };
+    color.map(|x| (f64::from(unit(x)) * f64::from(u16::MAX)).round() as u16)
 }
 
 impl ColorRecorder {
-    /// The row of a colour. What is no number counts as 1; other numbers are clamped to 0 and 1.
-    pub(crate) fn row(&mut self, color: [f32; 4]) -> u32 {
-        let unit = |x: f32| if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) };
-        let color = color.map(|x| (f64::from(unit(x)) * f64::from(u16::MAX)).round() as u16);
-        let next = self.colors.len() as u32;
-        let row = *self.rows.entry(color).or_insert(next);
-        if row == next {
-            self.colors.push(color);
-        }
-        row
+    /// The row of a linear colour.
+    pub(crate) fn row(&mut self, rgba: [f32; 4]) -> u32 {
+        self.0.row(color(rgba))
     }
 
     /// The row of a colour in sRGB.
@@ -149,23 +204,7 @@ impl ColorRecorder {
 
     /// Adds the rows of the corners of triangles from the triangle `first` on; those before without colours are white.
     pub(crate) fn add(&mut self, first: usize, corners: impl Iterator<Item = [u32; 3]>) {
-        self.fill(first);
-        self.corners.extend(corners);
-    }
-
-    fn fill(&mut self, triangles: usize) {
-        if self.corners.len() < triangles {
-            let white = self.row(WHITE);
-            self.corners.resize(triangles, [white; 3]);
-        }
-    }
-
-    fn finish(mut self, triangles: usize) -> (Vec<[u32; 3]>, Vec<[u16; 4]>) {
-        if self.corners.is_empty() {
-            return (Vec::new(), Vec::new());
-        }
-        self.fill(triangles);
-        (self.corners, self.colors)
+        self.0.add(first, corners, color(WHITE));
     }
 }
 
@@ -184,10 +223,10 @@ mod tests {
         let red = recorder.row([2.0, -1.0, 0.0, f32::NAN]);
         assert_eq!(recorder.row([1.0, 0.0, 0.0, 1.0]), red);
         recorder.add(2, [[red; 3]].into_iter());
-        let (corners, colors) = recorder.finish(4);
+        let (corners, colors) = recorder.0.finish(4, color(WHITE));
         assert_eq!(colors, [[65535, 0, 0, 65535], [65535; 4]]);
         assert_eq!(corners, [[1; 3], [1; 3], [0; 3], [1; 3]]);
-        assert_eq!(ColorRecorder::default().finish(7), (Vec::new(), Vec::new()));
+        assert_eq!(CornerRecorder::<[u16; 4]>::default().finish(7, [0; 4]), (Vec::new(), Vec::new()));
     }
 
     #[test]
@@ -198,10 +237,12 @@ mod tests {
             wrap: [0; 2],
             filter: 0,
             transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            reserved: [0; 3],
+            uv_set: u32::from(byte == 1),
+            reserved: [0; 2],
         };
         let rows = [recorder.texture(texture(1)), recorder.texture(texture(2)), recorder.texture(texture(1))];
         assert_eq!(rows, [0, 1, 0]);
+        recorder.second_uvs.add(0, [[0; 3]].into_iter(), [0; 2]);
         recorder.parameters = vec![
             MaterialParameters { base_color_texture: 0, ..PLAIN },
             PLAIN,
@@ -210,6 +251,10 @@ mod tests {
         let materials = recorder.finish(&[2, 1], 3);
         assert_eq!(materials.parameters, [MaterialParameters { emissive_texture: 0, ..PLAIN }, PLAIN]);
         assert_eq!(materials.textures, [texture(2)]);
+        assert!(
+            materials.second_corners.is_empty(),
+            "the texture with coordinates of a second set is not used"
+        );
     }
 
     #[test]

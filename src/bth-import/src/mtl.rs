@@ -320,7 +320,8 @@ fn texture(map: &Map, image: [u8; 16]) -> Texture {
         wrap: [wrap; 2],
         filter: FILTER_LINEAR,
         transform: [[scale[0], 0.0, offset[0]], [0.0, -scale[1], 1.0 - offset[1]]],
-        reserved: [0; 3],
+        uv_set: UV_SET_FIRST,
+        reserved: [0; 2],
     }
 }
 

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::disjoint_sets::DisjointSets;
 use crate::mesh::Mesh;
 use crate::zero_area::is_zero_area;
 
@@ -95,31 +96,11 @@ fn for_each_run<T: Ord + Copy + Default>(
     }
 }
 
-/// Counts components by union-find with path halving. The smaller row becomes the root, which keeps the forest shallow
-/// on meshes whose rows are in order of first use.
+/// Counts components.
 fn components(mesh: &Mesh) -> u64 {
-    let mut parents: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    fn root(parents: &mut [u32], mut row: u32) -> u32 {
-        while parents[row as usize] != row {
-            parents[row as usize] = parents[parents[row as usize] as usize];
-            row = parents[row as usize];
-        }
-        row
-    }
-    let mut count = parents.len() as u64;
-    for &[a, b, c] in &mesh.triangles {
-        let mut first = root(&mut parents, a);
-        for corner in [b, c] {
-            let other = root(&mut parents, corner);
-            if first != other {
-                let (low, high) = (first.min(other), first.max(other));
-                parents[high as usize] = low;
-                first = low;
-                count -= 1;
-            }
-        }
-    }
-    count
+    let mut sets = DisjointSets::new(mesh.positions.len());
+    let gone: u64 = mesh.triangles.iter().map(|triangle| sets.join(*triangle)).sum();
+    mesh.positions.len() as u64 - gone
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 #![warn(missing_docs)]
 
 pub mod error;
+mod joint_set;
 pub mod limits;
 mod model;
 mod names;
@@ -18,6 +19,7 @@ mod table;
 mod write;
 
 pub use error::{Error, Result};
+pub use joint_set::JointSet;
 pub use model::*;
 pub use read::{parse, read};
 

@@ -1,5 +1,7 @@
 //! A scene as a manifest describes it. References to nodes and objects are indices into the vectors of [`Manifest`].
 
+use crate::joint_set::JointSet;
+
 /// Version of the manifest format that this crate reads and writes.
 pub const VERSION: i64 = 1;
 
@@ -92,6 +94,18 @@ pub enum Source {
         path: String,
         /// Number of the mesh.
         mesh: u32,
+        /// Joints whose rigid parts ([`Source::RigidPart`]) are left out.
+        without: JointSet,
+    },
+    /// The part of a mesh that one joint moves rigidly: all its connected components whose vertices follow this joint alone and no
+    /// morph target. Triangles are connected where they have a corner of equal position.
+    RigidPart {
+        /// glTF or GLB file.
+        path: String,
+        /// Number of the mesh.
+        mesh: u32,
+        /// Number of the joint, below [`JointSet::LIMIT`].
+        joint: u32,
     },
     /// The mesh of a node at rest: with its default morph weights and with its joints where the nodes place them.
     AtRest {
@@ -129,6 +143,7 @@ impl Source {
             | Source::Compiled { path, .. }
             | Source::Cached { path, .. }
             | Source::Deforming { path, .. }
+            | Source::RigidPart { path, .. }
             | Source::AtRest { path, .. } => path,
             Source::Sequence { frames: SequenceFrames::Numbered(pattern), .. } => pattern,
             Source::Sequence { frames: SequenceFrames::Listed(files), .. } => {

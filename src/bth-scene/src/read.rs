@@ -1,6 +1,7 @@
 //! Reads a manifest strictly.
 
 use crate::error::{Error, Result, code};
+use crate::joint_set::JointSet;
 use crate::limits::{MAX_MANIFEST, MAX_PATH};
 use crate::model::*;
 use crate::names::Names;
@@ -125,11 +126,19 @@ fn object(table: &Table<'_>) -> Result<Object> {
         ("model", "object"),
         ("file", "mesh"),
         ("file", "deforms"),
+        ("file", "joint"),
         ("file", "node"),
         ("node", "mesh"),
         ("node", "deforms"),
+        ("node", "joint"),
+        ("joint", "deforms"),
     ] {
         table.exclude(a, b)?;
+    }
+    let deforms = table.get("deforms").map_or(Ok(false), |v| v.boolean())?;
+    if let Some(value) = table.get("without_joints").filter(|_| !deforms) {
+        let message = "`without_joints` belongs to objects with `deforms`";
+        return Err(value.error(code::CONFLICT, message, "remove it"));
     }
     if let Some(source) = sequence(table)? {
         return Ok(Object { name: name(table)?, source });
@@ -144,22 +153,37 @@ fn object(table: &Table<'_>) -> Result<Object> {
         Some(file) => Source::Compiled { path: path(&file)?, object: index("object")?.unwrap_or(0) },
         None => {
             let path = path(&table.need("model")?)?;
-            let deforms = table.get("deforms").map_or(Ok(false), |v| v.boolean())?;
-            match (index("node")?, index("mesh")?) {
-                (Some(node), _) => Source::AtRest { path, node },
-                (None, Some(mesh)) if deforms => Source::Deforming { path, mesh },
-                (None, None) if deforms => return Err(missing_mesh(table)?),
-                (None, mesh) => Source::Model { path, mesh },
+            let joint = table.get("joint").map(|v| joint(&v)).transpose()?;
+            match (index("node")?, index("mesh")?, joint) {
+                (Some(node), ..) => Source::AtRest { path, node },
+                (None, Some(mesh), Some(joint)) => Source::RigidPart { path, mesh, joint },
+                (None, None, Some(_)) => return Err(missing_mesh(table, "joint")?),
+                (None, Some(mesh), None) if deforms => {
+                    Source::Deforming { path, mesh, without: without_joints(table)? }
+                }
+                (None, None, None) if deforms => return Err(missing_mesh(table, "deforms")?),
+                (None, mesh, None) => Source::Model { path, mesh },
             }
         }
     };
     Ok(Object { name: name(table)?, source })
 }
 
-/// The error for an object that deforms without a mesh.
-fn missing_mesh(table: &Table<'_>) -> Result<Error> {
-    let message = "only single meshes of glTF files deform";
-    Ok(table.need("deforms")?.error(code::CONFLICT, message, "name a mesh by its number"))
+/// The error for an object with `deforms` or `joint` without a mesh.
+fn missing_mesh(table: &Table<'_>, key: &'static str) -> Result<Error> {
+    let message = "only single meshes of glTF files deform or have parts of joints";
+    Ok(table.need(key)?.error(code::CONFLICT, message, "name a mesh by its number"))
+}
+
+/// The number of a joint whose rigid part can be named.
+fn joint(value: &Value<'_>) -> Result<u32> {
+    Ok(value.integer(0..=i64::from(JointSet::LIMIT) - 1)? as u32)
+}
+
+/// The joints whose rigid parts are left out of an object that deforms.
+fn without_joints(table: &Table<'_>) -> Result<JointSet> {
+    let Some(value) = table.get("without_joints") else { return Ok(JointSet::default()) };
+    value.array()?.iter().map(joint).collect()
 }
 
 /// A path that stays within the manifest's folder on every system.

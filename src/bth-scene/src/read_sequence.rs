@@ -11,6 +11,8 @@ pub(crate) const OBJECT_KEYS: &[&str] = &[
     "model",
     "mesh",
     "deforms",
+    "joint",
+    "without_joints",
     "node",
     "file",
     "object",
@@ -23,7 +25,7 @@ pub(crate) const OBJECT_KEYS: &[&str] = &[
 /// The source of an object with a sequence; `None` for others.
 pub(crate) fn sequence(table: &Table<'_>) -> Result<Option<Source>> {
     let Some(value) = table.get("sequence") else { return Ok(None) };
-    for key in ["model", "mesh", "deforms", "node", "file", "object", "vertex_cache"] {
+    for key in ["model", "mesh", "deforms", "joint", "node", "file", "object", "vertex_cache"] {
         table.exclude("sequence", key)?;
     }
     let timing = timing(table)?;
@@ -56,7 +58,7 @@ pub(crate) fn vertex_cache(table: &Table<'_>) -> Result<Option<Source>> {
         }
         return Ok(None);
     };
-    for key in ["mesh", "deforms", "node", "file", "object"] {
+    for key in ["mesh", "deforms", "joint", "node", "file", "object"] {
         table.exclude("vertex_cache", key)?;
     }
     let (path, cache) = (path(&table.need("model")?)?, path(&cache)?);

@@ -36,8 +36,14 @@ impl Manifest {
                     writeln!(out, "model = {}\nvertex_cache = {}", text(path), text(cache))?;
                     write_timing(out, timing)?;
                 }
-                Source::Deforming { path, mesh } => {
+                Source::Deforming { path, mesh, without } => {
                     writeln!(out, "model = {}\nmesh = {mesh}\ndeforms = true", text(path))?;
+                    if !without.is_empty() {
+                        list(out, "without_joints", without.iter().map(|joint| joint.to_string()))?;
+                    }
+                }
+                Source::RigidPart { path, mesh, joint } => {
+                    writeln!(out, "model = {}\nmesh = {mesh}\njoint = {joint}", text(path))?;
                 }
                 Source::AtRest { path, node } => writeln!(out, "model = {}\nnode = {node}", text(path))?,
             }

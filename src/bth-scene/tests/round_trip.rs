@@ -34,7 +34,22 @@ prop_compose! {
             Object { name: "model".into(), source: Source::Model { path: "a b/ü.ply".into(), mesh: None } },
             Object { name: "mesh".into(), source: Source::Model { path: "x.glb".into(), mesh: Some(7) } },
             Object { name: "file".into(), source: Source::Compiled { path: "x.bth".into(), object: 1 } },
-            Object { name: "deforms".into(), source: Source::Deforming { path: "x.glb".into(), mesh: 2 } },
+            Object {
+                name: "deforms".into(),
+                source: Source::Deforming { path: "x.glb".into(), mesh: 2, without: JointSet::default() },
+            },
+            Object {
+                name: "soft".into(),
+                source: Source::Deforming {
+                    path: "x.glb".into(),
+                    mesh: 2,
+                    without: frames.1.cast_unsigned().to_le_bytes().map(u32::from).into_iter().collect(),
+                },
+            },
+            Object {
+                name: "rigid".into(),
+                source: Source::RigidPart { path: "x.glb".into(), mesh: 2, joint: 255 },
+            },
             Object { name: "rests".into(), source: Source::AtRest { path: "x.glb".into(), node: 3 } },
             Object {
                 name: "walk".into(),

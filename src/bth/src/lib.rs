@@ -36,7 +36,8 @@ mod opacity;
 mod query;
 pub mod rays;
 mod scene;
-mod simd;
+#[doc(hidden)]
+pub mod simd;
 mod streams;
 mod surface;
 mod tets;

@@ -1,11 +1,12 @@
-//! How surfaces look: parameters of materials, textures as the image files that they are, and vertex colours, from the sections
-//! that a file keeps with `bthc compile --materials`. Nothing is decoded here.
+//! How surfaces look: parameters of materials, textures as the image files that they are, a second set of texture
+//! coordinates, and vertex colours, from the sections that a file keeps with `bthc compile --materials`. Nothing is decoded here.
 
 use crate::rays::Hit;
 use crate::scene::Scene;
+use crate::surface::interpolated_uv;
 use bth_format::layout::{
-    ALPHA_BLEND, ALPHA_MASK, FILTER_NEAREST, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, WRAP_CLAMP,
-    WRAP_MIRROR,
+    ALPHA_BLEND, ALPHA_MASK, FILTER_NEAREST, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, NONE, UV_SET_FIRST,
+    UV_SET_SECOND, WRAP_CLAMP, WRAP_MIRROR,
 };
 
 /// What the alpha of a material means: the fourth component of its base colour, times that of the base colour texture, times
@@ -61,7 +62,10 @@ pub struct Texture<'a> {
     pub wrap: [Wrap; 2],
     /// Whether the nearest texel is taken; else four are interpolated bilinearly, after they have been made linear.
     pub nearest: bool,
-    /// Rows of the transform from (u, v, 1), where u and v are those of [`SurfacePoint::uv`](crate::SurfacePoint::uv), to
+    /// The set of its texture coordinates: 0 for [`SurfacePoint::uv`](crate::SurfacePoint::uv), 1 for a second one;
+    /// [`Scene::texture_coordinates`] has both.
+    pub uv_set: u32,
+    /// Rows of the transform from (u, v, 1), where u and v are the coordinates of its set, to
     /// coordinates of the image. There (0, 0) is the upper left corner, (1, 1) the lower right one, and the center of texel (i,
     /// j) is at ((i + ½) / width, (j + ½) / height).
     pub transform: [[f32; 3]; 2],
@@ -121,8 +125,27 @@ impl Scene {
                 _ => Wrap::Repeat,
             }),
             nearest: row.filter == FILTER_NEAREST,
+            uv_set: row.uv_set,
             transform: row.transform,
         })
+    }
+
+    /// The texture coordinates of a set at a hit, interpolated; set 0 is that of [`SurfacePoint::uv`](crate::SurfacePoint::uv). `None`
+    /// if the file keeps none of that set, or if there is no such instance, triangle or set.
+    pub fn texture_coordinates(&self, hit: &Hit, uv_set: u32) -> Option<[f32; 2]> {
+        let object = self.object_at(hit.primitive)?;
+        let triangle = hit.primitive.triangle;
+        match uv_set {
+            UV_SET_FIRST => {
+                let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+                interpolated_uv(self.view(object), triangle, [1.0 - u - v, u, v])
+            }
+            UV_SET_SECOND => {
+                let (file, row) = self.objects().locate(object)?;
+                file.materials(row).second_uv_at(triangle, hit.u, hit.v)
+            }
+            _ => None,
+        }
     }
 
     /// The vertex colour at a hit, interpolated linearly: linear red, green, blue and alpha. `None` if the file keeps none, or

@@ -230,7 +230,7 @@ fn plane_normal(corners: [[f32; 3]; 3]) -> Option<[f64; 3]> {
 }
 
 /// The interpolated texture coordinates at barycentric weights.
-fn interpolated_uv(view: &ObjectView<'_>, id: u32, weights: [f64; 3]) -> Option<[f32; 2]> {
+pub(crate) fn interpolated_uv(view: &ObjectView<'_>, id: u32, weights: [f64; 3]) -> Option<[f32; 2]> {
     let corners = attribute(view, view.uvs, id)?;
     Some(weighted(weights, corners.map(|uv| uv.map(f64::from))).map(|x| x as f32))
 }

@@ -9,7 +9,7 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 25] = files![
+const VALID: [(&str, &[u8]); 26] = files![
     "deformable",
     "deformers",
     "free-directions",
@@ -25,6 +25,7 @@ const VALID: [(&str, &[u8]); 25] = files![
     "scene-empty",
     "scene-moving",
     "scene-still",
+    "second-uvs",
     "sequence",
     "tets-link32",
     "tets-tet16",

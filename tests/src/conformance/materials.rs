@@ -2,7 +2,7 @@
 
 use super::valid::{CORNERS, bounds, indexed, lines};
 use super::{Case, Editor, Seal, valid};
-use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, images, object};
+use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, Source, images, object};
 use bth_format::file::hash128;
 use bth_format::layout::*;
 use bth_import::Materials;
@@ -27,7 +27,7 @@ fn image_names() -> [[u8; 16]; 2] {
 
 fn texture(image: &[u8], wrap: [u32; 2], filter: u32) -> Texture {
     let transform = [[1.0, 0.0, 0.25], [0.0, -1.0, 1.0]];
-    Texture { image: hash128(image), wrap, filter, transform, reserved: [0; 3] }
+    Texture { image: hash128(image), wrap, filter, transform, uv_set: UV_SET_FIRST, reserved: [0; 2] }
 }
 
 /// Two materials with three textures of two images, and vertex colors; an object with a texture of one of these images; and one
@@ -60,6 +60,7 @@ pub(super) fn materials() -> Vec<u8> {
         ],
         color_corners: vec![[0, 1, 0]],
         colors: vec![[65535; 4], [65535, 0, 32768, 65535]],
+        ..Materials::default()
     };
     let blended =
         MaterialParameters { alpha_mode: ALPHA_BLEND, flags: MATERIAL_UNLIT, base_color_texture: 0, ..plain };
@@ -86,9 +87,69 @@ pub(super) fn materials() -> Vec<u8> {
     builder.finish()
 }
 
+/// A material whose base color texture and emissive texture have sets of texture coordinates of their own; and one without such coordinates,
+/// though its texture has them.
+pub(super) fn second_uvs() -> Vec<u8> {
+    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
+    let groups = GroupParts::of(&bth_import::Groups {
+        groups: vec![bth_import::Group { name: "lamp".into(), material: Some(0) }],
+        materials: vec!["lamp".into()],
+        runs: vec![[0, 0]],
+    });
+    let lamp = MaterialParameters {
+        base_color: [1.0; 4],
+        emissive: [2.0; 3],
+        alpha_cutoff: 0.5,
+        alpha_mode: ALPHA_OPAQUE,
+        flags: 0,
+        base_color_texture: 0,
+        emissive_texture: 1,
+        reserved: [0; 4],
+    };
+    let first = texture(RED, [WRAP_REPEAT; 2], FILTER_LINEAR);
+    let second = Texture { uv_set: UV_SET_SECOND, ..texture(RED, [WRAP_CLAMP; 2], FILTER_LINEAR) };
+    let looks = Materials {
+        parameters: vec![lamp],
+        textures: vec![first, second],
+        second_corners: vec![[0, 1, 0]],
+        second_uvs: vec![[0.5, 0.25], [-1.0, 2.0]],
+        ..Materials::default()
+    };
+    let uvs = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    let source = Source {
+        positions: &CORNERS,
+        triangles: &[[0, 1, 2]],
+        corners: &[[0, 1, 2]],
+        normals: &[],
+        uvs: &uvs,
+    };
+    let parts = ObjectParts {
+        bounds: Some(bounds(&CORNERS)),
+        root: Child::Indexed(0).code(),
+        triangles: 1,
+        lines: &lines,
+        triangle_ids: &[0],
+        source: Some(source),
+        groups: Some(&groups),
+        materials: Some(&looks),
+        ..ObjectParts::default()
+    };
+    let without = Materials { second_corners: Vec::new(), second_uvs: Vec::new(), ..looks.clone() };
+    let mut builder = FileBuilder::new();
+    object(&mut builder, 0, &parts).unwrap();
+    object(&mut builder, 1, &ObjectParts { materials: Some(&without), ..parts }).unwrap();
+    images(&mut builder, [(hash128(RED), RED)]).unwrap();
+    builder.finish()
+}
+
 /// Changes the valid file.
 fn broken(name: &str, change: impl FnOnce(&mut Editor)) -> Case {
-    let base = valid().into_iter().find(|c| c.name == "materials").expect("a valid file of that name");
+    broken_file("materials", name, change)
+}
+
+/// Changes a valid file.
+fn broken_file(of: &str, name: &str, change: impl FnOnce(&mut Editor)) -> Case {
+    let base = valid().into_iter().find(|c| c.name == of).expect("a valid file of that name");
     let mut editor = Editor::new(&base.bytes);
     change(&mut editor);
     Case::new(name, editor.seal(Seal::Sections))
@@ -134,7 +195,8 @@ pub(super) fn invalid() -> Vec<Case> {
         texture("F160-wrap", offset_of!(Texture, wrap) + 4, 3),
         texture("F160-filter", offset_of!(Texture, filter), 2),
         texture("F160-transform", offset_of!(Texture, transform) + 8, f32::NAN.to_bits()),
-        texture("F160-reserved", offset_of!(Texture, reserved) + 8, 1),
+        texture("F160-reserved", offset_of!(Texture, reserved) + 4, 1),
+        texture("F160-uv-set", offset_of!(Texture, uv_set), 2),
         broken("F161-row", |e| {
             e.put_u32(kind::COLOR_CORNERS, 4, 2);
         }),
@@ -142,6 +204,16 @@ pub(super) fn invalid() -> Vec<Case> {
         texture("F162-no-such-image", offset_of!(Texture, image), 0),
     ];
     cases.extend(invalid_images());
+    let second = |name: &str, change: &dyn Fn(&mut Editor)| broken_file("second-uvs", name, change);
+    cases.extend([
+        second("F220-row", &|e| {
+            e.put_u32(kind::SECOND_CORNERS, 8, 2);
+        }),
+        second("F220-no-coordinates", &|e| shorten(e, (0, kind::SECOND_UVS), 0)),
+        second("F221-not-finite", &|e| {
+            e.put_u32(kind::SECOND_UVS, 12, f32::NAN.to_bits());
+        }),
+    ]);
     cases
 }
 

@@ -113,6 +113,45 @@ fn four_texels_are_where_the_texture_has_them_with_their_bytes() {
     }
 }
 
+/// The base colour by the second set of texture coordinates, which runs from right to left, and the emission by the first one; and the
+/// other way round. A mirrored node shows the same surface from behind.
+#[test]
+fn textures_of_two_sets_lie_where_each_set_has_them() {
+    let red_left = uri(&png(2, &[[255, 0, 0, 255], [0, 0, 0, 255]]));
+    let green_top = uri(&png(1, &[[0, 255, 0, 255], [0, 0, 0, 255]]));
+    let images = [json!({"uri": red_left}), json!({"uri": green_top})];
+    for (base, emissive) in [(1, 0), (0, 1), (1, 1), (0, 0)] {
+        let material = unlit(json!({"doubleSided": true, "emissiveFactor": [1, 1, 1],
+            "emissiveTexture": {"index": 1, "texCoord": emissive},
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": base}}}));
+        let mut document: Value = serde_json::from_str(&square(&material, &images, None)).unwrap();
+        // Right to left, and upside down.
+        let turned: Vec<u8> =
+            [1.0f32, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        document["buffers"].as_array_mut().unwrap().push(json!({"byteLength": 32, "uri": uri(&turned)}));
+        document["bufferViews"].as_array_mut().unwrap().push(json!({"buffer": 1, "byteLength": 32}));
+        let accessor = json!({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC2"});
+        document["accessors"].as_array_mut().unwrap().push(accessor);
+        document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_1"] = json!(4);
+        for mirrored in [false, true] {
+            if mirrored {
+                document["nodes"][0] = json!({"mesh": 0, "scale": [-1, 1, 1], "translation": [2, 0, 0]});
+            }
+            let picture = picture(&document.to_string(), &[]);
+            for (x, y) in [(0.5, 1.5), (1.5, 1.5), (0.5, 0.5), (1.5, 0.5)] {
+                let is_red = ((x < 1.0) != (base == 1)) != mirrored;
+                let is_green = (y > 1.0) != (emissive == 1);
+                let expected = [if is_red { 255 } else { 0 }, if is_green { 255 } else { 0 }, 0];
+                assert_eq!(
+                    at(&picture, x, y),
+                    expected,
+                    "sets {base} and {emissive} at ({x}, {y}), {mirrored}"
+                );
+            }
+        }
+    }
+}
+
 /// Every step of the chain is linear light: 0.5 of it is the byte 188 (IEC 61966-2-1).
 #[test]
 fn half_the_light_is_mid_grey_from_factors_vertices_and_texels() {

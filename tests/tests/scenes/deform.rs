@@ -125,6 +125,79 @@ fn a_refit_has_the_same_bits_on_every_instruction_set_and_with_any_number_of_thr
     }
 }
 
+/// Positions between two times, by integers: the multiple of 2⁻¹⁴⁹ that is nearest to the exact value, which needs no more than a
+/// share of few bits.
+fn between(a: f32, b: f32, eighths: i64) -> f32 {
+    // Coordinates of the mesh are multiples of 2⁻²⁰ below 2⁷, so that all of this is exact in integers.
+    let [a, b] = [a, b].map(|x| (f64::from(x) * f64::from(1 << 20)) as i64);
+    let sum = (8 - eighths) * a + eighths * b;
+    // Sums below 2³¹ are exact in f64; the only rounding is that to f32.
+    (sum as f64 / f64::from(1 << 23)) as f32
+}
+
+#[test]
+fn positions_between_two_times_are_those_of_the_formula_and_traced_as_exactly() {
+    let grid =
+        |p: [f32; 3]| p.map(|x| ((f64::from(x) * f64::from(1 << 20)).round() / f64::from(1 << 20)) as f32);
+    let (rest, triangles) = mesh(600);
+    let rest: Positions = rest.into_iter().map(grid).collect();
+    let rng = &mut Rng::new(27);
+    let open: Positions = deformed(&rest, 1, rng).into_iter().map(grid).collect();
+    let close: Positions = deformed(&rest, 2, rng).into_iter().map(grid).collect();
+    let largest = open.iter().chain(&close).flatten().fold(0.0f32, |most, x| most.max(x.abs()));
+    assert!(largest < 128.0, "{largest}");
+    let mut scene = bth::from_bytes(&bytes(&rest, &triangles, &deformable())).unwrap();
+    let bounds = [&open, &close].map(|ends| {
+        scene.set_positions(0, ends).unwrap();
+        scene.bounds().unwrap()
+    });
+    let mut builder = placed(&scene, &[IDENTITY]);
+    let mut hits = 0;
+    for eighths in 0..=8 {
+        let expected: Positions =
+            (open.iter().zip(&close)).map(|(a, b)| [0, 1, 2].map(|k| between(a[k], b[k], eighths))).collect();
+        let share = eighths as f64 / 8.0;
+        let update = scene.set_positions_between(0, [&open, &close], share).unwrap();
+        assert_eq!((update.deformed, scene.object(0).positions), (1, &expected[..]), "{eighths}");
+        builder.set_positions_between(0, [&open, &close], share).unwrap();
+        builder.commit().unwrap();
+        assert!(builder.scene().object(0).lines == scene.object(0).lines);
+        let fresh = bth::from_bytes(&bytes(&expected, &triangles, &options())).unwrap();
+        hits += compare(&fresh, &scene, 0, rng);
+        let (lower, upper) = scene.bounds().unwrap();
+        for k in 0..3 {
+            assert!(lower[k] >= bounds[0].0[k].min(bounds[1].0[k]));
+            assert!(upper[k] <= bounds[0].1[k].max(bounds[1].1[k]));
+        }
+    }
+    assert!(hits > 3000, "{hits}");
+}
+
+/// Ends of any magnitude: positions never leave what lies between them, are the ends at shares of 0 and 1, and stay where both are equal.
+#[test]
+fn positions_between_two_times_never_leave_what_lies_between() {
+    let (rest, triangles) = mesh(600);
+    let mut scene = bth::from_bytes(&bytes(&rest, &triangles, &deformable())).unwrap();
+    let rng = &mut Rng::new(28);
+    let mut any = |_: &[f32; 3]| {
+        [0; 3].map(|_| f32::from_bits(rng.next() as u32)).map(|x| if x.is_finite() { x } else { f32::MAX })
+    };
+    for share in [0.0, 5e-324, 0.1, 1.0 / 3.0, 0.5, 0.999, 1.0 - f64::EPSILON / 2.0, 1.0] {
+        let open: Positions = rest.iter().map(&mut any).collect();
+        let mut close: Positions = rest.iter().map(&mut any).collect();
+        close[..100].copy_from_slice(&open[..100]);
+        scene.set_positions_between(0, [&open, &close], share).unwrap();
+        for ((found, a), b) in
+            scene.object(0).positions.as_flattened().iter().zip(open.as_flattened()).zip(close.as_flattened())
+        {
+            assert!(*found >= a.min(*b) && *found <= a.max(*b), "{found} between {a} and {b}");
+            assert!(share > 0.0 && share < 1.0 || found == if share == 0.0 { a } else { b });
+            assert!(found.to_bits() != (-0.0f32).to_bits());
+        }
+        assert_eq!(scene.object(0).positions[99], open[99].map(|x| x + 0.0));
+    }
+}
+
 #[test]
 fn what_cannot_be_set_is_an_error_and_changes_nothing() {
     let (rest, triangles) = mesh(600);
@@ -141,6 +214,27 @@ fn what_cannot_be_set_is_an_error_and_changes_nothing() {
     }
     assert_eq!(scene.set_positions(0, &good[1..]).unwrap_err().code(), Code::NewPositions);
     assert_eq!(scene.set_positions(1, &good).unwrap_err().code(), Code::NoSuchObject);
+    for share in [-0.1, 1.5, f64::NAN, f64::INFINITY] {
+        assert_eq!(
+            scene.set_positions_between(0, [&rest, &rest], share).unwrap_err().code(),
+            Code::NewPositions
+        );
+    }
+    let mut bad = rest.clone();
+    bad[3][1] = f32::NAN;
+    for ends in [[&rest, &bad], [&bad, &rest]] {
+        assert_eq!(
+            scene.set_positions_between(0, [ends[0], ends[1]], 0.5).unwrap_err().code(),
+            Code::NewPositions
+        );
+        let ends = [&rest[..], &rest[1..]];
+        assert_eq!(scene.set_positions_between(0, ends, 0.5).unwrap_err().code(), Code::NewPositions);
+    }
+    let mut staged = placed(&scene, &[IDENTITY]);
+    staged.set_positions(0, &good).unwrap();
+    assert!(staged.set_positions_between(0, [&rest, &bad], 0.5).is_err());
+    staged.commit().unwrap();
+    assert!(staged.scene().object(0).positions == good, "what was staged before remains");
     assert!(scene.object(0).lines == lines && scene.object(0).positions[5] == good[5]);
     let mut still = bth::from_bytes(&bytes(&rest, &triangles, &options())).unwrap();
     assert_eq!(still.vertex_count(0), None);

@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// A glTF document in the making, with its binary data.
-struct Document {
-    json: Value,
+pub(crate) struct Document {
+    pub(crate) json: Value,
     bytes: Vec<u8>,
 }
 
@@ -22,7 +22,7 @@ const SQUARE: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]
 
 impl Document {
     /// A mesh of the square at node 0, whose transform must not count for a skin, and two joints below a moved node.
-    fn new() -> Document {
+    pub(crate) fn new() -> Document {
         let mut document = Document { json: json!({}), bytes: Vec::new() };
         document.json = json!({
             "asset": {"version": "2.0"},
@@ -57,7 +57,7 @@ impl Document {
         push(&mut self.json["bufferViews"], view)
     }
 
-    fn floats<const N: usize>(&mut self, rows: &[[f32; N]]) -> usize {
+    pub(crate) fn floats<const N: usize>(&mut self, rows: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
         let view = self.view(&bytes);
         let shape = match N {
@@ -69,7 +69,7 @@ impl Document {
         push(&mut self.json["accessors"], accessor)
     }
 
-    fn integers(&mut self, numbers: &[u8], shape: &str, width: usize) -> usize {
+    pub(crate) fn integers(&mut self, numbers: &[u8], shape: &str, width: usize) -> usize {
         let view = self.view(numbers);
         let count = numbers.len() / width;
         let accessor = json!({"bufferView": view, "componentType": 5121, "count": count, "type": shape});
@@ -88,7 +88,7 @@ impl Document {
     }
 
     /// A channel of the first animation.
-    fn animate<const N: usize>(
+    pub(crate) fn animate<const N: usize>(
         mut self,
         (node, path, interpolation): (usize, &str, &str),
         times: &[f32],
@@ -112,12 +112,12 @@ impl Document {
         self.animate((3, "translation", "LINEAR"), &[0.0, 8.0], &[[0.0; 3], [8.0, 0.0, 0.0]])
     }
 
-    fn edit(mut self, edit: impl FnOnce(&mut Value)) -> Document {
+    pub(crate) fn edit(mut self, edit: impl FnOnce(&mut Value)) -> Document {
         edit(&mut self.json);
         self
     }
 
-    fn written(&self) -> tempfile::TempDir {
+    pub(crate) fn written(&self) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let mut json = self.json.clone();
         json["buffers"] = json!([{"uri": "data.bin", "byteLength": self.bytes.len()}]);
@@ -126,7 +126,7 @@ impl Document {
         folder
     }
 
-    fn imported(&self, options: &ImportOptions) -> Result<(Manifest, ImportReport), Error> {
+    pub(crate) fn imported(&self, options: &ImportOptions) -> Result<(Manifest, ImportReport), Error> {
         let folder = self.written();
         import(&folder.path().join("a.gltf"), "a.gltf", options, &Silent)
     }
@@ -165,7 +165,7 @@ impl Document {
     }
 }
 
-fn push(array: &mut Value, value: Value) -> usize {
+pub(crate) fn push(array: &mut Value, value: Value) -> usize {
     let array = array.as_array_mut().unwrap();
     array.push(value);
     array.len() - 1
@@ -418,7 +418,7 @@ fn several_skins_on_one_mesh_are_objects_of_their_own() {
     });
     let (manifest, report) = document.imported(&ImportOptions::default()).unwrap();
     let sources: Vec<_> = manifest.objects.iter().map(|object| &object.source).collect();
-    let deforming = Source::Deforming { path: "a.gltf".into(), mesh: 0 };
+    let deforming = Source::Deforming { path: "a.gltf".into(), mesh: 0, without: Default::default() };
     let still = Source::Model { path: "a.gltf".into(), mesh: Some(0) };
     assert_eq!(sources, [&deforming, &deforming, &still]);
     assert_eq!((report.deformers, manifest.skins.len()), (2, 2));
@@ -491,7 +491,7 @@ fn equal_positions_are_one_vertex_only_where_they_move_alike() {
     document.attribute("JOINTS_0", joints);
     document.attribute("WEIGHTS_0", weights);
     let folder = document.written();
-    let parts = [bth_import::GltfPart::Deforming(0)];
+    let parts = [bth_import::GltfPart::Deforming { mesh: 0, without: Default::default() }];
     let meshes = bth_import::import_gltf_parts(&folder.path().join("a.gltf"), &parts, Keep::None, &Silent);
     let (mesh, report) = &meshes.unwrap()[0];
     assert_eq!((mesh.positions.len(), report.positions_read), (5, 6));

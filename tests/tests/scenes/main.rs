@@ -8,6 +8,7 @@ mod flattened;
 mod import;
 mod motion;
 mod poses;
+mod rigid_parts;
 mod sequences;
 mod sources;
 mod support;

@@ -31,6 +31,7 @@ pub mod rivals;
 pub mod rounds;
 pub mod scatter;
 pub mod scenes;
+pub mod shutter;
 pub mod speed;
 pub mod stress;
 pub mod structures;

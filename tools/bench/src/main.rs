@@ -4,7 +4,7 @@ use bth_bench::args::{Arguments, Command};
 use bth_bench::compare::Verdict;
 use bth_bench::{
     accuracy, animation, compare, costs, inside, instances, load, output, paper, quality, records, refit,
-    scenes, speed, stress,
+    scenes, shutter, speed, stress,
 };
 use clap::Parser;
 use std::process::ExitCode;
@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         Command::Instances(arguments) => instances::run(&arguments),
         Command::Refit(arguments) => refit::run(&arguments),
         Command::Animation(arguments) => animation::run(&arguments),
+        Command::Shutter(arguments) => shutter::run(&arguments),
         Command::Probe(arguments) => load::probe::run(&arguments),
     };
     match done {

@@ -216,6 +216,8 @@ impl Codec for Mesh {
             (m.parameters.is_empty() || m.parameters.len() == known)
                 && (m.color_corners.is_empty() || m.color_corners.len() == triangles.len())
                 && within(&m.color_corners, m.colors.len())
+                && (m.second_corners.is_empty() || m.second_corners.len() == triangles.len())
+                && within(&m.second_corners, m.second_uvs.len())
         });
         let sequence_fits = sequence.as_ref().is_none_or(|s: &Sequence| {
             !s.times.is_empty() && s.times.len().checked_mul(positions.len()) == Some(s.positions.len())
@@ -278,6 +280,8 @@ impl Codec for Materials {
         to.add(&self.textures);
         to.add(&self.color_corners);
         to.add(&self.colors);
+        to.add(&self.second_corners);
+        to.add(&self.second_uvs);
     }
 
     fn read(from: &mut RowReader<'_>) -> Option<Self> {
@@ -286,7 +290,9 @@ impl Codec for Materials {
         let fits = |p: &MaterialParameters| known(p.base_color_texture) && known(p.emissive_texture);
         let fits = parameters.iter().all(fits);
         let (color_corners, colors) = (from.take()?, from.take()?);
-        fits.then_some(Materials { parameters, textures, color_corners, colors })
+        let (second_corners, second_uvs) = (from.take()?, from.take()?);
+        let all = Materials { parameters, textures, color_corners, colors, second_corners, second_uvs };
+        fits.then_some(all)
     }
 }
 
@@ -414,7 +420,7 @@ mod tests {
 
     fn texture() -> Texture {
         let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        Texture { image: [7; 16], wrap: [0, 1], filter: 1, transform, reserved: [0; 3] }
+        Texture { image: [7; 16], wrap: [0, 1], filter: 1, transform, uv_set: 1, reserved: [0; 2] }
     }
 
     #[test]
@@ -437,6 +443,8 @@ mod tests {
                 textures: vec![texture()],
                 color_corners: vec![[0, 1, 1]],
                 colors: vec![[65535; 4], [0, 1, 2, 3]],
+                second_corners: vec![[1, 0, 1]],
+                second_uvs: vec![[0.5, 0.0], [0.0, 2.0]],
             }),
             sequence: Some(Sequence { times: vec![0.0, 2.0], positions: vec![[1.5; 3]; 6] }),
             deformation: Some(Deformation {
@@ -476,11 +484,13 @@ mod tests {
             change(other.groups.as_mut().unwrap());
             assert_eq!(decode::<Mesh>(&encode(&other)), None);
         }
-        let changes: [fn(&mut Materials); 4] = [
+        let changes: [fn(&mut Materials); 6] = [
             |m| m.parameters[0] = parameters(1),
             |m| m.parameters.push(parameters(0)),
             |m| m.color_corners[0][2] = 2,
             |m| m.color_corners.push([0; 3]),
+            |m| m.second_corners[0][0] = 2,
+            |m| m.second_corners.push([0; 3]),
         ];
         for change in changes {
             let mut other = mesh.clone();

@@ -19,14 +19,14 @@ use std::path::Path;
 const MESH: &str = "3";
 const COORDINATES: &str = "1";
 const BVH: &str = "1";
-const FREE: &str = "1";
+const FREE: &str = "2";
 const MARKS: &str = "1";
 const COSTS: &str = "3";
 const TETS: &str = "1";
 const COLLAPSE: &str = "1";
 const OPACITY: &str = "1";
 const NAMES: &str = "1";
-const MATERIALS: &str = "1";
+const MATERIALS: &str = "2";
 const DEFORMABLE: &str = "1";
 /// Version of how objects are compiled whose vertices move by themselves.
 pub(crate) const MOTION: &str = "1";
@@ -76,6 +76,7 @@ pub(crate) fn bvh(geometry: &Digest, options: &bvh::BvhOptions) -> Key {
 pub(crate) fn free(geometry: &Digest, bvh: &bvh::BvhOptions, options: &free::FreeOptions) -> Key {
     Key::new("free directions")
         .with_all(self::bvh(geometry, bvh).components().iter().cloned())
+        .with("keep", text(&options.keep))
         .with("reach", text(&options.reach))
         .with("free directions version", FREE)
 }

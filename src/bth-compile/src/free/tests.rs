@@ -197,6 +197,41 @@ fn results_do_not_depend_on_threads() {
 }
 
 #[test]
+fn results_do_not_depend_on_the_instruction_set() {
+    for mesh in [terraces(12, 3), soup(200, 4), patch(5, 14), sphere(10, [7.0, 1e4, 0.0])] {
+        let (binary, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+        let wide = Tree::new(&mesh, &binary).unwrap();
+        let around = Surroundings { mesh: &mesh, order: &binary.order, tree: wide, reach: 0.5 };
+        let of = |isa: Isa| isa.run(Decide { around: &around, rows: 0..binary.order.len() });
+        let scalar = of(Isa::Scalar);
+        assert!(scalar.iter().any(|bins| bins.0 != 0));
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            assert_eq!(of(isa), scalar, "{isa}");
+        }
+    }
+}
+
+#[test]
+fn closed_rooms_are_given_up_after_a_sample() {
+    // Seen from inside, and so much of both sides that neither is free.
+    let mut mesh = soup(4000, 9);
+    mesh.positions.iter_mut().flatten().for_each(|x| *x *= 0.5);
+    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let options = |keep| FreeOptions { keep, ..FreeOptions::default() };
+    let (free, report) = find(&mesh, &tree, &options(KeepFree::Auto), &Silent).unwrap();
+    assert!(free.bins.iter().all(|bins| *bins == [0; 4]) && !report.is_worthwhile(KeepFree::Auto));
+    let (free, all) = find(&mesh, &tree, &options(KeepFree::All), &Silent).unwrap();
+    assert!(free.bins.iter().any(|bins| *bins != [0; 4]));
+    let difference = report.free + report.free_nearby - all.free - all.free_nearby;
+    assert!(difference.abs() < 0.1, "{report:?} {all:?}");
+    // Where most is free, all of it is found.
+    let mesh = sphere(24, [0.0; 3]);
+    let (tree, _) = bvh::build(&mesh, &BvhOptions::default(), &Silent).unwrap();
+    let of = |keep| find(&mesh, &tree, &options(keep), &Silent).unwrap();
+    assert_eq!(of(KeepFree::Auto), of(KeepFree::All));
+}
+
+#[test]
 fn huge_and_tiny_meshes_have_no_free_directions() {
     for scale in [1e-30f32, 1e30] {
         let mut mesh = soup(20, 5);

@@ -56,7 +56,7 @@ pub struct SegmentReport {
 }
 
 /// A range is divided if its tree costs more than this on average, relative to trees that are built for each pose alone.
-const TOO_DEAR: f64 = 1.1;
+const TOO_DEAR: f64 = 1.05;
 /// Dividing a range must reduce its mean ratio at least by this much.
 const LEAST_GAIN: f64 = 0.03;
 /// Times of comparison with trees of a single pose, for each segment that there may be.

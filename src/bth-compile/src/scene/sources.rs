@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::source::{SourceDigest, TriangleMesh};
 use bth_files::Digest;
 use bth_import::{AlphaMode, GltfPart, Looks};
-use bth_scene::{Manifest, Source};
+use bth_scene::{JointSet, Manifest, Source};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ pub(super) enum SourcePart {
     /// A part of a glTF file.
     Gltf(GltfPart),
     /// A mesh of a glTF file that a clip of the scene poses, for which its tree is built.
-    Posed(u32, Digest),
+    Posed(u32, JointSet, Digest),
     /// An object of a compiled file.
     Object(u32),
 }
@@ -32,10 +32,11 @@ impl SourcePart {
         match *source {
             Source::Model { mesh: None, .. } => SourcePart::Whole,
             Source::Model { mesh: Some(mesh), .. } => SourcePart::Gltf(GltfPart::Mesh(mesh)),
-            Source::Deforming { mesh, .. } => match clip {
-                Some(clip) => SourcePart::Posed(mesh, clip),
-                None => SourcePart::Gltf(GltfPart::Deforming(mesh)),
+            Source::Deforming { mesh, without, .. } => match clip {
+                Some(clip) => SourcePart::Posed(mesh, without, clip),
+                None => SourcePart::Gltf(GltfPart::Deforming { mesh, without }),
             },
+            Source::RigidPart { mesh, joint, .. } => SourcePart::Gltf(GltfPart::Rigid { mesh, joint }),
             Source::AtRest { node, .. } => SourcePart::Gltf(GltfPart::AtRest(node)),
             Source::Compiled { object, .. } => SourcePart::Object(object),
             Source::Sequence { .. } | Source::Cached { .. } => SourcePart::Whole,
@@ -46,7 +47,7 @@ impl SourcePart {
     pub(super) fn gltf(self) -> Option<GltfPart> {
         match self {
             SourcePart::Gltf(part) => Some(part),
-            SourcePart::Posed(mesh, _) => Some(GltfPart::Deforming(mesh)),
+            SourcePart::Posed(mesh, without, _) => Some(GltfPart::Deforming { mesh, without }),
             SourcePart::Whole | SourcePart::Object(_) => None,
         }
     }
@@ -54,7 +55,7 @@ impl SourcePart {
     /// The clip that poses it.
     pub(super) fn clip(self) -> Option<Digest> {
         match self {
-            SourcePart::Posed(_, clip) => Some(clip),
+            SourcePart::Posed(.., clip) => Some(clip),
             SourcePart::Whole | SourcePart::Gltf(_) | SourcePart::Object(_) => None,
         }
     }
@@ -63,9 +64,19 @@ impl SourcePart {
     pub(super) fn name(self) -> String {
         match self {
             SourcePart::Whole => "flat".to_owned(),
-            SourcePart::Posed(mesh, _) => SourcePart::Gltf(GltfPart::Deforming(mesh)).name(),
+            SourcePart::Posed(mesh, without, _) => {
+                SourcePart::Gltf(GltfPart::Deforming { mesh, without }).name()
+            }
             SourcePart::Gltf(GltfPart::Mesh(mesh)) => format!("mesh {mesh}"),
-            SourcePart::Gltf(GltfPart::Deforming(mesh)) => format!("deforming mesh {mesh}"),
+            SourcePart::Gltf(GltfPart::Deforming { mesh, without }) => {
+                let mut name = format!("deforming mesh {mesh}");
+                if !without.is_empty() {
+                    let joints: Vec<_> = without.iter().map(|joint| joint.to_string()).collect();
+                    name = format!("{name} without joints {}", joints.join(" "));
+                }
+                name
+            }
+            SourcePart::Gltf(GltfPart::Rigid { mesh, joint }) => format!("joint {joint} of mesh {mesh}"),
             SourcePart::Gltf(GltfPart::AtRest(node)) => format!("node {node} at rest"),
             SourcePart::Object(object) => format!("object {object}"),
         }
@@ -73,7 +84,7 @@ impl SourcePart {
 
     /// Whether its vertices can be moved, so that each deformer needs an object of its own.
     pub(super) fn deforms(self) -> bool {
-        matches!(self, SourcePart::Gltf(GltfPart::Deforming(_)) | SourcePart::Posed(..))
+        matches!(self, SourcePart::Gltf(GltfPart::Deforming { .. }) | SourcePart::Posed(..))
     }
 }
 

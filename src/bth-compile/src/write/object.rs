@@ -150,6 +150,8 @@ pub fn object<'a>(builder: &mut FileBuilder<'a>, index: u32, parts: &ObjectParts
         builder.rows(kind::TEXTURES, index, &materials.textures)?;
         builder.rows(kind::COLOR_CORNERS, index, &materials.color_corners)?;
         builder.rows(kind::COLORS, index, &materials.colors)?;
+        builder.rows(kind::SECOND_CORNERS, index, &materials.second_corners)?;
+        builder.rows(kind::SECOND_UVS, index, &materials.second_uvs)?;
     }
     if let Some(deformation) = parts.deformation {
         builder.rows(kind::DEFORMATION, index, std::slice::from_ref(&deformation.counts))?;

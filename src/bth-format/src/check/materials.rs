@@ -1,4 +1,5 @@
-//! Materials, textures, vertex colours and images: BTH-F149 and BTH-F160 to BTH-F162.
+//! Materials, textures, vertex colours, second sets of texture coordinates and images: BTH-F149, BTH-F160 to BTH-F162, BTH-F220
+//! and BTH-F221.
 
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
@@ -19,7 +20,8 @@ pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u
     for (row, texture) in view.textures.iter().enumerate() {
         self::texture(texture, row * size_of::<Texture>())?;
     }
-    colors(view, triangles as usize)
+    colors(view, triangles as usize)?;
+    second_uvs(view, triangles as usize)
 }
 
 /// BTH-F149 of a row.
@@ -73,7 +75,10 @@ fn texture(t: &Texture, at: usize) -> Result<()> {
     if !t.transform.as_flattened().iter().all(|x| x.is_finite()) {
         return wrong(offset_of!(Texture, transform), "a finite transform", &t.transform);
     }
-    if t.reserved != [0; 3] {
+    if t.uv_set > UV_SET_SECOND {
+        return wrong(offset_of!(Texture, uv_set), "a set of texture coordinates, 0 or 1", &t.uv_set);
+    }
+    if t.reserved != [0; 2] {
         return wrong(offset_of!(Texture, reserved), "zeros", &t.reserved);
     }
     Ok(())
@@ -81,16 +86,35 @@ fn texture(t: &Texture, at: usize) -> Result<()> {
 
 /// BTH-F161.
 fn colors(view: &MaterialsView<'_>, triangles: usize) -> Result<()> {
-    let (corners, rows) = (view.color_corners, view.colors.len());
+    corners((Code::Colors, kind::COLOR_CORNERS), view.color_corners, (view.colors.len(), triangles))
+}
+
+/// BTH-F220 and F221.
+fn second_uvs(view: &MaterialsView<'_>, triangles: usize) -> Result<()> {
+    let (code, section) = (Code::SecondCorners, kind::SECOND_CORNERS);
+    corners((code, section), view.second_corners, (view.second_uvs.len(), triangles))?;
+    let numbers = view.second_uvs.as_flattened();
+    match numbers.iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(i) => error(Code::SecondUvs, kind::SECOND_UVS, 4 * i, "finite coordinates", &numbers[i]),
+    }
+}
+
+/// Whether corners have as many rows as the object has triangles, or none, which lie within so many rows of another section.
+fn corners(
+    (code, section): (Code, u32),
+    corners: &[[u32; 3]],
+    (rows, triangles): (usize, usize),
+) -> Result<()> {
     if !corners.is_empty() && corners.len() != triangles {
         let expected = format!("{triangles} rows or none");
-        return error(Code::Colors, kind::COLOR_CORNERS, 0, &expected, &corners.len());
+        return error(code, section, 0, &expected, &corners.len());
     }
     match corners.as_flattened().iter().position(|row| *row as usize >= rows) {
         None => Ok(()),
         Some(i) => {
             let expected = format!("a row below {rows}");
-            error(Code::Colors, kind::COLOR_CORNERS, 4 * i, &expected, &corners.as_flattened()[i])
+            error(code, section, 4 * i, &expected, &corners.as_flattened()[i])
         }
     }
 }

@@ -340,6 +340,8 @@ impl File {
             textures: self.slice(object, kind::TEXTURES),
             color_corners: self.slice(object, kind::COLOR_CORNERS),
             colors: self.slice(object, kind::COLORS),
+            second_corners: self.slice(object, kind::SECOND_CORNERS),
+            second_uvs: self.slice(object, kind::SECOND_UVS),
         }
     }
 

@@ -1,5 +1,5 @@
-//! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38 and 41 to 47 belong to an object, the others to the
-//! whole file.
+//! Section kinds. Specification: "Kinds". Kinds 1 to 31, 35 to 38, 41 to 47 and 64 to 71 belong to an object, the others to
+//! the whole file.
 
 /// One [`super::Object`].
 pub const OBJECT: u32 = 1;
@@ -110,6 +110,10 @@ pub const SKINS: u32 = 58;
 pub const SKIN_JOINTS: u32 = 59;
 /// `f64`: weights of the morph targets of all deformers, where no track gives others.
 pub const MORPH_WEIGHTS: u32 = 60;
+/// `[u32; 3]` per source triangle: rows of `SECOND_UVS`.
+pub const SECOND_CORNERS: u32 = 68;
+/// `[f32; 2]`: a second set of texture coordinates.
+pub const SECOND_UVS: u32 = 69;
 
 /// Whether sections of this kind are part of the scene.
 pub const fn is_scene(kind: u32) -> bool {

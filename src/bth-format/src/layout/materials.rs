@@ -46,11 +46,18 @@ pub struct Texture {
     pub wrap: [u32; 2],
     /// [`FILTER_LINEAR`] or [`FILTER_NEAREST`].
     pub filter: u32,
-    /// Rows of the transform from (u, v, 1) of `UVS` to coordinates of the image.
+    /// Rows of the transform from (u, v, 1) of the coordinates to those of the image.
     pub transform: [[f32; 3]; 2],
+    /// [`UV_SET_FIRST`] or [`UV_SET_SECOND`].
+    pub uv_set: u32,
     /// Zero.
-    pub reserved: [u32; 3],
+    pub reserved: [u32; 2],
 }
+
+/// Coordinates of a texture are those of `UVS`.
+pub const UV_SET_FIRST: u32 = 0;
+/// Coordinates of a texture are those of `SECOND_UVS`.
+pub const UV_SET_SECOND: u32 = 1;
 
 /// The image repeats.
 pub const WRAP_REPEAT: u32 = 0;
@@ -78,6 +85,6 @@ pub struct Image {
 assert_layout! {
     MaterialParameters 64 { base_color 0, emissive 16, alpha_cutoff 28, alpha_mode 32, flags 36, base_color_texture 40,
         emissive_texture 44, reserved 48 }
-    Texture 64 { image 0, wrap 16, filter 24, transform 28, reserved 52 }
+    Texture 64 { image 0, wrap 16, filter 24, transform 28, uv_set 52, reserved 56 }
     Image 32 { name 0, first 16, length 24 }
 }

@@ -52,6 +52,15 @@ impl PrimitiveReader<'_, '_> {
         Ok(())
     }
 
+    /// What each target adds to the normals of vertices, of those that do.
+    ///
+    /// # Errors
+    /// As for [`Self::deformation`].
+    pub(super) fn target_normals(&self, triangles: &Triangles) -> Result<Vec<Vec<[f32; 3]>>> {
+        let of_target = |target| self.target_rows(triangles, target, "NORMAL").transpose();
+        self.targets()?.iter().filter_map(of_target).collect()
+    }
+
     /// Refuses more rows of targets than the bytes that were read can hold.
     fn check_target_rows(
         &self,

@@ -1,5 +1,6 @@
 //! Flat models: the default scene's meshes in world space, in node traversal order, or single meshes in their own space.
 
+use bth_scene::JointSet;
 use glam::DAffine3;
 use std::collections::HashMap;
 
@@ -12,6 +13,7 @@ use crate::gltf::extensions::SUPPORTED;
 use crate::gltf::materials::{self, SharedMaterials};
 use crate::gltf::primitive::{PrimitiveReader, Triangles};
 use crate::gltf::rest_pose::RestPose;
+use crate::gltf::rigid_parts::{KeptTriangles, Selection};
 use crate::gltf::schema::{GltfDocument, GltfMesh, Primitive};
 use crate::gltf::transform;
 use crate::mesh::{Keep, Wanted};
@@ -24,6 +26,7 @@ pub(super) struct PlacedMesh {
     node: Option<usize>,
     pub(super) mesh: usize,
     pub(super) world: DAffine3,
+    pub(super) kept: KeptTriangles,
 }
 
 /// A part of a glTF document that is read as a model of its own.
@@ -31,8 +34,20 @@ pub(super) struct PlacedMesh {
 pub enum GltfPart {
     /// A mesh by its number, in its own space.
     Mesh(u32),
-    /// A mesh by its number, in its own space, with what moves its vertices.
-    Deforming(u32),
+    /// A mesh in its own space, with what moves its vertices.
+    Deforming {
+        /// Number of the mesh.
+        mesh: u32,
+        /// Joints whose rigid parts ([`GltfPart::Rigid`]) are left out.
+        without: JointSet,
+    },
+    /// The connected components of a mesh that one joint alone moves, in the space of the mesh.
+    Rigid {
+        /// Number of the mesh.
+        mesh: u32,
+        /// Number of the joint.
+        joint: u32,
+    },
     /// The mesh of a node, by the node's number, at rest: with its default morph weights, and with its joints where the nodes
     /// place them. With a skin it is in world space, else in that of the node.
     AtRest(u32),
@@ -44,8 +59,15 @@ impl GltfPart {
     /// # Errors
     /// `BTH-I012` where the node does not exist or has no mesh.
     pub(super) fn placed(self, source: &Source<'_>, document: &GltfDocument) -> Result<PlacedMesh> {
+        let kept = match self {
+            GltfPart::Mesh(_) | GltfPart::AtRest(_) => KeptTriangles::All,
+            GltfPart::Deforming { without, .. } => KeptTriangles::without(without),
+            GltfPart::Rigid { joint, .. } => KeptTriangles::Part(joint),
+        };
         let (node, mesh) = match self {
-            GltfPart::Mesh(mesh) | GltfPart::Deforming(mesh) => (None, mesh as usize),
+            GltfPart::Mesh(mesh) | GltfPart::Deforming { mesh, .. } | GltfPart::Rigid { mesh, .. } => {
+                (None, mesh as usize)
+            }
             GltfPart::AtRest(node) => {
                 let mesh = document.nodes.get(node as usize).and_then(|node| node.mesh);
                 let message = "it does not exist or has no mesh";
@@ -54,7 +76,7 @@ impl GltfPart {
                 (Some(node as usize), mesh.ok_or_else(error)?)
             }
         };
-        Ok(PlacedMesh { node, mesh, world: DAffine3::IDENTITY })
+        Ok(PlacedMesh { node, mesh, world: DAffine3::IDENTITY, kept })
     }
 }
 
@@ -117,7 +139,7 @@ pub(crate) fn read_part<'a>(
     wanted: (Wanted, &SharedMaterials),
 ) -> Result<Raw<'a>> {
     let placed = [part.placed(source, document)?];
-    read_placed(source, document, binary, wanted, (&placed, matches!(part, GltfPart::Deforming(_))))
+    read_placed(source, document, binary, wanted, (&placed, matches!(part, GltfPart::Deforming { .. })))
 }
 
 /// Reads placed meshes; those that are `deforming` without moving their vertices.
@@ -190,7 +212,7 @@ pub(super) fn placed_meshes(source: &Source<'_>, document: &GltfDocument) -> Res
         }
         let world = parent * transform::local(node);
         if let Some(mesh) = node.mesh {
-            placed.push(PlacedMesh { node: Some(index), mesh, world });
+            placed.push(PlacedMesh { node: Some(index), mesh, world, kept: KeptTriangles::All });
         }
         stack.extend(node.children.iter().rev().map(|&child| (child, world)));
     }
@@ -206,20 +228,22 @@ impl Flattener<'_, '_> {
                 placed.node.map_or_else(|| format!("mesh {}", placed.mesh), |node| format!("node {node}"));
             return Err(source.error_in_part(GRAPH, part, message, "export the model again"));
         };
-        let pose = match self.raw.deformation {
-            Some(_) => RestPose::default(),
-            None => RestPose::new(&self.accessors, placed.node, placed.mesh)?,
+        // Nothing but their joint moves the vertices of a rigid part.
+        let pose = match (&self.raw.deformation, placed.kept) {
+            (Some(_), _) | (None, KeptTriangles::Part(_)) => RestPose::default(),
+            (None, _) => RestPose::new(&self.accessors, placed.node, placed.mesh)?,
         };
+        let selection = placed.kept.of_mesh(&self.accessors, placed.mesh)?;
         for (index, primitive) in primitives.iter().enumerate() {
             source.monitor.check()?;
-            self.primitive((placed, &pose), index, primitive)?;
+            self.primitive((placed, &pose, &selection), index, primitive)?;
         }
         Ok(())
     }
 
     fn primitive(
         &mut self,
-        (placed, pose): (&PlacedMesh, &RestPose),
+        (placed, pose, selection): (&PlacedMesh, &RestPose, &Selection),
         index: usize,
         primitive: &Primitive,
     ) -> Result<()> {
@@ -243,20 +267,34 @@ impl Flattener<'_, '_> {
             primitive: index,
         });
         let mut triangles = reader.read(&kept, self.raw.positions.len())?;
+        selection.retain(index, &mut triangles.corners);
         let first = [self.raw.positions.len(), self.raw.normals.len()];
         match &mut self.raw.deformation {
             Some(deformation) => reader.deformation(&triangles, first, deformation)?,
             None => pose.apply(&reader, &mut triangles)?,
         }
-        let mut colors = None;
+        let (mut colors, mut second_uvs) = (None, None);
         if self.colors {
             warn_without_coordinates(&reader, &triangles);
             colors = vertex_colors(&reader, &triangles)?;
+            second_uvs = second_coordinates(&reader, &triangles)?;
         }
         self.start_group(placed.mesh, index, primitive.material);
         let world = if pose.is_skinned() { DAffine3::IDENTITY } else { placed.world };
-        self.append_colors(colors.as_deref(), &triangles.corners, transform::is_mirrored(&world));
+        let mirrored = transform::is_mirrored(&world);
+        self.append_colors(colors.as_deref(), &triangles.corners, mirrored);
+        self.append_second_uvs(second_uvs.as_deref(), &triangles.corners, mirrored);
         self.append(&triangles, &world)
+    }
+
+    /// Adds the second set of texture coordinates, as bits, of the corners of a primitive's triangles, which will be appended next.
+    fn append_second_uvs(&mut self, uvs: Option<&[[u32; 2]]>, corners: &[[u32; 3]], mirrored: bool) {
+        let Some(uvs) = uvs else { return };
+        let recorder = &mut self.raw.materials.second_uvs;
+        let rows: Vec<u32> = uvs.iter().map(|uv| recorder.row(*uv)).collect();
+        let turned = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        let corners = corners.iter().map(|triangle| turned(triangle).map(|row| rows[row as usize]));
+        recorder.add(self.raw.triangles.len(), corners, [0; 2]);
     }
 
     /// Adds the colours of the corners of a primitive's triangles, which will be appended next.
@@ -339,6 +377,30 @@ fn vertex_colors(reader: &PrimitiveReader<'_, '_>, triangles: &Triangles) -> Res
         return Ok(colors.map(|colors| colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect()));
     }
     reader.optional::<4>(triangles, "COLOR_0")
+}
+
+/// The bits of the texture coordinates of a primitive's vertices that a texture of its material has beside those that are kept for
+/// all purposes, if there is such a texture.
+fn second_coordinates(
+    reader: &PrimitiveReader<'_, '_>,
+    triangles: &Triangles,
+) -> Result<Option<Vec<[u32; 2]>>> {
+    let (source, document) = (reader.accessors.source, reader.accessors.document);
+    let material = reader.primitive.material.and_then(|number| document.materials.get(number));
+    let Some(set) = material.and_then(materials::second_set) else { return Ok(None) };
+    let name = format!("TEXCOORD_{set}");
+    let Some(uvs) = reader.optional::<2>(triangles, &name)? else {
+        source.monitor.warn(&format!("{}: it has no {name}; (0, 0) is taken everywhere", reader.part));
+        return Ok(None);
+    };
+    if let Some(row) = uvs.iter().position(|uv| !uv.iter().all(|x| x.is_finite())) {
+        let message = format!("expected a finite texture coordinate, found {:?}", uvs[row]);
+        let part = format!("{} {name} row {row}", reader.part);
+        let hint = "export the model again, or compile without --materials";
+        return Err(source.error_in_part("BTH-I008", part, message, hint));
+    }
+    // Adding 0 turns -0 into 0.
+    Ok(Some(uvs.into_iter().map(|uv| uv.map(|x| (x + 0.0).to_bits())).collect()))
 }
 
 /// Warns if the material of a primitive has a base colour texture and the primitive no coordinates for it.

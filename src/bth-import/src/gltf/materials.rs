@@ -124,6 +124,46 @@ impl SharedMaterials {
     }
 }
 
+/// Which coordinates a texture has and their transform, given the set that is kept and the number of the second one; `None` where they can
+/// be had from neither.
+fn coordinates(
+    texture: &TextureReference,
+    kept: &KeptSet,
+    second: Option<u32>,
+) -> serde_json::Result<Option<(u32, [[f32; 3]; 2])>> {
+    if let Some(transform) = kept.relative(texture)? {
+        return Ok(Some((UV_SET_FIRST, transform)));
+    }
+    let (set, transform) = texture::own_set(texture)?;
+    let transform = transform.filter(|_| second == Some(set));
+    Ok(transform.map(|transform| (UV_SET_SECOND, transform)))
+}
+
+/// The number of the second set of texture coordinates of a material: that of the first of the textures that are kept whose
+/// coordinates cannot be had from the set that is kept. `None` for a malformed material, whose error is found where it is read.
+pub(super) fn second_set(material: &Value) -> Option<u32> {
+    let kept = texture::kept_set(material).ok()?;
+    let material = SurfaceMaterial::deserialize(material).ok()?;
+    let is_lit = material.emissive_factor.is_some_and(|factor| factor != [0.0; 3]);
+    let emissive = material.emissive_texture.clone().filter(|_| is_lit);
+    let used = [base_texture(&material), emissive];
+    used.into_iter().flatten().find_map(|used| {
+        let reference = &used.reference;
+        let absent = kept.relative(reference).ok()?.is_none();
+        let (set, transform) = texture::own_set(reference).ok()?;
+        (absent && transform.is_some()).then_some(set)
+    })
+}
+
+/// The texture of a material's base colour, if the material is well-formed.
+fn base_texture(material: &SurfaceMaterial) -> Option<UsedTexture> {
+    if let Some(base) = &material.pbr_metallic_roughness {
+        return base.base_color_texture.clone();
+    }
+    let older = material.extensions.get(SPECULAR_GLOSSINESS)?;
+    SpecularGlossiness::deserialize(older).ok()?.diffuse_texture
+}
+
 /// Reads the materials with these numbers, in order, into a recorder.
 ///
 /// # Errors
@@ -186,11 +226,11 @@ impl MaterialReader<'_, '_> {
             reserved: [0; 4],
         };
         self.check(&parameters, &part)?;
-        let base_color_texture =
-            self.texture(base.base_color_texture.as_ref(), &kept, &part, "base color")?;
+        let sets = (&kept, second_set(&reader.parts.materials[number]));
+        let base_color_texture = self.texture(base.base_color_texture.as_ref(), sets, &part, "base color")?;
         let emissive_texture = match emissive == [0.0; 3] {
             true => NONE,
-            false => self.texture(material.emissive_texture.as_ref(), &kept, &part, "emissive")?,
+            false => self.texture(material.emissive_texture.as_ref(), sets, &part, "emissive")?,
         };
         Ok(MaterialParameters { base_color_texture, emissive_texture, ..parameters })
     }
@@ -210,7 +250,14 @@ impl MaterialReader<'_, '_> {
     }
 
     /// The row of a texture; `NONE` without one, and for one that is left out with a warning.
-    fn texture(&mut self, used: Option<&UsedTexture>, kept: &KeptSet, part: &str, what: &str) -> Result<u32> {
+    /// `sets` are that which is kept, and the number of the second one.
+    fn texture(
+        &mut self,
+        used: Option<&UsedTexture>,
+        (kept, second): (&KeptSet, Option<u32>),
+        part: &str,
+        what: &str,
+    ) -> Result<u32> {
         let Some(used) = used else { return Ok(NONE) };
         let left_out = |why: &str| {
             let warning = format!("{part}: its {what} texture is left out: {why}");
@@ -221,11 +268,10 @@ impl MaterialReader<'_, '_> {
         let Some(image) = sampled.image else {
             return left_out("it has no image in PNG, JPEG or WebP");
         };
-        let transform = kept
-            .relative(&used.reference)
+        let coordinates = coordinates(&used.reference, kept, second)
             .map_err(|e| self.textures.malformed(part, format!("expected a texture, found: {e}")))?;
-        let Some(transform) = transform else {
-            return left_out("its texture coordinates are not those that are kept");
+        let Some((uv_set, transform)) = coordinates else {
+            return left_out("its texture coordinates are none of the two sets that are kept");
         };
         let wrap = sampled.wrap.map(|wrap| match wrap {
             Wrap::Repeat => WRAP_REPEAT,
@@ -234,7 +280,7 @@ impl MaterialReader<'_, '_> {
         });
         let filter = if sampled.nearest { FILTER_NEAREST } else { FILTER_LINEAR };
         let image = self.image(image)?;
-        Ok(self.recorder.texture(Texture { image, wrap, filter, transform, reserved: [0; 3] }))
+        Ok(self.recorder.texture(Texture { image, wrap, filter, transform, uv_set, reserved: [0; 2] }))
     }
 
     /// The name of an image.
@@ -276,12 +322,7 @@ fn image_file(textures: &TextureReader<'_, '_>, index: usize) -> Result<ImageFil
 fn used_textures(materials: &[Value]) -> Vec<usize> {
     let mut used = BTreeSet::new();
     for material in materials.iter().filter_map(|value| SurfaceMaterial::deserialize(value).ok()) {
-        let older = material.extensions.get(SPECULAR_GLOSSINESS);
-        let older = older.and_then(|value| SpecularGlossiness::deserialize(value).ok());
-        let base = match material.pbr_metallic_roughness {
-            Some(base) => base.base_color_texture,
-            None => older.and_then(|older| older.diffuse_texture),
-        };
+        let base = base_texture(&material);
         used.extend([base, material.emissive_texture].into_iter().flatten().map(|texture| texture.index));
     }
     used.into_iter().collect()

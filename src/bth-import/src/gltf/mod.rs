@@ -1,6 +1,6 @@
 //! glTF and GLB, in the order of the data: `container` splits a GLB, `document` reads its JSON into `schema`, `buffer`
 //! gives the bytes of views (`meshopt` decompresses them), `accessor` their rows, `primitive` triangles (`draco`
-//! decompresses them, `texture` chooses texture coordinates), and `flatten` a model. `cutout` reads which materials make
+//! decompresses them, `texture` chooses texture coordinates), `rigid_parts` what of them a joint moves alone, and `flatten` a model. `cutout` reads which materials make
 //! holes. [`scene`] makes a manifest instead.
 
 pub(crate) mod accessor;
@@ -16,6 +16,7 @@ pub(crate) mod materials;
 mod meshopt;
 mod primitive;
 mod rest_pose;
+mod rigid_parts;
 pub mod scene;
 pub(crate) mod schema;
 mod source_files;

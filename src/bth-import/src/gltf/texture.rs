@@ -1,7 +1,8 @@
 //! Which texture coordinates of a primitive are kept, and how a texture changes them (KHR_texture_transform).
 //!
-//! A mesh keeps one set. The base colour texture decides, since it is what most renderers show; where a material has none,
-//! the next of its textures in the order of the specification does. Without any texture it is `TEXCOORD_0`, unchanged.
+//! A mesh keeps one set for all purposes. The base colour texture decides, since it is what most renderers show; where a material has none,
+//! the next of its textures in the order of the specification does. Without any texture it is `TEXCOORD_0`, unchanged. Where
+//! another texture that a file keeps needs another set, that is kept beside it, with the materials.
 
 use glam::DAffine2;
 use serde::Deserialize;
@@ -87,6 +88,19 @@ fn set_of(texture: &TextureReference) -> serde_json::Result<(u32, Option<UvTrans
     Ok((transform.tex_coord.unwrap_or(texture.tex_coord), UvTransform::new(&transform)))
 }
 
+/// The set of a texture's coordinates, and the rows of their transform.
+pub(super) fn own_set(texture: &TextureReference) -> serde_json::Result<(u32, Option<[[f32; 3]; 2]>)> {
+    let (set, transform) = set_of(texture)?;
+    Ok((set, rows(transform.as_ref().map_or(DAffine2::IDENTITY, UvTransform::matrix))))
+}
+
+/// The rows of a transform, if they are finite.
+fn rows(transform: DAffine2) -> Option<[[f32; 3]; 2]> {
+    let [x, y, z] = transform.to_cols_array_2d();
+    let rows = [0, 1].map(|k| [x[k], y[k], z[k]].map(|number| number as f32));
+    rows.as_flattened().iter().all(|x| x.is_finite()).then_some(rows)
+}
+
 impl KeptSet {
     /// Rows of the transform from kept coordinates to those of a texture; `None` where they cannot be had from them.
     pub(super) fn relative(&self, texture: &TextureReference) -> serde_json::Result<Option<[[f32; 3]; 2]>> {
@@ -99,9 +113,7 @@ impl KeptSet {
             true => DAffine2::IDENTITY,
             false => matrix(&transform) * matrix(&self.transform).inverse(),
         };
-        let [x, y, z] = relative.to_cols_array_2d();
-        let rows = [0, 1].map(|k| [x[k], y[k], z[k]].map(|number| number as f32));
-        Ok(rows.as_flattened().iter().all(|x| x.is_finite()).then_some(rows))
+        Ok(rows(relative))
     }
 }
 

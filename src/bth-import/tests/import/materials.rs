@@ -114,10 +114,11 @@ fn textures_of_one_set_share_it_by_a_transform() {
 
 #[test]
 fn what_is_left_out_is_reported() {
+    // The normal texture decides which set is kept for all purposes; the diffuse texture has the second one.
     let (read, warnings) = materials(json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0},
-        "normalTexture": {"index": 1}, "extensions": {"KHR_materials_clearcoat": {}},
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1, "texCoord": 1}}}));
-    assert_eq!(read.parameters[0].emissive_texture, NONE);
+        "normalTexture": {"index": 1, "texCoord": 2}, "extensions": {"KHR_materials_clearcoat": {},
+        "KHR_materials_pbrSpecularGlossiness": {"diffuseTexture": {"index": 1, "texCoord": 1}}}}));
+    assert_eq!((read.parameters[0].base_color_texture, read.parameters[0].emissive_texture), (0, NONE));
     let all = warnings.join("\n");
     for part in [
         "material 0: its emissive texture is left out: its texture coordinates",
@@ -129,6 +130,100 @@ fn what_is_left_out_is_reported() {
     let (read, warnings) = materials(json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 2}}}));
     assert_eq!(read.parameters[0].base_color_texture, NONE);
     assert!(warnings[0].contains("no image in PNG, JPEG or WebP"), "{warnings:?}");
+}
+
+/// The texture coordinates of the corners of the triangle for a texture, by the rows that the materials keep.
+fn coordinates(mesh: &Mesh, texture: u32) -> [[f32; 2]; 3] {
+    let looks = mesh.materials.as_ref().unwrap();
+    let Texture { uv_set, transform, .. } = looks.textures[texture as usize];
+    let kept = match uv_set {
+        UV_SET_FIRST => {
+            let attributes = mesh.attributes.as_ref().unwrap();
+            attributes.corners[0].map(|row| attributes.uvs[row as usize])
+        }
+        _ => looks.second_corners[0].map(|row| looks.second_uvs[row as usize]),
+    };
+    kept.map(|[u, v]| transform.map(|[a, b, c]| a * u + b * v + c))
+}
+
+#[test]
+fn two_textures_have_sets_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+    let second = [[0.5, 0.5], [0.25, 0.5], [0.5, 0.75]];
+    let moved = |uvs: [[f32; 2]; 3]| uvs.map(|[u, v]| [2.0 * u + 0.5, v]);
+    // The extension's set takes the place of the texture's own (KHR_texture_transform).
+    let transform = |set: Option<u32>| {
+        let mut value = json!({"offset": [0.5, 0], "scale": [2, 1]});
+        if let Some(set) = set {
+            value["texCoord"] = json!(set);
+        }
+        json!({"KHR_texture_transform": value})
+    };
+    for (base, emissive, expected) in [
+        (json!({"texCoord": 1}), json!({}), [second, first]),
+        (json!({}), json!({"texCoord": 1}), [first, second]),
+        (json!({"texCoord": 1}), json!({"texCoord": 1}), [second, second]),
+        (
+            json!({"texCoord": 1, "extensions": transform(None)}),
+            json!({"extensions": transform(None)}),
+            [moved(second), moved(first)],
+        ),
+        (
+            json!({"texCoord": 1, "extensions": transform(Some(0))}),
+            json!({"extensions": transform(Some(1))}),
+            [moved(first), moved(second)],
+        ),
+        // Nothing can be had from coordinates that are all one point.
+        (
+            json!({"extensions": {"KHR_texture_transform": {"scale": [0, 0]}}}),
+            json!({}),
+            [[[0.0; 2]; 3], first],
+        ),
+    ] {
+        let with = |mut texture: Value, index: u32| {
+            texture["index"] = json!(index);
+            texture
+        };
+        let material = json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": with(emissive, 0),
+            "pbrMetallicRoughness": {"baseColorTexture": with(base, 1)}});
+        let (mesh, warnings) = read(folder.path(), material.clone()).unwrap();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        let parameters = mesh.materials.as_ref().unwrap().parameters[0];
+        let found =
+            [parameters.base_color_texture, parameters.emissive_texture].map(|row| coordinates(&mesh, row));
+        assert_eq!(found, expected, "{material}");
+    }
+    // Without emission there is no second texture, and no second set.
+    let (mesh, _) = read(
+        folder.path(),
+        json!({"emissiveTexture": {"index": 0, "texCoord": 1},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}),
+    )
+    .unwrap();
+    assert!(mesh.materials.unwrap().second_corners.is_empty());
+    // A set that the mesh does not have.
+    let (mesh, warnings) = read(
+        folder.path(),
+        json!({"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 7},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}),
+    )
+    .unwrap();
+    assert!(warnings[0].contains("TEXCOORD_7"), "{warnings:?}");
+    assert!(mesh.materials.unwrap().second_uvs.is_empty());
+}
+
+#[test]
+fn a_second_set_that_is_not_finite_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let (document, mut bytes) =
+        document(json!([{"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": 1},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}]));
+    bytes[60 + 8..60 + 12].copy_from_slice(&f32::NAN.to_le_bytes());
+    let path = folder.path().join("a.glb");
+    std::fs::write(&path, glb(&document, &bytes)).unwrap();
+    let error = import(&path, WANTED, &Listener::default()).unwrap_err().to_string();
+    assert!(error.contains("BTH-I008") && error.contains("TEXCOORD_1 row 1"), "{error}");
 }
 
 #[test]

@@ -60,6 +60,7 @@ fn object_materials(scene: &Scene, object: u32, images: &BTreeMap<u32, Arc<Texel
             texels: images.get(&texture.image)?.clone(),
             wrap: texture.wrap,
             nearest: texture.nearest,
+            uv_set: texture.uv_set,
             transform: texture.transform,
         })
     };

@@ -35,6 +35,7 @@ pub(super) struct LoadedTexture {
     pub(super) texels: Arc<Texels>,
     pub(super) wrap: [Wrap; 2],
     pub(super) nearest: bool,
+    pub(super) uv_set: u32,
     pub(super) transform: [[f32; 3]; 2],
 }
 
@@ -54,11 +55,14 @@ impl ObjectMaterials {
         !self.has_colors && self.materials.iter().all(Option::is_none)
     }
 
-    /// The linear texel of a texture at texture coordinates; white without one.
-    fn texel(&self, texture: Option<u32>, uv: [f32; 2]) -> Vec4 {
+    /// The linear texel of a texture at a hit; white without one.
+    fn texel(&self, texture: Option<u32>, scene: &Scene, hit: &Hit) -> Vec4 {
         let texture = texture.and_then(|row| self.textures.get(row as usize)?.as_ref());
-        let Some(LoadedTexture { texels, wrap, nearest, transform }) = texture else { return Vec4::ONE };
-        let [u, v] = uv.map(f64::from);
+        let Some(LoadedTexture { texels, wrap, nearest, uv_set, transform }) = texture else {
+            return Vec4::ONE;
+        };
+        // Zeros where the file keeps none.
+        let [u, v] = scene.texture_coordinates(hit, *uv_set).unwrap_or_default().map(f64::from);
         let at = transform.map(|[a, b, c]| (f64::from(a) * u + f64::from(b) * v + f64::from(c)) as f32);
         texels.at(at, *wrap, *nearest)
     }
@@ -94,20 +98,17 @@ impl SceneMaterials {
     }
 
     /// The base colour with alpha at a hit.
-    fn base_color(&self, scene: &Scene, view: &ObjectView<'_>, hit: &Hit, material: &Material) -> Vec4 {
+    fn base_color(&self, scene: &Scene, hit: &Hit, material: &Material) -> Vec4 {
         let object = &self.objects[scene.object_of(hit.primitive.instance) as usize];
         let factor = Vec4::from_array(material.base_color);
         let vertex = if object.has_colors { scene.vertex_color(hit) } else { None };
-        let texel = match material.base_color_texture {
-            None => Vec4::ONE,
-            texture => object.texel(texture, texture_coordinates(view, hit)),
-        };
+        let texel = object.texel(material.base_color_texture, scene, hit);
         factor * texel * vertex.map_or(Vec4::ONE, Vec4::from_array)
     }
 
     /// The alpha of a material's surface at a hit.
-    pub(crate) fn alpha(&self, scene: &Scene, view: &ObjectView<'_>, hit: &Hit, material: &Material) -> f32 {
-        self.base_color(scene, view, hit, material).w
+    pub(crate) fn alpha(&self, scene: &Scene, hit: &Hit, material: &Material) -> f32 {
+        self.base_color(scene, hit, material).w
     }
 
     /// How the surface at a hit looks; `None` where it has neither material nor vertex colour.
@@ -118,24 +119,14 @@ impl SceneMaterials {
             None if object.has_colors => &WHITE,
             None => return None,
         };
-        let base_color = self.base_color(scene, view, hit, material).truncate();
+        let base_color = self.base_color(scene, hit, material).truncate();
         let emissive = Vec3::from_array(material.emissive);
         let emissive = match material.emissive_texture {
             Some(_) if emissive != Vec3::ZERO => {
-                emissive * object.texel(material.emissive_texture, texture_coordinates(view, hit)).truncate()
+                emissive * object.texel(material.emissive_texture, scene, hit).truncate()
             }
             _ => emissive,
         };
         Some(Look { base_color, emissive, unlit: material.unlit })
     }
-}
-
-/// The interpolated texture coordinates at a hit; zeros where the file keeps none.
-fn texture_coordinates(view: &ObjectView<'_>, hit: &Hit) -> [f32; 2] {
-    let corners = view.corners.get(hit.primitive.triangle as usize);
-    let uvs =
-        corners.map(|corners| corners.map(|row| view.uvs.get(row as usize).copied().unwrap_or_default()));
-    let Some([a, b, c]) = uvs else { return [0.0; 2] };
-    let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-    [0, 1].map(|k| (f64::from(a[k]) * (1.0 - u - v) + f64::from(b[k]) * u + f64::from(c[k]) * v) as f32)
 }

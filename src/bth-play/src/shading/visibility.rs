@@ -38,8 +38,8 @@ fn stops(frame: &FrameContext<'_>, ray: &Ray, hit: &Hit, camera: bool, chance: C
     }
     match material.alpha {
         Alpha::Opaque => true,
-        Alpha::Mask(cutoff) => materials.alpha(frame.scene, view, hit, material) >= cutoff,
-        Alpha::Blend => materials.alpha(frame.scene, view, hit, material) > chance.at(hit.primitive),
+        Alpha::Mask(cutoff) => materials.alpha(frame.scene, hit, material) >= cutoff,
+        Alpha::Blend => materials.alpha(frame.scene, hit, material) > chance.at(hit.primitive),
     }
 }
 

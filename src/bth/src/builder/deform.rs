@@ -2,6 +2,7 @@
 
 use super::SceneBuilder;
 use crate::clock;
+use crate::deform::Deforming;
 use crate::deformers::Posed;
 use crate::instances::Update;
 use bth_format::Error;
@@ -16,8 +17,30 @@ impl SceneBuilder {
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with `--deformable`, `BTH-S007` if the number of
     /// positions is wrong or one is not finite, `BTH-O001` if there is not enough memory. Nothing is changed then.
     pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<(), Error> {
+        self.stage_positions(object, |deforming| deforming.stage(positions))
+    }
+
+    /// As [`Self::set_positions`], with positions at a share of the way between those at two times, as
+    /// [`Scene::set_positions_between`](crate::Scene::set_positions_between) has them.
+    ///
+    /// # Errors
+    /// As [`Self::set_positions`], for both ends, and `BTH-S007` if `share` is not from 0 to 1. Nothing is changed then.
+    pub fn set_positions_between(
+        &mut self,
+        object: u32,
+        ends: [&[[f32; 3]]; 2],
+        share: f64,
+    ) -> Result<(), Error> {
+        self.stage_positions(object, |deforming| deforming.stage_between(ends, share))
+    }
+
+    fn stage_positions(
+        &mut self,
+        object: u32,
+        stage: impl FnOnce(&mut Deforming) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         self.check_object(object)?;
-        self.scene.objects_mut().deforming(object)?.stage(positions)?;
+        stage(self.scene.objects_mut().deforming(object)?)?;
         if !self.deformed.contains(&object) {
             self.deformed.push(object);
         }

@@ -63,14 +63,34 @@ impl Deforming {
     /// # Errors
     /// `BTH-S007` if their number is another or one is not finite. What was staged before remains.
     pub(crate) fn stage(&mut self, positions: &[[f32; 3]]) -> Result<(), Error> {
+        self.check(positions)?;
+        copy_positions(positions, &mut self.staged);
+        self.staged_normals = Some(Vec::new());
+        Ok(())
+    }
+
+    /// Stages positions on the straight lines between given ones, at a share of the way from the first to the second.
+    ///
+    /// # Errors
+    /// As [`Self::stage`], and `BTH-S007` for a share that is not from 0 to 1.
+    #[cold]
+    pub(crate) fn stage_between(&mut self, ends: [&[[f32; 3]]; 2], share: f64) -> Result<(), Error> {
+        if !(0.0..=1.0).contains(&share) {
+            return Err(Error::of_call(Code::NewPositions, "a share from 0 to 1", share.to_string()));
+        }
+        self.check(ends[1])?;
+        self.stage(ends[0])?;
+        move_towards(&mut self.staged, ends[1], share);
+        Ok(())
+    }
+
+    /// Checks the number of positions that are given, and that all are finite.
+    fn check(&self, positions: &[[f32; 3]]) -> Result<(), Error> {
         if positions.len() != self.staged.len() {
             let expected = format!("{} positions", self.staged.len());
             return Err(Error::of_call(Code::NewPositions, expected, positions.len().to_string()));
         }
-        check_finite(positions)?;
-        copy_positions(positions, &mut self.staged);
-        self.staged_normals = Some(Vec::new());
-        Ok(())
+        check_finite(positions)
     }
 
     /// Memory for new positions, which are staged when all of it has been filled and [`Self::check_staged`] has been called. The
@@ -164,5 +184,25 @@ fn copy_positions(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
 fn copy_some(from: &[[f32; 3]], to: &mut [[f32; 3]]) {
     for (to, from) in to.as_flattened_mut().iter_mut().zip(from.as_flattened()) {
         *to = from + 0.0;
+    }
+}
+
+/// Moves positions by a share of the way to others.
+fn move_towards(positions: &mut [[f32; 3]], to: &[[f32; 3]], share: f64) {
+    #[cfg(feature = "rayon")]
+    if positions.len() >= MIN_PARALLEL {
+        use rayon::iter::{IndexedParallelIterator, ParallelIterator};
+        use rayon::slice::{ParallelSlice, ParallelSliceMut};
+        let tasks = positions.par_chunks_mut(TASK).zip(to.par_chunks(TASK));
+        return tasks.for_each(|(positions, to)| move_some(positions, to, share));
+    }
+    move_some(positions, to, share);
+}
+
+/// A coordinate is (1 − share) · a + share · b in `f64`, rounded once to `f32`. Since a and b are `f32`, it is exactly a and b at
+/// the ends and never beyond them.
+fn move_some(positions: &mut [[f32; 3]], to: &[[f32; 3]], share: f64) {
+    for (from, to) in positions.as_flattened_mut().iter_mut().zip(to.as_flattened()) {
+        *from = ((1.0 - share) * f64::from(*from) + share * f64::from(*to)) as f32 + 0.0;
     }
 }

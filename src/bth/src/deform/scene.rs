@@ -1,5 +1,6 @@
 //! New positions of the objects of a [`Scene`].
 
+use super::Deforming;
 use crate::clock;
 use crate::instances::Update;
 use crate::scene::Scene;
@@ -30,9 +31,40 @@ impl Scene {
     /// positions is wrong or one is not finite, `BTH-S002` if the world box of an instance would not be finite, `BTH-O001` if there is
     /// not enough memory. The scene is then unchanged.
     pub fn set_positions(&mut self, object: u32, positions: &[[f32; 3]]) -> Result<Update, Error> {
+        self.refit_object(object, |deforming| deforming.stage(positions))
+    }
+
+    /// As [`Self::set_positions`], with positions on the straight lines between those at two times: at `share` of the way from the
+    /// first to the second, from 0 to 1. For motion blur, where positions are known when the shutter opens and when it closes: set the
+    /// object to as many shares as there are times at which the picture is sampled.
+    ///
+    /// A coordinate is (1 − `share`) · a + `share` · b in `f64`, rounded once to `f32`: exactly a or b at the ends, and never beyond
+    /// them, so that the boxes of both ends together contain all that is between. Rays are traced as exactly as against any other positions.
+    ///
+    /// # Errors
+    /// As [`Self::set_positions`], for both ends, and `BTH-S007` if `share` is not from 0 to 1. The scene is then unchanged.
+    pub fn set_positions_between(
+        &mut self,
+        object: u32,
+        ends: [&[[f32; 3]]; 2],
+        share: f64,
+    ) -> Result<Update, Error> {
+        self.refit_object(object, |deforming| deforming.stage_between(ends, share))
+    }
+
+    /// Stages positions of an object, refits it, and places its instances again; after an error the scene is unchanged.
+    fn refit_object(
+        &mut self,
+        object: u32,
+        stage: impl FnOnce(&mut Deforming) -> Result<(), Error>,
+    ) -> Result<Update, Error> {
         let start = clock::now();
+        stage(self.objects_mut().deforming(object)?)?;
+        self.refit_staged(object, start)
+    }
+
+    fn refit_staged(&mut self, object: u32, start: Option<std::time::Instant>) -> Result<Update, Error> {
         let deforming = self.objects_mut().deforming(object)?;
-        deforming.stage(positions)?;
         deforming.refit_staged();
         let (refit, deformed_cost_ratio) = (clock::elapsed(start), deforming.cost_ratio());
         let (objects, world) = self.objects_and_world_mut();

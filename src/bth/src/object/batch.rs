@@ -6,7 +6,6 @@ use super::scratch::Scratch;
 use super::single;
 use super::strategy::{HintUse, MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
-use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::packet::{self, Packets};
 use crate::bvh::single::TetOutcome;
 use crate::clock;
@@ -69,19 +68,31 @@ fn trace_from<Q: Query>(
         match rest {
             None => trace_batch(object, rays, from, scratch, &mut sink),
             // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
-            Some(rest) if Q::ANY => {
-                let rest_rays: Vec<Ray> = rest.iter().map(|ray| rays[*ray as usize]).collect();
-                let miss = |ray: &Ray| Q::new(ray).answer(object.triangle_ids, instance);
-                let mut found: Vec<Q::Answer> = rest_rays.iter().map(miss).collect();
-                let mut sink = Sink::<Q>::new(object.triangle_ids, &mut found, instance);
-                trace_batch(object, &rest_rays, None, scratch, &mut sink);
-                for (ray, found) in rest.iter().zip(found) {
-                    answers[*ray as usize] = found;
-                }
-            }
+            Some(rest) if Q::ANY => trace_gathered::<Q>(object, (rays, rest), instance, scratch, answers),
             Some(rest) => trace_rest(object, rays, rest, scratch, &mut sink),
         }
     });
+}
+
+/// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers
+/// are misses before.
+fn trace_gathered<Q: Query>(
+    object: &ObjectView<'_>,
+    (rays, rest): (&[Ray], &[u32]),
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let mut gathered = std::mem::take(&mut scratch.gathered);
+    gathered.clear();
+    gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
+    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+    trace_batch(object, &gathered, None, scratch, &mut sink);
+    // No ray is before its place among those that are left, so the last answers can move first.
+    for (i, &ray) in rest.iter().enumerate().rev() {
+        answers.swap(i, ray as usize);
+    }
+    scratch.gathered = gathered;
 }
 
 /// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
@@ -349,19 +360,7 @@ fn through_bvh<Q: Query>(
         return one_by_one(object, rays, &remaining, sink);
     }
     // `run_wide` runs nothing in scalar code, which has returned above.
-    if object.has_packed_nodes() {
-        let _ = Isa::chosen().run_wide(InterleavedKernel {
-            nodes: Packed,
-            object,
-            rays,
-            remaining,
-            scratch,
-            sink,
-        });
-    } else {
-        let _ =
-            Isa::chosen().run_wide(InterleavedKernel { nodes: Wide, object, rays, remaining, scratch, sink });
-    }
+    let _ = Isa::chosen().run_wide(InterleavedKernel { object, rays, remaining, scratch, sink });
 }
 
 /// Implements [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar
@@ -386,8 +385,7 @@ fn one_by_one<Q: Query>(
 }
 
 /// The kernel of [`through_bvh`].
-struct InterleavedKernel<'a, 's, N, Q: Query> {
-    nodes: N,
+struct InterleavedKernel<'a, 's, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a, Q>,
@@ -395,14 +393,13 @@ struct InterleavedKernel<'a, 's, N, Q: Query> {
     sink: &'a mut Sink<'s, Q>,
 }
 
-impl<N: Nodes, Q: Query> Kernel for InterleavedKernel<'_, '_, N, Q> {
+impl<Q: Query> Kernel for InterleavedKernel<'_, '_, Q> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let InterleavedKernel { nodes, object, rays, remaining, scratch, sink } = self;
+        let InterleavedKernel { object, rays, remaining, scratch, sink } = self;
         let traversal = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, sink };
-        traversal.run(s, nodes, |leaf, ray, query| {
-            enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
-        });
+        traversal
+            .run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }
 }

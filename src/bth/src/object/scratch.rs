@@ -3,6 +3,7 @@
 use super::strategy::StrategyTable;
 use crate::bvh::packet::PacketScratch;
 use crate::bvh::stack::Stacks;
+use crate::rays::Ray;
 use std::cell::Cell;
 
 /// Memory that the traversals of batches use, and the measured costs of strategies.
@@ -13,6 +14,8 @@ pub(crate) struct Scratch {
     pub(super) choices: StrategyTable,
     /// Indices of the rays that remain after those in free directions have ended.
     pub(crate) rest: Vec<u32>,
+    /// Copies of these rays, where they are traced like a batch of their own.
+    pub(super) gathered: Vec<Ray>,
 }
 
 /// Calls `work` with the thread's scratch memory.

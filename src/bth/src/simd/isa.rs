@@ -214,8 +214,9 @@ impl Isa {
     }
 
     /// Runs a kernel with this instruction set, or in scalar code if the machine does not have it.
+    #[doc(hidden)]
     #[inline(always)]
-    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // This repeats `run_wide`, because its `Result` would cost one more copy of the output.
         with_vectors!(self, simd => return simd.run(kernel));
         run_scalar(kernel)

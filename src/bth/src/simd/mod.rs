@@ -6,6 +6,8 @@
 //! ([`Isa::run`]). A closure, or a library function that takes one (`array::map`), is compiled as a function of its own,
 //! without these features, and must not use lanes.
 //!
+//! The module is public for the compiler alone, and hidden: nothing of it but [`Isa`] is part of the library's interface.
+//!
 //! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64 ([`crate::intersect::exact`]).
 //! Answers therefore do not depend on whether `fma` rounds once or twice.
 
@@ -28,17 +30,17 @@ pub use isa::{Isa, IsaError};
 pub(crate) use scalar::Scalar;
 
 /// Number of lanes.
-pub(crate) const LANES: usize = 16;
+pub const LANES: usize = 16;
 
 /// A function that is generic over the instruction set, with its arguments.
-pub(crate) trait Kernel {
+pub trait Kernel {
     type Output;
     /// Must be `#[inline(always)]`.
     fn run<S: Simd>(self, simd: S) -> Self::Output;
 }
 
 /// A part of kernels that is compiled once per instruction set, with its arguments ([`Simd::call`]).
-pub(crate) trait Part<S> {
+pub trait Part<S> {
     type Output;
     /// Must be `#[inline(always)]`.
     fn run(self, simd: S) -> Self::Output;
@@ -56,7 +58,7 @@ pub(crate) trait Part<S> {
 /// Operations on vectors that treat each lane alone. A vector has sixteen lanes or, in a [piece](Simd::Piece), some of the sixteen;
 /// arrays always have sixteen elements, of which a piece reads and writes its own. Where masks are given as bits, bit i stands for lane
 /// i of sixteen.
-pub(crate) trait Lanewise: Copy + 'static {
+pub trait Lanewise: Copy + 'static {
     /// f32 lanes.
     type F: Copy;
     /// u32 lanes.
@@ -142,7 +144,7 @@ pub(crate) trait Lanewise: Copy + 'static {
 }
 
 /// Operations on vectors of sixteen lanes across lanes and with memory.
-pub(crate) trait Simd: Lanewise {
+pub trait Simd: Lanewise {
     /// Whether the lanes are vector registers. Kernels that are faster only with vectors are not compiled without them.
     const HAS_VECTORS: bool = true;
     /// Whether kernels contain their larger parts. Otherwise they call them ([`Self::call`]), because unrolled in every kernel, with

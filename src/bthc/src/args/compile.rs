@@ -25,7 +25,7 @@ pub(crate) struct Compile {
     #[command(flatten)]
     pub(crate) keeping: Keeping,
     /// Make one object of a glTF file: its scene at rest, in world space, without hierarchy and animation.
-    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "strict"])]
+    #[arg(long, conflicts_with_all = ["scene", "animation", "rate", "at_rest", "rigid_parts", "strict"])]
     pub(crate) flatten: bool,
     #[command(flatten)]
     pub(crate) gltf: Gltf,
@@ -80,7 +80,7 @@ pub(crate) struct Compile {
     pub(crate) compact: bool,
     /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
     /// source, and the object is a BVH.
-    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact"])]
+    #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
     /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
     /// the first pose.
@@ -126,6 +126,10 @@ pub(crate) struct Gltf {
     /// Leave meshes with skins and morph targets at rest; by default they deform where an animation moves them.
     #[arg(long)]
     pub(crate) at_rest: bool,
+    /// Make instances of the parts of skinned meshes that one joint moves rigidly: updates of the time only place them, but rays that
+    /// have to enter several instances are slower. See docs/scenes.md.
+    #[arg(long, conflicts_with = "at_rest")]
+    pub(crate) rigid_parts: bool,
     /// Refuse what would be ignored: animations of other things than nodes and morph weights.
     #[arg(long)]
     pub(crate) strict: bool,
@@ -146,6 +150,7 @@ impl Gltf {
             animation,
             rate: self.rate,
             deform: !self.at_rest,
+            rigid_parts: self.rigid_parts,
             strict: self.strict,
         }
     }

@@ -120,6 +120,9 @@ pub(crate) struct Explain {
     /// Also draw the model, coloured by what its triangles are in and by what a bounce costs, as a PNG.
     #[arg(long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,
+    /// Also decide in which directions rays from triangles meet nothing, say what it costs, and draw as a PNG which surfaces are free.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) free_picture: Option<PathBuf>,
     /// Nodes to show, largest first; 0 for all.
     #[arg(long, default_value_t = 20, value_name = "N")]
     pub(crate) top: usize,

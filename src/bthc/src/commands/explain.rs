@@ -1,17 +1,21 @@
-//! `bthc explain`: shows which nodes would be tetrahedralized, which not, and why.
+//! `bthc explain`: shows which nodes would be tetrahedralized, which not, and why; and which surfaces have free directions.
 
 use super::threads::with_threads;
 use crate::args::Explain;
-use crate::explain::{Explained, MeasuredNode, measure, picture};
+use crate::explain::{Explained, MeasuredNode, free_picture, measure, picture};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::table::{Table, count};
 use bth_compile::costs::{self, Verdict};
+use bth_compile::free::{self, FreeOptions, FreeReport, KeepFree};
 use bth_compile::{Error, Monitor, bvh, marks, pipeline, tets, write};
-use bth_import::Keep;
+use bth_format::layout::FreeDirections;
+use bth_import::{Keep, Mesh};
 use serde_json::{Value, json};
 use std::cmp::Reverse;
+use std::path::Path;
+use std::time::Instant;
 
 pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     let mut options = pipeline::CompileOptions { geometry: false, ..pipeline::CompileOptions::default() };
@@ -54,6 +58,12 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
             brightest = Some(most);
         }
     }
+    let free = match &args.free_picture {
+        Some(path) => {
+            Some(with_threads(args.threads, || free_directions((&mesh, &tree), &options, path, &progress))??)
+        }
+        None => None,
+    };
     drop(progress);
 
     let mut verdicts: Vec<&Verdict> = choice.verdicts.iter().collect();
@@ -65,8 +75,9 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
     if args.json {
         let mut report = json!({"triangles": mesh.triangles.len(), "examined": examined,
             "chosen": choice.chosen.len(), "report": report, "nodes": verdicts});
-        if let (Some(nodes), Value::Object(report)) = (&measured, &mut report) {
-            report.insert("measured".to_owned(), json!(nodes));
+        if let Value::Object(report) = &mut report {
+            report.extend(measured.map(|nodes| ("measured".to_owned(), json!(nodes))));
+            report.extend(free.map(|free| ("free_directions".to_owned(), json!(free))));
         }
         output::json(&report)?;
         return Ok(());
@@ -89,7 +100,42 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
             path.display()
         ));
     }
+    if let (Some(path), Some(free)) = (&args.free_picture, free) {
+        text.push_str(&free_line(path, &free));
+    }
     Ok(output::text(&text)?)
+}
+
+/// Decides free directions, and draws which surfaces have them.
+fn free_directions(
+    (mesh, tree): (&Mesh, &bvh::BinaryBvh),
+    options: &pipeline::CompileOptions,
+    path: &Path,
+    progress: &Progress,
+) -> Result<FreeReport, Failure> {
+    let start = Instant::now();
+    let all = FreeOptions { keep: KeepFree::All, ..FreeOptions::default() };
+    let (free, mut report) = free::find(mesh, tree, &all, progress)?;
+    report.seconds = start.elapsed().as_secs_f64();
+    report.kept = report.is_worthwhile(KeepFree::Auto);
+    progress.stage("picture", None);
+    let scene = bth::from_bytes(&pipeline::assemble(mesh, tree, &[], options, progress)?.bytes)?;
+    write::write_atomically(path, &free_picture((mesh, tree), &scene, &free)?)?;
+    Ok(report)
+}
+
+/// What free directions bring and cost.
+fn free_line(path: &Path, free: &FreeReport) -> String {
+    format!(
+        "wrote {}: from dark, where rays of no direction are known to meet nothing, to yellow, where all are; half as bright where only \
+         what is nearby is known\n{:.0} % of directions free, {:.0} % nearby; {} bytes, {:.1} s; {} by --free-directions auto\n",
+        path.display(),
+        100.0 * free.free,
+        100.0 * free.free_nearby,
+        count(free.triangles * size_of::<FreeDirections>() as u64),
+        free.seconds,
+        if free.kept { "kept" } else { "not kept" },
+    )
 }
 
 fn table(verdicts: &[&Verdict]) -> String {

@@ -1,6 +1,7 @@
 //! `bthc import`: writes a scene manifest for a glTF file.
 
 use super::scene::{folder, is_gltf};
+use super::summary::row_unless_zero;
 use crate::args::Import;
 use crate::failure::Failure;
 use crate::output;
@@ -75,6 +76,7 @@ pub(super) fn facts(report: &ImportReport) -> Table {
         table.row(["animations left out", &report.animations_left_out.join(", ")]);
     }
     table.row(["objects that deform", &count(report.deformers)]);
+    row_unless_zero(&mut table, "instances of parts that move rigidly", report.rigid_parts);
     table.row(["tracks", &count(report.tracks)]);
     table.row(["cameras", &count(report.cameras)]);
     table.row(["lights", &count(report.lights)]);

@@ -1,10 +1,10 @@
-//! What `bthc explain` adds to the table of decisions: measured costs, and a picture.
+//! What `bthc explain` adds to the table of decisions: measured costs, and pictures.
 
 mod measured;
 mod picture;
 
 pub(crate) use measured::{MeasuredNode, measure};
-pub(crate) use picture::picture;
+pub(crate) use picture::{free_picture, picture};
 
 use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::{Choice, CostOptions};

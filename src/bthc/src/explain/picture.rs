@@ -1,9 +1,14 @@
-//! A picture with the model twice: coloured by the structure that holds each triangle, and by the cost of a bounced ray.
+//! Pictures of the model: twice, coloured by the structure that holds each triangle and by the cost of a bounced ray; and coloured by
+//! how many directions are free.
 
 use super::Explained;
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth_compile::Result;
+use bth_compile::bvh::BinaryBvh;
 use bth_compile::costs::SelectionOutcome;
+use bth_compile::free::Free;
+use bth_format::layout::{FREE_BINS, FreeBins, FreeDirections, NONE};
+use bth_import::Mesh;
 use glam::Vec3;
 
 /// Pixels of each half.
@@ -24,11 +29,8 @@ fn unit(v: Vec3) -> Vec3 {
 /// # Errors
 /// An internal error of the encoder.
 pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
-    let rays = camera(of);
-    let mut hits = vec![Hit::MISS; rays.len()];
-    for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
-        of.plain.batch(rays).nearest(hits);
-    }
+    let rays = camera(of.tree);
+    let hits = nearest(of.plain, &rays);
     let kind = kinds(of);
     let costs: Vec<Option<f64>> = rays.iter().zip(&hits).map(|(ray, hit)| bounce(of, ray, hit)).collect();
     let mut sorted: Vec<f64> = costs.iter().flatten().copied().collect();
@@ -39,27 +41,65 @@ pub(crate) fn picture(of: &Explained<'_>) -> Result<(Vec<u8>, f64)> {
     let mut pixels = vec![255u8; (2 * SIZE * SIZE * 3) as usize];
     for (i, ((ray, hit), cost)) in rays.iter().zip(&hits).zip(&costs).enumerate() {
         let Some(cost) = cost else { continue };
-        let normal = normal(of, hit.primitive.triangle);
-        let light = 0.35 + 0.65 * normal.dot(Vec3::from_array(ray.direction)).abs();
         let (x, y) = (i as u32 % SIZE, i as u32 / SIZE);
-        let left = kind[hit.primitive.triangle as usize] * light;
+        let left = kind[hit.primitive.triangle as usize] * light(of.mesh, ray, hit);
         for (colour, x) in [(left, x), (heat((cost / most) as f32), x + SIZE)] {
-            let at = ((y * 2 * SIZE + x) * 3) as usize;
-            for k in 0..3 {
-                pixels[at + k] = (255.0 * colour[k].clamp(0.0, 1.0).powf(1.0 / 2.2)) as u8;
-            }
+            paint(&mut pixels, y * 2 * SIZE + x, colour);
         }
     }
-    Ok((encode(&pixels)?, most))
+    Ok((encode(&pixels, 2 * SIZE)?, most))
 }
 
-fn encode(pixels: &[u8]) -> Result<Vec<u8>> {
+/// The bytes of a PNG file that shows in how many of its directions rays from each triangle meet nothing: from dark where in none to
+/// yellow where in all. What is only free nearby is half as bright.
+///
+/// # Errors
+/// An internal error of the encoder.
+pub(crate) fn free_picture(
+    (mesh, tree): (&Mesh, &BinaryBvh),
+    scene: &bth::Scene,
+    free: &Free,
+) -> Result<Vec<u8>> {
+    let rays = camera(tree);
+    let hits = nearest(scene, &rays);
+    let mut pixels = vec![255u8; (SIZE * SIZE * 3) as usize];
+    for (i, (ray, hit)) in rays.iter().zip(&hits).enumerate().filter(|(_, (_, hit))| hit.is_hit()) {
+        let row = FreeDirections { place: NONE, bins: free.bins[hit.primitive.triangle as usize] };
+        let bins = row.bins();
+        let share = (bins.0 & FreeBins::ALL).count_ones() as f32 / FREE_BINS as f32;
+        let brightness = if bins.is_nearby() { 0.5 } else { 1.0 };
+        paint(&mut pixels, i as u32, brightness * light(mesh, ray, hit) * heat(share));
+    }
+    encode(&pixels, SIZE)
+}
+
+fn nearest(scene: &bth::Scene, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        scene.batch(rays).nearest(hits);
+    }
+    hits
+}
+
+/// The light of a lamp beside the camera on what a ray hits.
+fn light(mesh: &Mesh, ray: &Ray, hit: &Hit) -> f32 {
+    0.35 + 0.65 * normal(mesh, hit.primitive.triangle).dot(Vec3::from_array(ray.direction)).abs()
+}
+
+fn paint(pixels: &mut [u8], pixel: u32, colour: Vec3) {
+    let at = (pixel * 3) as usize;
+    for k in 0..3 {
+        pixels[at + k] = (255.0 * colour[k].clamp(0.0, 1.0).powf(1.0 / 2.2)) as u8;
+    }
+}
+
+fn encode(pixels: &[u8], width: u32) -> Result<Vec<u8>> {
     let failed = |e: png::EncodingError| bth_compile::Error::Internal {
         code: "BTH-X061",
         message: format!("a picture cannot be encoded: {e}"),
     };
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, 2 * SIZE, SIZE);
+    let mut encoder = png::Encoder::new(&mut bytes, width, SIZE);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.write_header().and_then(|mut writer| writer.write_image_data(pixels)).map_err(failed)?;
@@ -67,8 +107,8 @@ fn encode(pixels: &[u8]) -> Result<Vec<u8>> {
 }
 
 /// Rays of a camera that sees the whole model, row by row.
-fn camera(of: &Explained<'_>) -> Vec<Ray> {
-    let Some(root) = of.tree.nodes.first() else { return Vec::new() };
+fn camera(tree: &BinaryBvh) -> Vec<Ray> {
+    let Some(root) = tree.nodes.first() else { return Vec::new() };
     let (lower, upper) = (Vec3::from_array(root.lower), Vec3::from_array(root.upper));
     let middle = 0.5 * (lower + upper);
     let radius = 0.5 * (upper - lower).length();
@@ -86,8 +126,8 @@ fn camera(of: &Explained<'_>) -> Vec<Ray> {
     (0..SIZE * SIZE).map(pixel).collect()
 }
 
-fn normal(of: &Explained<'_>, triangle: u32) -> Vec3 {
-    let [a, b, c] = of.mesh.corners(triangle).map(Vec3::from_array);
+fn normal(mesh: &Mesh, triangle: u32) -> Vec3 {
+    let [a, b, c] = mesh.corners(triangle).map(Vec3::from_array);
     unit((b - a).cross(c - a))
 }
 
@@ -127,7 +167,7 @@ fn bounce(of: &Explained<'_>, ray: &Ray, hit: &Hit) -> Option<f64> {
         return None;
     }
     let (start, incoming) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
-    let n = normal(of, hit.primitive.triangle);
+    let n = normal(of.mesh, hit.primitive.triangle);
     let cosine = n.dot(incoming);
     let direction = unit(incoming - 2.0 * cosine * n).to_array();
     let root = &of.tree.nodes[0];

@@ -3,16 +3,14 @@
 use super::frame_mesh::FrameMesh;
 use crate::clock::Clock;
 use crate::rivals::embree::{self, EmbreeScene};
-use crate::scenes::Source;
 use crate::structures::BATCH;
 use crate::tracer::{Batch, Tracer};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bth::rays::Hit;
 use bth::{Scene, SceneBuilder};
 use bth_compile::Silent;
 use bth_compile::memory::{TriangleMesh, open};
-use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
-use std::path::Path;
+use bth_compile::pipeline::{CompileOptions, Structure};
 
 /// Names of the contenders.
 pub(super) const NAMES: [&str; 4] = ["bth", "bth anew", "embree refit", "embree anew"];
@@ -46,15 +44,6 @@ pub(super) struct Trees {
     pub(super) same_triangles: bool,
     refit: EmbreeScene,
     rebuilt: EmbreeScene,
-}
-
-/// Compiles a scene without tetrahedra.
-pub(super) fn compiled(source: &Source, motion: MotionOptions) -> Result<Scene> {
-    let options = CompileOptions { structure: Structure::Bvh, motion, ..CompileOptions::default() };
-    let name = Path::new(&source.name);
-    let (compiled, _) =
-        bth_compile::scene::compile(&source.manifest, &source.folder, name, &options, &Silent)?;
-    bth::from_bytes(&compiled.bytes).context("a file that was just compiled")
 }
 
 impl Trees {

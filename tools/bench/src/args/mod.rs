@@ -15,6 +15,7 @@ mod records;
 mod refit;
 mod run;
 mod scenes;
+mod shutter;
 mod speed;
 mod stress;
 mod values;
@@ -34,6 +35,7 @@ pub use records::{RecordRows, Summary};
 pub use refit::Refit;
 pub use run::RunOptions;
 pub use scenes::Scenes;
+pub use shutter::Shutter;
 pub use speed::Speed;
 pub use stress::Stress;
 
@@ -83,6 +85,8 @@ pub enum Command {
     Refit(Refit),
     /// Scenes whose objects deform: updates and rays over whole animations, beside trees made anew for each frame.
     Animation(Animation),
+    /// Motion blur of objects that deform: positions of each time, between two refits, or of each ray.
+    Shutter(Shutter),
     /// One start in a process of its own; `load` calls this.
     #[command(hide = true)]
     Probe(Probe),

@@ -10,7 +10,7 @@ mod tables;
 
 pub(crate) use frame_rays::FrameRays;
 pub use record::{ContenderRow, SceneTimes, ScenesRecord};
-pub(crate) use source::Source;
+pub(crate) use source::{Source, compiled};
 pub use tables::markdown;
 
 use crate::args::Scenes;

@@ -3,10 +3,12 @@
 use crate::model::Model;
 use crate::twist::{TWIST, twisted};
 use anyhow::{Context, Result};
+use bth::Scene;
 use bth_compile::Silent;
+use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
 use bth_import::gltf::scene::ImportOptions;
 use bth_scene::Manifest;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Frames of a twist, besides the first.
 const TWIST_FRAMES: i32 = 24;
@@ -90,4 +92,13 @@ impl Source {
         let count = (count as i64).min(last - first + 1);
         (0..count).map(|i| (first + (last - first) * (2 * i + 1) / (2 * count)) as i32).collect()
     }
+}
+
+/// Compiles a scene without tetrahedra.
+pub(crate) fn compiled(source: &Source, motion: MotionOptions) -> Result<Scene> {
+    let options = CompileOptions { structure: Structure::Bvh, motion, ..CompileOptions::default() };
+    let name = Path::new(&source.name);
+    let (compiled, _) =
+        bth_compile::scene::compile(&source.manifest, &source.folder, name, &options, &Silent)?;
+    bth::from_bytes(&compiled.bytes).context("a file that was just compiled")
 }

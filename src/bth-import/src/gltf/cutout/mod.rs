@@ -13,6 +13,7 @@ use crate::gltf::document;
 use crate::gltf::extensions::{SCENE_EXTENSIONS, SUPPORTED};
 use crate::gltf::flatten::{GltfPart, PlacedMesh, placed_meshes};
 use crate::gltf::primitive::{KeptAttributes, PrimitiveReader, Triangles};
+use crate::gltf::rigid_parts::Selection;
 use crate::gltf::schema::GltfDocument;
 use crate::gltf::texture_parts::TextureParts;
 use crate::gltf::transform;
@@ -86,17 +87,23 @@ impl CutoutReader<'_, '_> {
     fn mesh(&mut self, placed: &PlacedMesh) -> Result<()> {
         let document = self.accessors.document;
         let primitives = document.meshes.get(placed.mesh).map_or(&[][..], |mesh| &mesh.primitives);
+        let selection = placed.kept.of_mesh(self.accessors, placed.mesh)?;
         for (index, primitive) in primitives.iter().enumerate() {
             self.accessors.source.monitor.check()?;
             let part = format!("mesh {} primitive {index}", placed.mesh);
             let reader = PrimitiveReader { accessors: self.accessors, primitive, part };
-            self.primitive(&reader, transform::is_mirrored(&placed.world))?;
+            self.primitive(&reader, (index, &selection), transform::is_mirrored(&placed.world))?;
         }
         Ok(())
     }
 
     /// Appends the triangles of a primitive, whose last two corners the import exchanges where it is `mirrored`.
-    fn primitive(&mut self, reader: &PrimitiveReader<'_, '_>, mirrored: bool) -> Result<()> {
+    fn primitive(
+        &mut self,
+        reader: &PrimitiveReader<'_, '_>,
+        (index, selection): (usize, &Selection),
+        mirrored: bool,
+    ) -> Result<()> {
         let row = match reader.primitive.material {
             Some(material) => self.materials.row(material)?,
             None => None,
@@ -107,7 +114,8 @@ impl CutoutReader<'_, '_> {
         if reader.points_or_lines(&kept)?.is_some() {
             return Ok(());
         }
-        let triangles = reader.read(&kept, 0)?;
+        let mut triangles = reader.read(&kept, 0)?;
+        selection.retain(index, &mut triangles.corners);
         let first = self.cutouts.mesh_triangles;
         self.cutouts.mesh_triangles += triangles.corners.len();
         let Some(row) = row else { return Ok(()) };

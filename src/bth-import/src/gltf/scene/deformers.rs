@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use bth_scene::{Deformer, Node, Skin, Source, Transform};
+use bth_scene::{Deformer, JointSet, Node, Skin, Source, Transform};
 
 use crate::error::{Error, Result};
 use crate::gltf::flatten::GltfPart;
@@ -60,8 +60,9 @@ impl Importer<'_> {
         let moves = self.is_moved(index, node)?;
         let name = self.document.meshes[mesh].name.clone();
         if moves && self.deform {
-            let source = Source::Deforming { path: self.file.to_owned(), mesh: mesh as u32 };
-            let object = self.new_object(&name, mesh, source);
+            let (path, mesh) = (self.file.to_owned(), mesh as u32);
+            let source = Source::Deforming { path, mesh, without: JointSet::default() };
+            let object = self.new_object(&name, mesh as usize, source);
             self.deforming.push(Deforming { node: index, row, object, weights });
             return Ok(object);
         }

@@ -6,6 +6,7 @@ mod importer;
 mod lights;
 mod nodes;
 pub(crate) mod options;
+mod rigid_parts;
 mod tracks;
 
 use std::collections::{HashMap, HashSet};
@@ -84,6 +85,9 @@ pub fn import_bytes(
     importer.deformers()?;
     let (tracks, last) = importer.tracks(&animations)?;
     importer.manifest.tracks = tracks;
+    if options.rigid_parts {
+        importer.rigid_parts()?;
+    }
     let last = (last * options.rate).ceil().clamp(0.0, f64::from(MAX_FRAMES)) as i32;
     importer.manifest.frames = Frames { first: 0, last, rate: options.rate };
     source.progress(data.len())?;

@@ -28,6 +28,8 @@ pub struct ImportOptions {
     pub rate: f64,
     /// Whether skins and morph targets that the animations move deform their meshes; else these stay at rest.
     pub deform: bool,
+    /// Whether the parts of deforming meshes that a joint moves rigidly become instances, which are placed and never refitted.
+    pub rigid_parts: bool,
     /// Whether what would be ignored with a warning is an error: animations of other things than nodes and weights.
     pub strict: bool,
 }
@@ -39,6 +41,7 @@ impl Default for ImportOptions {
             animation: Chosen::First,
             rate: Frames::default().rate,
             deform: true,
+            rigid_parts: false,
             strict: false,
         }
     }
@@ -61,6 +64,8 @@ pub struct ImportReport {
     pub animations_left_out: Vec<String>,
     /// Objects that deform.
     pub deformers: u64,
+    /// Instances of parts that joints move rigidly.
+    pub rigid_parts: u64,
     /// Animated properties of nodes.
     pub tracks: u64,
     /// Cameras.

@@ -9,7 +9,7 @@ use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::free;
-use crate::object::{self, Scratch};
+use crate::object::{self, HintUse, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{self, Query, Steps, better};
@@ -127,7 +127,7 @@ impl World {
         hits: &mut [Hit],
     ) {
         hits.fill(Hit::MISS);
-        object::with_scratch(|scratch| {
+        self.by_hints(rays.len(), from, false, |from, scratch| {
             let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -142,7 +142,7 @@ impl World {
         found: &mut [bool],
     ) {
         found.fill(false);
-        object::with_scratch(|scratch| {
+        self.by_hints(rays.len(), from, true, |from, scratch| {
             let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -153,6 +153,26 @@ impl World {
         let mut query = SceneCounted { ray, best: Hit::MISS, steps: Steps::default() };
         self.run(objects, std::slice::from_ref(ray), Some(&[from]), &mut query);
         (query.best, query.steps)
+    }
+
+    /// Calls `trace` with the hints of a batch, or with none where it was measured to be faster so through this scene: rays that visit
+    /// the instance on which they start before all others go in no packets of the top level.
+    fn by_hints(
+        &self,
+        rays: usize,
+        from: Option<&[PrimitiveRef]>,
+        any: bool,
+        trace: impl FnOnce(Option<&[PrimitiveRef]>, &mut Scratch),
+    ) {
+        object::with_scratch(|scratch| {
+            if from.is_none() {
+                return trace(None, scratch);
+            }
+            let key = (std::ptr::from_ref(self).addr(), HintUse::Free.kind(any));
+            object::by_hint(key, rays, Strategy::Bvh, scratch, |strategy, scratch| {
+                trace(from.filter(|_| strategy == Strategy::Hinted), scratch);
+            });
+        });
     }
 
     fn run(

@@ -120,7 +120,8 @@ pub(crate) fn without_free<Q: Query>(
     trace: impl FnOnce(Option<&[u32]>, &mut Scratch),
 ) {
     // Small batches come before measurements: then the look-up decides by how many of the first rays end.
-    by_hint::<Q>((object, HintUse::Free), rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
+    let key = (address_of(object), HintUse::Free.kind(Q::ANY));
+    by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
         let mut rest = std::mem::take(&mut scratch.rest);
         let finds = strategy == Strategy::Hinted && free::find_rest(object, rays, from, &mut rest);
         trace(finds.then_some(&rest), scratch);
@@ -128,17 +129,22 @@ pub(crate) fn without_free<Q: Query>(
     });
 }
 
-/// Traces a batch by the strategy that was measured to be faster for such rays through the object on this thread, and measures it.
-/// `unmeasured` is the strategy of small batches before there are measurements.
-fn by_hint<Q: Query>(
-    (object, used): (&ObjectView<'_>, HintUse),
+/// What measurements of an object are stored under.
+fn address_of(object: &ObjectView<'_>) -> usize {
+    std::ptr::from_ref(object.header).addr()
+}
+
+/// Traces a batch by the strategy that was measured to be faster for such rays on this thread, and measures it. The measurements are
+/// those of an address, of an object or a scene, and of a kind of rays ([`HintUse::kind`]). `unmeasured` is the strategy of small
+/// batches before there are measurements.
+pub(crate) fn by_hint(
+    (address, kind): (usize, usize),
     rays: usize,
     unmeasured: Strategy,
     scratch: &mut Scratch,
     trace: impl FnOnce(Strategy, &mut Scratch),
 ) {
     let hinted = Hinted::chosen();
-    let (address, kind) = (std::ptr::from_ref(object.header).addr(), 2 * used as usize + usize::from(Q::ANY));
     let choice = scratch.choices.of(address, kind);
     let measured = rays >= MIN_MEASURED_RAYS && hinted == Hinted::Measured;
     let strategy = match hinted {
@@ -205,7 +211,8 @@ pub(crate) fn trace_batch<Q: Query>(
     if from.is_none() || !has_subtrees(object) {
         return trace_with(object, rays, from, scratch, sink);
     }
-    by_hint::<Q>((object, HintUse::Tets), rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
+    let key = (address_of(object), HintUse::Tets.kind(Q::ANY));
+    by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
         trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
     });
 }

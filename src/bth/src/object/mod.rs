@@ -7,10 +7,11 @@ pub(crate) mod single;
 mod strategy;
 
 pub(crate) use batch::{
-    MIN_BATCH, any_batch, fill_misses, nearest_batch, trace_batch, trace_rest, without_free,
+    MIN_BATCH, any_batch, by_hint, fill_misses, nearest_batch, trace_batch, trace_rest, without_free,
 };
 pub use hints::Hinted;
 pub(crate) use scratch::{Scratch, with_scratch};
+pub(crate) use strategy::{HintUse, Strategy};
 
 use self::single::trace;
 use crate::query::{Any, Nearest, Steps};

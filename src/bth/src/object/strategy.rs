@@ -19,8 +19,15 @@ pub(crate) enum Strategy {
 pub(crate) enum HintUse {
     /// Walks through tetrahedra.
     Tets,
-    /// Look-ups of free directions.
+    /// Look-ups of free directions; in scenes, the visit of the instance on which a ray starts before all others.
     Free,
+}
+
+impl HintUse {
+    /// The number of a kind of rays, below 4: what hints are used for, and whether any hit ends the ray.
+    pub(crate) fn kind(self, any: bool) -> usize {
+        2 * self as usize + usize::from(any)
+    }
 }
 
 /// Least number of rays of a batch that is measured. Smaller batches take the strategy that is faster by the measurements so far.

@@ -1,5 +1,6 @@
 """Free directions (format-spec/README.md, "Free directions"): F168 to F171 and F209."""
 
+import math
 from fractions import Fraction
 
 import bth_container as c
@@ -16,6 +17,7 @@ BORDERS = tuple(
     for x in (0.020672197824104982, 0.20856091329926152, 0.750830798121458, 2.4212305216220913, 11.598705569133076)
 )
 STEEPEST = 256
+QUICK_BORDERS = tuple(map(float, BORDERS)) + (float(STEEPEST),)
 # Triangles from which rays are sent.
 STARTS = 64
 
@@ -102,6 +104,28 @@ def bin_of(axes_, direction):
     return SIDE * columns[1] + columns[0], z < 0
 
 
+def quick_bin(axes_, direction):
+    """As `bin_of`, in floating point; `Ellipsis` where that does not decide.
+
+    Normals are at least 2^-7 of the product of their edges (`axes`), so that products in f64 are off by less than 1e-10 of the
+    lengths. What is within 1e-6 of a border is left to exact arithmetic.
+    """
+    parts = [_dot(direction, axis) / math.sqrt(_dot(axis, axis)) for axis in axes_]
+    length = math.sqrt(_dot(direction, direction))
+    if not abs(parts[2]) > 1e-6 * length:
+        return ...
+    columns = []
+    for part in parts[:2]:
+        square = (part / parts[2]) ** 2
+        if any(abs(square - border) <= 1e-6 * border for border in QUICK_BORDERS) or abs(part) <= 1e-6 * length:
+            return ...
+        if square > STEEPEST:
+            return None
+        beyond = sum(square > border for border in QUICK_BORDERS[:-1])
+        columns.append(SIDE // 2 - beyond if part < 0 else SIDE // 2 + beyond)
+    return SIDE * columns[1] + columns[0], parts[2] < 0
+
+
 def check_met(view, corners, side):
     """F210; F209 for rays from corners of some triangles to the middles of all others.
 
@@ -119,19 +143,29 @@ def check_met(view, corners, side):
     for start in range(0, len(view.free), max(1, -(-len(view.free) // STARTS))):
         if start not in starts:
             continue
-        known = starts[start], bits(view.free[start]), reach
+        quick = [[float(x) for x in axis] for axis in starts[start]]
+        known = starts[start], quick, bits(view.free[start]), reach
         for other, target in corners.items():
             if other != start and any(_is_met(known, p, target, side) for p in corners[start]):
                 raise view.invalid("F209", f"triangle {start} meets {other}", c.FREE_DIRECTIONS, ROW * start)
 
 
+def _is_free(found, free):
+    """Whether a bin, and the side that it is on, is called free."""
+    return bool(free >> found[0] & 1) and found[1] == bool(free & BACK)
+
+
 def _is_met(known, origin, target, side):
     """Whether the ray from a point through the middle of a triangle meets it in a direction that is called free."""
-    axes_, free, reach = known
+    axes_, quick, free, reach = known
+    near = [sum(p[k] for p in target) / 3 - origin[k] for k in range(3)]
+    found = quick_bin(quick, near)
+    if found is None or found is not ... and not _is_free(found, free):
+        return False
     middle = [sum(Fraction(p[k]) for p in target) / 3 for k in range(3)]
     direction = [m - Fraction(x) for m, x in zip(middle, origin)]
     found = bin_of(axes_, direction) if any(direction) else None
-    if found is None or not free >> found[0] & 1 or found[1] != bool(free & BACK):
+    if found is None or not _is_free(found, free):
         return False
     if free & NEARBY and _dot(direction, direction) > reach * reach:
         return False

@@ -31,6 +31,14 @@ impl<'a> NodeBase<'a> {
     pub fn packed_node(self, line: u32) -> &'a PackedNode {
         self.block(line, PACKED_NODE_LINES)
     }
+    /// The node that a child code leads to, if it is a wide node that lies within the lines: the codes of all others are greater than
+    /// the number of lines. So a traversal that asks it needs no test of the kind of a node.
+    #[inline(always)]
+    pub fn wide_node(self, code: u32) -> Option<&'a WideNode> {
+        let at = code as usize;
+        let bytes = self.lines.get(at..at + NODE_LINES)?.as_bytes();
+        Some(WideNode::ref_from_bytes(bytes).expect("a node is a whole number of aligned lines"))
+    }
     /// The leaf that a child code leads to, if it is an indexed leaf of `f32`.
     #[inline(always)]
     pub fn indexed_leaf(self, code: u32) -> Option<&'a IndexedLeaf> {
@@ -50,7 +58,10 @@ impl<'a> ObjectView<'a> {
     /// The object's lines, for a traversal loop.
     #[inline(always)]
     pub fn node_base(&self) -> NodeBase<'a> {
-        NodeBase { lines: self.lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
+        // All lines but those of which no child code can be an index, for `NodeBase::wide_node`.
+        const LINES: usize = Child::PACKED_BIT as usize + NODE_LINES - 1;
+        let lines = self.lines.get(..LINES).unwrap_or(self.lines);
+        NodeBase { lines, halved: if self.grid.is_some() { Child::LEAF_BIT } else { 0 } }
     }
     /// The node at a line. Panics when the lines end before the node does; after [`crate::File::check`] they never do.
     #[inline(always)]
@@ -70,7 +81,7 @@ impl<'a> ObjectView<'a> {
     /// The raw leaf of `f32` at a line; panics as [`Self::node`] does.
     #[inline(always)]
     pub fn raw_leaf(&self, line: u32) -> &'a RawLeaf {
-        self.node_base().block(line, RAW_LINES)
+        NodeBase { lines: self.lines, halved: 0 }.block(line, RAW_LINES)
     }
     /// The node that a child code leads to, unpacked if it is packed; `None` for leaves. Panics as [`Self::node`] does.
     pub fn unpacked_node(&self, child: Child) -> Option<WideNode> {

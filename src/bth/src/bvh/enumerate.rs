@@ -7,7 +7,7 @@
 //! are then all of one sign or zero, and the filter excludes only triangles with two weights of certain and opposite signs.
 
 use super::candidate::{Candidate, ReadCorners};
-use super::nodes::{Wide, indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
 use super::single_stack::SingleStack;
 use super::stack::BOTTOM;
@@ -72,16 +72,12 @@ impl Kernel for EnumerateKernel<'_> {
         let mut last = lesser(slabs.last, slabs.limit(receiver.limit()));
         // Stack entries with a greater key are dropped.
         let mut limit = key_limit(last);
+        let mut unpacked_node = UnpackedNode::NONE;
         while code != BOTTOM {
             if code & Child::LEAF_BIT == 0 {
                 let planes = RaySlabLanes::new(s, slabs);
-                let ((bits, enter), children) = if code & Child::PACKED_BIT == 0 {
-                    let node = node_base.node(code);
-                    (planes.children(s, node, last), &node.child)
-                } else {
-                    let node = node_base.packed_node(code & !Child::PACKED_BIT);
-                    (planes.children(s, node, last), &node.child)
-                };
+                let node = node(s, node_base, code, &mut unpacked_node);
+                let ((bits, enter), children) = (planes.children(s, node, last), &node.child);
                 if bits == 0 {
                     code = stack.pop::<Nearest>(limit);
                 } else if bits & (bits - 1) == 0 {
@@ -93,7 +89,7 @@ impl Kernel for EnumerateKernel<'_> {
                     code = children[nearest % WIDTH];
                     free.push(count);
                     // The entry below the new top is most often needed next.
-                    prefetch(s, Wide, node_base, stack.below());
+                    prefetch(s, node_base, stack.below());
                 }
                 continue;
             }

@@ -3,8 +3,8 @@
 
 use super::deferred::DeferredHits;
 use super::leaf::{LeafOutcome, Progress, decide};
-use super::nodes::Nodes;
-use super::ray_pool::RayPool;
+use super::nodes::{UnpackedNode, Wide, children, node};
+use super::ray_pool::{PackedSteps, RayPool};
 use super::ray_state::RayState;
 use super::stack::{StackPosition, Stacks};
 use crate::intersect::prepare::Prepared;
@@ -64,12 +64,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
     /// Traces all rays and stores their answers. `tets` intersects a tet leaf without a subtree, given its row, and returns whether the
     /// query is complete.
     #[inline(always)]
-    pub(crate) fn run<S: Simd, N: Nodes>(
-        self,
-        s: S,
-        nodes: N,
-        mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool,
-    ) {
+    pub(crate) fn run<S: Simd>(self, s: S, mut tets: impl FnMut(u32, &Ray, &mut Q) -> bool) {
         let Interleaved { object, rays, remaining, stacks, sink } = self;
         let walked = remaining.walked;
         let mut source = RaySource {
@@ -89,15 +84,20 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
         };
         let mut deferred = DeferredHits::new();
         let mut pool = RayPool::new(object, stacks);
+        let has_packed_nodes = object.has_packed_nodes();
         while !pool.is_empty() {
-            pool.inner_steps(s, nodes, object);
+            if has_packed_nodes {
+                s.call(PackedSteps(&mut pool, object));
+            } else {
+                pool.inner_steps::<S, Wide>(s, object);
+            }
             for i in 0..pool.take_bottom() {
                 if let Some(slot) = pool.finished(i) {
                     deferred.add(s, object, rays, pool.state(slot), sink);
-                    source.start(s, nodes, slot, &mut pool);
+                    source.start(s, slot, &mut pool);
                 }
             }
-            pool.leaf_steps(s, nodes, (object, rays), |row, state, top, stacks| {
+            pool.leaf_steps(s, (object, rays), |row, state, top, stacks| {
                 let ray = state.ray();
                 if walked.is_some_and(|walked| walked[ray] == row) {
                     return LeafOutcome::Nothing;
@@ -112,10 +112,10 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
 impl<Q: Query> RaySource<'_, Q> {
     /// Starts the next ray that can hit anything in a slot, if there is one.
     #[inline(always)]
-    fn start<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, slot: usize, pool: &mut RayPool<'_, Q>) {
+    fn start<S: Simd>(&mut self, s: S, slot: usize, pool: &mut RayPool<'_, Q>) {
         loop {
             while self.used == self.filled {
-                if !self.refill(s, nodes) {
+                if !self.refill(s) {
                     return;
                 }
             }
@@ -137,7 +137,7 @@ impl<Q: Query> RaySource<'_, Q> {
                 state.update_from_query(&self.rays[index as usize]);
             }
             if prepared.is_some() && self.root & Child::LEAF_BIT == 0 {
-                let root = N::node(self.object.node_base(), self.root);
+                let root = children(self.object.node_base(), self.root);
                 pool.start_among(s, slot, root, (self.children[lane], s.load(&self.enter[lane])));
             } else {
                 pool.start(slot, self.root);
@@ -148,7 +148,7 @@ impl<Q: Query> RaySource<'_, Q> {
 
     /// Prepares the next rays, up to sixteen; false if there are none.
     #[inline(always)]
-    fn refill<S: Simd, N: Nodes>(&mut self, s: S, _nodes: N) -> bool {
+    fn refill<S: Simd>(&mut self, s: S) -> bool {
         let order = self.remaining.order;
         let total = order.map_or(self.rays.len(), <[u32]>::len);
         let count = (total - self.taken).min(LANES);
@@ -162,7 +162,12 @@ impl<Q: Query> RaySource<'_, Q> {
             return false;
         }
         self.prepared.fill(s, &self.bounds, self.rays, &self.ray, count);
-        let root = (self.root & Child::LEAF_BIT == 0).then(|| N::node(self.object.node_base(), self.root));
+        let mut unpacked = UnpackedNode::NONE;
+        let root = if self.root & Child::LEAF_BIT == 0 {
+            Some(node(s, self.object.node_base(), self.root, &mut unpacked))
+        } else {
+            None
+        };
         for lane in 0..count {
             let mut may_hit = true;
             if let (Some(prepared), Some(root)) = (self.prepared.prepared(lane), root) {

@@ -1,47 +1,105 @@
-//! The two node formats of objects. Kernels are compiled for each, because even a well predicted branch in every step costs some
-//! per cent.
+//! Nodes and leaves by child code, in each of their formats. Kernels read [`WideNode`]s and leaves of f32; parts that are called unpack
+//! the others. The steps through inner nodes that decide the speed of rays are compiled for each format of nodes ([`Nodes`]), because
+//! even a well predicted branch in every step costs some per cent.
 
-use crate::intersect::boxes::ChildBoxes;
+use crate::intersect::boxes::{ChildBoxes, FAR};
 use crate::simd::{Part, Simd};
 use bth_format::layout::{
-    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PACKED_NODE_LINES, PackedNode, RawLeaf, WideNode,
+    Child, INDEXED_LINES, IndexedLeaf, NODE_LINES, PackedNode, RawLeaf, WIDTH, WideNode,
 };
 use bth_format::object::Unpacked;
 use bth_format::object::{NodeBase, ObjectView};
 
 /// A node format.
-pub(crate) trait Nodes: Copy {
+pub(crate) trait Nodes {
     /// Record of a node.
     type Node: ChildBoxes;
-    /// Cache lines of a node.
-    const LINES: usize;
-    /// The node with this child code.
+    /// The node with this child code, which must be of the format.
     fn node(node_base: NodeBase<'_>, code: u32) -> &Self::Node;
+    /// As [`Self::node`]; for [`Wide`] `None` for nodes of the other format.
+    fn node_if(node_base: NodeBase<'_>, code: u32) -> Option<&Self::Node>;
 }
 
-/// All nodes are [`WideNode`]s.
-#[derive(Clone, Copy, Debug)]
+/// [`WideNode`]s.
 pub(crate) struct Wide;
 
-/// All nodes are [`PackedNode`]s.
-#[derive(Clone, Copy, Debug)]
+/// [`PackedNode`]s.
 pub(crate) struct Packed;
 
 impl Nodes for Wide {
     type Node = WideNode;
-    const LINES: usize = NODE_LINES;
     #[inline(always)]
     fn node(node_base: NodeBase<'_>, code: u32) -> &WideNode {
         node_base.node(code)
+    }
+    #[inline(always)]
+    fn node_if(node_base: NodeBase<'_>, code: u32) -> Option<&WideNode> {
+        node_base.wide_node(code)
     }
 }
 
 impl Nodes for Packed {
     type Node = PackedNode;
-    const LINES: usize = PACKED_NODE_LINES;
     #[inline(always)]
     fn node(node_base: NodeBase<'_>, code: u32) -> &PackedNode {
         node_base.packed_node(code & !Child::PACKED_BIT)
+    }
+    #[inline(always)]
+    fn node_if(node_base: NodeBase<'_>, code: u32) -> Option<&PackedNode> {
+        Some(Self::node(node_base, code))
+    }
+}
+
+/// The child codes of the node with this code.
+#[inline(always)]
+pub(crate) fn children(node_base: NodeBase<'_>, code: u32) -> &[u32; WIDTH] {
+    match node_base.wide_node(code) {
+        Some(node) => &node.child,
+        None => &Packed::node(node_base, code).child,
+    }
+}
+
+/// Memory for a node that is unpacked, on cache lines.
+#[repr(C, align(64))]
+pub(crate) struct UnpackedNode(Option<WideNode>);
+
+impl UnpackedNode {
+    pub(crate) const NONE: UnpackedNode = UnpackedNode(None);
+}
+
+/// Unpacking of the node with a child code, as a part of kernels: one function serves all kernels of an instruction set.
+struct UnpackNode<'r, 'o>(NodeBase<'o>, u32, &'r mut UnpackedNode);
+
+impl<'r, S: Simd> Part<S> for UnpackNode<'r, '_> {
+    type Output = &'r WideNode;
+    #[inline(always)]
+    fn run(self, s: S) -> &'r WideNode {
+        const ZERO: WideNode = WideNode { bounds: [[[0.0; WIDTH]; 2]; 3], child: [0; WIDTH] };
+        let UnpackNode(node_base, code, unpacked) = self;
+        assert!(code & Child::PACKED_BIT != 0, "a node lies outside of the object's lines");
+        let packed = Packed::node(node_base, code);
+        let node = unpacked.0.get_or_insert(ZERO);
+        for axis in 0..3 {
+            for side in 0..2 {
+                s.store(packed.planes(s, axis, side as u32 * FAR), &mut node.bounds[axis][side]);
+            }
+        }
+        node.child = packed.child;
+        node
+    }
+}
+
+/// The inner node with this child code: in place or, if it is packed, unpacked into `unpacked`.
+#[inline(always)]
+pub(crate) fn node<'r, S: Simd>(
+    s: S,
+    node_base: NodeBase<'r>,
+    code: u32,
+    unpacked: &'r mut UnpackedNode,
+) -> &'r WideNode {
+    match node_base.wide_node(code) {
+        Some(node) => node,
+        None => s.call(UnpackNode(node_base, code, unpacked)),
     }
 }
 
@@ -104,9 +162,10 @@ pub(crate) fn indexed_leaf<'r, S: Simd>(
 
 /// Prefetches the cache lines of a node or of an indexed leaf.
 #[inline(always)]
-pub(crate) fn prefetch<S: Simd, N: Nodes>(s: S, _nodes: N, node_base: NodeBase<'_>, code: u32) {
+pub(crate) fn prefetch<S: Simd>(s: S, node_base: NodeBase<'_>, code: u32) {
+    const LINES: usize = if NODE_LINES > INDEXED_LINES { NODE_LINES } else { INDEXED_LINES };
     let first = node_base.block_address(code);
-    for i in 0..N::LINES.max(INDEXED_LINES) {
+    for i in 0..LINES {
         s.prefetch(first.wrapping_add(i));
     }
 }

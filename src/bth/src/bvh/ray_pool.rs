@@ -2,14 +2,13 @@
 //! with the work of the others. [`super::interleaved`] starts the rays and stores their answers.
 
 use super::leaf::{LeafOutcome, enter_leaf};
-use super::nodes::{Nodes, indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{Nodes, Packed, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
-use crate::intersect::boxes::ChildBoxes;
 use crate::query::Query;
 use crate::rays::Ray;
-use crate::simd::Simd;
-use bth_format::layout::Child;
+use crate::simd::{Part, Simd};
+use bth_format::layout::{Child, WIDTH};
 use bth_format::object::ObjectView;
 
 /// Number of rays in the pool.
@@ -151,19 +150,19 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         self.lists.push(&mut self.counts, slot, root);
     }
 
-    /// As [`Self::start`] for a root whose children were already tested: `children` holds a bit for each child that the ray may meet,
-    /// and the depths at which it enters them.
+    /// As [`Self::start`] for a root whose children were already tested, given their codes: `children` holds a bit for each child that the
+    /// ray may meet, and the depths at which it enters them.
     #[inline(always)]
-    pub(super) fn start_among<S: Simd, B: ChildBoxes>(
+    pub(super) fn start_among<S: Simd>(
         &mut self,
         s: S,
         slot: usize,
-        root: &B,
+        root: &[u32; WIDTH],
         children: (u32, S::F),
     ) {
         let slot = slot % POOL_SIZE;
         let top = self.stacks.start_at(self.bottoms[slot]);
-        let count = write_children::<S, Q, B>(s, root, children, self.stacks.free_entries(top));
+        let count = write_children::<S, Q>(s, root, children, self.stacks.free_entries(top));
         let top = self.stacks.replaced(top, count);
         let code = self.stacks.code(top);
         (self.tops.position[slot], self.tops.code[slot]) = (top, code);
@@ -194,7 +193,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
     /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
-    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, nodes: N, object: &ObjectView<'_>) {
+    pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, object: &ObjectView<'_>) {
         let RayPool { slots, tops, lists, stacks, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
@@ -205,7 +204,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.position[slot], tops.code[slot]) = (top, code);
-                prefetch(s, nodes, node_base, code);
+                prefetch(s, node_base, code);
                 lists.push(&mut counts, slot, code);
             }
             if counts.inner() < MIN_INNER && counts.leaf() | counts.bottom() > 0 {
@@ -218,10 +217,9 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     /// Makes the step of each ray whose next step enters a leaf. `tets` intersects a tet leaf, given its row, the ray and the position
     /// of the leaf on the ray's stack.
     #[inline(always)]
-    pub(super) fn leaf_steps<S: Simd, N: Nodes>(
+    pub(super) fn leaf_steps<S: Simd>(
         &mut self,
         s: S,
-        nodes: N,
         (object, rays): (&ObjectView<'_>, &[Ray]),
         mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
@@ -256,9 +254,24 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             };
             let code = stacks.code(top);
             (tops.position[slot], tops.code[slot]) = (top, code);
-            prefetch(s, nodes, node_base, code);
+            prefetch(s, node_base, code);
             lists.push(&mut counts, slot, code);
         }
         self.counts = counts;
+    }
+}
+
+/// [`RayPool::inner_steps`] through packed nodes, as a part of kernels: apart from the loop for wide nodes, whose constants then stay in
+/// registers.
+pub(super) struct PackedSteps<'p, 'a, 'o, Q>(
+    pub(super) &'p mut RayPool<'a, Q>,
+    pub(super) &'p ObjectView<'o>,
+);
+
+impl<S: Simd, Q: Query> Part<S> for PackedSteps<'_, '_, '_, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        self.0.inner_steps::<S, Packed>(s, self.1);
     }
 }

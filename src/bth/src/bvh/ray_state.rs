@@ -105,7 +105,7 @@ impl<Q: Query> RayState<Q> {
         entries: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.prepared.slabs.children(s, node, self.prepared.slabs.last);
-        write_children::<S, Q, B>(s, node, (bits, enter), entries)
+        write_children::<S, Q>(s, node.child(), (bits, enter), entries)
     }
 }
 
@@ -153,16 +153,16 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
     }
 }
 
-/// Writes codes and keys of the children whose bit is set, the nearest last, given the depths at which the ray enters all children;
+/// Writes codes and keys of the children whose bit is set, the nearest last, given the codes of all children and the depths at which the ray enters all children;
 /// returns their number. Any-hit queries write no keys.
 #[inline(always)]
-pub(crate) fn write_children<S: Simd, Q: Query, B: ChildBoxes>(
+pub(crate) fn write_children<S: Simd, Q: Query>(
     s: S,
-    node: &B,
+    child: &[u32; WIDTH],
     (bits, enter): (u32, S::F),
     (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
 ) -> usize {
-    let children = s.load_u(node.child());
+    let children = s.load_u(child);
     if Q::ANY {
         s.compress(bits, children, codes)
     } else {

@@ -5,18 +5,19 @@
 //! the end.
 
 use super::leaf::{LeafOutcome, Progress, decide, enter_leaf};
-use super::nodes::{Nodes, indexed_leaf, prefetch, raw as raw_leaf};
+use super::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::key_limit;
-use super::single_stack::SingleStack;
+use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::{Candidate, settle_one};
 use crate::intersect::boxes::{ChildBoxes, RaySlabLanes};
 use crate::intersect::prepare::PreparedRay;
 use crate::query::{Count, Query};
 use crate::rays::Ray;
-use crate::simd::Simd;
+use crate::simd::{Part, Simd};
 use bth_format::layout::{Child, NONE, WIDTH};
-use bth_format::object::ObjectView;
+use bth_format::object::{NodeBase, ObjectView};
 use std::hint::black_box;
+use std::marker::PhantomData;
 
 /// Result of a tet leaf for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,9 +86,8 @@ impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
 /// and a function boundary or a struct of parameters between the steps was measured to be slower.
 #[inline(always)]
 #[expect(clippy::too_many_arguments)]
-pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
+pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     s: S,
-    nodes: N,
     (object, ray): (&ObjectView<'_>, &Ray),
     prepared: &PreparedRay,
     walked: u32,
@@ -114,34 +114,8 @@ pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
     // Stack entries with a greater key are dropped.
     let mut limit = key_limit(state.last);
     loop {
-        // These broadcasts stay in registers until a leaf is entered.
-        let planes = RaySlabLanes::new(s, &prepared.slabs);
-        while code & Child::LEAF_BIT == 0 {
-            count.node();
-            let node = N::node(node_base, code);
-            let (bits, enter) = planes.children(s, node, state.last);
-            if bits & bits.wrapping_sub(1) == 0 {
-                if bits != 0 {
-                    code = node.child()[bits.trailing_zeros() as usize % WIDTH];
-                } else {
-                    code = stack.pop::<Q>(limit);
-                }
-                continue;
-            }
-            let free = stack.free_entries();
-            let children = s.load_u(node.child());
-            if Q::ANY {
-                code = node.child()[bits.trailing_zeros() as usize % WIDTH];
-                let others = s.compress(bits & (bits - 1), children, free.codes);
-                free.push(others + 1);
-            } else {
-                let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
-                code = node.child()[nearest % WIDTH];
-                free.push(count);
-            }
-            // The entry below the new top is most often needed next.
-            prefetch(s, nodes, node_base, stack.below());
-        }
+        let limits = [state.last, limit];
+        code = descend::<S, Wide, Q, C>(s, prepared, node_base, limits, code, &mut stack, count);
         let mut unpacked = None;
         let done = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
             count.leaf();
@@ -168,6 +142,13 @@ pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
                     state.update_from_query(ray);
                     done
                 }
+                Some(Child::Packed(_)) => {
+                    // The stack is moved, because one that is passed by reference would lie in memory.
+                    let (count, query) = (&mut *count, PhantomData::<Q>);
+                    let steps = PackedSteps { prepared, node_base, limits, code, stack, count, query };
+                    (code, stack) = s.call(steps);
+                    continue;
+                }
                 _ => stack.is_empty(),
             }
         };
@@ -179,5 +160,69 @@ pub(crate) fn trace_single<S: Simd, N: Nodes, Q: Query, C: Count>(
     }
     if state.pending.leaf != NONE {
         settle_one(object, ray, state.pending, state.query);
+    }
+}
+
+/// Steps through inner nodes of a format down to the next leaf, the bottom of the stack or a wide node that is none; returns its code. `limits` are those of depths of hits
+/// and of keys of stack entries that can still change the result.
+#[inline(always)]
+fn descend<S: Simd, N: Nodes, Q: Query, C: Count>(
+    s: S,
+    prepared: &PreparedRay,
+    node_base: NodeBase<'_>,
+    [last, limit]: [f32; 2],
+    mut code: u32,
+    stack: &mut OpenSingleStack<'_>,
+    count: &mut C,
+) -> u32 {
+    // These broadcasts stay in registers.
+    let planes = RaySlabLanes::new(s, &prepared.slabs);
+    while code & Child::LEAF_BIT == 0 {
+        let Some(node) = N::node_if(node_base, code) else { break };
+        count.node();
+        let (bits, enter) = planes.children(s, node, last);
+        if bits & bits.wrapping_sub(1) == 0 {
+            if bits != 0 {
+                code = node.child()[bits.trailing_zeros() as usize % WIDTH];
+            } else {
+                code = stack.pop::<Q>(limit);
+            }
+            continue;
+        }
+        let free = stack.free_entries();
+        let children = s.load_u(node.child());
+        if Q::ANY {
+            code = node.child()[bits.trailing_zeros() as usize % WIDTH];
+            let others = s.compress(bits & (bits - 1), children, free.codes);
+            free.push(others + 1);
+        } else {
+            let (count, nearest) = s.sort_far_to_near(bits, enter, children, free.codes, free.keys);
+            code = node.child()[nearest % WIDTH];
+            free.push(count);
+        }
+        // The entry below the new top is most often needed next.
+        prefetch(s, node_base, stack.below());
+    }
+    code
+}
+
+/// [`descend`] through packed nodes, as a part of kernels, so that the kernel for the other format stays short.
+struct PackedSteps<'p, 'o, 's, Q, C> {
+    prepared: &'p PreparedRay,
+    node_base: NodeBase<'o>,
+    limits: [f32; 2],
+    code: u32,
+    stack: OpenSingleStack<'s>,
+    count: &'p mut C,
+    query: PhantomData<Q>,
+}
+
+impl<'s, S: Simd, Q: Query, C: Count> Part<S> for PackedSteps<'_, '_, 's, Q, C> {
+    type Output = (u32, OpenSingleStack<'s>);
+    #[inline(always)]
+    fn run(self, s: S) -> Self::Output {
+        let PackedSteps { prepared, node_base, limits, code, mut stack, count, .. } = self;
+        let code = descend::<S, Packed, Q, C>(s, prepared, node_base, limits, code, &mut stack, count);
+        (code, stack)
     }
 }

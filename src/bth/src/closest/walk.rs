@@ -2,7 +2,7 @@
 
 use super::placed::PlacedObject;
 use super::search::Search;
-use crate::bvh::nodes::{Nodes, Packed, Wide, indexed_leaf, prefetch, raw as raw_leaf};
+use crate::bvh::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
@@ -68,15 +68,11 @@ impl Kernel for WalkKernel<'_> {
         let mut code = object.header.root;
         let mut stack = stack.start(code);
         let mut limit = walk.limit(search);
+        let mut unpacked_node = UnpackedNode::NONE;
         loop {
             while code & Child::LEAF_BIT == 0 {
-                let (child, (bits, squared)) = if code & Child::PACKED_BIT == 0 {
-                    let node = Wide::node(node_base, code);
-                    (&node.child, point.children(s, node, limit))
-                } else {
-                    let node = Packed::node(node_base, code);
-                    (&node.child, point.children(s, node, limit))
-                };
+                let node = node(s, node_base, code, &mut unpacked_node);
+                let (child, (bits, squared)) = (&node.child, point.children(s, node, limit));
                 if bits & bits.wrapping_sub(1) == 0 {
                     code = match bits {
                         0 => stack.pop::<Nearest>(limit),
@@ -90,7 +86,7 @@ impl Kernel for WalkKernel<'_> {
                 code = child[nearest % WIDTH];
                 free.push(count);
                 // The entry below the new top is most often needed next.
-                prefetch(s, Wide, node_base, stack.below());
+                prefetch(s, node_base, stack.below());
             }
             let (mut indexed, mut raw) = (None, None);
             if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut indexed) {

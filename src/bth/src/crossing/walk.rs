@@ -10,7 +10,7 @@
 //! That rule moves the ray by infinitely little. What the moved ray crosses, the ray touches, so no crossing is missed by
 //! tests that exclude only what the closed ray certainly does not touch; and a weight or depth of certain sign keeps it.
 
-use crate::bvh::nodes::{indexed_leaf, raw as raw_leaf};
+use crate::bvh::nodes::{UnpackedNode, indexed_leaf, node, raw as raw_leaf};
 use crate::bvh::single_stack::SingleStack;
 use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::{ChildBoxes, FAR};
@@ -19,7 +19,7 @@ use crate::intersect::filter::{TriangleBlock, TriangleFilter, cross};
 use crate::query::Any;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Part, Simd};
-use bth_format::layout::{Child, NONE, TetLeaf, WIDTH};
+use bth_format::layout::{Child, NONE, TetLeaf, WIDTH, WideNode};
 use bth_format::object::ObjectView;
 
 /// 12u: bounds the error of a weight relative to XY, with the roundings of the bound.
@@ -122,7 +122,7 @@ impl AxisRay {
 
     /// The children of a node whose boxes the ray touches, as bits.
     #[inline(always)]
-    fn children<S: Simd, B: ChildBoxes>(&self, s: S, node: &B) -> u32 {
+    fn children<S: Simd>(&self, s: S, node: &WideNode) -> u32 {
         let [i, j, k] = self.filter.axis.map(|axis| axis as usize);
         let far = node.planes(s, k, if self.forward > 0.0 { FAR } else { 0 });
         let mut touched = s.le(s.splat(-self.filter.start), s.mul(far, s.splat(self.forward)));
@@ -184,15 +184,11 @@ impl AxisRay {
         let mut code = object.header.root;
         let mut stack = stack.start(code);
         let mut winding = 0;
+        let mut unpacked_node = UnpackedNode::NONE;
         while code != BOTTOM {
             if code & Child::LEAF_BIT == 0 {
-                let (bits, children) = if code & Child::PACKED_BIT == 0 {
-                    let node = node_base.node(code);
-                    (self.children(s, node), &node.child)
-                } else {
-                    let node = node_base.packed_node(code & !Child::PACKED_BIT);
-                    (self.children(s, node), &node.child)
-                };
+                let node = node(s, node_base, code, &mut unpacked_node);
+                let (bits, children) = (self.children(s, node), &node.child);
                 if bits == 0 {
                     code = stack.pop::<Any>(0.0);
                     continue;

@@ -12,7 +12,7 @@
 
 use super::boxes::{ChildBoxes, FAR};
 use crate::simd::{LANES, Part, Simd};
-use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH};
+use bth_format::layout::{IndexedLeaf, RawLeaf, WIDTH, WideNode};
 
 const _: () = assert!(WIDTH == LANES);
 
@@ -78,13 +78,13 @@ pub(crate) struct PointLanes<S: Simd> {
 }
 
 /// [`PointLanes::children`] as a part of kernels.
-struct Children<'a, S: Simd, B> {
+struct Children<'a, S: Simd> {
     point: &'a PointLanes<S>,
-    node: &'a B,
+    node: &'a WideNode,
     limit: f32,
 }
 
-impl<S: Simd, B: ChildBoxes> Part<S> for Children<'_, S, B> {
+impl<S: Simd> Part<S> for Children<'_, S> {
     type Output = (u32, S::F);
     #[inline(always)]
     fn run(self, s: S) -> (u32, S::F) {
@@ -96,12 +96,12 @@ impl<S: Simd> PointLanes<S> {
     /// The children of a node that may contain a point whose squared distance, scaled, is at most `limit`, as bits, and lower
     /// bounds of the scaled squared distances. Empty slots may be among them.
     #[inline(always)]
-    pub(crate) fn children<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    pub(crate) fn children(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         Children { point: self, node, limit }.inline_or_call(s)
     }
 
     #[inline(always)]
-    fn children_inlined<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+    fn children_inlined(&self, s: S, node: &WideNode, limit: f32) -> (u32, S::F) {
         let mut squared = s.splat(0.0);
         for k in 0..3 {
             let below = s.fma(node.planes(s, k, 0), self.scale, s.splat(-self.origin[k]));

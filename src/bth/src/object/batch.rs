@@ -6,8 +6,7 @@ use super::scratch::Scratch;
 use super::single;
 use super::strategy::{HintUse, MIN_MEASURED_RAYS, Strategy};
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
-use crate::bvh::nodes::{Nodes, Packed, Wide};
-use crate::bvh::packet;
+use crate::bvh::packet::{self, Packets};
 use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::free;
@@ -345,24 +344,8 @@ fn in_packets<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) -> usize {
-    Isa::chosen().run_wide(PacketKernel { object, rays, scratch, sink }).unwrap_or(0)
-}
-
-/// The kernel of [`in_packets`].
-struct PacketKernel<'a, 's, Q: Query> {
-    object: &'a ObjectView<'a>,
-    rays: &'a [Ray],
-    scratch: &'a mut Scratch,
-    sink: &'a mut Sink<'s, Q>,
-}
-
-impl<Q: Query> Kernel for PacketKernel<'_, '_, Q> {
-    type Output = usize;
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> usize {
-        let packets = &mut self.scratch.packets;
-        packet::trace(s, self.object, self.rays, packets, packet::MINIMUM_USE, self.sink).rays
-    }
+    let (scratch, least) = (&mut scratch.packets, packet::MINIMUM_USE);
+    Isa::chosen().run_wide(Packets { object, rays, scratch, least, sink }).map_or(0, |count| count.rays)
 }
 
 /// Traces rays through the BVH: interleaved, or in scalar code one after the other.
@@ -377,19 +360,7 @@ fn through_bvh<Q: Query>(
         return one_by_one(object, rays, &remaining, sink);
     }
     // `run_wide` runs nothing in scalar code, which has returned above.
-    if object.has_packed_nodes() {
-        let _ = Isa::chosen().run_wide(InterleavedKernel {
-            nodes: Packed,
-            object,
-            rays,
-            remaining,
-            scratch,
-            sink,
-        });
-    } else {
-        let _ =
-            Isa::chosen().run_wide(InterleavedKernel { nodes: Wide, object, rays, remaining, scratch, sink });
-    }
+    let _ = Isa::chosen().run_wide(InterleavedKernel { object, rays, remaining, scratch, sink });
 }
 
 /// Implements [`through_bvh`] in scalar code, one ray after the other. Interleaved and packet kernels are not compiled for scalar
@@ -414,8 +385,7 @@ fn one_by_one<Q: Query>(
 }
 
 /// The kernel of [`through_bvh`].
-struct InterleavedKernel<'a, 's, N, Q: Query> {
-    nodes: N,
+struct InterleavedKernel<'a, 's, Q: Query> {
     object: &'a ObjectView<'a>,
     rays: &'a [Ray],
     remaining: RemainingRays<'a, Q>,
@@ -423,14 +393,13 @@ struct InterleavedKernel<'a, 's, N, Q: Query> {
     sink: &'a mut Sink<'s, Q>,
 }
 
-impl<N: Nodes, Q: Query> Kernel for InterleavedKernel<'_, '_, N, Q> {
+impl<Q: Query> Kernel for InterleavedKernel<'_, '_, Q> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let InterleavedKernel { nodes, object, rays, remaining, scratch, sink } = self;
+        let InterleavedKernel { object, rays, remaining, scratch, sink } = self;
         let traversal = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, sink };
-        traversal.run(s, nodes, |leaf, ray, query| {
-            enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done
-        });
+        traversal
+            .run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
     }
 }

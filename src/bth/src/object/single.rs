@@ -1,6 +1,5 @@
 //! Tracing of one object by a single ray.
 
-use crate::bvh::nodes::{Nodes, Packed, Wide};
 use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
@@ -81,35 +80,6 @@ impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        if self.object.has_packed_nodes() {
-            return through_packed_nodes(self);
-        }
-        self.traverse(s, Wide);
-    }
-}
-
-/// Runs a separate kernel for the less common node format, so that the kernel for the other stays short.
-#[cold]
-#[inline(never)]
-fn through_packed_nodes<Q: Query, C: Count>(single: &mut SingleKernel<'_, Q, C>) {
-    Isa::chosen().run(SinglePackedKernel(single));
-}
-
-/// The kernel of [`through_packed_nodes`].
-struct SinglePackedKernel<'a, T>(&'a mut T);
-
-impl<Q: Query, C: Count> Kernel for SinglePackedKernel<'_, SingleKernel<'_, Q, C>> {
-    type Output = ();
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) {
-        self.0.traverse(s, Packed);
-    }
-}
-
-impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
-    /// Prepares the ray and traverses the BVH with nodes in the format `N`.
-    #[inline(always)]
-    fn traverse<S: Simd, N: Nodes>(&mut self, s: S, nodes: N) {
         let SingleKernel { object, ray, query, walked, count, stack } = self;
         let (object, ray) = (*object, *ray);
         let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
@@ -120,6 +90,6 @@ impl<Q: Query, C: Count> SingleKernel<'_, Q, C> {
                 None => return,
             },
         };
-        trace_single(s, nodes, (object, ray), &prepared, *walked, *query, stack, *count, tets);
+        trace_single(s, (object, ray), &prepared, *walked, *query, stack, *count, tets);
     }
 }

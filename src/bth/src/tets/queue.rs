@@ -3,7 +3,7 @@
 use super::lanes::{Extent, Lanes, cross, float, three, word};
 use crate::intersect::prepare;
 use crate::rays::Ray;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{HullFace, NONE, TetFace};
 use zerocopy::{FromBytes, IntoBytes};
 
@@ -76,14 +76,7 @@ impl PreparedQueue {
     /// Appends the rays of the lanes whose bit is set.
     #[inline(always)]
     pub(super) fn push<S: Simd>(&mut self, s: S, bits: u32, lanes: &Lanes<S>) {
-        macro_rules! push {
-            ($values:ident $compress:ident $($i:literal)*) => { $(
-                s.$compress(bits, lanes.$values[$i], sixteen_mut(&mut self.$values[$i], self.end));
-            )* };
-        }
-        push!(words compress 0 1 2 3 4 5 6 7 8);
-        push!(floats compress_f 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
-        self.end += bits.count_ones() as usize;
+        s.call(Push { queue: self, bits, lanes });
     }
 
     /// Moves rays from the queue to lanes whose bit is set in `idle`, until no such lane or no ray is left. Returns the bits of
@@ -108,6 +101,40 @@ impl PreparedQueue {
     }
 }
 
+/// [`PreparedQueue::push`] as a part of kernels, of which there are three calls.
+struct Push<'a, S: Simd> {
+    queue: &'a mut PreparedQueue,
+    bits: u32,
+    lanes: &'a Lanes<S>,
+}
+
+impl<S: Simd> Part<S> for Push<'_, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run(self, s: S) {
+        let Push { queue, bits, lanes } = self;
+        macro_rules! push {
+            ($values:ident $compress:ident $($i:literal)*) => { $(
+                s.$compress(bits, lanes.$values[$i], sixteen_mut(&mut queue.$values[$i], queue.end));
+            )* };
+        }
+        push!(words compress 0 1 2 3 4 5 6 7 8);
+        push!(floats compress_f 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+        queue.end += bits.count_ones() as usize;
+    }
+}
+
+/// [`PreparedWalks::of_rays`] as a part of kernels: the mask, the rays and the indices of sixteen.
+struct OfRays<'a, S: Simd>(S::M, &'a [Ray], S::U);
+
+impl<S: Simd> Part<S> for OfRays<'_, S> {
+    type Output = PreparedWalks<S>;
+    #[inline(always)]
+    fn run(self, s: S) -> PreparedWalks<S> {
+        PreparedWalks::prepare(s, self.0, self.1, self.2)
+    }
+}
+
 /// Slack of comparisons of `depth` with bounds of t.
 #[inline(always)]
 fn slack<S: Simd>(s: S, depth: S::F) -> S::F {
@@ -127,6 +154,12 @@ impl<S: Simd> PreparedWalks<S> {
     /// Computes the constants of projection of the rays with indices `ray` in `rays`.
     #[inline(always)]
     fn of_rays(s: S, m: S::M, rays: &[Ray], ray: S::U) -> Self {
+        s.call(OfRays(m, rays, ray))
+    }
+
+    /// Implements [`Self::of_rays`].
+    #[inline(always)]
+    fn prepare(s: S, m: S::M, rays: &[Ray], ray: S::U) -> Self {
         let [ox, oy, oz, tmin, dx, dy, dz, tmax] = prepare::gather_rays(s, m, rays, ray);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let size = three!(|k| s.abs(d[k]));

@@ -19,8 +19,8 @@ pub(crate) mod ray_group;
 pub(crate) mod runs;
 pub(crate) mod segment_box;
 pub(crate) mod single_rays;
-#[cfg(test)]
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64", target_feature = "simd128")))]
 mod tests;
 pub(crate) mod traverse;
 
-pub(crate) use runs::{MINIMUM_USE, PacketScratch, trace};
+pub(crate) use runs::{MINIMUM_USE, PacketScratch, Packets};

@@ -11,7 +11,7 @@ use super::traverse::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
 use crate::query::Query;
 use crate::query::sink::Sink;
 use crate::rays::Ray;
-use crate::simd::{LANES, Part, Simd};
+use crate::simd::{Kernel, LANES, Part, Simd};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectBounds;
 use bth_format::object::ObjectView;
@@ -53,10 +53,28 @@ pub(crate) struct PacketCount {
     pub(crate) poor: usize,
 }
 
+/// Kernel that traces the coherent rays of a batch in packets; see [`trace`].
+pub(crate) struct Packets<'a, 's, Q: Query> {
+    pub object: &'a ObjectView<'a>,
+    pub rays: &'a [Ray],
+    pub scratch: &'a mut PacketScratch,
+    /// The least use of packets for which they are made.
+    pub least: MinimumUse,
+    pub sink: &'a mut Sink<'s, Q>,
+}
+
+impl<Q: Query> Kernel for Packets<'_, '_, Q> {
+    type Output = PacketCount;
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> PacketCount {
+        trace(s, self.object, self.rays, self.scratch, self.least, self.sink)
+    }
+}
+
 /// Traces the coherent rays of a batch in packets, and stores the answers of those that hit something. The indices of the other rays
 /// are left in `scratch.rest`, unless no packets were tried; then the returned count is 0.
 #[inline(always)]
-pub(crate) fn trace<S: Simd, Q: Query>(
+fn trace<S: Simd, Q: Query>(
     s: S,
     object: &ObjectView<'_>,
     rays: &[Ray],

@@ -155,6 +155,7 @@ mod tests {
 
     impl Kernel for Children<'_> {
         type Output = [u64; WIDTH];
+        #[inline(always)]
         fn run<S: Simd>(self, s: S) -> [u64; WIDTH] {
             let Children(rays, node, tested) = self;
             let mut groups = [RayGroup::vacant(s); GROUPS];
@@ -211,7 +212,8 @@ mod tests {
             }
             let tested = (0..rays.len()).fold(0u64, |tested, i| tested | u64::from(unit() > 0.5) << i);
             for isa in Isa::ALL {
-                let found = isa.run(Children(&rays, &node, tested));
+                // There are no packets in scalar code.
+                let Ok(found) = isa.run_wide(Children(&rays, &node, tested)) else { continue };
                 for (slot, &found) in found.iter().enumerate() {
                     let [lower, upper] = [0, 1].map(|end| [0, 1, 2].map(|k| node.bounds[k][end][slot]));
                     for (i, ray) in rays.iter().enumerate() {
@@ -231,6 +233,6 @@ mod tests {
                 }
             }
         }
-        assert!(met > 1000 && missed > 1000, "{met}, {missed}");
+        assert!(Isa::best() == Isa::Scalar || met > 1000 && missed > 1000, "{met}, {missed}");
     }
 }

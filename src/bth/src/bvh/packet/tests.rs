@@ -3,12 +3,12 @@
 mod height_field;
 
 use self::height_field::HeightField;
-use crate::bvh::packet::runs::{self as packets, MINIMUM_USE, MinimumUse, PacketCount, PacketScratch};
+use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
 use crate::object::single;
 use crate::query::sink::Sink;
 use crate::query::{Any, Nearest, Query};
 use crate::rays::{Hit, Ray};
-use crate::simd::{Isa, Kernel, Simd};
+use crate::simd::Isa;
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use bth_random::Rng;
@@ -16,21 +16,9 @@ use bth_random::Rng;
 /// Packets are made of all coherent rays, however few take part in a step.
 const ALWAYS: MinimumUse = MinimumUse { coherent: 0, short: 0 };
 
-/// Kernel that traces the packets of a batch.
-struct PacketBatch<'a, 'b, Q: Query> {
-    object: &'a ObjectView<'a>,
-    rays: &'a [Ray],
-    scratch: &'a mut PacketScratch,
-    least: MinimumUse,
-    sink: Sink<'b, Q>,
-}
-
-impl<Q: Query> Kernel for PacketBatch<'_, '_, Q> {
-    type Output = PacketCount;
-    #[inline(always)]
-    fn run<S: Simd>(mut self, s: S) -> PacketCount {
-        packets::trace(s, self.object, self.rays, self.scratch, self.least, &mut self.sink)
-    }
+/// The instruction sets of this machine for which packets are compiled.
+fn isas() -> impl Iterator<Item = Isa> {
+    Isa::ALL.into_iter().filter(|isa| *isa != Isa::Scalar && isa.is_available())
 }
 
 fn packed<Q: Query>(
@@ -54,8 +42,9 @@ fn packed_in<Q: Query>(
     least: MinimumUse,
     answers: &mut [Q::Answer],
 ) -> PacketCount {
-    let sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
-    let count = isa.run(PacketBatch { object, rays, scratch, least, sink });
+    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
+    let kernel = Packets { object, rays, scratch, least, sink: &mut sink };
+    let Ok(count) = isa.run_wide(kernel) else { panic!("{isa} has packets") };
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
     count
 }
@@ -64,18 +53,20 @@ fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.triangle]
 }
 
+/// The answers of a single ray.
+fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
+    let (mut hit, mut found) = (Hit::MISS, false);
+    single::trace::<Nearest, ()>(object, ray, NONE, 0, &mut (), &mut hit);
+    single::trace::<Any, ()>(object, ray, NONE, 0, &mut (), &mut found);
+    (hit, found)
+}
+
 /// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
 fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
-    let alone = |ray: &Ray| {
-        let (mut hit, mut found) = (Hit::MISS, false);
-        single::trace::<Nearest, ()>(&object, ray, NONE, 0, &mut (), &mut hit);
-        single::trace::<Any, ()>(&object, ray, NONE, 0, &mut (), &mut found);
-        (hit, found)
-    };
-    let expected: Vec<(Hit, bool)> = rays.iter().map(alone).collect();
-    for isa in Isa::ALL {
+    let expected: Vec<(Hit, bool)> = rays.iter().map(|ray| alone(&object, ray)).collect();
+    for isa in isas() {
         let mut hits = vec![Hit::MISS; rays.len()];
         let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
         let mut found = vec![false; rays.len()];
@@ -176,8 +167,7 @@ fn views_from_one_point_are_traced_to_the_same_bits() {
     let [(count, hits), _] = check(&surface, &rays, ALWAYS);
     assert!(count.coherent > 60 && hits > 1000, "{count:?}, {hits}");
     // The numbers of triangles that a packet hits include at most half of the hit cache, more than half, and more than it holds.
-    let mut all = vec![Hit::MISS; rays.len()];
-    packed::<Nearest>(Isa::Scalar, &surface.view(), &rays, ALWAYS, &mut all);
+    let all: Vec<Hit> = rays.iter().map(|ray| alone(&surface.view(), ray).0).collect();
     let mut runs = [0; 3];
     for run in all.chunks(64) {
         let different: std::collections::BTreeSet<u32> =
@@ -269,7 +259,7 @@ fn nothing_of_a_batch_is_left_for_the_next() {
         })
         .collect();
     let before = bundles(&surface, 1.0, false, 14);
-    for isa in Isa::ALL {
+    for isa in isas() {
         let mut scratch = PacketScratch::default();
         let mut hits = vec![Hit::MISS; before.len()];
         packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, &mut hits);

@@ -13,7 +13,7 @@ use super::leaf_mesh::Leaf;
 use super::points::{ProjectedPoints, RelativePoints};
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::{FEW_OF_PACKET, SingleRays};
-use crate::bvh::nodes::{self, Wide, prefetch};
+use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
 use crate::query::Query;
@@ -182,7 +182,7 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
                 }
                 let node = object.node(entry.parent);
                 code = node.child[entry.slot as usize % WIDTH];
-                prefetch(s, Wide, object.node_base(), code);
+                prefetch(s, object.node_base(), code);
                 // The rays are tested against the box only here, because hits since the parent was entered may have shortened them.
                 if !H::MIXED_OCTANTS {
                     mask &= meeting(s, bounds, groups, mask, node, entry.slot);

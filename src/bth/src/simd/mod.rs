@@ -8,7 +8,7 @@
 //!
 //! The module is public for the compiler alone, and hidden: nothing of it but [`Isa`] is part of the library's interface.
 //!
-//! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64 ([`crate::intersect::exact`]).
+//! The f32 arithmetic of kernels only *excludes* nodes and triangles; hits are decided in f64 (`crate::intersect::exact`).
 //! Answers therefore do not depend on whether `fma` rounds once or twice.
 
 #[cfg(target_arch = "x86_64")]

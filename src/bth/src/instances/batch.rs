@@ -168,7 +168,7 @@ impl World {
             if from.is_none() {
                 return trace(None, scratch);
             }
-            let key = (std::ptr::from_ref(self).addr(), HintUse::Free.kind(any));
+            let key = (std::ptr::from_ref(self).addr(), HintUse::StartInstance.kind(any));
             object::by_hint(key, rays, Strategy::Bvh, scratch, |strategy, scratch| {
                 trace(from.filter(|_| strategy == Strategy::Hinted), scratch);
             });

@@ -19,12 +19,14 @@ pub(crate) enum Strategy {
 pub(crate) enum HintUse {
     /// Walks through tetrahedra.
     Tets,
-    /// Look-ups of free directions; in scenes, the visit of the instance on which a ray starts before all others.
+    /// Look-ups of free directions.
     Free,
+    /// The visit, in scenes, of the instance on which a ray starts before all others.
+    StartInstance,
 }
 
 impl HintUse {
-    /// The number of a kind of rays, below 4: what hints are used for, and whether any hit ends the ray.
+    /// The number of a kind of rays, below [`StrategyTable::KINDS`]: what hints are used for, and whether any hit ends the ray.
     pub(crate) fn kind(self, any: bool) -> usize {
         2 * self as usize + usize::from(any)
     }
@@ -42,7 +44,7 @@ const FIRST_INTERVAL: u32 = 32;
 /// Greatest number of batches until the slower strategy is measured again.
 const LAST_INTERVAL: u32 = 256;
 
-/// The measurements for one kind of rays through one object.
+/// The measurements for one kind of rays through one object or scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StrategyChoice {
     /// Seconds per ray of each strategy, in the order of [`Strategy`]; `None` before the first measurement.
@@ -112,17 +114,19 @@ impl StrategyChoice {
     }
 }
 
-/// The choices of one thread, as a hash table by object and kind of rays. A new key replaces the key that has the same row.
+/// The choices of one thread, as a hash table by object or scene and kind of rays. A new key replaces the key that has the same row.
 #[derive(Debug)]
 pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 
 impl StrategyTable {
     const ROWS: usize = 32;
+    /// An upper bound on the kinds of rays, and the alignment of the addresses of objects and scenes, so that keys are distinct.
+    const KINDS: usize = 8;
 
-    /// The choice for a kind of rays, below 4, through the object with the address `object`. If another object had this address
-    /// before, a few batches may take the slower strategy.
-    pub(crate) fn of(&mut self, object: usize, kind: usize) -> &mut StrategyChoice {
-        let key = (object / 8).wrapping_mul(4).wrapping_add(kind);
+    /// The choice for a kind of rays ([`HintUse::kind`]) through the object or scene with the given address. If another one had this
+    /// address before, a few batches may take the slower strategy.
+    pub(crate) fn of(&mut self, address: usize, kind: usize) -> &mut StrategyChoice {
+        let key = (address / Self::KINDS).wrapping_mul(Self::KINDS).wrapping_add(kind);
         let row = (key.wrapping_mul(0x9e37_79b9) >> 16) % Self::ROWS;
         let (stored_key, choice) = &mut self.0[row];
         if *stored_key != key {

@@ -1,6 +1,6 @@
 //! Files with materials, textures, images and vertex colors, and their faults.
 
-use super::valid::{CORNERS, bounds, indexed, lines};
+use super::valid::{CORNERS, indexed, lines, one_triangle};
 use super::{Case, Editor, Seal, valid};
 use bth_compile::write::{FileBuilder, GroupParts, ObjectParts, Source, images, object};
 use bth_format::file::hash128;
@@ -69,16 +69,7 @@ pub(super) fn materials() -> Vec<u8> {
         textures: vec![texture(RED, [WRAP_CLAMP; 2], FILTER_NEAREST)],
         ..Materials::default()
     };
-    let parts = ObjectParts {
-        bounds: Some(bounds(&CORNERS)),
-        root: Child::Indexed(0).code(),
-        triangles: 1,
-        lines: &lines,
-        triangle_ids: &[0],
-        groups: Some(&groups),
-        materials: Some(&of_leaf),
-        ..ObjectParts::default()
-    };
+    let parts = ObjectParts { groups: Some(&groups), materials: Some(&of_leaf), ..one_triangle(&lines) };
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, &parts).unwrap();
     object(&mut builder, 1, &ObjectParts { materials: Some(&of_other), ..parts }).unwrap();
@@ -124,15 +115,10 @@ pub(super) fn second_uvs() -> Vec<u8> {
         uvs: &uvs,
     };
     let parts = ObjectParts {
-        bounds: Some(bounds(&CORNERS)),
-        root: Child::Indexed(0).code(),
-        triangles: 1,
-        lines: &lines,
-        triangle_ids: &[0],
         source: Some(source),
         groups: Some(&groups),
         materials: Some(&looks),
-        ..ObjectParts::default()
+        ..one_triangle(&lines)
     };
     let without = Materials { second_corners: Vec::new(), second_uvs: Vec::new(), ..looks.clone() };
     let mut builder = FileBuilder::new();

@@ -1,6 +1,6 @@
 //! Files with scene sections: valid ones, and those that break one rule each.
 
-use super::valid::{CORNERS, bounds, indexed, lines};
+use super::valid::{CORNERS, indexed, lines, one_triangle};
 use super::{Case, Editor, Seal};
 use bth_compile::write::{DeformerParts, FileBuilder, ObjectParts, SceneParts, object, scene};
 use bth_format::layout::*;
@@ -106,14 +106,7 @@ fn moving() -> SceneParts {
 /// A file with a number of equal objects and a scene.
 fn file(objects: u32, scene_parts: &SceneParts) -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
-    let parts = ObjectParts {
-        bounds: Some(bounds(&CORNERS)),
-        root: Child::Indexed(0).code(),
-        triangles: 1,
-        lines: &lines,
-        triangle_ids: &[0],
-        ..ObjectParts::default()
-    };
+    let parts = one_triangle(&lines);
     let mut builder = FileBuilder::new();
     (0..objects).for_each(|i| object(&mut builder, i, &parts).expect("the parts fit together"));
     scene(&mut builder, scene_parts).expect("each section once");

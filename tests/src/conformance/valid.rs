@@ -106,18 +106,22 @@ fn nothing_to_hit() -> Vec<u8> {
     })
 }
 
-fn triangle() -> Vec<u8> {
-    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
-    let source = Source { positions: &CORNERS, triangles: &[[0, 1, 2]], ..Source::default() };
-    let parts = ObjectParts {
+/// An object of the one triangle [`CORNERS`], whose leaf is all of its lines.
+pub(super) fn one_triangle(lines: &[CacheLine]) -> ObjectParts<'_> {
+    ObjectParts {
         bounds: Some(bounds(&CORNERS)),
         root: Child::Indexed(0).code(),
         triangles: 1,
-        lines: &lines,
+        lines,
         triangle_ids: &[0],
-        source: Some(source),
         ..ObjectParts::default()
-    };
+    }
+}
+
+fn triangle() -> Vec<u8> {
+    let lines = lines(indexed(&[CORNERS], 0).as_bytes());
+    let source = Source { positions: &CORNERS, triangles: &[[0, 1, 2]], ..Source::default() };
+    let parts = ObjectParts { source: Some(source), ..one_triangle(&lines) };
     let mut builder = FileBuilder::new();
     object(&mut builder, 0, &parts).unwrap();
     builder.provenance("{\"tool\":\"conformance\"}".into()).unwrap();
@@ -296,14 +300,7 @@ fn groups() -> Vec<u8> {
 
 fn two_objects() -> Vec<u8> {
     let lines = lines(indexed(&[CORNERS], 0).as_bytes());
-    let parts = ObjectParts {
-        bounds: Some(bounds(&CORNERS)),
-        root: Child::Indexed(0).code(),
-        triangles: 1,
-        lines: &lines,
-        triangle_ids: &[0],
-        ..ObjectParts::default()
-    };
+    let parts = one_triangle(&lines);
     let mut builder = FileBuilder::new();
     object(&mut builder, 1, &parts).unwrap();
     object(&mut builder, 0, &parts).unwrap();

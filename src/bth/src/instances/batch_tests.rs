@@ -93,6 +93,23 @@ fn rays(rng: &mut Rng, transforms: &[Affine], count: usize) -> Vec<Ray> {
         .collect()
 }
 
+/// The answers of a batch that uses its hints, which [`World::nearest`] and [`World::any`] do only where that was measured to be faster.
+fn traced(
+    world: &World,
+    objects: &Objects,
+    rays: &[Ray],
+    from: Option<&[PrimitiveRef]>,
+) -> (Vec<Hit>, Vec<bool>) {
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    object::with_scratch(|scratch| {
+        let object_rays = ObjectRays::default();
+        world.run(objects, rays, from, &mut SceneNearest { rays, hits: &mut hits, scratch, object_rays });
+        let object_rays = ObjectRays::default();
+        world.run(objects, rays, from, &mut SceneAny { rays, found: &mut found, scratch, object_rays });
+    });
+    (hits, found)
+}
+
 #[test]
 fn top_level_and_hints_do_not_change_results() {
     let mut rng = Rng::new(11);
@@ -111,10 +128,7 @@ fn top_level_and_hints_do_not_change_results() {
             })
             .collect();
         for from in [None, Some(from.as_slice())] {
-            let mut hits = vec![Hit::MISS; rays.len()];
-            let mut found = vec![false; rays.len()];
-            world.nearest(&objects, &rays, from, &mut hits);
-            world.any(&objects, &rays, from, &mut found);
+            let (hits, found) = traced(&world, &objects, &rays, from);
             for (i, ray) in rays.iter().enumerate() {
                 let expected = nearest_by_loop(&world, &file, ray);
                 assert_eq!(hits[i], expected, "case {case}, ray {i}: {ray:?}");
@@ -133,6 +147,26 @@ fn top_level_and_hints_do_not_change_results() {
         hit_count > ray_count / 3 && far_hits > 500,
         "{hit_count} of {ray_count} hit, {far_hits} from afar"
     );
+}
+
+/// The first batches of a scene take turns with and without their hints, whatever is measured.
+#[test]
+fn batches_that_are_measured_with_and_without_hints_have_the_same_answers() {
+    let mut rng = Rng::new(13);
+    let file = File::from_bytes(FILES[1]).unwrap();
+    let objects = Objects::of_file(file.clone());
+    let (world, transforms) = world(&file, &mut rng, 40);
+    let rays = rays(&mut rng, &transforms, 300);
+    let start = |i: usize| PrimitiveRef { instance: i as u32 % 40, triangle: i as u32 % 3 };
+    let from: Vec<PrimitiveRef> = (0..rays.len()).map(start).collect();
+    let expected = traced(&world, &objects, &rays, None);
+    for batch in 0..12 {
+        let mut answers = (vec![Hit::MISS; rays.len()], vec![true; rays.len()]);
+        world.nearest(&objects, &rays, Some(&from), &mut answers.0);
+        world.any(&objects, &rays, Some(&from), &mut answers.1);
+        assert_eq!(answers, expected, "batch {batch}");
+    }
+    assert!(expected.1.iter().filter(|found| **found).count() > 50);
 }
 
 #[test]
@@ -237,9 +271,7 @@ fn a_single_instance_in_world_space_has_the_same_hits_with_and_without_the_top_l
             .iter()
             .map(|_| PrimitiveRef { instance: rng.below(6) as u32, triangle: rng.below(3) as u32 })
             .collect();
-        let (mut hits, mut found) = (vec![Hit::MISS; count], vec![false; count]);
-        world.nearest(&objects, &rays, Some(&from), &mut hits);
-        world.any(&objects, &rays, Some(&from), &mut found);
+        let (hits, found) = traced(&world, &objects, &rays, Some(&from));
         let scene = Scene::with_instances(file, world);
         let (mut sole_hits, mut sole_found) = (vec![Hit { t: 7.0, ..Hit::MISS }; count], vec![true; count]);
         scene.batch(&rays).from(&from[..]).nearest(&mut sole_hits);

@@ -1,7 +1,7 @@
 //! Batches of rays, with and without hints, give the bits of the same rays traced one at a time, on every instruction set.
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene};
+use bth::{Accept, Hinted, HitStreams, Isa, RayStreams, Scene, SceneBuilder};
 use bth_compile::Silent;
 use bth_compile::free::{FreeOptions, KeepFree};
 use bth_compile::pipeline::{CompileOptions, Structure, compile};
@@ -200,6 +200,83 @@ fn free_directions_on_a_grid_and_far_from_the_origin_change_no_answer() {
     check_free_directions(&torus_knot(800), on_grid);
     let far = scaled(torus_knot(800), 1.0, [300.0, -700.0, 1100.0]);
     check_free_directions(&far, CompileOptions::default());
+}
+
+/// A scene of some instances of an object with free directions, moved, turned, mirrored, scaled and sheared, of which several overlap; and
+/// their transforms.
+fn instances_of(object: &Scene, count: usize, seed: u64) -> (Scene, Vec<[f32; 12]>) {
+    let mut rng = Rng::new(seed);
+    let mut number = |size: f32| (2.0 * rng.unit_f64() as f32 - 1.0) * size;
+    let transforms: Vec<[f32; 12]> = (0..count)
+        .map(|i| {
+            let scale = [1.0, -0.3, 40.0, 1e-25][i % 4];
+            let mut rows = [0.0; 12];
+            for k in 0..3 {
+                (0..3).for_each(|j| {
+                    rows[4 * k + j] = scale * (number(0.4) + if j == (k + i) % 3 { 1.0 } else { 0.0 })
+                });
+                rows[4 * k + 3] = number([3.0, 3.0, 60.0, 1e-24][i % 4]);
+            }
+            rows
+        })
+        .collect();
+    let mut builder = SceneBuilder::new();
+    let object = builder.add(object);
+    for transform in &transforms {
+        builder.instance(object, transform).expect("an object");
+    }
+    builder.commit().expect("transforms that can be inverted");
+    (builder.into_scene(), transforms)
+}
+
+/// The ray in world space whose transform is about this ray of an object.
+fn placed(ray: &Ray, rows: &[f32; 12]) -> Ray {
+    let times =
+        |v: [f32; 3], k: usize| (0..3).map(|j| f64::from(rows[4 * k + j]) * f64::from(v[j])).sum::<f64>();
+    let origin = [0, 1, 2].map(|k| (times(ray.origin, k) + f64::from(rows[4 * k + 3])) as f32);
+    Ray { origin, direction: [0, 1, 2].map(|k| times(ray.direction, k) as f32), ..*ray }
+}
+
+/// Rays that start on instances have the same bits with and without hints, right ones and wrong ones.
+#[test]
+fn free_directions_of_instances_change_no_answer() {
+    let _turn = turn();
+    let model = torus_knot(2000);
+    let corners: Vec<[[f32; 3]; 3]> = (0..model.triangles.len()).map(|i| model.corners(i)).collect();
+    let object = with_free_directions(&model, CompileOptions::default());
+    let mut rng = Rng::new(5);
+    // One visible instance has a way of its own.
+    for count in [1, 3, 24] {
+        let (scene, transforms) = instances_of(&object, count, 21 + count as u64);
+        let (mut rays, mut from) = (Vec::new(), Vec::new());
+        for (ray, start) in rays_off_the_surface(&corners, 12_000, 22) {
+            let instance = rng.below(count as u64) as u32;
+            rays.push(placed(&ray, &transforms[instance as usize]));
+            let wrong = rng.below(10) == 0;
+            let hint = if wrong { rng.below(count as u64 + 2) as u32 } else { instance };
+            from.push(PrimitiveRef { instance: hint, ..start });
+        }
+        let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
+        assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 1000);
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            isa.choose().expect("an instruction set that is available");
+            // Hints are used although they may be slower.
+            Hinted::Tets.choose();
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let mut any = vec![false; rays.len()];
+            for first in (0..rays.len()).step_by(5000) {
+                let part = first..rays.len().min(first + 5000);
+                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).nearest(&mut hits[part.clone()]);
+                scene.batch(&rays[part.clone()]).from(&from[part.clone()]).any(&mut any[part]);
+            }
+            for (i, (ray, from)) in rays.iter().zip(&from).enumerate() {
+                assert_eq!(bits(&hits[i]), bits(&expected[i]), "{isa}, {count}: {ray:?} from {from:?}");
+                assert_eq!(any[i], expected[i].is_hit(), "any hit, {isa}, {count}: {ray:?} from {from:?}");
+            }
+        }
+    }
+    Hinted::Measured.choose();
+    Isa::best().choose().expect("the best is available");
 }
 
 fn scaled(mut model: Model, scale: f32, offset: [f32; 3]) -> Model {

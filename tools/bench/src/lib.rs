@@ -1,7 +1,7 @@
 //! Measures bth beside other CPU ray tracers on identical rays.
 //!
 //! `rays` makes the seeded ray sets, `structures` and `rivals` the [`tracer::Contender`]s. `speed`, `compare`, `accuracy`, `load`,
-//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `instances`, `refit` and `animation` are the measurements; `output` writes their
+//! `stress`, `inside`, `costs`, `paper`, `quality`, `scenes`, `hints`, `instances`, `refit` and `animation` are the measurements; `output` writes their
 //! records as Markdown, JSON and SVG, and `records` keeps the figures of `benchmarks/`.
 #![warn(missing_docs)]
 
@@ -12,6 +12,7 @@ pub mod chart;
 pub mod clock;
 pub mod compare;
 pub mod costs;
+pub mod hints;
 pub mod inside;
 pub mod instances;
 pub mod isa;

@@ -3,18 +3,19 @@
 
 use super::World;
 use super::enter_object::ObjectRays;
+use super::free_starts::{FreeStarts, Starts};
 use super::packets::TopLevelPackets;
 use super::placement::Placement;
 use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
-use crate::free;
 use crate::object::{self, HintUse, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{self, Query, Steps, better};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
+use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
 use std::cell::RefCell;
 
@@ -43,6 +44,8 @@ struct ActiveRays {
     active: Vec<u32>,
     /// The visits to be traced before the rays advance.
     visits: VisitQueue,
+    /// The instances that rays do not meet although they start there.
+    free_starts: FreeStarts,
 }
 
 thread_local! {
@@ -68,23 +71,24 @@ impl Kernel for StartKernel<'_> {
             batch,
             first,
             count,
-            active_rays: ActiveRays { packets, traversals, active, visits },
+            active_rays: ActiveRays { packets, traversals, active, visits, free_starts },
         } = self;
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
-        // A ray visits the instance on which it starts first, because a hit there shortens it at little cost.
-        let start = |index: usize| world.start_instance(batch.from, first + index);
-        if batch.from.is_some() {
-            let starts = active.iter().filter_map(|&index| Some((index, start(index as usize)?)));
-            visits.all.extend(starts.map(|(index, instance)| Visit { ray: first as u32 + index, instance }));
-            // If no other instance is visible, such a ray needs no traversal.
-            if world.has_single_visible() {
-                active.retain(|&index| start(index as usize).is_none());
-            }
+        if let (Some(from), true) = (batch.from, world.has_single_visible()) {
+            // No other instance is visible, so a ray that starts on it needs no traversal.
+            active.retain(|&index| {
+                let instance = world.start_instance(from[first + index as usize]);
+                if let Some(instance) = instance
+                    && free_starts.not_met(index as usize) == NONE
+                {
+                    visits.all.push(Visit { ray: first as u32 + index, instance });
+                }
+                instance.is_none()
+            });
         }
-        // The traversal skips the instance that has been visited first.
-        traversals.start(s, top, rays, active, start);
+        traversals.start(s, top, rays, active, |index| free_starts.not_met(index));
     }
 }
 
@@ -106,12 +110,16 @@ impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
             batch,
             query,
             first,
-            active_rays: ActiveRays { packets, traversals, active, visits },
+            active_rays: ActiveRays { packets, traversals, active, visits, free_starts },
         } = self;
         let world = batch.world;
         let tmax = |index: usize| query.tmax(first + index);
         packets.advance(&batch.rays[first..], tmax, |index, instance| {
-            visits.all.push(Visit { ray: (first + index) as u32, instance });
+            let enters = free_starts.not_met(index) != instance;
+            if enters {
+                visits.all.push(Visit { ray: (first + index) as u32, instance });
+            }
+            enters
         });
         traversals.advance(s, &world.top, active, tmax, (first as u32, &mut visits.all));
     }
@@ -127,7 +135,7 @@ impl World {
         hits: &mut [Hit],
     ) {
         hits.fill(Hit::MISS);
-        self.by_hints(rays.len(), from, false, |from, scratch| {
+        self.by_hints(objects, from, false, |from, scratch| {
             let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -142,7 +150,7 @@ impl World {
         found: &mut [bool],
     ) {
         found.fill(false);
-        self.by_hints(rays.len(), from, true, |from, scratch| {
+        self.by_hints(objects, from, true, |from, scratch| {
             let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -155,24 +163,33 @@ impl World {
         (query.best, query.steps)
     }
 
-    /// Calls `trace` with the hints of a batch, or with none where it was measured to be faster so through this scene: rays that visit
-    /// the instance on which they start before all others go in no packets of the top level.
+    /// Calls `trace` with the hints of a batch, or with none where they are of no use to it or it was measured to be faster so through
+    /// this scene: most rays may leave in directions that are not free, or meet nothing of their instance anyway.
     fn by_hints(
         &self,
-        rays: usize,
+        objects: &Objects,
         from: Option<&[PrimitiveRef]>,
         any: bool,
         trace: impl FnOnce(Option<&[PrimitiveRef]>, &mut Scratch),
     ) {
+        let hints = from.filter(|from| self.has_use_for(objects, from));
         object::with_scratch(|scratch| {
-            if from.is_none() {
-                return trace(None, scratch);
-            }
+            let Some(from) = hints else { return trace(None, scratch) };
             let key = (std::ptr::from_ref(self).addr(), HintUse::StartInstance.kind(any));
-            object::by_hint(key, rays, Strategy::Bvh, scratch, |strategy, scratch| {
-                trace(from.filter(|_| strategy == Strategy::Hinted), scratch);
+            object::by_hint(key, from.len(), Strategy::Bvh, scratch, |strategy, scratch| {
+                trace(hints.filter(|_| strategy == Strategy::Hinted), scratch);
             });
         });
+    }
+
+    /// Whether hints are of use to any ray of a sample of a batch.
+    fn has_use_for(&self, objects: &Objects, from: &[PrimitiveRef]) -> bool {
+        /// One ray of so many is looked at.
+        const EVERY: usize = 16;
+        let mut starts = Starts::new(self, objects);
+        let mut instances = from.iter().step_by(EVERY);
+        instances
+            .any(|from| starts.instance(*from).is_some() && (starts.is_of_use || self.has_single_visible()))
     }
 
     fn run(
@@ -189,6 +206,7 @@ impl World {
         for first in (0..rays.len()).step_by(CHUNK) {
             let end = (first + CHUNK).min(rays.len());
             active_rays.visits.all.clear();
+            active_rays.free_starts.find(&batch, first..end);
             isa.run(StartKernel { batch: &batch, first, count: end - first, active_rays: &mut active_rays });
             self.trace(&batch, query, &mut active_rays.visits);
             while !active_rays.active.is_empty() || !active_rays.packets.is_empty() {
@@ -199,10 +217,9 @@ impl World {
         ACTIVE_RAYS.set(active_rays);
     }
 
-    /// The instance on which a ray starts, if it is given and visible.
-    fn start_instance(&self, from: Option<&[PrimitiveRef]>, ray: usize) -> Option<u32> {
-        let instance = from?[ray].instance;
-        self.placements.get(instance as usize)?.is_some().then_some(instance)
+    /// The instance on which a ray starts, if it is visible.
+    fn start_instance(&self, from: PrimitiveRef) -> Option<u32> {
+        self.placements.get(from.instance as usize)?.is_some().then_some(from.instance)
     }
 
     /// The placement of an instance that is in the top level.
@@ -213,20 +230,25 @@ impl World {
 
     /// Traces all queued visits, object by object, and empties the queue.
     fn trace(&self, batch: &SceneBatch<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
-        // Neighbouring rays through one instance remain coherent in its space.
-        visits.sort(self.placements.len());
-        let mut trace = |object: u32, visits: &[Visit]| {
+        self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);
             query.trace(batch, object, visits);
-        };
+        });
+        visits.all.clear();
+    }
+
+    /// Calls `work` with objects and all queued visits of their instances, sorted by instance. An object may come several times.
+    pub(super) fn by_object(&self, visits: &mut VisitQueue, mut work: impl FnMut(u32, &[Visit])) {
+        // Neighbouring rays through one instance remain coherent in its space.
+        visits.sort(self.placements.len());
         let VisitQueue { sorted, short_runs, gathered, .. } = &mut *visits;
         short_runs.clear();
         let mut first = 0;
         for run in sorted.chunk_by(|a, b| a.instance == b.instance) {
             let (object, end) = (self.placement(run[0].instance).object(), first + run.len());
             if run.len() >= MIN_RAYS_PER_INSTANCE {
-                trace(object, run);
+                work(object, run);
             } else {
                 short_runs.push(u64::from(object) << 32 | first as u64);
             }
@@ -239,14 +261,12 @@ impl World {
                 let visits = &sorted[run as u32 as usize..];
                 gathered.extend(visits.iter().take_while(|visit| visit.instance == visits[0].instance));
             }
-            trace((runs[0] >> 32) as u32, gathered);
+            work((runs[0] >> 32) as u32, gathered);
         }
-        visits.all.clear();
     }
 }
 
-/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene. Visits
-/// whose ray leaves its triangle in a free direction are left out.
+/// Traces visits of one object, given with their rays in its space, and merges the answers into those of the rays of the scene.
 fn trace_visits<Q: Query>(
     batch: &SceneBatch<'_>,
     object: &ObjectView<'_>,
@@ -256,14 +276,7 @@ fn trace_visits<Q: Query>(
 ) {
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
     let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
-    let (rays, hints) = (&object_rays.rays, object_rays.hints());
-    let Some(from) = hints.filter(|_| free::is_known(object)) else {
-        return object::trace_batch(object, rays, hints, scratch, &mut sink);
-    };
-    object::without_free::<Q>(object, rays, from, scratch, |rest, scratch| match rest {
-        None => object::trace_batch(object, rays, hints, scratch, &mut sink),
-        Some(rest) => object::trace_rest(object, rays, rest, scratch, &mut sink),
-    });
+    object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);
 }
 
 struct SceneNearest<'a> {
@@ -289,7 +302,8 @@ impl SceneQuery for SceneNearest<'_> {
             }
             return;
         }
-        self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax.min(self.hits[ray].t));
+        let tmax = |ray: usize| batch.rays[ray].tmax.min(self.hits[ray].t);
+        self.object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, tmax);
         trace_visits::<query::Nearest>(batch, object, (visits, &self.object_rays), self.scratch, self.hits);
     }
 }
@@ -314,7 +328,8 @@ impl SceneQuery for SceneAny<'_> {
             }
             return;
         }
-        self.object_rays.fill(batch, object, visits, |ray| batch.rays[ray].tmax);
+        let hinted = !object.tet_leaves.is_empty();
+        self.object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
         trace_visits::<query::Any>(batch, object, (visits, &self.object_rays), self.scratch, self.found);
     }
 }

@@ -2,12 +2,10 @@
 
 use super::affine::{ObjectRay, RayLanes};
 use super::scene_batch::SceneBatch;
-use crate::free;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
 use bth_format::layout::NONE;
-use bth_format::object::ObjectView;
 
 /// The rays of visits of one object, in its space and in the order of the visits.
 #[derive(Default)]
@@ -16,17 +14,18 @@ pub(super) struct ObjectRays {
     /// For each ray the factor from its t to t in world space.
     pub(super) t_scale: Vec<f32>,
     /// For each ray the triangle on which it starts, or `NONE`; empty where hints are of no use.
-    from: Vec<u32>,
+    pub(super) from: Vec<u32>,
     /// For each ray its greatest t in world space.
     tmax: Vec<f32>,
 }
 
 impl ObjectRays {
-    /// Transforms the rays of visits into the space of the object. `tmax` returns the greatest t of a ray, given its index.
+    /// Transforms the rays of visits into the space of the object. `hinted` says whether hints are of use there; `tmax` returns the greatest t
+    /// of a ray, given its index.
     pub(super) fn fill(
         &mut self,
         batch: &SceneBatch<'_>,
-        object: &ObjectView<'_>,
+        hinted: bool,
         visits: &[Visit],
         tmax: impl Fn(usize) -> f32,
     ) {
@@ -35,8 +34,7 @@ impl ObjectRays {
         self.from.clear();
         self.tmax.clear();
         self.tmax.extend(visits.iter().map(|visit| tmax(visit.ray as usize)));
-        // Only objects with tetrahedra or free directions use hints.
-        if batch.from.is_some() && (!object.tet_leaves.is_empty() || free::is_known(object)) {
+        if hinted && batch.from.is_some() {
             self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
         }
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });

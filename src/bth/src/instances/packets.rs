@@ -173,14 +173,14 @@ impl TopLevelPackets {
     }
 
     /// Advances each packet to the next instance whose box any of its rays may still intersect, and calls `visit` with the index
-    /// of each such ray and the instance. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance).
+    /// of each such ray and the instance; it returns whether the ray enters it. `tmax` is as for [`RayTraversals::advance`](super::traverse::RayTraversals::advance).
     /// Packets without a further instance are removed.
     #[inline(always)]
     pub(super) fn advance(
         &mut self,
         rays: &[Ray],
         tmax: impl Fn(usize) -> Option<f32>,
-        mut visit: impl FnMut(usize, u32),
+        mut visit: impl FnMut(usize, u32) -> bool,
     ) {
         let items = &self.items;
         self.packets.retain_mut(|packet| {
@@ -195,8 +195,7 @@ impl TopLevelPackets {
                     let Some(tmax) = tmax(ray) else { continue };
                     let [x, y, z] = rays[ray].direction;
                     if item.depth <= limit(x.abs().max(y.abs()).max(z.abs()), tmax) {
-                        visit(ray, item.instance);
-                        visited = true;
+                        visited |= visit(ray, item.instance);
                     }
                 }
             }

@@ -60,7 +60,7 @@ pub(super) fn limit(scale: f32, tmax: f32) -> f32 {
 
 impl RayTraversals {
     /// Starts the rays whose indices are in `active`, and removes those that cannot hit anything. `skip` returns for the index of
-    /// a ray an instance that it is not to enter.
+    /// a ray an instance that it is not to enter, or `NONE`.
     #[inline(always)]
     pub(super) fn start<S: Simd>(
         &mut self,
@@ -68,7 +68,7 @@ impl RayTraversals {
         top: &TopLevel,
         rays: &[Ray],
         active: &mut Vec<u32>,
-        skip: impl Fn(usize) -> Option<u32>,
+        skip: impl Fn(usize) -> u32,
     ) {
         if top.is_empty() || active.is_empty() {
             return active.clear();
@@ -109,7 +109,7 @@ impl RayTraversals {
                     },
                 }
                 (state.tmax, state.limit) = (ray.tmax, limit(state.slabs.scale, ray.tmax));
-                state.skip = skip(ray_index).map_or(NONE, |instance| INSTANCE | instance);
+                state.skip = INSTANCE | skip(ray_index);
                 state.top = self.stacks.start(ray_index, 0);
                 active[kept] = index[lane];
                 kept += 1;

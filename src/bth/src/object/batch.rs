@@ -96,7 +96,7 @@ fn trace_gathered<Q: Query>(
 }
 
 /// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
-pub(crate) fn trace_rest<Q: Query>(
+fn trace_rest<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     rest: &[u32],
@@ -112,7 +112,7 @@ pub(crate) fn trace_rest<Q: Query>(
 
 /// Calls `trace` with the indices of the rays that may hit something, by what is known of free directions at the triangles
 /// `from`; with `None` for all rays where that takes longer than it saves.
-pub(crate) fn without_free<Q: Query>(
+fn without_free<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     from: &[u32],

@@ -6,9 +6,7 @@ mod scratch;
 pub(crate) mod single;
 mod strategy;
 
-pub(crate) use batch::{
-    MIN_BATCH, any_batch, by_hint, fill_misses, nearest_batch, trace_batch, trace_rest, without_free,
-};
+pub(crate) use batch::{MIN_BATCH, any_batch, by_hint, fill_misses, nearest_batch, trace_batch};
 pub use hints::Hinted;
 pub(crate) use scratch::{Scratch, with_scratch};
 pub(crate) use strategy::{HintUse, Strategy};

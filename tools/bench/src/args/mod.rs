@@ -4,6 +4,7 @@ mod accuracy;
 mod animation;
 mod compare;
 mod costs;
+mod hints;
 mod inside;
 mod instances;
 mod load;
@@ -24,6 +25,7 @@ pub use accuracy::Accuracy;
 pub use animation::Animation;
 pub use compare::Compare;
 pub use costs::Costs;
+pub use hints::Hints;
 pub use inside::Inside;
 pub use instances::Instances;
 pub use load::{Load, LoadScenes, Probe, Start, Starts};
@@ -79,6 +81,8 @@ pub enum Command {
     Quality(Quality),
     /// Scenes that move: ours, and Embree with the same instances.
     Scenes(Scenes),
+    /// Rays in scenes that say where they start, beside the same rays without that.
+    Hints(Hints),
     /// Instances that the caller moves: setting their transforms and committing, ours and Embree's.
     Instances(Instances),
     /// Objects that deform: new positions of all vertices, ours and Embree's.

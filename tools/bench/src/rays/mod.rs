@@ -39,9 +39,9 @@ pub const QUICK_PICTURE_SIZE: (u32, u32) = (128, 72);
 pub const FEWEST_TIMED: usize = 1024;
 
 /// Length of the ambient occlusion rays, relative to the diagonal.
-const AO_REACH: f64 = 0.05;
+pub(crate) const AO_REACH: f64 = 0.05;
 /// Ambient occlusion rays from each point.
-const AO_RAYS: usize = 4;
+pub(crate) const AO_RAYS: usize = 4;
 
 /// Rays of one kind.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use crate::machine;
 use crate::names::Names;
 use crate::rivals::embree;
 use crate::rounds::geometric_mean;
-use crate::speed::{self, SpeedRecord};
+use crate::speed::{self, SpeedRecord, ThreadsRun};
 use anyhow::{Result, bail};
 use std::path::Path;
 
@@ -42,7 +42,16 @@ pub(super) fn measure(definition: &Definition, models: &Path, quick: bool) -> Re
     Ok(rows_of_speed(&definition.benchmark, definition.rounds, &speed::measure(&arguments)?))
 }
 
-/// Rays per second and bytes of every tracer, and means over the models relative to Embree where it was measured.
+/// Unit of the speed of rays that say where they start, relative to the same rays through the same file that do not.
+const UNHINTED: &str = "times unhinted";
+
+/// Millions of rays per second of the tracer that is told nothing and else is the same, for a tracer that is told where rays start.
+fn rate_without_hints(run: &ThreadsRun, tracer: &str, set: &str) -> Option<f64> {
+    let base = tracer.strip_suffix(" from")?;
+    run.tracers.iter().find(|t| t.name == base)?.mrays_per_s.get(set).copied()
+}
+
+/// Rays per second and bytes of every tracer, what hints are worth, and means over the models relative to Embree where it was measured.
 fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedRecord) -> Vec<Row> {
     let commit = record.head.commit.clone().or_else(machine::commit).unwrap_or_else(|| "?".to_owned());
     let commit = commit.split(' ').next().unwrap_or("?").to_owned();
@@ -74,6 +83,10 @@ fn rows_of_speed(benchmark: &str, rounds: usize, record: &SpeedRecord) -> Vec<Ro
                 }
                 for (set, speed) in &tracer.mrays_per_s {
                     rows.push(row(name, ours, &model.name, set, run.threads, *speed, "Mrays/s"));
+                    if let Some(without) = rate_without_hints(run, name, set) {
+                        let gain = speed / without;
+                        rows.push(row(name, ours, &model.name, set, run.threads, gain, UNHINTED));
+                    }
                     let Some(other) = base.and_then(|base| base.mrays_per_s.get(set)) else { continue };
                     let of = |r: &&mut (String, bool, String, usize, Vec<f64>)| {
                         r.0 == name && r.2 == *set && r.3 == run.threads

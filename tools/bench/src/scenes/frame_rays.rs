@@ -1,7 +1,7 @@
 //! The rays of a frame: the camera's, and those of the diffuse bounces after it.
 
 use crate::model::position;
-use crate::rays::{Camera, LIFT, cosine_weighted, ray};
+use crate::rays::{AO_RAYS, AO_REACH, Camera, LIFT, cosine_weighted, ray};
 use crate::tracer::Batch;
 use anyhow::{Context, Result, ensure};
 use bth::Scene;
@@ -27,6 +27,8 @@ pub(crate) struct FrameRaySet {
 /// The rays of a frame, by [`super::SETS`].
 pub(crate) struct FrameRays {
     pub(crate) sets: [FrameRaySet; 3],
+    /// Ambient occlusion rays from what the camera sees.
+    pub(crate) occlusion: FrameRaySet,
 }
 
 impl FrameRaySet {
@@ -77,8 +79,23 @@ impl FrameRays {
             (rays, hits) = (set.rays, set.expected);
         }
         let third = FrameRaySet::of(scene, later, Some(from), false);
-        Ok(FrameRays { sets: [first, second, third] })
+        let occlusion = occlusion(scene, &first, diagonal, &mut Rng::new(2));
+        Ok(FrameRays { sets: [first, second, third], occlusion })
     }
+}
+
+/// Short rays from the hits of other rays, several from each.
+fn occlusion(scene: &Scene, first: &FrameRaySet, diagonal: f64, rng: &mut Rng) -> FrameRaySet {
+    let (mut all, mut starts) = (Vec::new(), Vec::new());
+    for (ray, hit) in first.rays.iter().zip(&first.expected) {
+        for _ in 0..AO_RAYS {
+            let (rays, from) = onward(scene, &[*ray], &[*hit], LIFT * diagonal, rng);
+            let tmax = (AO_REACH * diagonal) as f32;
+            all.extend(rays.into_iter().map(|ray| Ray { tmax, ..ray }));
+            starts.extend(from);
+        }
+    }
+    FrameRaySet::of(scene, all, Some(starts), false)
 }
 
 /// The first camera of the scene, or one that frames all of it; and the diagonal of the visible instances' box.

@@ -8,7 +8,7 @@ mod record;
 mod source;
 mod tables;
 
-pub(crate) use frame_rays::FrameRays;
+pub(crate) use frame_rays::{FrameRaySet, FrameRays};
 pub use record::{ContenderRow, SceneTimes, ScenesRecord};
 pub(crate) use source::{Source, compiled};
 pub use tables::markdown;

@@ -1,0 +1,103 @@
+//! Rays that certainly do not meet the instance on which they start, decided before they go through the top level.
+//!
+//! Such a ray leaves its triangle in a direction that is free for the instance's object ([`crate::free`]). It never enters that instance,
+//! and it ends where it meets no other instance's box. The ray that is looked up is the one that would be traced in the instance, with all its
+//! rounding, so the answer is the same.
+
+use super::World;
+use super::enter_object::ObjectRays;
+use super::scene_batch::SceneBatch;
+use super::visit_queue::VisitQueue;
+use crate::free;
+use crate::objects::Objects;
+use crate::query::sink::Visit;
+use crate::rays::PrimitiveRef;
+use bth_format::layout::{Child, NONE};
+use std::ops::Range;
+
+/// For each ray of a chunk the instance on which it starts and which it certainly does not meet. A thread keeps this memory from one
+/// batch to the next.
+#[derive(Default)]
+pub(super) struct FreeStarts {
+    /// By index in the chunk; `NONE` if the ray may meet all instances. Empty if that is so for all rays.
+    not_met: Vec<u32>,
+    visits: VisitQueue,
+    object_rays: ObjectRays,
+    rest: Vec<u32>,
+}
+
+impl FreeStarts {
+    /// The instance that a ray of the chunk does not meet, or `NONE`.
+    #[inline(always)]
+    pub(super) fn not_met(&self, index: usize) -> u32 {
+        self.not_met.get(index).copied().unwrap_or(NONE)
+    }
+
+    /// Decides the rays of a chunk.
+    pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
+        let FreeStarts { not_met, visits, object_rays, rest } = self;
+        not_met.clear();
+        let Some(from) = batch.from else { return };
+        visits.all.clear();
+        let mut starts = Starts::new(batch.world, batch.objects);
+        for ray in chunk.clone() {
+            if let Some(instance) = starts.instance(from[ray]).filter(|_| starts.is_looked_up) {
+                visits.all.push(Visit { ray: ray as u32, instance });
+            }
+        }
+        if visits.all.is_empty() {
+            return;
+        }
+        not_met.resize(chunk.len(), NONE);
+        batch.world.by_object(visits, |object, visits| {
+            let object = batch.objects.view(object);
+            object_rays.fill(batch, true, visits, |ray| batch.rays[ray].tmax);
+            if free::find_rest(object, &object_rays.rays, &object_rays.from, rest) {
+                let mut rest = rest.iter().map(|index| *index as usize).peekable();
+                for (index, visit) in visits.iter().enumerate() {
+                    if rest.next_if_eq(&index).is_none() {
+                        not_met[visit.ray as usize - chunk.start] = visit.instance;
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// The instances on which rays start. Neighbouring rays often start on the same one, which is kept.
+pub(super) struct Starts<'a> {
+    world: &'a World,
+    objects: &'a Objects,
+    last: Option<u32>,
+    /// Whether the object of the last instance has free directions that are worth a look-up.
+    is_looked_up: bool,
+    /// Whether hints are of any use in that object.
+    pub(super) is_of_use: bool,
+}
+
+impl<'a> Starts<'a> {
+    pub(super) fn new(world: &'a World, objects: &'a Objects) -> Starts<'a> {
+        Starts { world, objects, last: None, is_looked_up: false, is_of_use: false }
+    }
+
+    /// The instance on which a ray starts, if it is given and visible; then its object is that of the fields.
+    #[inline(always)]
+    pub(super) fn instance(&mut self, from: PrimitiveRef) -> Option<u32> {
+        if self.last != Some(from.instance) {
+            self.look_at(from.instance)?;
+        }
+        self.last
+    }
+
+    fn look_at(&mut self, instance: u32) -> Option<()> {
+        let placement = self.world.placements.get(instance as usize)?.as_ref()?;
+        let object = self.objects.view(placement.object());
+        // A ray passes an object of a leaf as quickly as it is looked up.
+        let has_nodes =
+            matches!(Child::from_code(object.header.root), Some(Child::Node(_) | Child::Packed(_)));
+        self.is_looked_up = has_nodes && free::is_known(object);
+        self.is_of_use = self.is_looked_up || !object.tet_leaves.is_empty();
+        self.last = Some(instance);
+        Some(())
+    }
+}

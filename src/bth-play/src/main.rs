@@ -1,5 +1,8 @@
 //! `bth-play`: renders compiled BTH files and scenes to pictures and animations.
 
+// The window alone moves cameras, changes modes and renders parts of a picture anew.
+#![cfg_attr(not(feature = "window"), allow(dead_code, unused_imports))]
+
 mod args;
 mod camera;
 mod compile_source;
@@ -11,10 +14,12 @@ mod render;
 mod report;
 mod sampling;
 mod shading;
+#[cfg(feature = "window")]
 mod window;
 
 use clap::{CommandFactory, Parser};
 use failure::Failure;
+use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -64,16 +69,36 @@ fn run(args: &args::Args) -> Result<(), Failure> {
         .map_err(|e| Failure::Usage(format!("cannot start {} threads: {e}", args.threads)))?;
     let threads = pool.current_num_threads();
     if args.window {
-        let shown = window::show(&mut scene, file, args, &pool)?;
-        return report::window(args, &shown);
+        return show_window(&mut scene, file, args, &pool);
     }
     let output = args.output()?;
     let (report, quiet) = pool.install(|| render::render_sequence(&mut scene, file, output, args))?;
     report::show(args, &scene, file, &report, threads, quiet)
 }
 
+#[cfg(feature = "window")]
+fn show_window(
+    scene: &mut bth::Scene,
+    file: &Path,
+    args: &args::Args,
+    pool: &rayon::ThreadPool,
+) -> Result<(), Failure> {
+    let shown = window::show(scene, file, args, pool)?;
+    report::window(args, &shown)
+}
+
+#[cfg(not(feature = "window"))]
+fn show_window(
+    _scene: &mut bth::Scene,
+    _file: &Path,
+    _args: &args::Args,
+    _pool: &rayon::ThreadPool,
+) -> Result<(), Failure> {
+    Err(Failure::Usage("this bth-play was built without its feature `window`; -o writes pictures".to_owned()))
+}
+
 #[allow(unsafe_code)]
-fn open(file: &std::path::Path, map: bool) -> Result<bth::Scene, bth::Error> {
+fn open(file: &Path, map: bool) -> Result<bth::Scene, bth::Error> {
     if map {
         // SAFETY: `map` requires that bthc wrote the file, and that nobody changes or shrinks it while it
         // is mapped. With `--map` the user guarantees this, as its help tells. Entries of the cache are

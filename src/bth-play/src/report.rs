@@ -4,6 +4,7 @@ use crate::args::Args;
 use crate::failure::Failure;
 use crate::messages::{note, print};
 use crate::render::{FrameReport, Report};
+#[cfg(feature = "window")]
 use crate::window::WindowSummary;
 use bth::Scene;
 use serde::Serialize;
@@ -11,6 +12,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Prints a summary of what a window showed, for people or as JSON.
+#[cfg(feature = "window")]
 pub(crate) fn window(args: &Args, shown: &WindowSummary) -> Result<(), Failure> {
     if args.json {
         return print(&format!("{:#}\n", json!({ "window": shown })));

@@ -17,6 +17,7 @@ mod moving;
 mod object;
 mod objects;
 mod parallel;
+mod places;
 mod plan;
 mod previous;
 mod report;

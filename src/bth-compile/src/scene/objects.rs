@@ -2,10 +2,10 @@
 
 use super::context::Context;
 use super::file_index::{FileIndex, Hash, ObjectRow, PartRow, SectionRow};
-use super::meshes::{self, SourceMesh, content};
+use super::meshes;
 use super::object::{self, BuiltObject};
 use super::parallel::run_parallel;
-use super::previous::Previous;
+use super::places::{Part, Places, Stored, Task, place_of};
 use super::report::ObjectReport;
 use super::sections::ObjectSections;
 use super::sources::{File, SourcePart};
@@ -15,8 +15,7 @@ use crate::tets;
 use crate::write::FileBuilder;
 use bth_format::layout::{self, SectionEntry, kind};
 use bth_scene::Manifest;
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use zerocopy::IntoBytes;
 
@@ -38,21 +37,6 @@ pub(super) struct Objects {
     parts: Vec<(Hash, String, u32)>,
 }
 
-/// An object that is built from a mesh.
-struct Task<'a> {
-    file: &'a File<'a>,
-    mesh: SourceMesh,
-    number: usize,
-    content: blake3::Hash,
-}
-
-/// A part of a source.
-pub(super) enum Part {
-    /// In the previous file: the format of the source, and the object in that file.
-    InPrevious(String, u32),
-    Mesh(Box<SourceMesh>),
-}
-
 /// Compiles the objects that are used, or takes them from the previous file or the cache.
 pub(super) fn build(
     manifest: &Manifest,
@@ -61,18 +45,11 @@ pub(super) fn build(
     clock: &mut Clock,
 ) -> Result<Objects> {
     let mut objects = Objects { number: vec![None; manifest.objects.len()], ..Objects::default() };
-    let mut of_content: HashMap<blake3::Hash, u32> = HashMap::new();
-    // Copied objects are filled in at once, the others when they are built.
-    let mut places: Vec<Option<Stored>> = Vec::new();
-    let mut tasks = Vec::new();
-    // Objects that deform, whose geometry is that of an object before: numbers of both.
-    let mut copies: Vec<(usize, u32)> = Vec::new();
-    let mut deforming = HashSet::new();
-    let mut taken = 0;
+    let mut places = Places::default();
     for (file, parts) in sources.iter().zip(read(sources, context, clock)?) {
         if file.compiled {
             objects.sources.push(("bth".to_owned(), file.digest.file.hex()));
-            copy(&mut objects, &mut places, manifest, file, &mut of_content)?;
+            copy(&mut objects, &mut places, manifest, file)?;
             continue;
         }
         let format = match parts.first() {
@@ -82,54 +59,25 @@ pub(super) fn build(
         };
         objects.sources.push((format.clone(), file.digest.file.hex()));
         for ((part, rows), what) in file.parts.iter().zip(parts) {
-            let (old, content) = find(&what, context);
-            let number = match of_content.entry(content) {
-                Entry::Occupied(there) => *there.get(),
-                Entry::Vacant(free) => {
-                    let number = places.len();
-                    match (old, what) {
-                        (Some((file, object)), _) => {
-                            taken += 1;
-                            objects.note_worker(file.index.worker_of(object).clone());
-                            places.push(Some(vec![(
-                                ObjectSections::InPrevious { file: file.clone(), object },
-                                file.index.report_of(object),
-                            )]));
-                        }
-                        (None, Part::Mesh(mesh)) => {
-                            tasks.push(Task { file, mesh: *mesh, number, content });
-                            places.push(None);
-                        }
-                        (None, Part::InPrevious(..)) => {
-                            unreachable!("a part without a mesh is in the previous file")
-                        }
-                    }
-                    *free.insert(number as u32)
-                }
-            };
+            let number = places.of_part(file, what, context);
             objects.parts.push((part_hash(file, *part), format.clone(), number));
             for row in rows {
-                let mut own = number;
-                // Each deformer moves an object of its own.
-                if part.deforms() && !deforming.insert(number) {
-                    own = places.len() as u32;
-                    copies.push((places.len(), number));
-                    places.push(None);
-                }
-                objects.number[*row] = Some(own);
+                objects.number[*row] = Some(places.for_row(*part, number));
             }
         }
     }
+    let Places { mut stored, tasks, copies, taken, worker, .. } = places;
+    objects.worker = worker;
     context.cache.hits("object", taken);
     for (number, content, built) in build_all(tasks, context, clock)? {
         objects.note_worker(built.record.worker.clone());
         let made = (content, built.record.worker);
-        places[number] = Some(stored(built.file, built.record.object, made));
+        stored[number] = Some(place_of(built.file, built.record.object, made));
     }
     for (copy, of) in copies {
-        places[copy] = places[of as usize].clone();
+        stored[copy] = stored[of as usize].clone();
     }
-    objects.fill(places);
+    objects.fill(stored);
     for (stored, report) in objects.stored.iter().zip(&mut objects.reports) {
         report.resident_bytes = stored.resident_bytes();
     }
@@ -179,22 +127,6 @@ pub(super) fn parts_without_reading(file: &File<'_>, context: &Context<'_>) -> O
     file.parts.iter().map(|(source, _)| part(*source)).collect()
 }
 
-/// The object in the previous file, if it has it, and the hash by which equal objects are found.
-fn find<'a>(part: &Part, context: &'a Context<'_>) -> (Option<(&'a Arc<Previous>, u32)>, blake3::Hash) {
-    let previous = context.previous.as_ref();
-    match part {
-        Part::InPrevious(_, object) => {
-            let hash = previous.map_or([0; 32], |p| p.index.objects[*object as usize].content);
-            (previous.map(|p| (p, *object)), blake3::Hash::from_bytes(hash))
-        }
-        Part::Mesh(mesh) => {
-            let content = content(&mesh.summary, mesh.part);
-            let old = previous.and_then(|p| Some((p, p.index.object_of(content.as_bytes())?)));
-            (old.filter(|(p, object)| p.has(*object)), content)
-        }
-    }
-}
-
 /// The hash that identifies a part of a source.
 fn part_hash(file: &File<'_>, part: SourcePart) -> Hash {
     *blake3::hash(file.content(part).as_bytes()).as_bytes()
@@ -229,13 +161,7 @@ fn build_all(
 }
 
 /// Takes objects from a compiled file.
-fn copy(
-    objects: &mut Objects,
-    places: &mut Vec<Option<Stored>>,
-    manifest: &Manifest,
-    file: &File<'_>,
-    of_content: &mut HashMap<blake3::Hash, u32>,
-) -> Result<()> {
+fn copy(objects: &mut Objects, places: &mut Places<'_>, manifest: &Manifest, file: &File<'_>) -> Result<()> {
     let path = file.full.as_path();
     let unusable = |e: &dyn std::fmt::Display| Error::Input {
         code: "BTH-I051",
@@ -263,7 +189,7 @@ fn copy(
             // The hash is computed here; that of the section table is untrusted.
             hasher.update(blake3::hash(section.bytes).as_bytes());
         }
-        let number = *of_content.entry(hasher.finalize()).or_insert_with(|| {
+        let number = *places.of_content.entry(hasher.finalize()).or_insert_with(|| {
             let report = ObjectReport {
                 triangles: view.header.triangles.into(),
                 degenerate: view.header.dropped.into(),
@@ -279,38 +205,12 @@ fn copy(
                 one(object + segment, ObjectReport { copied: true, ..ObjectReport::default() })
             });
             let first = one(object, report);
-            places.push(Some(std::iter::once(first).chain(behind).collect()));
-            places.len() as u32 - 1
+            places.stored.push(Some(std::iter::once(first).chain(behind).collect()));
+            places.stored.len() as u32 - 1
         });
         rows.iter().for_each(|row| objects.number[*row] = Some(number));
     }
     Ok(())
-}
-
-/// An object of a source and the objects of its segments, which follow it in the file.
-type Stored = Vec<(ObjectSections, ObjectReport)>;
-
-/// The place of a built object: the first of a file, which holds nothing but it and its segments.
-fn stored(
-    file: bth_format::File,
-    report: ObjectReport,
-    made: (blake3::Hash, Option<tets::WorkerStatus>),
-) -> Stored {
-    let file = Arc::new(file);
-    // An object with segments is not taken from the previous file, whose index has single objects.
-    let made = (file.object_count() == 1).then_some(made);
-    let segments = report.motion.as_ref().map_or(&[][..], |motion| &motion.segments);
-    let of_segment = |object: u32| ObjectReport {
-        triangles: report.triangles,
-        segment_from: segments.get(object as usize).map(|segment| segment.first),
-        ..ObjectReport::default()
-    };
-    let behind: Vec<_> = (1..file.object_count())
-        .map(|object| (ObjectSections::InFile { file: file.clone(), object, made: None }, of_segment(object)))
-        .collect();
-    let mut place = vec![(ObjectSections::InFile { file, object: 0, made }, report)];
-    place.extend(behind);
-    place
 }
 
 impl Objects {

@@ -29,35 +29,10 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         let chosen = costs::choose(&mesh, &tree, &marks, &options.costs, storage, &progress)?;
         Ok(((mesh, tree), chosen))
     })??;
-    let (mut measured, mut brightest) = (None, None);
-    if args.measure || args.picture.is_some() {
-        let (built, _) = with_threads(args.threads, || {
-            tets::build(&mesh, &tree, &choice.chosen, &options.tets, &progress)
-        })??;
-        let scene = |built: &[(u32, tets::TetMesh)]| -> Result<bth::Scene, Failure> {
-            Ok(bth::from_bytes(&pipeline::assemble(&mesh, &tree, built, &options, &progress)?.bytes)?)
-        };
-        let explained = Explained {
-            mesh: &mesh,
-            tree: &tree,
-            choice: &choice,
-            costs: &options.costs,
-            built: &built,
-            compiled: &scene(&built)?,
-            plain: &scene(&[])?,
-        };
-        if args.measure {
-            progress.stage("measure", None);
-            let most = if args.top == 0 { usize::MAX } else { args.top };
-            measured = Some(measure(&explained, most, || progress.cancelled()).ok_or(Error::Cancelled)?);
-        }
-        if let Some(path) = &args.picture {
-            progress.stage("picture", None);
-            let (png, most) = picture(&explained)?;
-            write::write_atomically(path, &png)?;
-            brightest = Some(most);
-        }
-    }
+    let built = match args.measure || args.picture.is_some() {
+        true => built((&mesh, &tree), &choice, args, &options, &progress)?,
+        false => Built::default(),
+    };
     let free = match &args.free_picture {
         Some(path) => {
             Some(with_threads(args.threads, || free_directions((&mesh, &tree), &options, path, &progress))??)
@@ -76,7 +51,7 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         let mut report = json!({"triangles": mesh.triangles.len(), "examined": examined,
             "chosen": choice.chosen.len(), "report": report, "nodes": verdicts});
         if let Value::Object(report) = &mut report {
-            report.extend(measured.map(|nodes| ("measured".to_owned(), json!(nodes))));
+            report.extend(built.measured.map(|nodes| ("measured".to_owned(), json!(nodes))));
             report.extend(free.map(|free| ("free_directions".to_owned(), json!(free))));
         }
         output::json(&report)?;
@@ -90,20 +65,71 @@ pub(crate) fn run(args: &Explain) -> Result<(), Failure> {
         count(examined as u64),
         count(verdicts.len() as u64),
     ));
-    if let Some(nodes) = &measured {
+    if let Some(nodes) = &built.measured {
         text.push_str(&measured_table(nodes));
     }
-    if let (Some(path), Some(most)) = (&args.picture, brightest) {
-        text.push_str(&format!(
-            "wrote {}: left what triangles are in (green: tetrahedra; blue-grey: a BVH that is cheaper; grey: too few \
-             triangles; orange: bad contacts), right what a bounce costs, to {most:.0} ns\n",
-            path.display()
-        ));
+    if let (Some(path), Some(most)) = (&args.picture, built.brightest) {
+        text.push_str(&picture_line(path, most));
     }
     if let (Some(path), Some(free)) = (&args.free_picture, free) {
         text.push_str(&free_line(path, &free));
     }
     Ok(output::text(&text)?)
+}
+
+/// What is known only once the chosen nodes are tetrahedralized.
+#[derive(Default)]
+struct Built {
+    /// Costs of the largest nodes, where `--measure` asks for them.
+    measured: Option<Vec<MeasuredNode>>,
+    /// Nanoseconds of the brightest pixels of the picture, where one is drawn.
+    brightest: Option<f64>,
+}
+
+/// Tetrahedralizes the chosen nodes, measures what rays cost in them and draws the picture, as far as the options ask for it.
+fn built(
+    (mesh, tree): (&Mesh, &bvh::BinaryBvh),
+    choice: &costs::Choice,
+    args: &Explain,
+    options: &pipeline::CompileOptions,
+    progress: &Progress,
+) -> Result<Built, Failure> {
+    let (tets, _) =
+        with_threads(args.threads, || tets::build(mesh, tree, &choice.chosen, &options.tets, progress))??;
+    let scene = |tets: &[(u32, tets::TetMesh)]| -> Result<bth::Scene, Failure> {
+        Ok(bth::from_bytes(&pipeline::assemble(mesh, tree, tets, options, progress)?.bytes)?)
+    };
+    let explained = Explained {
+        mesh,
+        tree,
+        choice,
+        costs: &options.costs,
+        built: &tets,
+        compiled: &scene(&tets)?,
+        plain: &scene(&[])?,
+    };
+    let mut built = Built::default();
+    if args.measure {
+        progress.stage("measure", None);
+        let most = if args.top == 0 { usize::MAX } else { args.top };
+        built.measured = Some(measure(&explained, most, || progress.cancelled()).ok_or(Error::Cancelled)?);
+    }
+    if let Some(path) = &args.picture {
+        progress.stage("picture", None);
+        let (png, most) = picture(&explained)?;
+        write::write_atomically(path, &png)?;
+        built.brightest = Some(most);
+    }
+    Ok(built)
+}
+
+/// What the picture shows.
+fn picture_line(path: &Path, most: f64) -> String {
+    format!(
+        "wrote {}: left what triangles are in (green: tetrahedra; blue-grey: a BVH that is cheaper; grey: too few \
+         triangles; orange: bad contacts), right what a bounce costs, to {most:.0} ns\n",
+        path.display()
+    )
 }
 
 /// Decides free directions, and draws which surfaces have them.

@@ -1,143 +1,9 @@
-//! Encodes results of the stages as bytes, and decodes them with checks.
+//! Bytes of a mesh and of all that belongs to it.
 
-use super::rows::{HashedRows, RowReader, RowWriter};
-use crate::free::Free;
-use crate::marks::Marks;
-use crate::tets::{Behind, Face, TetMesh};
-use bth_files::Digest;
+use super::super::rows::{RowReader, RowWriter};
+use super::Codec;
 use bth_format::layout::{MaterialParameters, NONE, Texture};
-use bth_import::{
-    self as mesh, Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities,
-};
-use serde::{Deserialize, Serialize};
-
-/// A result that can be kept.
-pub(crate) trait Codec: Sized {
-    /// Writes the rows of the result.
-    fn write(&self, to: &mut RowWriter);
-    /// The result from its rows; `None` when they are not valid.
-    fn read(from: &mut RowReader<'_>) -> Option<Self>;
-}
-
-/// The bytes of a result.
-pub(crate) fn encode<T: Codec>(value: &T) -> Vec<u8> {
-    let mut rows = RowWriter::default();
-    value.write(&mut rows);
-    rows.finish()
-}
-
-/// A result from its bytes; `None` unless they are valid and all of them are used.
-pub(crate) fn decode<T: Codec>(bytes: &[u8]) -> Option<T> {
-    let mut rows = RowReader::new(bytes);
-    let value = T::read(&mut rows)?;
-    rows.is_empty().then_some(value)
-}
-
-/// Hash of a mesh's positions and triangles, the input of all stages between import and file.
-pub(super) fn geometry(mesh: &Mesh) -> Digest {
-    let mut hasher = HashedRows::new("geometry");
-    hasher.add(&mesh.positions);
-    hasher.add(&mesh.triangles);
-    hasher.finish()
-}
-
-/// Hash of a mesh's shading attributes, if it has any.
-fn shading(mesh: &Mesh) -> Option<Digest> {
-    let attributes = mesh.attributes.as_ref()?;
-    let mut hasher = HashedRows::new("shading");
-    hasher.add(&attributes.corners);
-    hasher.add(&attributes.normals);
-    hasher.add(&attributes.uvs);
-    Some(hasher.finish())
-}
-
-/// Hash of the opacity of a mesh's triangles, where some are not opaque.
-fn opacity(mesh: &Mesh) -> Option<Digest> {
-    let opacity = mesh.opacity.as_ref()?;
-    let mut hasher = HashedRows::new("opacity");
-    hasher.add(&opacity.rows);
-    hasher.add(&opacity.micro);
-    Some(hasher.finish())
-}
-
-/// Hash of a mesh's groups, if they are wanted.
-fn groups(mesh: &Mesh) -> Option<Digest> {
-    let mut rows = RowWriter::default();
-    mesh.groups.as_ref()?.write(&mut rows);
-    let mut hasher = HashedRows::new("groups");
-    hasher.add(&rows.finish());
-    Some(hasher.finish())
-}
-
-/// Hash of how a mesh's materials look, if that is wanted.
-fn materials(mesh: &Mesh) -> Option<Digest> {
-    let mut rows = RowWriter::default();
-    mesh.materials.as_ref()?.write(&mut rows);
-    let mut hasher = HashedRows::new("materials");
-    hasher.add(&rows.finish());
-    Some(hasher.finish())
-}
-
-/// Hash of the frames of a mesh that is a sequence.
-fn sequence(mesh: &Mesh) -> Option<Digest> {
-    let sequence = mesh.sequence.as_ref()?;
-    let mut hasher = HashedRows::new("sequence");
-    hasher.add(&sequence.times);
-    hasher.add(&sequence.positions);
-    Some(hasher.finish())
-}
-
-/// Hash of what moves a mesh's vertices, if that is wanted.
-fn deformation(mesh: &Mesh) -> Option<Digest> {
-    let mut rows = RowWriter::default();
-    mesh.deformation.as_ref()?.write(&mut rows);
-    let mut hasher = HashedRows::new("deformation");
-    hasher.add(&rows.finish());
-    Some(hasher.finish())
-}
-
-/// CompileReport and hashes of a mesh, without the mesh itself.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct MeshSummary {
-    /// The import's report.
-    pub(crate) report: mesh::Report,
-    /// Hash of positions and triangles.
-    pub(crate) geometry: Digest,
-    /// Hash of the shading attributes.
-    pub(crate) shading: Option<Digest>,
-    /// Hash of the opacity.
-    #[serde(default)]
-    pub(crate) opacity: Option<Digest>,
-    /// Hash of the groups.
-    #[serde(default)]
-    pub(crate) groups: Option<Digest>,
-    /// Hash of how materials look.
-    #[serde(default)]
-    pub(crate) materials: Option<Digest>,
-    /// Hash of the frames of a sequence.
-    #[serde(default)]
-    pub(crate) sequence: Option<Digest>,
-    /// Hash of what moves the vertices.
-    #[serde(default)]
-    pub(crate) deformation: Option<Digest>,
-}
-
-impl MeshSummary {
-    /// A mesh with its summary.
-    pub(crate) fn of((mesh, report): (Mesh, mesh::Report)) -> (Mesh, Self) {
-        let summary = Self {
-            report,
-            geometry: geometry(&mesh),
-            shading: shading(&mesh),
-            opacity: opacity(&mesh),
-            groups: groups(&mesh),
-            materials: materials(&mesh),
-            sequence: sequence(&mesh),
-            deformation: deformation(&mesh),
-        };
-        (mesh, summary)
-    }
-}
+use bth_import::{Attributes, Deformation, Group, Groups, Materials, Mesh, Sequence, TriangleOpacities};
 
 impl Codec for Mesh {
     fn write(&self, to: &mut RowWriter) {
@@ -330,78 +196,9 @@ impl Codec for Groups {
     }
 }
 
-impl Codec for Marks {
-    fn write(&self, to: &mut RowWriter) {
-        to.add(&self.suitable.iter().map(|s| u8::from(*s)).collect::<Vec<_>>());
-    }
-
-    fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        let suitable: Vec<u8> = from.take()?;
-        Some(Marks { suitable: suitable.iter().map(|s| *s != 0).collect() })
-    }
-}
-
-impl Codec for Free {
-    fn write(&self, to: &mut RowWriter) {
-        to.add(&[self.reach]);
-        to.add(&self.bins);
-    }
-
-    fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        Some(Free { reach: from.one()?, bins: from.take()? })
-    }
-}
-
-/// The flag of a constrained face in the number that encodes the neighbour across a face: a tetrahedron, 2³¹ + a
-/// constrained face, or all bits set for the hull.
-const FACE: u32 = 1 << 31;
-const HULL: u32 = u32::MAX;
-
-/// In the cache the faces of a tetrahedralization refer to triangles by their number within the node.
-impl Codec for TetMesh {
-    fn write(&self, to: &mut RowWriter) {
-        let code = |behind: &Behind| match *behind {
-            Behind::Tet(tet) => tet,
-            Behind::Face(face) => FACE | face,
-            Behind::Hull => HULL,
-        };
-        to.add(&[self.lower, self.upper]);
-        to.add(&self.vertices);
-        to.add(&self.tets);
-        to.add(&self.behind.iter().map(|b| b.each_ref().map(code)).collect::<Vec<_>>());
-        let face = |f: &Face| [f.triangle, f.vertex[0], f.vertex[1], f.vertex[2], f.tet[0], f.tet[1]];
-        to.add(&self.faces.iter().map(face).collect::<Vec<_>>());
-        to.add(&[self.steiner_points]);
-    }
-
-    fn read(from: &mut RowReader<'_>) -> Option<Self> {
-        let bounds: Vec<[f32; 3]> = from.take()?;
-        let [lower, upper] = *bounds.as_slice() else { return None };
-        let (vertices, tets): (Vec<[f32; 3]>, Vec<[u32; 4]>) = (from.take()?, from.take()?);
-        let behind: Vec<[u32; 4]> = from.take()?;
-        let faces: Vec<[u32; 6]> = from.take()?;
-        let steiner_points = from.one()?;
-        let vertex = |v: u32| (v as usize) < vertices.len();
-        let tet = |t: u32| (t as usize) < tets.len();
-        let link = |code: u32| match code {
-            HULL => Some(Behind::Hull),
-            code if code & FACE == 0 => tet(code).then_some(Behind::Tet(code)),
-            code => ((code ^ FACE) < faces.len() as u32).then_some(Behind::Face(code ^ FACE)),
-        };
-        let links = |[a, b, c, d]: [u32; 4]| Some([link(a)?, link(b)?, link(c)?, link(d)?]);
-        let behind: Vec<[Behind; 4]> = behind.into_iter().map(links).collect::<Option<_>>()?;
-        let face = |[triangle, a, b, c, front, back]: [u32; 6]| {
-            let fits = [a, b, c].into_iter().all(vertex) && tet(front) && tet(back);
-            fits.then_some(Face { triangle, vertex: [a, b, c], tet: [front, back] })
-        };
-        let faces: Vec<Face> = faces.iter().copied().map(face).collect::<Option<_>>()?;
-        let fits = behind.len() == tets.len() && tets.as_flattened().iter().all(|v| vertex(*v));
-        fits.then_some(TetMesh { lower, upper, vertices, tets, behind, faces, steiner_points })
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::{decode, encode};
     use super::*;
     use bth_format::layout::Morph;
 
@@ -500,31 +297,5 @@ mod tests {
         let mut other = mesh;
         other.attributes.as_mut().unwrap().corners[0] = [0, 2, 0];
         assert_eq!(decode::<Mesh>(&encode(&other)), None);
-    }
-
-    #[test]
-    fn tetrahedralizations_come_back_and_links_to_nowhere_do_not() {
-        let mesh = TetMesh {
-            lower: [0.0; 3],
-            upper: [1.0; 3],
-            vertices: vec![[0.0; 3]; 5],
-            tets: vec![[0, 1, 2, 3], [1, 2, 3, 4]],
-            behind: vec![
-                [Behind::Face(0), Behind::Hull, Behind::Hull, Behind::Hull],
-                [Behind::Hull, Behind::Hull, Behind::Hull, Behind::Tet(0)],
-            ],
-            faces: vec![Face { triangle: 0, vertex: [1, 2, 3], tet: [0, 1] }],
-            steiner_points: 2,
-        };
-        assert_eq!(decode::<TetMesh>(&encode(&mesh)), Some(mesh.clone()));
-        let mut other = mesh.clone();
-        other.behind[0][0] = Behind::Face(1);
-        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
-        let mut other = mesh.clone();
-        other.faces[0].tet[1] = 2;
-        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
-        let mut other = mesh;
-        other.tets[1][3] = 5;
-        assert_eq!(decode::<TetMesh>(&encode(&other)), None);
     }
 }

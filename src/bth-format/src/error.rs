@@ -331,7 +331,14 @@ impl std::fmt::Display for Error {
         if let Some(offset) = self.offset {
             write!(f, "byte {offset}: ")?;
         }
-        write!(f, "expected {}, found {} (hint: {})", self.expected, self.found, self.hint())
+        // With the feature `brief` some texts are empty.
+        if !self.expected.is_empty() {
+            write!(f, "expected {}, ", self.expected)?;
+        }
+        if !self.found.is_empty() {
+            write!(f, "found {} ", self.found)?;
+        }
+        write!(f, "(hint: {})", self.hint())
     }
 }
 

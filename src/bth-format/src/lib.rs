@@ -17,6 +17,15 @@
 //! # Ok::<(), bth_format::Error>(())
 //! ```
 #![warn(missing_docs)]
+// What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
+#![allow(clippy::ok_expect)]
+
+/// Text that is made for an error: as `format!`, and empty with the feature `brief`.
+macro_rules! text {
+    ($($arguments:tt)*) => {
+        if cfg!(feature = "brief") { String::new() } else { format!($($arguments)*) }
+    };
+}
 
 mod check;
 mod deformation_view;

@@ -13,6 +13,18 @@
 #![warn(missing_docs)]
 // Kernels loop over lanes by index: iterators and closures could be compiled as functions without the kernel's instruction set.
 #![allow(clippy::needless_range_loop)]
+// What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
+#![allow(clippy::ok_expect)]
+
+/// Whether the feature `small` is on.
+const SMALL: bool = cfg!(feature = "small");
+
+/// Text that is made for an error: as `format!`, and empty with the feature `small`.
+macro_rules! text {
+    ($($arguments:tt)*) => {
+        if crate::SMALL { String::new() } else { format!($($arguments)*) }
+    };
+}
 
 mod batch;
 mod builder;

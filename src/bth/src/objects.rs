@@ -104,10 +104,10 @@ impl Objects {
             return deforming.view();
         }
         match &self.files {
-            Files::One(file) => file.view(object).expect(CHECKED),
+            Files::One(file) => file.view(object).ok().expect(CHECKED),
             Files::Several(table) => {
                 let (file, object) = table.locate(object).expect(CHECKED);
-                file.view(object).expect(CHECKED)
+                file.view(object).ok().expect(CHECKED)
             }
         }
     }
@@ -178,7 +178,7 @@ impl Objects {
     pub(crate) fn deforming(&mut self, object: u32) -> Result<&mut Deforming, Error> {
         let count = self.count();
         let Some((file, row)) = self.locate(object) else {
-            let expected = format!("an object below {count}");
+            let expected = text!("an object below {count}");
             return Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()));
         };
         let index = object as usize;

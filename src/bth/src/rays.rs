@@ -39,7 +39,7 @@ impl Ray {
 
     /// For each ray the bits of its eight numbers, in the order of the fields.
     pub(crate) fn rows(rays: &[Ray]) -> &[[u32; 8]] {
-        <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).expect("a ray is eight words")
+        <[[u32; 8]]>::ref_from_bytes(rays.as_bytes()).ok().expect("a ray is eight words")
     }
 }
 

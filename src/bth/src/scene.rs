@@ -1,5 +1,6 @@
 //! Scenes: opening of compiled files and queries by rays in world space.
 
+use crate::SMALL;
 use crate::free;
 use crate::instances::World;
 use crate::masks::Masks;
@@ -405,11 +406,11 @@ fn start_primitive(from: Option<&[PrimitiveRef]>, ray: usize) -> PrimitiveRef {
 /// For each ray the triangle of an instance's object on which it starts, or `NONE`. `None` if there are no hints, or if the
 /// object has neither tetrahedra nor free directions, because only these use hints.
 fn hints(object: &ObjectView<'_>, from: Option<&[PrimitiveRef]>, instance: u32) -> Option<Vec<u32>> {
-    let from = from.filter(|_| !object.tet_leaves.is_empty() || free::is_known(object))?;
+    let from = from.filter(|_| !SMALL && !object.tet_leaves.is_empty() || free::is_known(object))?;
     Some(from.iter().map(|&from| hint(from, instance)).collect())
 }
 
 /// The triangle of an instance's object on which a ray starts, or `NONE`.
 fn hint(from: PrimitiveRef, instance: u32) -> u32 {
-    if from.instance == instance { from.triangle } else { NONE }
+    if !SMALL && from.instance == instance { from.triangle } else { NONE }
 }

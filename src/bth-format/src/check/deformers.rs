@@ -19,7 +19,7 @@ pub(super) fn check(view: &SceneView<'_>, objects: u32, deformation: Deformation
     match view.morph_weights.iter().position(|weight| !weight.is_finite()) {
         None => Ok(()),
         Some(row) => {
-            let found = view.morph_weights[row].to_string();
+            let found = text!("{}", view.morph_weights[row]);
             let at = 8 * row as u64;
             Err(Error::within_file(Code::MorphWeights, kind::MORPH_WEIGHTS, at, "a finite weight", found))
         }
@@ -35,7 +35,7 @@ fn skins(view: &SceneView<'_>) -> Result<()> {
         if !starts || skin.joints == 0 || end > view.skin_joints.len() as u64 || skin.reserved != [0; 2] {
             let at = (size_of::<Skin>() * row) as u64;
             let expected = "joints behind those before within SKIN_JOINTS, at least one, and zeros";
-            return Err(Error::within_file(Code::Skin, kind::SKINS, at, expected, format!("{skin:?}")));
+            return Err(Error::within_file(Code::Skin, kind::SKINS, at, expected, text!("{skin:?}")));
         }
     }
     cover(Code::Skin, kind::SKIN_JOINTS, size_of::<SkinJoint>(), end, view.skin_joints.len())
@@ -92,7 +92,7 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
         if !starts || end > view.morph_weights.len() as u64 {
             let at = (size_of::<Deformer>() * row + offset_of!(Deformer, first_weight)) as u64;
             let (expected, found) =
-                ("weights behind those before within MORPH_WEIGHTS", format!("{deformer:?}"));
+                ("weights behind those before within MORPH_WEIGHTS", text!("{deformer:?}"));
             return Err(Error::within_file(Code::MorphWeights, kind::DEFORMERS, at, expected, found));
         }
     }
@@ -101,13 +101,16 @@ fn deformers(view: &SceneView<'_>, objects: u32, deformation: DeformationOf<'_>)
 
 /// BTH-F180: no two deformers have the same object.
 fn distinct_objects(view: &SceneView<'_>) -> Result<()> {
-    let mut rows: Vec<(u32, usize)> = view.deformers.iter().map(|d| d.object).zip(0..).collect();
-    rows.sort_unstable();
-    match rows.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+    // An object in the upper half of a key, a row in the lower.
+    let mut keys: Vec<u64> =
+        view.deformers.iter().zip(0..).map(|(d, row)| u64::from(d.object) << 32 | row).collect();
+    keys.sort_unstable();
+    match keys.windows(2).find(|pair| pair[0] >> 32 == pair[1] >> 32) {
         None => Ok(()),
         Some(pair) => {
-            let at = (size_of::<Deformer>() * pair[1].1 + offset_of!(Deformer, object)) as u64;
-            let (expected, found) = ("an object of no other deformer", pair[0].0.to_string());
+            let row = pair[1] as u32 as usize;
+            let at = (size_of::<Deformer>() * row + offset_of!(Deformer, object)) as u64;
+            let (expected, found) = ("an object of no other deformer", text!("{}", pair[1] >> 32));
             Err(Error::within_file(Code::Deformer, kind::DEFORMERS, at, expected, found))
         }
     }
@@ -118,6 +121,6 @@ fn cover(code: Code, kind: u32, stride: usize, end: u64, rows: usize) -> Result<
     if end == rows as u64 {
         return Ok(());
     }
-    let (at, expected) = (stride as u64 * end, format!("{end} rows, as the ranges have"));
-    Err(Error::within_file(code, kind, at, expected, rows.to_string()))
+    let (at, expected) = (stride as u64 * end, text!("{end} rows, as the ranges have"));
+    Err(Error::within_file(code, kind, at, expected, text!("{rows}")))
 }

@@ -15,25 +15,25 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     let triangles = if view.is_deformable() { 0 } else { view.header.triangles as usize };
     if rows != 0 && rows != triangles {
         let expected =
-            if view.is_deformable() { "none".to_owned() } else { format!("{triangles} rows or none") };
-        return Err(Error::within(Code::FreeRows, kind::FREE_DIRECTIONS, 0, expected, rows.to_string()));
+            if view.is_deformable() { "none".to_owned() } else { text!("{triangles} rows or none") };
+        return Err(Error::within(Code::FreeRows, kind::FREE_DIRECTIONS, 0, expected, text!("{rows}")));
     }
     if reach.len() != usize::from(rows != 0) {
         let expected = "one row beside FREE_DIRECTIONS, else none";
-        return Err(Error::within(Code::FreeRows, kind::FREE_REACH, 0, expected, reach.len().to_string()));
+        return Err(Error::within(Code::FreeRows, kind::FREE_REACH, 0, expected, text!("{}", reach.len())));
     }
     for row in reach {
         let [least, most] = FREE_REACH_RANGE;
         if row.reach != 0.0 && !(least <= row.reach && row.reach <= most) || row.reserved != [0; 3] {
-            let expected = format!("0 or a reach from {least:e} to {most:e}, and zeros");
-            return Err(Error::within(Code::FreeReach, kind::FREE_REACH, 0, expected, format!("{row:?}")));
+            let expected = text!("0 or a reach from {least:e} to {most:e}, and zeros");
+            return Err(Error::within(Code::FreeReach, kind::FREE_REACH, 0, expected, text!("{row:?}")));
         }
     }
     for (triangle, row) in view.free.iter().enumerate() {
         let bits = row.bins().0;
         if bits & !(FreeBins::ALL | FreeBins::BACK | FreeBins::NEARBY) != 0 {
             let at = (ROW * triangle + offset_of!(FreeDirections, bins)) as u64;
-            let (expected, found) = ("zero in bits 121 to 125", format!("{bits:#034x}"));
+            let (expected, found) = ("zero in bits 121 to 125", text!("{bits:#034x}"));
             return Err(Error::within(Code::FreeBins, kind::FREE_DIRECTIONS, at, expected, found));
         }
     }
@@ -76,7 +76,7 @@ pub(super) fn check_places(view: &ObjectView, placed: &BitSet) -> Result<()> {
         None => Ok(()),
         Some(triangle) => {
             let (at, expected) = ((ROW * triangle) as u64, "the place of the triangle, or NONE and zeros");
-            let found = format!("{:#010x}", view.free[triangle].place);
+            let found = text!("{:#010x}", view.free[triangle].place);
             Err(Error::within(Code::FreePlace, kind::FREE_DIRECTIONS, at, expected, found))
         }
     }

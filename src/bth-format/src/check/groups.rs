@@ -11,9 +11,9 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     for (row, group) in view.groups.iter().enumerate() {
         let at = size_of::<Group>() * row;
         if group.material != NONE && group.material as usize >= view.materials.len() {
-            let expected = format!("a row below {} or NONE", view.materials.len());
+            let expected = text!("a row below {} or NONE", view.materials.len());
             let at = at + offset_of!(Group, material);
-            return error(Code::Group, kind::GROUPS, at, expected, group.material.to_string());
+            return error(Code::Group, kind::GROUPS, at, expected, text!("{}", group.material));
         }
         zero(kind::GROUPS, at + offset_of!(Group, reserved), group.reserved == 0)?;
         label(view, kind::GROUPS, at, (group.name, group.name_length))?;
@@ -37,7 +37,7 @@ fn runs(view: &ObjectView) -> Result<()> {
             kind::GROUP_RUNS,
             0,
             expected.to_owned(),
-            format!("{} rows", runs.len()),
+            text!("{} rows", runs.len()),
         );
     }
     for (row, run) in runs.iter().enumerate() {
@@ -46,12 +46,12 @@ fn runs(view: &ObjectView) -> Result<()> {
             Some(before) => runs[before].first < run.first,
         };
         if !ascends || run.first >= triangles || run.group as usize >= view.groups.len() {
-            let expected = format!(
+            let expected = text!(
                 "ascending triangles from 0 and below {triangles}, and a group below {}",
                 view.groups.len()
             );
             let at = size_of::<GroupRun>() * row;
-            return error(Code::GroupRuns, kind::GROUP_RUNS, at, expected, format!("{run:?}"));
+            return error(Code::GroupRuns, kind::GROUP_RUNS, at, expected, text!("{run:?}"));
         }
     }
     Ok(())
@@ -71,7 +71,7 @@ fn label(view: &ObjectView, kind: u32, at: usize, (first, length): (u32, u32)) -
         return Ok(());
     }
     let expected = "a name of at most 4096 bytes within LABELS".to_owned();
-    error(Code::Label, kind, at, expected, format!("{:?}", (first, length)))
+    error(Code::Label, kind, at, expected, text!("{:?}", (first, length)))
 }
 
 fn error(code: Code, kind: u32, at: usize, expected: String, found: String) -> Result<()> {

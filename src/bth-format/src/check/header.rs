@@ -28,7 +28,7 @@ fn record(view: &ObjectView) -> Result<()> {
         Records::Tet16(_) => record == RecordKind::Tet16 as u32,
     };
     if !fits {
-        let found = format!("{record} with {} tet leaves", view.tet_leaves.len());
+        let found = text!("{record} with {} tet leaves", view.tet_leaves.len());
         return fail(Code::Record, offset_of!(Object, record), "the kind of the records".into(), found);
     }
     Ok(())
@@ -45,21 +45,21 @@ fn counts(view: &ObjectView) -> Result<()> {
     let triangles = h.triangles as usize;
     for (name, rows) in rows {
         if rows != 0 && rows != triangles {
-            let expected = format!("{triangles} rows of {name}, or none");
-            return fail(Code::Counts, offset_of!(Object, triangles), expected, rows.to_string());
+            let expected = text!("{triangles} rows of {name}, or none");
+            return fail(Code::Counts, offset_of!(Object, triangles), expected, text!("{rows}"));
         }
     }
     if h.triangles > MAX_TRIANGLES {
-        let expected = format!("at most {MAX_TRIANGLES} triangles");
-        return fail(Code::Limit, offset_of!(Object, triangles), expected, triangles.to_string());
+        let expected = text!("at most {MAX_TRIANGLES} triangles");
+        return fail(Code::Limit, offset_of!(Object, triangles), expected, text!("{triangles}"));
     }
     if h.dropped > h.triangles {
-        let expected = format!("at most {triangles} dropped triangles");
-        return fail(Code::Counts, offset_of!(Object, dropped), expected, h.dropped.to_string());
+        let expected = text!("at most {triangles} dropped triangles");
+        return fail(Code::Counts, offset_of!(Object, dropped), expected, text!("{}", h.dropped));
     }
     if h.depth > MAX_DEPTH as u32 {
-        let expected = format!("at most {MAX_DEPTH}");
-        return fail(Code::Depth, offset_of!(Object, depth), expected, h.depth.to_string());
+        let expected = text!("at most {MAX_DEPTH}");
+        return fail(Code::Depth, offset_of!(Object, depth), expected, text!("{}", h.depth));
     }
     Ok(())
 }
@@ -73,7 +73,7 @@ fn bounds(header: &Object) -> Result<()> {
         (is_box(lower, upper), "finite bounds, lower <= upper")
     };
     if !good {
-        return fail(Code::ObjectBounds, 0, expected.into(), format!("{lower:?} to {upper:?}"));
+        return fail(Code::ObjectBounds, 0, expected.into(), text!("{lower:?} to {upper:?}"));
     }
     Ok(())
 }

@@ -11,11 +11,11 @@ pub(super) fn check_packed(node: &PackedNode, start: u64) -> Result<()> {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if !node.step.iter().all(|step| step.is_normal() && *step > 0.0 && step.to_bits() << 9 == 0) {
-        let found = format!("{:?}", node.step);
+        let found = text!("{:?}", node.step);
         return fail(Code::ChildBounds, offset_of!(PackedNode, step), "steps that are powers of two", found);
     }
     if !node.is_exact() {
-        let found = format!("{:?} and steps of {:?}", node.origin, node.step);
+        let found = text!("{:?} and steps of {:?}", node.origin, node.step);
         return fail(
             Code::ChildBounds,
             offset_of!(PackedNode, origin),
@@ -24,7 +24,7 @@ pub(super) fn check_packed(node: &PackedNode, start: u64) -> Result<()> {
         );
     }
     if node.reserved != [0; 2] {
-        let found = format!("{:?}", node.reserved);
+        let found = text!("{:?}", node.reserved);
         return fail(Code::Slots, offset_of!(PackedNode, reserved), "zeros", found);
     }
     Ok(())
@@ -45,10 +45,10 @@ pub(super) fn check_slots(node: &WideNode, start: u64, codes: usize) -> Result<(
         let upper = [0, 1, 2].map(|a| node.bounds[a][1][i]);
         if i < used {
             if !is_box(lower, upper) {
-                return fail(Code::ChildBounds, 4 * i, "a finite box", format!("{lower:?} to {upper:?}"));
+                return fail(Code::ChildBounds, 4 * i, "a finite box", text!("{lower:?} to {upper:?}"));
             }
         } else if node.child[i] != NONE || lower != [f32::MAX; 3] || upper != [-f32::MAX; 3] {
-            let found = format!("child {:#010x} with {lower:?} to {upper:?} in slot {i}", node.child[i]);
+            let found = text!("child {:#010x} with {lower:?} to {upper:?} in slot {i}", node.child[i]);
             return fail(Code::Slots, 4 * i, "an empty slot behind the used ones", found);
         }
     }

@@ -22,7 +22,7 @@ pub(super) fn violation<T>(
     expected: &'static str,
     found: impl Debug,
 ) -> RowResult<T> {
-    Err(Violation { code, offset, expected, found: format!("{found:?}") })
+    Err(Violation { code, offset, expected, found: text!("{found:?}") })
 }
 
 /// Checks every row of a section of the whole file by itself.
@@ -42,7 +42,7 @@ impl Violation {
             kind,
             offset as u64,
             self.expected,
-            format!("{} in row {row}", self.found),
+            text!("{} in row {row}", self.found),
         )
     }
 }

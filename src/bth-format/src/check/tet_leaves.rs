@@ -23,11 +23,11 @@ fn ranges(view: &ObjectView) -> Result<()> {
             Err(Error::within(code, kind::TET_LEAVES, start + offset as u64, expected, found))
         };
         if !is_box(leaf.lower, leaf.upper) || (0..3).any(|a| leaf.lower[a] >= leaf.upper[a]) {
-            let found = format!("{:?} to {:?}", leaf.lower, leaf.upper);
+            let found = text!("{:?} to {:?}", leaf.lower, leaf.upper);
             return fail(Code::TetBox, 0, "a finite box, lower < upper".into(), found);
         }
         if leaf.flags != 0 {
-            let found = leaf.flags.to_string();
+            let found = text!("{}", leaf.flags);
             return fail(Code::TetBox, offset_of!(TetLeaf, flags), "flags of 0".into(), found);
         }
         let first = [leaf.first_tet, leaf.first_vertex, leaf.first_face, leaf.first_hull];
@@ -37,21 +37,21 @@ fn ranges(view: &ObjectView) -> Result<()> {
             let offset = offset_of!(TetLeaf, first_tet) + 8 * k;
             let last = first[k] as u64 + count[k] as u64;
             if first[k] as u64 != end[k] || last > rows[k] as u64 {
-                let expected = format!("rows of {} from {} to {}", names[k], end[k], rows[k]);
-                return fail(Code::TetRanges, offset, expected, format!("{} to {last}", first[k]));
+                let expected = text!("rows of {} from {} to {}", names[k], end[k], rows[k]);
+                return fail(Code::TetRanges, offset, expected, text!("{} to {last}", first[k]));
             }
             if count[k] < least[k] {
-                let expected = format!("at least {} rows of {}", least[k], names[k]);
-                return fail(Code::TetCounts, offset + 4, expected, count[k].to_string());
+                let expected = text!("at least {} rows of {}", least[k], names[k]);
+                return fail(Code::TetCounts, offset + 4, expected, text!("{}", count[k]));
             }
             end[k] = last;
         }
     }
     for k in 0..4 {
         if end[k] != rows[k] as u64 {
-            let expected = format!("tet leaves with {} rows of {}", rows[k], names[k]);
+            let expected = text!("tet leaves with {} rows of {}", rows[k], names[k]);
             let at = size_of_val(view.tet_leaves) as u64;
-            return Err(Error::within(Code::TetRanges, kind::TET_LEAVES, at, expected, end[k].to_string()));
+            return Err(Error::within(Code::TetRanges, kind::TET_LEAVES, at, expected, text!("{}", end[k])));
         }
     }
     Ok(())
@@ -64,7 +64,7 @@ fn vertices(view: &ObjectView) -> Result<()> {
         None => Ok(()),
         Some(row) => {
             let at = (row * size_of::<TetVertex>()) as u64;
-            let found = format!("{:?}", view.tet_vertices[row]);
+            let found = text!("{:?}", view.tet_vertices[row]);
             Err(Error::within(Code::TetVertices, kind::TET_VERTICES, at, "a finite position and 0", found))
         }
     }
@@ -77,21 +77,21 @@ fn triangle_faces(view: &ObjectView) -> Result<()> {
     };
     let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };
     if view.triangle_faces.len() != expected {
-        let found = view.triangle_faces.len().to_string();
-        return fail(kind::TRIANGLE_FACES, 0, format!("{expected} rows"), found);
+        let found = text!("{}", view.triangle_faces.len());
+        return fail(kind::TRIANGLE_FACES, 0, text!("{expected} rows"), found);
     }
     for (row, face) in view.tet_faces.iter().enumerate() {
         if view.triangle_faces.get(face.triangle as usize) != Some(&(row as u32)) {
             let at = row * size_of::<TetFace>() + offset_of!(TetFace, triangle);
             let expected = "a triangle that TRIANGLE_FACES maps to this face".into();
-            return fail(kind::TET_FACES, at, expected, format!("triangle {}", face.triangle));
+            return fail(kind::TET_FACES, at, expected, text!("triangle {}", face.triangle));
         }
     }
     for (triangle, &face) in view.triangle_faces.iter().enumerate() {
         let named = view.tet_faces.get(face as usize).map(|f| f.triangle);
         if face != NONE && named != Some(triangle as u32) {
-            let expected = format!("NONE or the face of triangle {triangle}");
-            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, format!("row {face}"));
+            let expected = text!("NONE or the face of triangle {triangle}");
+            return fail(kind::TRIANGLE_FACES, 4 * triangle, expected, text!("row {face}"));
         }
     }
     Ok(())

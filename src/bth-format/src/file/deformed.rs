@@ -57,11 +57,7 @@ impl DeformedObject {
     pub fn of_segment(file: &File, object: u32, segment: u32) -> Result<Self> {
         let view = file.object(segment)?;
         if !view.is_deformable() {
-            return Err(Error::of_call(
-                Code::NotDeformable,
-                "a deformable object",
-                format!("object {object}"),
-            ));
+            return Err(Error::of_call(Code::NotDeformable, "a deformable object", text!("object {object}")));
         }
         let bytes = view.lines.as_bytes();
         let mut lines = Owned::zeroed(bytes.len()).ok_or_else(|| no_memory(bytes.len() as u64))?;
@@ -108,7 +104,8 @@ impl DeformedObject {
         let (root, leaf_vertices) = (self.view.header.root, self.view.leaf_vertices);
         std::mem::swap(&mut self.positions, positions);
         std::mem::swap(&mut self.normals, normals);
-        let lines = <[CacheLine]>::mut_from_bytes(self.lines.bytes_mut()).expect("a whole number of lines");
+        let lines =
+            <[CacheLine]>::mut_from_bytes(self.lines.bytes_mut()).ok().expect("a whole number of lines");
         let ([lower, upper], result) =
             refit(RefitParts { lines, leaf_vertices, positions: &self.positions, root });
         self.header = Arc::new(Object { lower, upper, ..*self.header });
@@ -130,7 +127,8 @@ impl DeformedObject {
             ..object
         };
         if own {
-            let lines = <[CacheLine]>::ref_from_bytes(self.lines.bytes()).expect("a whole number of lines");
+            let lines =
+                <[CacheLine]>::ref_from_bytes(self.lines.bytes()).ok().expect("a whole number of lines");
             let header: &Object = &self.header;
             let (bounds, positions) = (ObjectBounds::new(header), self.positions.as_slice());
             let normals = self.normals.as_deref().unwrap_or(view.normals);

@@ -113,7 +113,7 @@ impl File {
         let objects = table::check(buffer.bytes())?;
         let views = (0..objects).map(|_| OnceLock::new()).collect();
         let mut rows = vec![[NONE; OBJECT_KINDS]; objects as usize];
-        let (header, _) = Header::ref_from_prefix(buffer.bytes()).expect("checked above");
+        let (header, _) = Header::ref_from_prefix(buffer.bytes()).ok().expect("checked above");
         for (row, entry) in table::entries(buffer.bytes(), header).iter().enumerate() {
             let object = rows.get_mut(entry.object as usize);
             if let Some(slot) = object.and_then(|kinds| kinds.get_mut(entry.kind as usize)) {
@@ -130,7 +130,7 @@ impl File {
 
     /// The header.
     pub fn header(&self) -> &Header {
-        let (header, _) = Header::ref_from_prefix(self.bytes()).expect("checked when opened");
+        let (header, _) = Header::ref_from_prefix(self.bytes()).ok().expect("checked when opened");
         header
     }
 
@@ -226,8 +226,8 @@ impl File {
 
     fn make_view(&self, object: u32) -> Result<ObjectView<'_>> {
         if object >= self.object_count() {
-            let expected = format!("an object below {}", self.object_count());
-            return Err(Error::at(Code::NoSuchObject, 0, expected, object.to_string()));
+            let expected = text!("an object below {}", self.object_count());
+            return Err(Error::at(Code::NoSuchObject, 0, expected, text!("{object}")));
         }
         let header: &[Object] = self.slice(object, kind::OBJECT);
         let header = &header[0];
@@ -242,7 +242,7 @@ impl File {
             },
             None if header.record == 0 && entry.is_none_or(|e| e.count == 0) => Records::None,
             _ => {
-                let found = format!("record kind {} and a TETS stride of {stride}", header.record);
+                let found = text!("record kind {} and a TETS stride of {stride}", header.record);
                 let offset = std::mem::offset_of!(Object, record) as u64;
                 let error =
                     Error::within(Code::Record, kind::OBJECT, offset, "a record kind that fits TETS", found);
@@ -289,10 +289,10 @@ impl File {
         let grid = Grid::from_object(object).map_err(|what| wrong(expected, what.to_owned()))?;
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
-            return Err(wrong("f32, as the header announces no grid", format!("{:#x}", object.coordinates)));
+            return Err(wrong("f32, as the header announces no grid", text!("{:#x}", object.coordinates)));
         }
         if object.coordinates & PACKED_NODES != 0 && features & FEATURE_PACKED_NODES == 0 {
-            let found = format!("{:#x}", object.coordinates);
+            let found = text!("{:#x}", object.coordinates);
             return Err(wrong("no packed nodes, as the header announces none", found));
         }
         Ok(grid)
@@ -337,6 +337,7 @@ impl File {
     fn slice<T: FromBytes + KnownLayout + Immutable>(&self, object: u32, kind: u32) -> &[T] {
         let Some(section) = self.section(object, kind) else { return &[] };
         <[T]>::ref_from_bytes(section.bytes)
+            .ok()
             .expect("checking the table made length, stride and alignment fit")
     }
 }

@@ -102,13 +102,13 @@ impl File {
             Err(self.locate(error, NONE))
         };
         if !rows.is_empty() && rows.len() != self.object_count() as usize {
-            return error(0, format!("{} rows or none", self.object_count()), rows.len().to_string());
+            return error(0, text!("{} rows or none", self.object_count()), text!("{}", rows.len()));
         }
         match rows.iter().position(|n| !names::is_name(text, n.name, n.name_length)) {
             None => Ok(()),
             Some(row) => {
                 let expected = "a name of at most 4096 bytes within OBJECT_LABELS".to_owned();
-                error(size_of::<ObjectName>() * row, expected, format!("{:?}", rows[row]))
+                error(size_of::<ObjectName>() * row, expected, text!("{:?}", rows[row]))
             }
         }
     }

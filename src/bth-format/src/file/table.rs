@@ -124,15 +124,15 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
         Err(Error::at(code, offset as u64, expected, found))
     };
     let Ok((header, _)) = Header::ref_from_prefix(bytes) else {
-        return fail(Code::HeaderSize, 0, format!("{HEADER_SIZE} bytes"), bytes.len().to_string());
+        return fail(Code::HeaderSize, 0, text!("{HEADER_SIZE} bytes"), text!("{}", bytes.len()));
     };
     if header.identifier != IDENTIFIER {
         return fail(Code::Identifier, 0, hex(&IDENTIFIER), hex(&header.identifier));
     }
     let (writer, reader) = (header.writer_version, header.minimum_reader_version);
     if writer >> 16 != 1 || reader >> 16 != 1 || reader > writer || reader > WRITER_VERSION {
-        let expected = format!("versions 1.x that a reader of {} may read", version(WRITER_VERSION));
-        let found = format!("writer {}, minimum reader {}", version(writer), version(reader));
+        let expected = text!("versions 1.x that a reader of {} may read", version(WRITER_VERSION));
+        let found = text!("writer {}, minimum reader {}", version(writer), version(reader));
         return fail(Code::Version, offset_of!(Header, writer_version), expected, found);
     }
     let at = offset_of!(Header, header_hash);
@@ -142,15 +142,15 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     }
     if header.file_length != length {
         let at = offset_of!(Header, file_length);
-        return fail(Code::Length, at, format!("{} bytes", header.file_length), format!("{length} bytes"));
+        return fail(Code::Length, at, text!("{} bytes", header.file_length), text!("{length} bytes"));
     }
     if header.reserved != 0 {
-        return fail(Code::Reserved, offset_of!(Header, reserved), "0".into(), header.reserved.to_string());
+        return fail(Code::Reserved, offset_of!(Header, reserved), "0".into(), text!("{}", header.reserved));
     }
     let unknown = header.required_features & !KNOWN_FEATURES;
     if unknown != 0 {
         let at = offset_of!(Header, required_features);
-        return fail(Code::Features, at, "known feature bits".into(), format!("unknown {unknown:#x}"));
+        return fail(Code::Features, at, "known feature bits".into(), text!("unknown {unknown:#x}"));
     }
     let max_entries = (length - HEADER_SIZE as u64) / ENTRY_SIZE;
     if header.section_offset != HEADER_SIZE as u64
@@ -159,8 +159,8 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
     {
         let at = offset_of!(Header, section_offset);
         let expected =
-            format!("at most {} entries at byte {HEADER_SIZE}", max_entries.min(limits::MAX_SECTIONS as u64));
-        let found = format!("{} entries at byte {}", header.section_count, header.section_offset);
+            text!("at most {} entries at byte {HEADER_SIZE}", max_entries.min(limits::MAX_SECTIONS as u64));
+        let found = text!("{} entries at byte {}", header.section_count, header.section_offset);
         return fail(Code::Table, at, expected, found);
     }
     Ok(header)
@@ -170,6 +170,7 @@ pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
 pub(super) fn entries<'a>(bytes: &'a [u8], header: &Header) -> &'a [SectionEntry] {
     let end = HEADER_SIZE + header.section_count as usize * ENTRY_SIZE as usize;
     <[SectionEntry]>::ref_from_bytes(&bytes[HEADER_SIZE..end])
+        .ok()
         .expect("the buffer is aligned and a table is whole entries")
 }
 
@@ -203,8 +204,8 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
     // BTH-F019, which makes the file's length a multiple of 64. Sections end within the file, but rounding up may overflow.
     if end.checked_next_multiple_of(ALIGNMENT as u64) != Some(header.file_length) {
         let at = offset_of!(Header, file_length) as u64;
-        let expected = format!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
-        return Err(Error::at(Code::Tail, at, expected, header.file_length.to_string()));
+        let expected = text!("the end of the last section, {end}, rounded up to {ALIGNMENT}");
+        return Err(Error::at(Code::Tail, at, expected, text!("{}", header.file_length)));
     }
     Ok(objects)
 }
@@ -223,58 +224,63 @@ fn check_entry(
     if let Some(p) = previous
         && (p.object, p.kind) >= (e.object, e.kind)
     {
-        let expected = format!("an entry behind object {}, kind {}", p.object, p.kind);
-        return Err((Code::Order, 0, expected, format!("object {}, kind {}", e.object, e.kind)));
+        let expected = text!("an entry behind object {}, kind {}", p.object, p.kind);
+        return Err((Code::Order, 0, expected, text!("object {}, kind {}", e.object, e.kind)));
     }
     if e.reserved != 0 {
-        return Err((Code::Reserved, offset_of!(SectionEntry, reserved), "0".into(), e.reserved.to_string()));
+        return Err((
+            Code::Reserved,
+            offset_of!(SectionEntry, reserved),
+            "0".into(),
+            text!("{}", e.reserved),
+        ));
     }
     if e.flags & !SECTION_REQUIRED != 0 {
-        return Err((Code::Flags, offset_of!(SectionEntry, flags), "0 or 1".into(), e.flags.to_string()));
+        return Err((Code::Flags, offset_of!(SectionEntry, flags), "0 or 1".into(), text!("{}", e.flags)));
     }
     if e.alignment as usize != ALIGNMENT || !e.offset.is_multiple_of(ALIGNMENT as u64) {
-        let found = format!("alignment {} at offset {}", e.alignment, e.offset);
+        let found = text!("alignment {} at offset {}", e.alignment, e.offset);
         return Err((
             Code::Alignment,
             offset_of!(SectionEntry, alignment),
-            format!("multiples of {ALIGNMENT}"),
+            text!("multiples of {ALIGNMENT}"),
             found,
         ));
     }
     let last = e.offset.checked_add(e.length).filter(|last| e.offset >= end && *last <= length);
     let Some(last) = last else {
-        let found = format!("{} bytes at {}", e.length, e.offset);
+        let found = text!("{} bytes at {}", e.length, e.offset);
         return Err((
             Code::Bounds,
             offset_of!(SectionEntry, offset),
-            format!("bytes from {end} to {length}"),
+            text!("bytes from {end} to {length}"),
             found,
         ));
     };
     if (e.stride as u64).checked_mul(e.count) != Some(e.length) {
-        let found = format!("{} bytes", e.length);
+        let found = text!("{} bytes", e.length);
         return Err((
             Code::Count,
             offset_of!(SectionEntry, length),
-            format!("{} times {} bytes", e.count, e.stride),
+            text!("{} times {} bytes", e.count, e.stride),
             found,
         ));
     }
     match kind_stride(e.kind) {
         None if e.flags & SECTION_REQUIRED != 0 => {
-            return Err((Code::UnknownKind, 0, "a known kind".into(), e.kind.to_string()));
+            return Err((Code::UnknownKind, 0, "a known kind".into(), text!("{}", e.kind)));
         }
         None => {}
         Some(0) if RecordKind::ALL.iter().any(|r| r.stride() == e.stride as usize) => {}
         Some(stride) if stride == e.stride as usize && stride != 0 => {}
         Some(stride) => {
-            let expected = if stride == 0 { "16, 20 or 32".into() } else { stride.to_string() };
-            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, e.stride.to_string()));
+            let expected = if stride == 0 { "16, 20 or 32".into() } else { text!("{}", stride) };
+            return Err((Code::Stride, offset_of!(SectionEntry, stride), expected, text!("{}", e.stride)));
         }
     }
     if e.kind != kind::OBJECT && e.count > max_count(e.kind) {
-        let expected = format!("at most {}", max_count(e.kind));
-        return Err((Code::Limit, offset_of!(SectionEntry, count), expected, e.count.to_string()));
+        let expected = text!("at most {}", max_count(e.kind));
+        return Err((Code::Limit, offset_of!(SectionEntry, count), expected, text!("{}", e.count)));
     }
     Ok(last)
 }
@@ -295,9 +301,8 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
         };
         if wrong {
             let at = HEADER_SIZE as u64 + i as u64 * ENTRY_SIZE + offset_of!(SectionEntry, object) as u64;
-            let expected =
-                format!("the one OBJECT row of object {objects}, or a section that fits its object");
-            let found = format!("{} rows of kind {} in object {}", e.count, e.kind, e.object);
+            let expected = text!("the one OBJECT row of object {objects}, or a section that fits its object");
+            let found = text!("{} rows of kind {} in object {}", e.count, e.kind, e.object);
             return Err(Error::within(Code::Objects, e.kind, at, expected, found).in_object(e.object));
         }
         objects += u32::from(first && e.kind == kind::OBJECT);
@@ -306,9 +311,9 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
 }
 
 fn version(v: u32) -> String {
-    format!("{}.{}", v >> 16, v & 0xffff)
+    text!("{}.{}", v >> 16, v & 0xffff)
 }
 
 fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
+    bytes.iter().map(|b| text!("{b:02x}")).collect()
 }

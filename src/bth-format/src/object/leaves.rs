@@ -51,7 +51,7 @@ impl<'a> ObjectView<'a> {
     #[inline(always)]
     fn grid_leaf<T: FromBytes + KnownLayout + Immutable>(&self, half_line: u32) -> &'a T {
         let bytes = &self.lines.as_bytes()[half_line as usize * HALF_LINE..][..size_of::<T>()];
-        T::ref_from_bytes(bytes).expect("half lines are aligned for every leaf")
+        T::ref_from_bytes(bytes).ok().expect("half lines are aligned for every leaf")
     }
 
     /// The half lines of the block that a child code leads to: the first one, and how many. `None` for tet leaves, which
@@ -78,7 +78,7 @@ impl<'a> ObjectView<'a> {
 
     /// All bytes of LINES, by half line.
     pub(crate) fn half_line_bytes(&self) -> &'a [[u8; HALF_LINE]] {
-        <[[u8; HALF_LINE]]>::ref_from_bytes(self.lines.as_bytes()).expect("a line is two half lines")
+        <[[u8; HALF_LINE]]>::ref_from_bytes(self.lines.as_bytes()).ok().expect("a line is two half lines")
     }
 
     /// Bit 15 of the fields `high` of a leaf of 21 bits, which the specification wants zero and the unpacked leaf lacks.

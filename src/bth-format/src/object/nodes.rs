@@ -19,7 +19,7 @@ impl<'a> NodeBase<'a> {
     fn block<T: FromBytes + KnownLayout + Immutable>(self, line: u32, lines: usize) -> &'a T {
         let at = line as usize;
         let bytes = self.lines[at..at + lines].as_bytes();
-        T::ref_from_bytes(bytes).expect("a block is a whole number of aligned lines")
+        T::ref_from_bytes(bytes).ok().expect("a block is a whole number of aligned lines")
     }
     /// As [`ObjectView::node`].
     #[inline(always)]
@@ -37,7 +37,7 @@ impl<'a> NodeBase<'a> {
     pub fn wide_node(self, code: u32) -> Option<&'a WideNode> {
         let at = code as usize;
         let bytes = self.lines.get(at..at + NODE_LINES)?.as_bytes();
-        Some(WideNode::ref_from_bytes(bytes).expect("a node is a whole number of aligned lines"))
+        Some(WideNode::ref_from_bytes(bytes).ok().expect("a node is a whole number of aligned lines"))
     }
     /// The leaf that a child code leads to, if it is an indexed leaf of `f32`.
     #[inline(always)]

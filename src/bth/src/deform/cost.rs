@@ -39,7 +39,7 @@ fn areas(nodes: &[CacheLine]) -> f64 {
 }
 
 fn node(lines: &[CacheLine]) -> &WideNode {
-    WideNode::ref_from_bytes(lines.as_bytes()).expect("the lines of a node")
+    WideNode::ref_from_bytes(lines.as_bytes()).ok().expect("the lines of a node")
 }
 
 /// The box of all children of a node: lower and upper end.

@@ -87,7 +87,7 @@ impl Deforming {
     /// Checks the number of positions that are given, and that all are finite.
     fn check(&self, positions: &[[f32; 3]]) -> Result<(), Error> {
         if positions.len() != self.staged.len() {
-            let expected = format!("{} positions", self.staged.len());
+            let expected = text!("{} positions", self.staged.len());
             return Err(Error::of_call(Code::NewPositions, expected, positions.len().to_string()));
         }
         check_finite(positions)
@@ -143,7 +143,7 @@ fn check_finite(positions: &[[f32; 3]]) -> Result<(), Error> {
         return Ok(());
     }
     let row = positions.iter().position(|p| !p.iter().all(|x| x.is_finite())).unwrap_or_default();
-    let found = format!("{:?} of vertex {row}", positions[row]);
+    let found = text!("{:?} of vertex {row}", positions[row]);
     Err(Error::of_call(Code::NewPositions, "finite positions", found))
 }
 

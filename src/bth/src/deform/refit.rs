@@ -93,7 +93,7 @@ fn take<'a>(
 /// The node or leaf in lines that are as long as it.
 #[inline(always)]
 fn block_mut<T: FromBytes + IntoBytes + KnownLayout + Immutable>(lines: &mut [CacheLine]) -> &mut T {
-    T::mut_from_bytes(lines.as_mut_bytes()).expect("a block is a whole number of aligned lines")
+    T::mut_from_bytes(lines.as_mut_bytes()).ok().expect("a block is a whole number of aligned lines")
 }
 
 /// Stores the box of a child.

@@ -77,7 +77,7 @@ impl Scene {
             Err(failed) => {
                 self.objects_mut().deforming(object)?.undo();
                 let (code, expected, found) = failed.error.words();
-                let found = format!("{found}: instance {}", failed.instance);
+                let found = text!("{found}: instance {}", failed.instance);
                 Err(Error::of_call(code, expected, found))
             }
         }

@@ -123,7 +123,7 @@ impl Deformers {
                 }
                 let at = size_of::<Deformer>() as u64 * row as u64;
                 let name = view.node_name(deformer.node).escape_debug();
-                let found = format!("others: node \"{name}\" at {seconds} s");
+                let found = text!("others: node \"{name}\" at {seconds} s");
                 let error =
                     Error::within_file(Code::NotFinite, kind::DEFORMERS, at, "finite positions", found);
                 return Err(file.locate(error, NONE));

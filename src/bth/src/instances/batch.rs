@@ -9,6 +9,7 @@ use super::placement::Placement;
 use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
+use crate::SMALL;
 use crate::object::{self, HintUse, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
@@ -76,7 +77,7 @@ impl Kernel for StartKernel<'_> {
         let (world, rays) = (batch.world, &batch.rays[first..first + count]);
         let top = &world.top;
         packets.start(s, top, rays, active);
-        if let (Some(from), true) = (batch.from, world.has_single_visible()) {
+        if let (Some(from), true) = (batch.hints(), world.has_single_visible()) {
             // No other instance is visible, so a ray that starts on it needs no traversal.
             active.retain(|&index| {
                 let instance = world.start_instance(from[first + index as usize]);
@@ -93,7 +94,7 @@ impl Kernel for StartKernel<'_> {
 }
 
 /// Kernel that advances each active ray to its next instance, and removes the rays that have ended.
-struct AdvanceKernel<'a, Q> {
+struct AdvanceKernel<'a, Q: ?Sized> {
     batch: &'a SceneBatch<'a>,
     query: &'a Q,
     /// Index of the first ray of the chunk.
@@ -101,7 +102,7 @@ struct AdvanceKernel<'a, Q> {
     active_rays: &'a mut ActiveRays,
 }
 
-impl<Q: SceneQuery> Kernel for AdvanceKernel<'_, Q> {
+impl<Q: SceneQuery + ?Sized> Kernel for AdvanceKernel<'_, Q> {
     type Output = ();
 
     #[inline(always)]
@@ -172,7 +173,7 @@ impl World {
         any: bool,
         trace: impl FnOnce(Option<&[PrimitiveRef]>, &mut Scratch),
     ) {
-        let hints = from.filter(|from| self.has_use_for(objects, from));
+        let hints = from.filter(|from| !SMALL && self.has_use_for(objects, from));
         object::with_scratch(|scratch| {
             let Some(from) = hints else { return trace(None, scratch) };
             let key = (std::ptr::from_ref(self).addr(), HintUse::StartInstance.kind(any));
@@ -192,12 +193,26 @@ impl World {
             .any(|from| starts.instance(*from).is_some() && (starts.is_of_use || self.has_single_visible()))
     }
 
-    fn run(
+    fn run<Q: SceneQuery>(
         &self,
         objects: &Objects,
         rays: &[Ray],
         from: Option<&[PrimitiveRef]>,
-        query: &mut impl SceneQuery,
+        query: &mut Q,
+    ) {
+        if SMALL {
+            // One kernel for all queries.
+            return self.run_query::<dyn SceneQuery + '_>(objects, rays, from, query);
+        }
+        self.run_query(objects, rays, from, query);
+    }
+
+    fn run_query<Q: SceneQuery + ?Sized>(
+        &self,
+        objects: &Objects,
+        rays: &[Ray],
+        from: Option<&[PrimitiveRef]>,
+        query: &mut Q,
     ) {
         let batch = SceneBatch { world: self, objects, rays, from };
         // They are taken out while they are in use, so that after a panic the next batch begins with new memory.
@@ -229,7 +244,7 @@ impl World {
     }
 
     /// Traces all queued visits, object by object, and empties the queue.
-    fn trace(&self, batch: &SceneBatch<'_>, query: &mut impl SceneQuery, visits: &mut VisitQueue) {
+    fn trace(&self, batch: &SceneBatch<'_>, query: &mut (impl SceneQuery + ?Sized), visits: &mut VisitQueue) {
         self.by_object(visits, |object, visits| {
             self.mark_traced(object);
             let object = batch.objects.view(object);

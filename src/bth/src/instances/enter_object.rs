@@ -2,6 +2,7 @@
 
 use super::affine::{ObjectRay, RayLanes};
 use super::scene_batch::SceneBatch;
+use crate::SMALL;
 use crate::query::sink::Visit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, LANES, Simd};
@@ -34,7 +35,7 @@ impl ObjectRays {
         self.from.clear();
         self.tmax.clear();
         self.tmax.extend(visits.iter().map(|visit| tmax(visit.ray as usize)));
-        if hinted && batch.from.is_some() {
+        if hinted && batch.hints().is_some() {
             self.from.extend(visits.iter().map(|visit| batch.hint(visit.ray as usize, visit.instance)));
         }
         Isa::chosen().run(EnterKernel { object_rays: self, batch, visits });
@@ -42,7 +43,7 @@ impl ObjectRays {
 
     /// The triangles on which rays start, if there are any.
     pub(super) fn hints(&self) -> Option<&[u32]> {
-        self.from.iter().any(|from| *from != NONE).then_some(&self.from)
+        (!SMALL && self.from.iter().any(|from| *from != NONE)).then_some(&self.from)
     }
 }
 

@@ -134,7 +134,7 @@ impl World {
             let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
                 let (code, expected, found) = error.words();
                 let name = view.node_name(instance.node).escape_debug();
-                let found = format!("{found}: node \"{name}\" at {seconds} s");
+                let found = text!("{found}: node \"{name}\" at {seconds} s");
                 let offset = u64::from(instance.node) * size_of::<Node>() as u64;
                 let error = Error::within_file(code, kind::NODES, offset, expected, found);
                 objects.sole_file().expect("a file with nodes").locate(error, NONE)

@@ -37,7 +37,7 @@ impl FreeStarts {
     pub(super) fn find(&mut self, batch: &SceneBatch<'_>, chunk: Range<usize>) {
         let FreeStarts { not_met, visits, object_rays, rest } = self;
         not_met.clear();
-        let Some(from) = batch.from else { return };
+        let Some(from) = batch.hints() else { return };
         visits.all.clear();
         let mut starts = Starts::new(batch.world, batch.objects);
         for ray in chunk.clone() {

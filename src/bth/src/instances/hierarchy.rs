@@ -33,10 +33,12 @@ pub(crate) struct NodeHierarchy {
 impl NodeHierarchy {
     /// The hierarchy of a checked scene, before the first update.
     pub(crate) fn new(view: &SceneView<'_>) -> NodeHierarchy {
-        let mut parents: Vec<u32> = view.nodes.iter().map(|n| n.parent).filter(|p| *p != NONE).collect();
-        parents.sort_unstable();
-        parents.dedup();
-        parents.shrink_to_fit();
+        let mut is_parent = vec![false; view.nodes.len()];
+        for node in view.nodes.iter().filter(|node| node.parent != NONE) {
+            is_parent[node.parent as usize] = true;
+        }
+        let mut parents = Vec::with_capacity(is_parent.iter().filter(|is_parent| **is_parent).count());
+        parents.extend((0..view.nodes.len() as u32).filter(|node| is_parent[*node as usize]));
         let first_track = if view.tracks.is_empty() {
             Vec::new()
         } else {

@@ -6,6 +6,7 @@
 
 use super::top_level::{INSTANCE, TopLevel};
 use super::traverse::limit;
+use crate::SMALL;
 use crate::bvh::packet::bounds::PacketBounds;
 use crate::bvh::packet::coherence::{PacketBackoff, Span, is_same_octant};
 use crate::bvh::packet::entry::{GROUPS, MIN_RAYS, PACKET};
@@ -37,7 +38,17 @@ struct ListedInstance {
 /// Sorts instances by depth. A function of its own, so that it is compiled once for all instruction sets.
 #[inline(never)]
 fn sort_by_depth(items: &mut [ListedInstance]) {
-    items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
+    if !SMALL {
+        return items.sort_unstable_by(|a, b| a.depth.total_cmp(&b.depth));
+    }
+    // Insertion: at most [`MAX_INSTANCES`] times as many steps as there are items.
+    for end in 1..items.len() {
+        let mut at = end;
+        while at > 0 && items[at].depth < items[at - 1].depth {
+            items.swap(at, at - 1);
+            at -= 1;
+        }
+    }
 }
 
 /// A packet, and the range of its instances in the list.

@@ -2,6 +2,7 @@
 
 use super::World;
 use super::affine::ObjectRay;
+use crate::SMALL;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::{PrimitiveRef, Ray};
@@ -22,9 +23,14 @@ impl SceneBatch<'_> {
         self.world.placement(visit.instance).inverse.ray(&Ray { tmax, ..self.rays[visit.ray as usize] })
     }
 
+    /// The triangles on which rays start, if they are given and used.
+    pub(super) fn hints(&self) -> Option<&[PrimitiveRef]> {
+        self.from.filter(|_| !SMALL)
+    }
+
     /// The triangle of an instance's object on which a ray starts, or `NONE`.
     pub(super) fn hint(&self, ray: usize, instance: u32) -> u32 {
-        let from = self.from.map_or(PrimitiveRef::NONE, |f| f[ray]);
+        let from = self.hints().map_or(PrimitiveRef::NONE, |f| f[ray]);
         if from.instance == instance { from.triangle } else { NONE }
     }
 }

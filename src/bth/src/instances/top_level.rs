@@ -225,7 +225,7 @@ impl TopLevel {
     #[inline(always)]
     pub(crate) fn node(&self, code: u32) -> &WideNode {
         let lines = &self.lines[code as usize..][..NODE_LINES];
-        WideNode::ref_from_bytes(lines.as_bytes()).expect("a node is as long as its lines")
+        WideNode::ref_from_bytes(lines.as_bytes()).ok().expect("a node is as long as its lines")
     }
 
     /// Whether no instance is visible.
@@ -277,7 +277,7 @@ fn add_node(lines: &mut Vec<CacheLine>) -> u32 {
 
 /// The node in the lines of one.
 pub(super) fn node_mut(lines: &mut [CacheLine]) -> &mut WideNode {
-    WideNode::mut_from_bytes(lines.as_mut_bytes()).expect("a node is as long as its lines")
+    WideNode::mut_from_bytes(lines.as_mut_bytes()).ok().expect("a node is as long as its lines")
 }
 
 /// Stores a child in a slot of a node.

@@ -5,6 +5,7 @@ use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
 use super::strategy::{HintUse, MIN_MEASURED_RAYS, Strategy};
+use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::packet::{self, Packets};
 use crate::bvh::single::TetOutcome;
@@ -12,7 +13,7 @@ use crate::clock;
 use crate::free;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{AnswerLanes, Any, Nearest, Query};
+use crate::query::{AnswerLanes, Any, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
@@ -59,7 +60,7 @@ fn trace_from<Q: Query>(
     scratch: &mut Scratch,
     answers: &mut [Q::Answer],
 ) {
-    let Some(hints) = from.filter(|_| free::is_known(object)) else {
+    let Some(hints) = from.filter(|_| !SMALL && free::is_known(object)) else {
         let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
         return trace_batch(object, rays, from, scratch, &mut sink);
     };
@@ -203,6 +204,9 @@ pub(crate) fn trace_batch<Q: Query>(
         return;
     }
     let from = from.filter(|from| {
+        if SMALL {
+            return false;
+        }
         let mut starts = rays.iter().zip(*from);
         !object.tet_leaves.is_empty()
             && starts.any(|(ray, &triangle)| triangle != NONE && may_gain_by_walk::<Q>(object, ray))
@@ -225,7 +229,7 @@ fn trace_with<Q: Query>(
     scratch: &mut Scratch,
     sink: &mut Sink<'_, Q>,
 ) {
-    if from.is_some() || sole_tet_leaf(object) != NONE {
+    if !SMALL && (from.is_some() || sole_tet_leaf(object) != NONE) {
         for (part, rays) in rays.chunks(RAYS_PER_PART).enumerate() {
             let first = part * RAYS_PER_PART;
             let from = from.map(|from| &from[first..][..rays.len()]);
@@ -382,7 +386,7 @@ fn one_by_one<Q: Query>(
         let ray = &rays[index];
         let mut query = remaining.queries.map_or_else(|| Q::new(ray), |queries| queries[index]);
         let walked = remaining.walked.map_or(NONE, |walked| walked[index]);
-        single::through_bvh(object, ray, &mut query, walked, &mut ());
+        single::through_bvh(object, ray, &mut query, walked, &mut Uncounted::default());
         sink.query(index, &query);
     };
     match remaining.order {
@@ -406,7 +410,8 @@ impl<Q: Query> Kernel for InterleavedKernel<'_, '_, Q> {
     fn run<S: Simd>(self, s: S) {
         let InterleavedKernel { object, rays, remaining, scratch, sink } = self;
         let traversal = Interleaved { object, rays, remaining, stacks: &mut scratch.stacks, sink };
-        traversal
-            .run(s, |leaf, ray, query| enter_tets(object, leaf, ray, query, &mut ()) == TetOutcome::Done);
+        traversal.run(s, |leaf, ray, query| {
+            enter_tets(object, leaf, ray, query, &mut Uncounted::default()) == TetOutcome::Done
+        });
     }
 }

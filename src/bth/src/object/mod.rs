@@ -12,7 +12,7 @@ pub(crate) use scratch::{Scratch, with_scratch};
 pub(crate) use strategy::{HintUse, Strategy};
 
 use self::single::trace;
-use crate::query::{Any, Nearest, Steps};
+use crate::query::{Any, Nearest, Steps, Uncounted};
 use crate::rays::{Hit, Ray};
 use bth_format::object::ObjectView;
 
@@ -29,7 +29,7 @@ pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u
 /// kernels of its own.
 #[inline(never)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
-    trace::<Nearest, ()>(object, ray, from, instance, &mut (), hit);
+    trace::<Nearest, Uncounted>(object, ray, from, instance, &mut Uncounted::default(), hit);
 }
 
 /// As [`nearest`], with the statistics of the traversal.
@@ -43,6 +43,6 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 #[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = false;
-    trace::<Any, ()>(object, ray, from, 0, &mut (), &mut found);
+    trace::<Any, Uncounted>(object, ray, from, 0, &mut Uncounted::default(), &mut found);
     found
 }

@@ -1,5 +1,6 @@
 //! Tracing of one object by a single ray.
 
+use crate::SMALL;
 use crate::bvh::single::trace_single;
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::prepare::PreparedRay;
@@ -21,7 +22,7 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    if from == NONE || object.tet_leaves.is_empty() {
+    if SMALL || from == NONE || object.tet_leaves.is_empty() {
         let mut query = Q::new(ray);
         through_bvh(object, ray, &mut query, NONE, count);
         *answer = query.answer(object.triangle_ids, instance);

@@ -275,6 +275,14 @@ pub(crate) trait Count {
 
 impl Count for () {}
 
+/// Receiver of statistics that nobody reads.
+#[cfg(not(feature = "small"))]
+pub(crate) type Uncounted = ();
+
+/// With the feature `small`, kernels that count are the only ones.
+#[cfg(feature = "small")]
+pub(crate) type Uncounted = Steps;
+
 /// Statistics of the traversal of rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steps {

@@ -194,7 +194,9 @@ impl Isa {
 
     #[cold]
     fn choose_first() -> Isa {
-        let isa = Isa::from_environment().ok().flatten().unwrap_or_else(Isa::best);
+        // Browsers have no environment variables.
+        let named = if crate::SMALL { None } else { Isa::from_environment().ok().flatten() };
+        let isa = named.unwrap_or_else(Isa::best);
         // Threads that run this concurrently store the same value.
         CHOSEN_ISA.store(isa as u8 + 1, Ordering::Relaxed);
         isa

@@ -138,5 +138,5 @@ impl<'a, Q: Query + Copy> WalkBatch<'a, Q> {
 
 /// The object's tet vertices as rows of four words: x, y, z and an unused word.
 pub(super) fn vertices<'a>(object: &ObjectView<'a>) -> &'a [[f32; 4]] {
-    <[[f32; 4]]>::ref_from_bytes(object.tet_vertices.as_bytes()).expect("a vertex is four words")
+    <[[f32; 4]]>::ref_from_bytes(object.tet_vertices.as_bytes()).ok().expect("a vertex is four words")
 }

@@ -278,7 +278,7 @@ impl<S: Simd> PreparedWalks<S> {
         ray: S::U,
         face: S::U,
     ) -> (Self, S::M) {
-        let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).expect("a face is eight words");
+        let faces = <[[u32; 8]]>::ref_from_bytes(faces.as_bytes()).ok().expect("a face is eight words");
         // The fields of a `TetFace`, in their order.
         let [v0, v1, v2, _, above, below, apex_above, apex_below] = s.rows8(m, faces, face);
         let vertex = [v0, v1, v2];

@@ -177,7 +177,7 @@ pub(crate) enum LaneRecords<'a> {
 fn words<T: FromBytes + zerocopy::Immutable>(
     records: &(impl IntoBytes + zerocopy::Immutable + ?Sized),
 ) -> &[T] {
-    <[T]>::ref_from_bytes(records.as_bytes()).expect("records are a whole number of words")
+    <[T]>::ref_from_bytes(records.as_bytes()).ok().expect("records are a whole number of words")
 }
 
 impl<'a> LaneRecords<'a> {

@@ -40,7 +40,7 @@ fn pair<S: Simd>(s: S, rays: &[Ray], at: usize) -> S::F {
 /// The floats of two rays.
 #[inline(always)]
 fn floats(rays: &[Ray; 2]) -> &[f32; LANES] {
-    <[f32; LANES]>::ref_from_bytes(rays.as_bytes()).expect("rays are made of f32")
+    <[f32; LANES]>::ref_from_bytes(rays.as_bytes()).ok().expect("rays are made of f32")
 }
 
 /// Whether the directions of two rays lie in the same octant. It is tested for the first and the last ray before [`Span::of`], which

@@ -215,7 +215,7 @@ impl Prepared {
     /// The prepared ray of a lane, if f32 could prepare it.
     #[inline(always)]
     pub(crate) fn prepared(&self, lane: usize) -> Option<&PreparedRay> {
-        let ray = PreparedRay::ref_from_bytes(self.rays[lane % LANES].as_bytes()).expect("of this size");
+        let ray = PreparedRay::ref_from_bytes(self.rays[lane % LANES].as_bytes()).ok().expect("of this size");
         (self.ready >> (lane % LANES) & 1 != 0).then_some(ray)
     }
 

@@ -56,6 +56,12 @@ pub struct PrimitiveRef {
 impl PrimitiveRef {
     /// No triangle: the surface of a miss, and of a ray of which it is not known where it starts.
     pub const NONE: PrimitiveRef = PrimitiveRef { instance: NONE, triangle: NONE };
+
+    /// The triangle, if it is one of the given instance; else `NONE`.
+    #[inline(always)]
+    pub(crate) fn triangle_of(self, instance: u32) -> u32 {
+        if self.instance == instance { self.triangle } else { NONE }
+    }
 }
 
 /// Nearest hit of a ray, or a miss.

@@ -1,7 +1,6 @@
 //! Scenes: opening of compiled files and queries by rays in world space.
 
 use crate::SMALL;
-use crate::free;
 use crate::instances::World;
 use crate::masks::Masks;
 use crate::object;
@@ -322,9 +321,8 @@ impl Scene {
                 }
                 return;
             }
-            let from = hints(object, from, instance);
             return object::with_scratch(|scratch| {
-                object::nearest_batch(object, rays, from.as_deref(), instance, scratch, hits);
+                object::nearest_batch(object, rays, from, instance, scratch, hits);
             });
         }
         if let Some(world) = &self.world {
@@ -381,9 +379,8 @@ impl Scene {
                 }
                 return;
             }
-            let from = hints(object, from, instance);
             return object::with_scratch(|scratch| {
-                object::any_batch(object, rays, from.as_deref(), scratch, found);
+                object::any_batch(object, rays, from, instance, scratch, found);
             });
         }
         if let Some(world) = &self.world {
@@ -403,14 +400,7 @@ fn start_primitive(from: Option<&[PrimitiveRef]>, ray: usize) -> PrimitiveRef {
     from.map_or(PrimitiveRef::NONE, |f| f[ray])
 }
 
-/// For each ray the triangle of an instance's object on which it starts, or `NONE`. `None` if there are no hints, or if the
-/// object has neither tetrahedra nor free directions, because only these use hints.
-fn hints(object: &ObjectView<'_>, from: Option<&[PrimitiveRef]>, instance: u32) -> Option<Vec<u32>> {
-    let from = from.filter(|_| !SMALL && !object.tet_leaves.is_empty() || free::is_known(object))?;
-    Some(from.iter().map(|&from| hint(from, instance)).collect())
-}
-
 /// The triangle of an instance's object on which a ray starts, or `NONE`.
 fn hint(from: PrimitiveRef, instance: u32) -> u32 {
-    if !SMALL && from.instance == instance { from.triangle } else { NONE }
+    if SMALL { NONE } else { from.triangle_of(instance) }
 }

@@ -10,7 +10,7 @@ use super::scene_batch::SceneBatch;
 use super::traverse::RayTraversals;
 use super::visit_queue::VisitQueue;
 use crate::SMALL;
-use crate::object::{self, HintUse, Scratch, Strategy};
+use crate::object::{self, HintUse, QueryKind, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
 use crate::query::{self, Query, Steps, better};
@@ -136,7 +136,7 @@ impl World {
         hits: &mut [Hit],
     ) {
         hits.fill(Hit::MISS);
-        self.by_hints(objects, from, false, |from, scratch| {
+        self.by_hints(objects, (rays, from), false, |from, scratch| {
             let mut query = SceneNearest { rays, hits, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -151,7 +151,7 @@ impl World {
         found: &mut [bool],
     ) {
         found.fill(false);
-        self.by_hints(objects, from, true, |from, scratch| {
+        self.by_hints(objects, (rays, from), true, |from, scratch| {
             let mut query = SceneAny { rays, found, scratch, object_rays: ObjectRays::default() };
             self.run(objects, rays, from, &mut query);
         });
@@ -169,14 +169,17 @@ impl World {
     fn by_hints(
         &self,
         objects: &Objects,
-        from: Option<&[PrimitiveRef]>,
+        (rays, from): (&[Ray], Option<&[PrimitiveRef]>),
         any: bool,
         trace: impl FnOnce(Option<&[PrimitiveRef]>, &mut Scratch),
     ) {
         let hints = from.filter(|from| !SMALL && self.has_use_for(objects, from));
         object::with_scratch(|scratch| {
             let Some(from) = hints else { return trace(None, scratch) };
-            let key = (std::ptr::from_ref(self).addr(), HintUse::StartInstance.kind(any));
+            let key = (
+                std::ptr::from_ref(self).addr(),
+                HintUse::StartInstance.kind(QueryKind::of(any, rays, self.top.extent)),
+            );
             object::by_hint(key, from.len(), Strategy::Bvh, scratch, |strategy, scratch| {
                 trace(hints.filter(|_| strategy == Strategy::Hinted), scratch);
             });

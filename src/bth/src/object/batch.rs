@@ -4,16 +4,15 @@
 use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::single;
-use super::strategy::{HintUse, MIN_MEASURED_RAYS, Strategy};
+use super::strategy::{HintUse, MIN_MEASURED_RAYS, QueryKind, Strategy, is_short};
 use crate::SMALL;
 use crate::bvh::interleaved::{Interleaved, RemainingRays};
 use crate::bvh::packet::{self, Packets};
 use crate::bvh::single::TetOutcome;
 use crate::clock;
-use crate::free;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{AnswerLanes, Any, Nearest, Query, Uncounted};
+use crate::query::{AnswerLanes, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
@@ -27,111 +26,15 @@ pub(crate) const MIN_BATCH: usize = 4;
 /// Greatest number of rays that walk through tetrahedra together. It is large, because lanes are idle at the end of each part.
 const RAYS_PER_PART: usize = 2048;
 
-/// Computes the nearest hits of rays in object space. `from` holds for each ray the triangle on which it starts, or `NONE`; it
-/// affects where the search begins, never the result.
-pub(crate) fn nearest_batch(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    from: Option<&[u32]>,
-    instance: u32,
-    scratch: &mut Scratch,
-    hits: &mut [Hit],
-) {
-    trace_from::<Nearest>(object, rays, from, instance, scratch, hits);
-}
-
-/// Computes whether rays in object space hit anything; `from` as for [`nearest_batch`].
-pub(crate) fn any_batch(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    from: Option<&[u32]>,
-    scratch: &mut Scratch,
-    found: &mut [bool],
-) {
-    trace_from::<Any>(object, rays, from, 0, scratch, found);
-}
-
-/// Stores the answers of those rays that hit anything. Rays that leave their triangle in a free direction are not traced.
-fn trace_from<Q: Query>(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    from: Option<&[u32]>,
-    instance: u32,
-    scratch: &mut Scratch,
-    answers: &mut [Q::Answer],
-) {
-    let Some(hints) = from.filter(|_| !SMALL && free::is_known(object)) else {
-        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-        return trace_batch(object, rays, from, scratch, &mut sink);
-    };
-    without_free::<Q>(object, rays, hints, scratch, |rest, scratch| {
-        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-        match rest {
-            None => trace_batch(object, rays, from, scratch, &mut sink),
-            // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
-            Some(rest) if Q::ANY => trace_gathered::<Q>(object, (rays, rest), instance, scratch, answers),
-            Some(rest) => trace_rest(object, rays, rest, scratch, &mut sink),
-        }
-    });
-}
-
-/// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers
-/// are misses before.
-fn trace_gathered<Q: Query>(
-    object: &ObjectView<'_>,
-    (rays, rest): (&[Ray], &[u32]),
-    instance: u32,
-    scratch: &mut Scratch,
-    answers: &mut [Q::Answer],
-) {
-    let mut gathered = std::mem::take(&mut scratch.gathered);
-    gathered.clear();
-    gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
-    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-    trace_batch(object, &gathered, None, scratch, &mut sink);
-    // No ray is before its place among those that are left, so the last answers can move first.
-    for (i, &ray) in rest.iter().enumerate().rev() {
-        answers.swap(i, ray as usize);
-    }
-    scratch.gathered = gathered;
-}
-
-/// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
-fn trace_rest<Q: Query>(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    rest: &[u32],
-    scratch: &mut Scratch,
-    sink: &mut Sink<'_, Q>,
-) {
-    if object.header.root != NONE && !rest.is_empty() {
-        // Too few rays are left of most packets.
-        let remaining = RemainingRays { order: Some(rest), queries: None, walked: None };
-        through_bvh(object, rays, remaining, scratch, sink);
-    }
-}
-
-/// Calls `trace` with the indices of the rays that may hit something, by what is known of free directions at the triangles
-/// `from`; with `None` for all rays where that takes longer than it saves.
-fn without_free<Q: Query>(
-    object: &ObjectView<'_>,
-    rays: &[Ray],
-    from: &[u32],
-    scratch: &mut Scratch,
-    trace: impl FnOnce(Option<&[u32]>, &mut Scratch),
-) {
-    // Small batches come before measurements: then the look-up decides by how many of the first rays end.
-    let key = (address_of(object), HintUse::Free.kind(Q::ANY));
-    by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
-        let mut rest = std::mem::take(&mut scratch.rest);
-        let finds = strategy == Strategy::Hinted && free::find_rest(object, rays, from, &mut rest);
-        trace(finds.then_some(&rest), scratch);
-        scratch.rest = rest;
-    });
+/// The longest side of the object's box.
+#[inline]
+pub(super) fn size_of(object: &ObjectView<'_>) -> f32 {
+    let header = object.header;
+    (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]))
 }
 
 /// What measurements of an object are stored under.
-fn address_of(object: &ObjectView<'_>) -> usize {
+pub(super) fn address_of(object: &ObjectView<'_>) -> usize {
     std::ptr::from_ref(object.header).addr()
 }
 
@@ -215,7 +118,7 @@ pub(crate) fn trace_batch<Q: Query>(
     if from.is_none() || !has_subtrees(object) {
         return trace_with(object, rays, from, scratch, sink);
     }
-    let key = (address_of(object), HintUse::Tets.kind(Q::ANY));
+    let key = (address_of(object), HintUse::Tets.kind(QueryKind::of(Q::ANY, rays, size_of(object))));
     by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
         trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
     });
@@ -310,8 +213,6 @@ fn trace_hinted<Q: Query>(
 /// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled;
 /// for other rays [`super::strategy`] chooses by measured time. No answer depends on this.
 fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
-    /// Greatest length of an any-hit ray that may gain, relative to the longest side of the object's box.
-    const SHORT: f32 = 0.3;
     if !has_subtrees(object) {
         return true;
     }
@@ -321,9 +222,7 @@ fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
     if !Q::ANY {
         return true;
     }
-    let (header, d) = (object.header, ray.direction);
-    let size = (0..3).fold(0f32, |size, k| size.max(header.upper[k] - header.lower[k]));
-    d[0].abs().max(d[1].abs()).max(d[2].abs()) * ray.tmax <= SHORT * size
+    is_short(ray, size_of(object))
 }
 
 /// Walks the rays through tetrahedra: those that have a face in `faces`, or all if a tet leaf is the whole object. `walks`
@@ -360,7 +259,7 @@ fn in_packets<Q: Query>(
 }
 
 /// Traces rays through the BVH: interleaved, or in scalar code one after the other.
-fn through_bvh<Q: Query>(
+pub(super) fn through_bvh<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     remaining: RemainingRays<'_, Q>,

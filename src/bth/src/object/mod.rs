@@ -1,15 +1,17 @@
 //! Tracing of one object by rays in object space, through its BVH and its tetrahedra: by one ray or by a batch.
 
 mod batch;
+mod hinted_batch;
 pub(crate) mod hints;
 mod scratch;
 pub(crate) mod single;
 mod strategy;
 
-pub(crate) use batch::{MIN_BATCH, any_batch, by_hint, fill_misses, nearest_batch, trace_batch};
+pub(crate) use batch::{MIN_BATCH, by_hint, fill_misses, trace_batch};
+pub(crate) use hinted_batch::{any_batch, nearest_batch};
 pub use hints::Hinted;
 pub(crate) use scratch::{Scratch, with_scratch};
-pub(crate) use strategy::{HintUse, Strategy};
+pub(crate) use strategy::{HintUse, QueryKind, Strategy};
 
 use self::single::trace;
 use crate::query::{Any, Nearest, Steps, Uncounted};

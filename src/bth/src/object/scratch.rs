@@ -12,6 +12,8 @@ pub(crate) struct Scratch {
     pub(super) stacks: Stacks,
     pub(super) packets: PacketScratch,
     pub(super) choices: StrategyTable,
+    /// For each ray of a batch the triangle on which it starts, or `NONE`.
+    pub(super) hints: Vec<u32>,
     /// Indices of the rays that remain after those in free directions have ended.
     pub(crate) rest: Vec<u32>,
     /// Copies of these rays, where they are traced like a batch of their own.

@@ -5,6 +5,8 @@
 //! have the same bits with either strategy, so the choice can depend on time. The slower strategy is measured again at intervals
 //! that grow while it remains the slower one; in the long run it gets one batch in 256.
 
+use crate::rays::Ray;
+
 /// How rays that start on known triangles are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Strategy {
@@ -25,10 +27,36 @@ pub(crate) enum HintUse {
     StartInstance,
 }
 
+/// The query of a batch, as far as the costs of strategies depend on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct QueryKind {
+    /// Whether any hit ends a ray.
+    pub(crate) any: bool,
+    /// Whether the rays are short for their object or scene: ambient occlusion rays end early, shadow rays go in packets.
+    pub(crate) short: bool,
+}
+
+impl QueryKind {
+    /// The kind of a batch by the ray in its middle, through what has the given size.
+    #[inline]
+    pub(crate) fn of(any: bool, rays: &[Ray], size: f32) -> QueryKind {
+        QueryKind { any, short: rays.get(rays.len() / 2).is_some_and(|ray| is_short(ray, size)) }
+    }
+}
+
+/// Whether a ray is short for something of the given size.
+#[inline]
+pub(crate) fn is_short(ray: &Ray, size: f32) -> bool {
+    /// Greatest length of a short ray, relative to the size.
+    const SHORT: f32 = 0.3;
+    let [x, y, z] = ray.direction;
+    x.abs().max(y.abs()).max(z.abs()) * ray.tmax <= SHORT * size
+}
+
 impl HintUse {
-    /// The number of a kind of rays, below [`StrategyTable::KINDS`]: what hints are used for, and whether any hit ends the ray.
-    pub(crate) fn kind(self, any: bool) -> usize {
-        2 * self as usize + usize::from(any)
+    /// The number of a kind of rays, below [`StrategyTable::KINDS`]: what hints are used for, and what is asked.
+    pub(crate) fn kind(self, query: QueryKind) -> usize {
+        4 * self as usize + 2 * usize::from(query.short) + usize::from(query.any)
     }
 }
 
@@ -119,9 +147,9 @@ impl StrategyChoice {
 pub(crate) struct StrategyTable([(usize, StrategyChoice); StrategyTable::ROWS]);
 
 impl StrategyTable {
-    const ROWS: usize = 32;
-    /// An upper bound on the kinds of rays, and the alignment of the addresses of objects and scenes, so that keys are distinct.
-    const KINDS: usize = 8;
+    const ROWS: usize = 64;
+    /// An upper bound on the kinds of rays. No two objects or scenes lie as close to each other, so keys are distinct.
+    const KINDS: usize = 16;
 
     /// The choice for a kind of rays ([`HintUse::kind`]) through the object or scene with the given address. If another one had this
     /// address before, a few batches may take the slower strategy.
@@ -182,6 +210,25 @@ mod tests {
         assert_eq!(choice.best(), Strategy::Bvh);
         tets_taken(&mut choice, &mut rng, 4000, [100e-9, 50e-9]);
         assert_eq!(choice.best(), Strategy::Hinted);
+    }
+
+    #[test]
+    fn short_and_long_rays_are_kinds_of_their_own() {
+        let ray = |tmax: f32| Ray { origin: [9.0; 3], tmin: 0.0, direction: [0.0, -2.0, 1.0], tmax };
+        let kind = |use_: HintUse, any: bool, tmax: f32| {
+            use_.kind(QueryKind::of(any, &[ray(f32::NAN), ray(tmax), ray(f32::NAN)], 1.0))
+        };
+        let mut kinds = Vec::new();
+        for use_ in [HintUse::Tets, HintUse::Free, HintUse::StartInstance] {
+            for any in [false, true] {
+                assert_eq!(kind(use_, any, 0.16), kind(use_, any, f32::INFINITY));
+                kinds.extend([kind(use_, any, 0.14), kind(use_, any, 0.16)]);
+            }
+        }
+        kinds.sort_unstable();
+        kinds.dedup();
+        assert!(kinds.len() == 12 && kinds[11] < StrategyTable::KINDS, "{kinds:?}");
+        assert!(!QueryKind::of(true, &[], 1.0).short);
     }
 
     #[test]

@@ -1,0 +1,132 @@
+//! Tracing of one object by batches of rays that may start on known triangles: what the hints are used for, and what is traced then.
+
+use super::batch::{address_of, by_hint, size_of, through_bvh, trace_batch};
+use super::scratch::Scratch;
+use super::strategy::{HintUse, QueryKind, Strategy};
+use crate::SMALL;
+use crate::bvh::interleaved::RemainingRays;
+use crate::free;
+use crate::query::sink::Sink;
+use crate::query::{Any, Nearest, Query};
+use crate::rays::{Hit, PrimitiveRef, Ray};
+use bth_format::layout::NONE;
+use bth_format::object::ObjectView;
+
+/// Computes the nearest hits of rays in object space, through the instance with the given index. `from` holds for each ray where it
+/// starts, on this instance or elsewhere; it affects where the search begins, never the result.
+pub(crate) fn nearest_batch(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[PrimitiveRef]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    hits: &mut [Hit],
+) {
+    trace_from::<Nearest>(object, rays, from, instance, scratch, hits);
+}
+
+/// Computes whether rays in object space hit anything; parameters as for [`nearest_batch`].
+pub(crate) fn any_batch(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[PrimitiveRef]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    found: &mut [bool],
+) {
+    trace_from::<Any>(object, rays, from, instance, scratch, found);
+}
+
+/// Stores the answers of those rays that hit anything. Rays that leave their triangle in a free direction are not traced, where looking
+/// that up was measured to take less time than it saves.
+fn trace_from<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: Option<&[PrimitiveRef]>,
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let trace = |from: Option<&[u32]>, scratch: &mut Scratch, answers: &mut [Q::Answer]| {
+        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+        trace_batch(object, rays, from, scratch, &mut sink);
+    };
+    // Only objects with tetrahedra or free directions use hints.
+    let has_tets = !object.tet_leaves.is_empty();
+    let Some(from) = from.filter(|_| !SMALL && (has_tets || free::is_known(object))) else {
+        return trace(None, scratch, answers);
+    };
+    if !free::is_known(object) {
+        return with_hints(from, instance, scratch, |hints, scratch| trace(Some(hints), scratch, answers));
+    }
+    // Small batches come before measurements: then the look-up decides by how many of the first rays end.
+    let key = (address_of(object), HintUse::Free.kind(QueryKind::of(Q::ANY, rays, size_of(object))));
+    by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
+        if strategy == Strategy::Bvh && !has_tets {
+            return trace(None, scratch, answers);
+        }
+        with_hints(from, instance, scratch, |hints, scratch| {
+            let mut rest = std::mem::take(&mut scratch.rest);
+            if strategy == Strategy::Bvh || !free::find_rest(object, rays, hints, &mut rest) {
+                trace(Some(hints), scratch, answers);
+            } else if Q::ANY {
+                // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
+                trace_gathered::<Q>(object, (rays, &rest), instance, scratch, answers);
+            } else {
+                let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+                trace_rest(object, rays, &rest, scratch, &mut sink);
+            }
+            scratch.rest = rest;
+        });
+    });
+}
+
+/// Calls `work` with the triangle of an instance on which each ray starts, or `NONE`.
+fn with_hints(
+    from: &[PrimitiveRef],
+    instance: u32,
+    scratch: &mut Scratch,
+    work: impl FnOnce(&[u32], &mut Scratch),
+) {
+    let mut hints = std::mem::take(&mut scratch.hints);
+    hints.clear();
+    hints.extend(from.iter().map(|from| from.triangle_of(instance)));
+    work(&hints, scratch);
+    scratch.hints = hints;
+}
+
+/// Stores the answers of those of the rays `rest`, by their ascending indices, that hit anything, from a copy of these rays. All answers
+/// are misses before.
+fn trace_gathered<Q: Query>(
+    object: &ObjectView<'_>,
+    (rays, rest): (&[Ray], &[u32]),
+    instance: u32,
+    scratch: &mut Scratch,
+    answers: &mut [Q::Answer],
+) {
+    let mut gathered = std::mem::take(&mut scratch.gathered);
+    gathered.clear();
+    gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
+    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+    trace_batch(object, &gathered, None, scratch, &mut sink);
+    // No ray is before its place among those that are left, so the last answers can move first.
+    for (i, &ray) in rest.iter().enumerate().rev() {
+        answers.swap(i, ray as usize);
+    }
+    scratch.gathered = gathered;
+}
+
+/// Stores in `sink` the answers of those of the rays `rest`, by their indices, that hit anything.
+fn trace_rest<Q: Query>(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    rest: &[u32],
+    scratch: &mut Scratch,
+    sink: &mut Sink<'_, Q>,
+) {
+    if object.header.root != NONE && !rest.is_empty() {
+        // Too few rays are left of most packets.
+        let remaining = RemainingRays { order: Some(rest), queries: None, walked: None };
+        through_bvh(object, rays, remaining, scratch, sink);
+    }
+}

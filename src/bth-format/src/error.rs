@@ -332,11 +332,11 @@ impl std::fmt::Display for Error {
             write!(f, "byte {offset}: ")?;
         }
         // With the feature `brief` some texts are empty.
-        if !self.expected.is_empty() {
-            write!(f, "expected {}, ", self.expected)?;
-        }
-        if !self.found.is_empty() {
-            write!(f, "found {} ", self.found)?;
+        match (self.expected.is_empty(), self.found.is_empty()) {
+            (false, false) => write!(f, "expected {}, found {} ", self.expected, self.found)?,
+            (false, true) => write!(f, "expected {} ", self.expected)?,
+            (true, false) => write!(f, "found {} ", self.found)?,
+            (true, true) => {}
         }
         write!(f, "(hint: {})", self.hint())
     }

@@ -1,7 +1,7 @@
 //! `bth-play`: renders compiled BTH files and scenes to pictures and animations.
 
 // The window alone moves cameras, changes modes and renders parts of a picture anew.
-#![cfg_attr(not(feature = "window"), allow(dead_code, unused_imports))]
+#![cfg_attr(not(feature = "window"), allow(dead_code, unused_imports, unused_variables))]
 
 mod args;
 mod camera;
@@ -76,24 +76,15 @@ fn run(args: &args::Args) -> Result<(), Failure> {
     report::show(args, &scene, file, &report, threads, quiet)
 }
 
-#[cfg(feature = "window")]
 fn show_window(
     scene: &mut bth::Scene,
     file: &Path,
     args: &args::Args,
     pool: &rayon::ThreadPool,
 ) -> Result<(), Failure> {
-    let shown = window::show(scene, file, args, pool)?;
-    report::window(args, &shown)
-}
-
-#[cfg(not(feature = "window"))]
-fn show_window(
-    _scene: &mut bth::Scene,
-    _file: &Path,
-    _args: &args::Args,
-    _pool: &rayon::ThreadPool,
-) -> Result<(), Failure> {
+    #[cfg(feature = "window")]
+    return report::window(args, &window::show(scene, file, args, pool)?);
+    #[cfg(not(feature = "window"))]
     Err(Failure::Usage("this bth-play was built without its feature `window`; -o writes pictures".to_owned()))
 }
 

@@ -23,7 +23,7 @@ pub(crate) enum HintUse {
     Tets,
     /// Look-ups of free directions.
     Free,
-    /// The visit, in scenes, of the instance on which a ray starts before all others.
+    /// Look-ups in scenes before the top level, and walks through tetrahedra of the instance on which a ray starts.
     StartInstance,
 }
 

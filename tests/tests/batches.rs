@@ -159,6 +159,24 @@ fn rays_off_the_surface(corners: &[[[f32; 3]; 3]], count: usize, seed: u64) -> V
     (0..count).map(|i| of_ray(i, &mut rng)).collect()
 }
 
+/// Whether a ray points to the side of a triangle from which its corners go around counterclockwise.
+fn is_outward(ray: &Ray, [a, b, c]: &[[f32; 3]; 3]) -> bool {
+    let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|k| corner[k] - a[k]));
+    let normal = [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
+    (0..3).map(|k| f64::from(normal[k]) * f64::from(ray.direction[k])).sum::<f64>() > 0.0
+}
+
+/// Of [`rays_off_the_surface`], 250,000 of them, those that leave the outside of a triangle, and some of all: where few rays end, batches are
+/// traced without look-ups.
+fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<(Ray, PrimitiveRef)> {
+    let leaves = |i: usize, ray: &Ray, start: &PrimitiveRef| {
+        let off_the_middle = i % 4 >= 2 && i / 4 % 4 == 0;
+        off_the_middle && corners.get(start.triangle as usize).is_some_and(|corners| is_outward(ray, corners))
+    };
+    let all = rays_off_the_surface(corners, 250_000, seed).into_iter().enumerate();
+    all.filter(|(i, (ray, start))| i % 36 == 5 || leaves(*i, ray, start)).map(|(_, ray)| ray).collect()
+}
+
 /// Free directions change no bit.
 fn check_free_directions(model: &Model, options: CompileOptions) {
     let _turn = turn();
@@ -166,6 +184,7 @@ fn check_free_directions(model: &Model, options: CompileOptions) {
     let scene = with_free_directions(model, options);
     let mut all = hinted_rays(&scene, &corners, 3000, 11);
     all.extend(rays_off_the_surface(&corners, 30_000, 12));
+    all.extend(rays_of_which_many_end(&corners, 13));
     let (rays, from): (Vec<Ray>, Vec<PrimitiveRef>) = all.into_iter().unzip();
     let expected: Vec<Hit> = rays.iter().map(|ray| scene.nearest(ray).unwrap_or(Hit::MISS)).collect();
     let ways = Isa::ALL.into_iter().flat_map(|isa| [(isa, Hinted::Tets), (isa, Hinted::Measured)]);
@@ -237,13 +256,6 @@ fn placed(ray: &Ray, rows: &[f32; 12]) -> Ray {
     Ray { origin, direction: [0, 1, 2].map(|k| times(ray.direction, k) as f32), ..*ray }
 }
 
-/// Whether a ray points to the side of a triangle from which its corners go around counterclockwise.
-fn is_outward(ray: &Ray, [a, b, c]: &[[f32; 3]; 3]) -> bool {
-    let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|k| corner[k] - a[k]));
-    let normal = [0, 1, 2].map(|k| p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]);
-    (0..3).map(|k| f64::from(normal[k]) * f64::from(ray.direction[k])).sum::<f64>() > 0.0
-}
-
 /// Rays that start on instances have the same bits with and without hints, right ones and wrong ones.
 #[test]
 fn free_directions_of_instances_change_no_answer() {
@@ -256,14 +268,7 @@ fn free_directions_of_instances_change_no_answer() {
     for count in [1, 3, 24] {
         let (scene, transforms) = instances_of(&object, count, 21 + count as u64);
         let (mut rays, mut from) = (Vec::new(), Vec::new());
-        // Where few rays end, batches are traced without look-ups: most of these leave the outside of a triangle, and every ninth is any ray.
-        let all = rays_off_the_surface(&corners, 250_000, 22).into_iter().enumerate();
-        let leaves = |i: usize, ray: &Ray, start: &PrimitiveRef| {
-            let off_the_middle = i % 4 >= 2 && i / 4 % 4 == 0;
-            off_the_middle
-                && corners.get(start.triangle as usize).is_some_and(|corners| is_outward(ray, corners))
-        };
-        for (_, (ray, start)) in all.filter(|(i, (ray, start))| i % 36 == 5 || leaves(*i, ray, start)) {
+        for (ray, start) in rays_of_which_many_end(&corners, 22) {
             let instance = rng.below(count as u64) as u32;
             rays.push(placed(&ray, &transforms[instance as usize]));
             let wrong = rng.below(12) == 0;

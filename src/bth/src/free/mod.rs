@@ -34,9 +34,19 @@ const PROBE: usize = 4 * LANES;
 const LEAST: usize = 6;
 
 /// Finds the rays in object space that may meet something, and stores their indices in `rest`. `from` holds for each ray the triangle
-/// on which it starts, or `NONE`. False if so few rays would end that all of them are to be traced.
-pub(crate) fn find_rest(object: &ObjectView<'_>, rays: &[Ray], from: &[u32], rest: &mut Vec<u32>) -> bool {
+/// on which it starts, or `NONE`. False if so few rays would end that all of them are to be traced, unless the look-up is `forced`.
+pub(crate) fn find_rest(
+    object: &ObjectView<'_>,
+    rays: &[Ray],
+    from: &[u32],
+    forced: bool,
+    rest: &mut Vec<u32>,
+) -> bool {
     rest.clear();
+    if forced {
+        decide(object, rays, from, 0..rays.len(), rest);
+        return true;
+    }
     let probe = PROBE.min(rays.len());
     decide(object, rays, from, 0..probe, rest);
     if (probe - rest.len()) * LEAST < probe {

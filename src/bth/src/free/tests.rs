@@ -76,7 +76,11 @@ fn batches_of_which_few_rays_end_are_traced_whole() {
     let (free, other) = (ray(10.01, [0.0, 0.0, 1.0]), ray(10.01, [0.0, 0.0, -1.0]));
     let rays: Vec<Ray> = (0..192).map(|i| if i % 2 == 0 { free } else { other }).collect();
     let mut rest = Vec::new();
-    assert!(find_rest(&object, &rays, &[1; 192], &mut rest));
+    assert!(find_rest(&object, &rays, &[1; 192], false, &mut rest));
     assert_eq!(rest, (0..192).filter(|i| i % 2 == 1).collect::<Vec<u32>>());
-    assert!(!find_rest(&object, &[other; 192], &[1; 192], &mut rest));
+    let mut few = [other; 192];
+    few[100] = free;
+    assert!(!find_rest(&object, &few, &[1; 192], false, &mut rest));
+    assert!(find_rest(&object, &few, &[1; 192], true, &mut rest));
+    assert_eq!(rest, (0..192).filter(|i| *i != 100).collect::<Vec<u32>>());
 }

@@ -9,6 +9,7 @@ use super::enter_object::ObjectRays;
 use super::scene_batch::SceneBatch;
 use super::visit_queue::VisitQueue;
 use crate::free;
+use crate::object::Hinted;
 use crate::objects::Objects;
 use crate::query::sink::Visit;
 use crate::rays::PrimitiveRef;
@@ -52,7 +53,7 @@ impl FreeStarts {
         batch.world.by_object(visits, |object, visits| {
             let object = batch.objects.view(object);
             object_rays.fill(batch, true, visits, |ray| batch.rays[ray].tmax);
-            if free::find_rest(object, &object_rays.rays, &object_rays.from, rest) {
+            if free::find_rest(object, &object_rays.rays, &object_rays.from, Hinted::are_forced(), rest) {
                 let mut rest = rest.iter().map(|index| *index as usize).peekable();
                 for (index, visit) in visits.iter().enumerate() {
                     if rest.next_if_eq(&index).is_none() {

@@ -1,6 +1,7 @@
 //! Tracing of one object by batches of rays that may start on known triangles: what the hints are used for, and what is traced then.
 
 use super::batch::{address_of, by_hint, size_of, through_bvh, trace_batch};
+use super::hints::Hinted;
 use super::scratch::Scratch;
 use super::strategy::{HintUse, QueryKind, Strategy};
 use crate::SMALL;
@@ -67,7 +68,9 @@ fn trace_from<Q: Query>(
         }
         with_hints(from, instance, scratch, |hints, scratch| {
             let mut rest = std::mem::take(&mut scratch.rest);
-            if strategy == Strategy::Bvh || !free::find_rest(object, rays, hints, &mut rest) {
+            if strategy == Strategy::Bvh
+                || !free::find_rest(object, rays, hints, Hinted::are_forced(), &mut rest)
+            {
                 trace(Some(hints), scratch, answers);
             } else if Q::ANY {
                 // Most shorter rays go in packets, also those that are left. Others are faster without moving them.

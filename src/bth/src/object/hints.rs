@@ -48,6 +48,13 @@ impl Hinted {
     }
 }
 
+impl Hinted {
+    /// Whether hints are used although that may take longer.
+    pub(crate) fn are_forced() -> bool {
+        Hinted::chosen() == Hinted::Tets
+    }
+}
+
 impl FromStr for Hinted {
     type Err = ();
     fn from_str(name: &str) -> Result<Self, ()> {

@@ -47,6 +47,7 @@ fn crowd(count: usize, rng: &mut Rng) -> (SceneBuilder, Vec<u32>, Vec<[f32; 12]>
     (builder, ids, places)
 }
 
+#[cfg(feature = "rayon")]
 fn aimed(places: &[[f32; 12]], rng: &mut Rng, count: usize) -> Vec<Ray> {
     (0..count)
         .map(|_| {

@@ -170,7 +170,7 @@ fn is_outward(ray: &Ray, [a, b, c]: &[[f32; 3]; 3]) -> bool {
 /// traced without look-ups.
 fn rays_of_which_many_end(corners: &[[[f32; 3]; 3]], seed: u64) -> Vec<(Ray, PrimitiveRef)> {
     let leaves = |i: usize, ray: &Ray, start: &PrimitiveRef| {
-        let off_the_middle = i % 4 >= 2 && i / 4 % 4 == 0;
+        let off_the_middle = i % 4 >= 2 && (i / 4).is_multiple_of(4);
         off_the_middle && corners.get(start.triangle as usize).is_some_and(|corners| is_outward(ray, corners))
     };
     let all = rays_off_the_surface(corners, 250_000, seed).into_iter().enumerate();

@@ -5,7 +5,7 @@ mod failure;
 use bth_scenes::animations::{self, ANIMATIONS};
 use bth_scenes::catalogue::{self, ENTRIES, MAX_FACES};
 use bth_scenes::{topology, write};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use failure::{EXIT_CODES, Failure};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -36,6 +36,13 @@ enum Command {
         #[arg(short, long, value_name = "FOLDER")]
         output: PathBuf,
     },
+    /// Prints a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Prints the manual page.
+    Man,
 }
 
 fn main() -> ExitCode {
@@ -43,6 +50,8 @@ fn main() -> ExitCode {
         Command::List => list(),
         Command::Make { name, faces, output } => make(&name, faces, &output),
         Command::Scene { name, output } => scene(&name, &output),
+        Command::Completions { shell } => completions(shell),
+        Command::Man => manual(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -106,4 +115,25 @@ fn scene(name: &str, folder: &Path) -> Result<(), Failure> {
     let frames = scene.manifest.frames;
     writeln!(out, "{}: frames {} to {}", path.display(), frames.first, frames.last)?;
     Ok(())
+}
+
+fn completions(shell: clap_complete::Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Command::command(), "bth-scenes", &mut script);
+    Ok(std::io::stdout().lock().write_all(&script)?)
+}
+
+/// Prints the manual page, subcommands included, as roff.
+fn manual() -> Result<(), Failure> {
+    let mut page = Vec::new();
+    let mut command = Command::command();
+    command.build();
+    clap_mangen::Man::new(command.clone()).render(&mut page)?;
+    for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
+        let man = clap_mangen::Man::new(sub.clone());
+        man.render_synopsis_section(&mut page)?;
+        man.render_description_section(&mut page)?;
+        man.render_options_section(&mut page)?;
+    }
+    Ok(std::io::stdout().lock().write_all(&page)?)
 }

@@ -1,6 +1,6 @@
 //! `bthc info`, `verify`, `marks` and `diff`: what they report about files and models.
 
-use crate::support::{bthc, crossing, folder, sphere};
+use crate::support::{bthc, crossing, folder, run, sphere};
 
 #[test]
 fn info_shows_sections_and_provenance_without_paths() {
@@ -89,9 +89,17 @@ fn info_lists_groups_and_materials() {
 #[test]
 fn completions_and_manual_are_printed() {
     let folder = folder(&[]);
-    for shell in ["bash", "zsh", "fish"] {
-        let run = bthc(folder.path(), &["completions", shell]).expect(0);
-        assert!(run.stdout.contains("bthc"), "{shell}");
+    let programs = [
+        ("bthc", "completions", "man"),
+        ("bth-play", "--completions", "--man"),
+        ("bth-scenes", "completions", "man"),
+    ];
+    for (program, completions, man) in programs {
+        for shell in ["bash", "zsh", "fish"] {
+            let printed = run(program, folder.path(), &[completions, shell]).expect(0);
+            assert!(printed.stdout.contains(program), "{program} {shell}: {printed:?}");
+        }
+        let page = run(program, folder.path(), &[man]).expect(0).stdout;
+        assert!(page.contains(&format!(".TH {program}")), "{program}: {page}");
     }
-    assert!(bthc(folder.path(), &["man"]).expect(0).stdout.contains(".TH"));
 }

@@ -17,7 +17,9 @@ function compileModule() {
     const arguments_ = ["build", "-p", "bth-js", "--profile", "wasm", "--target", "wasm32-unknown-unknown", "--target-dir", target];
     // What kernels need is inlined by force; anything else is smaller as a function of its own.
     const small = "-C llvm-args=-inline-threshold=5";
-    const RUSTFLAGS = `${process.env.RUSTFLAGS ?? ""} -C target-feature=+simd128 ${small}`;
+    // Calls and addresses as short as they are, in place of five bytes each.
+    const short = "-C link-arg=--compress-relocations";
+    const RUSTFLAGS = `${process.env.RUSTFLAGS ?? ""} -C target-feature=+simd128 ${small} ${short}`;
     // BLAKE3 in plain Rust, so that no C compiler for the target is needed.
     execFileSync("cargo", [...arguments_, "--features", "bth/small,bth-format/pure"], { cwd: root, stdio: "inherit", env: { ...process.env, RUSTFLAGS } });
     return join(target, "wasm32-unknown-unknown/wasm/bth_js.wasm");

@@ -6,8 +6,8 @@ use crate::bvh::candidate::{Candidate, Reader, settle};
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::gather_rays;
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd};
 use bth_format::layout::{NONE, WIDTH};
@@ -82,7 +82,7 @@ impl DeferredHits {
         sink: &mut Sink<'_, Q>,
     ) {
         let (ray, candidate) = (state.ray(), state.pending());
-        if Q::ANY || candidate.leaf == NONE {
+        if sink.goal().is_any() || candidate.leaf == NONE {
             return state.report(sink);
         }
         let lane = self.count % LANES;
@@ -107,7 +107,7 @@ impl DeferredHits {
         sink: &mut Sink<'_, Q>,
     ) {
         // An any-hit query has no pending hits.
-        if Q::ANY || self.count == 0 {
+        if sink.goal().is_any() || self.count == 0 {
             return;
         }
         Flush { deferred: self, object, rays, sink }.inline_or_call(s);
@@ -144,7 +144,7 @@ impl DeferredHits {
             let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest - 1;
             let ray = &rays[self.ray[lane] as usize];
-            let mut query = Q::new(ray);
+            let mut query = Q::new(sink.goal(), ray);
             settle(object, ray, self.candidate[lane], (NONE, 0), &mut query);
             sink.query(self.ray[lane] as usize, &query);
         }

@@ -14,7 +14,7 @@ use super::stack::BOTTOM;
 use crate::intersect::boxes::RaySlabLanes;
 use crate::intersect::line::Line;
 use crate::intersect::prepare::PreparedRay;
-use crate::query::{Nearest, TriangleRef};
+use crate::query::{NearestHit, TriangleRef};
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::flood::{FaceReceiver, VisitedSet};
@@ -79,7 +79,7 @@ impl Kernel for EnumerateKernel<'_> {
                 let node = node(s, node_base, code, &mut unpacked_node);
                 let ((bits, enter), children) = (planes.children(s, node, last), &node.child);
                 if bits == 0 {
-                    code = stack.pop::<Nearest>(limit);
+                    code = stack.pop(limit, NearestHit);
                 } else if bits & (bits - 1) == 0 {
                     code = children[bits.trailing_zeros() as usize % WIDTH];
                 } else {
@@ -121,7 +121,7 @@ impl Kernel for EnumerateKernel<'_> {
             }
             last = lesser(slabs.last, slabs.limit(receiver.limit()));
             limit = key_limit(last);
-            code = stack.pop::<Nearest>(limit);
+            code = stack.pop(limit, NearestHit);
         }
         false
     }

@@ -83,7 +83,7 @@ impl<Q: Query> Interleaved<'_, '_, Q> {
             taken: 0,
         };
         let mut deferred = DeferredHits::new();
-        let mut pool = RayPool::new(object, stacks);
+        let mut pool = RayPool::new(object, stacks, sink.goal());
         let has_packed_nodes = object.has_packed_nodes();
         while !pool.is_empty() {
             if has_packed_nodes {

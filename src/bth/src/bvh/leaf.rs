@@ -9,7 +9,7 @@
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter::{Certain, TriangleBlock};
 use crate::intersect::prepare::PreparedRay;
-use crate::query::Query;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::object::ObjectView;
@@ -29,6 +29,7 @@ pub(crate) enum LeafOutcome {
 
 /// State of a ray that leaves read and update.
 pub(crate) trait Progress<Q: Query> {
+    fn goal(&self) -> Q::Goal;
     fn prepared(&self) -> &PreparedRay;
     /// Upper limit of the depths of hits that can still change the result.
     fn last(&self) -> f32;
@@ -48,7 +49,7 @@ pub(crate) trait Progress<Q: Query> {
     #[inline(always)]
     fn update_from_query(&mut self, ray: &Ray) -> LeafOutcome {
         // The limits of an any-hit query do not change before its first hit, which ends it.
-        if Q::ANY {
+        if self.goal().is_any() {
             return LeafOutcome::Nothing;
         }
         let (before, query) = (self.last(), *self.query(ray));
@@ -72,7 +73,7 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
     }
-    if Q::ANY {
+    if progress.goal().is_any() {
         if found.sure != 0 {
             progress.accept();
             return LeafOutcome::Done;

@@ -5,7 +5,7 @@ use super::leaf::{LeafOutcome, enter_leaf};
 use super::nodes::{Nodes, Packed, indexed_leaf, prefetch, raw as raw_leaf};
 use super::ray_state::{RayState, write_children};
 use super::stack::{BOTTOM, StackPosition, Stacks};
-use crate::query::Query;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{Child, WIDTH};
@@ -94,12 +94,13 @@ struct StackTops {
 }
 
 /// The pool: a slot for each ray.
-pub(super) struct RayPool<'a, Q> {
+pub(super) struct RayPool<'a, Q: Query> {
     slots: [Slot<Q>; POOL_SIZE],
     tops: StackTops,
     lists: StepLists,
     counts: StepCounts,
     stacks: &'a mut Stacks,
+    goal: Q::Goal,
     /// Position of the bottom of each slot's stack.
     bottoms: [StackPosition; POOL_SIZE],
 }
@@ -107,8 +108,8 @@ pub(super) struct RayPool<'a, Q> {
 impl<'a, Q: Query> RayPool<'a, Q> {
     /// Vacant slots, for the BVH of an object.
     #[inline(always)]
-    pub(super) fn new(object: &ObjectView<'_>, stacks: &'a mut Stacks) -> Self {
-        let vacant = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+    pub(super) fn new(object: &ObjectView<'_>, stacks: &'a mut Stacks, goal: Q::Goal) -> Self {
+        let vacant = Q::new(goal, &Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
         stacks.reserve(object, POOL_SIZE);
         let mut bottoms = [StackPosition::FIRST; POOL_SIZE];
         for (stack, bottom) in bottoms.iter_mut().enumerate() {
@@ -125,6 +126,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             lists: StepLists { inner: [0; 256], leaf: [0; 256], bottom },
             counts: StepCounts((POOL_SIZE as u32) << StepCounts::BOTTOM),
             stacks,
+            goal,
             bottoms,
         }
     }
@@ -162,7 +164,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     ) {
         let slot = slot % POOL_SIZE;
         let top = self.stacks.start_at(self.bottoms[slot]);
-        let count = write_children::<S, Q>(s, root, children, self.stacks.free_entries(top));
+        let count = write_children(s, self.goal, root, children, self.stacks.free_entries(top));
         let top = self.stacks.replaced(top, count);
         let code = self.stacks.code(top);
         (self.tops.position[slot], self.tops.code[slot]) = (top, code);
@@ -194,13 +196,13 @@ impl<'a, Q: Query> RayPool<'a, Q> {
     /// Steps through inner nodes until few rays have one as their next step.
     #[inline(always)]
     pub(super) fn inner_steps<S: Simd, N: Nodes>(&mut self, s: S, object: &ObjectView<'_>) {
-        let RayPool { slots, tops, lists, stacks, .. } = self;
+        let RayPool { slots, tops, lists, stacks, goal, .. } = self;
         let (mut counts, mut stacks, node_base) = (self.counts, stacks.open(), object.node_base());
         while counts.inner() > 0 {
             for i in 0..counts.take(StepCounts::INNER) {
                 let slot = usize::from(lists.inner[i]) % POOL_SIZE;
                 let (top, node) = (tops.position[slot], N::node(node_base, tops.code[slot]));
-                let count = slots[slot].0.enter_node(s, node, stacks.free_entries(top));
+                let count = slots[slot].0.enter_node(s, *goal, node, stacks.free_entries(top));
                 let top = stacks.replaced(top, count);
                 let code = stacks.code(top);
                 (tops.position[slot], tops.code[slot]) = (top, code);
@@ -223,7 +225,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         (object, rays): (&ObjectView<'_>, &[Ray]),
         mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
-        let RayPool { slots, tops, lists, stacks, bottoms, .. } = self;
+        let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
         let (mut counts, node_base) = (self.counts, object.node_base());
         for i in 0..counts.take(StepCounts::LEAF) {
             let slot = usize::from(lists.leaf[i]) % POOL_SIZE;
@@ -246,7 +248,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
             let below = top.below();
             let top = match found {
                 // Any-hit queries store no keys by which entries could be dropped.
-                LeafOutcome::Nearer if Q::ANY => below,
+                LeafOutcome::Nearer if goal.is_any() => below,
                 LeafOutcome::Nothing => below,
                 LeafOutcome::Replaced => top,
                 LeafOutcome::Nearer => stacks.keep_up_to(s, bottoms[slot], below, state.key_limit()),
@@ -263,7 +265,7 @@ impl<'a, Q: Query> RayPool<'a, Q> {
 
 /// [`RayPool::inner_steps`] through packed nodes, as a part of kernels: apart from the loop for wide nodes, whose constants then stay in
 /// registers.
-pub(super) struct PackedSteps<'p, 'a, 'o, Q>(
+pub(super) struct PackedSteps<'p, 'a, 'o, Q: Query>(
     pub(super) &'p mut RayPool<'a, Q>,
     pub(super) &'p ObjectView<'o>,
 );

@@ -5,8 +5,8 @@ use super::leaf::Progress;
 use crate::bvh::candidate::Candidate;
 use crate::intersect::boxes::ChildBoxes;
 use crate::intersect::prepare::{HitProgress, PreparedRay};
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::Simd;
 use bth_format::layout::WIDTH;
@@ -29,7 +29,7 @@ pub(crate) fn key_limit(last: f32) -> f32 {
 pub(crate) struct RayState<Q> {
     /// The prepared ray, with the hits found so far in `progress` and the limit of depth in `slabs.last`.
     prepared: PreparedRay,
-    /// Valid if [`HitProgress::BY_QUERY`] is set. Most rays never need a decision in f64, and their query is never written.
+    /// Valid if [`HitProgress::BY_QUERY`] is set; its goal always is. Most rays never need a decision in f64, and their query is never written.
     query: Q,
 }
 
@@ -82,7 +82,9 @@ impl<Q: Query> RayState<Q> {
         match self.prepared.progress.decided {
             HitProgress::UNDECIDED => {}
             HitProgress::ACCEPTED => {
-                let mut query = Q::new(&Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
+                let goal = self.query.goal();
+                let mut query =
+                    Q::new(goal, &Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
                 query.accept();
                 sink.query(self.ray(), &query);
             }
@@ -101,15 +103,20 @@ impl<Q: Query> RayState<Q> {
     pub(crate) fn enter_node<S: Simd, B: ChildBoxes>(
         &self,
         s: S,
+        goal: Q::Goal,
         node: &B,
         entries: (&mut [u32; WIDTH], &mut [f32; WIDTH]),
     ) -> usize {
         let (bits, enter) = self.prepared.slabs.children(s, node, self.prepared.slabs.last);
-        write_children::<S, Q>(s, node.child(), (bits, enter), entries)
+        write_children(s, goal, node.child(), (bits, enter), entries)
     }
 }
 
 impl<Q: Query> Progress<Q> for RayState<Q> {
+    #[inline(always)]
+    fn goal(&self) -> Q::Goal {
+        self.query.goal()
+    }
     #[inline(always)]
     fn prepared(&self) -> &PreparedRay {
         &self.prepared
@@ -143,7 +150,7 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
     #[inline(always)]
     fn query(&mut self, ray: &Ray) -> &mut Q {
         if self.prepared.progress.decided == HitProgress::UNDECIDED {
-            self.set_query(Q::new(ray));
+            self.set_query(Q::new(self.query.goal(), ray));
         }
         &mut self.query
     }
@@ -156,14 +163,15 @@ impl<Q: Query> Progress<Q> for RayState<Q> {
 /// Writes codes and keys of the children whose bit is set, the nearest last, given the codes of all children and the depths at which the ray enters all children;
 /// returns their number. Any-hit queries write no keys.
 #[inline(always)]
-pub(crate) fn write_children<S: Simd, Q: Query>(
+pub(crate) fn write_children<S: Simd>(
     s: S,
+    goal: impl Goal,
     child: &[u32; WIDTH],
     (bits, enter): (u32, S::F),
     (codes, keys): (&mut [u32; WIDTH], &mut [f32; WIDTH]),
 ) -> usize {
     let children = s.load_u(child);
-    if Q::ANY {
+    if goal.is_any() {
         s.compress(bits, children, codes)
     } else {
         s.compress_far_to_near(bits, enter, children, codes, keys)

@@ -11,13 +11,12 @@ use super::single_stack::{OpenSingleStack, SingleStack};
 use crate::bvh::candidate::{Candidate, settle_one};
 use crate::intersect::boxes::{ChildBoxes, RaySlabLanes};
 use crate::intersect::prepare::PreparedRay;
-use crate::query::{Count, Query};
+use crate::query::{Count, Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Part, Simd};
 use bth_format::layout::{Child, NONE, WIDTH};
 use bth_format::object::{NodeBase, ObjectView};
 use std::hint::black_box;
-use std::marker::PhantomData;
 
 /// Result of a tet leaf for a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +40,10 @@ struct SingleState<'a, Q> {
 }
 
 impl<Q: Query> Progress<Q> for SingleState<'_, Q> {
+    #[inline(always)]
+    fn goal(&self) -> Q::Goal {
+        self.query.goal()
+    }
     #[inline(always)]
     fn prepared(&self) -> &PreparedRay {
         self.prepared
@@ -98,6 +101,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
 ) {
     // Kept in memory: the compiler would otherwise broadcast each number to sixteen lanes before the loop and spill the vectors.
     let prepared = black_box(prepared);
+    let goal = query.goal();
     let mut state = SingleState {
         prepared,
         query,
@@ -115,7 +119,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
     let mut limit = key_limit(state.last);
     loop {
         let limits = [state.last, limit];
-        code = descend::<S, Wide, Q, C>(s, prepared, node_base, limits, code, &mut stack, count);
+        code = descend::<S, Wide, _, C>(s, prepared, node_base, limits, (code, goal), &mut stack, count);
         let mut unpacked = None;
         let done = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
             count.leaf();
@@ -144,8 +148,8 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
                 }
                 Some(Child::Packed(_)) => {
                     // The stack is moved, because one that is passed by reference would lie in memory.
-                    let (count, query) = (&mut *count, PhantomData::<Q>);
-                    let steps = PackedSteps { prepared, node_base, limits, code, stack, count, query };
+                    let count = &mut *count;
+                    let steps = PackedSteps { prepared, node_base, limits, code, stack, count, goal };
                     (code, stack) = s.call(steps);
                     continue;
                 }
@@ -156,7 +160,7 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
             break;
         }
         limit = key_limit(state.last);
-        code = stack.pop::<Q>(limit);
+        code = stack.pop(limit, goal);
     }
     if state.pending.leaf != NONE {
         settle_one(object, ray, state.pending, state.query);
@@ -166,12 +170,12 @@ pub(crate) fn trace_single<S: Simd, Q: Query, C: Count>(
 /// Steps through inner nodes of a format down to the next leaf, the bottom of the stack or a wide node that is none; returns its code. `limits` are those of depths of hits
 /// and of keys of stack entries that can still change the result.
 #[inline(always)]
-fn descend<S: Simd, N: Nodes, Q: Query, C: Count>(
+fn descend<S: Simd, N: Nodes, G: Goal, C: Count>(
     s: S,
     prepared: &PreparedRay,
     node_base: NodeBase<'_>,
     [last, limit]: [f32; 2],
-    mut code: u32,
+    (mut code, goal): (u32, G),
     stack: &mut OpenSingleStack<'_>,
     count: &mut C,
 ) -> u32 {
@@ -185,13 +189,13 @@ fn descend<S: Simd, N: Nodes, Q: Query, C: Count>(
             if bits != 0 {
                 code = node.child()[bits.trailing_zeros() as usize % WIDTH];
             } else {
-                code = stack.pop::<Q>(limit);
+                code = stack.pop(limit, goal);
             }
             continue;
         }
         let free = stack.free_entries();
         let children = s.load_u(node.child());
-        if Q::ANY {
+        if goal.is_any() {
             code = node.child()[bits.trailing_zeros() as usize % WIDTH];
             let others = s.compress(bits & (bits - 1), children, free.codes);
             free.push(others + 1);
@@ -207,22 +211,23 @@ fn descend<S: Simd, N: Nodes, Q: Query, C: Count>(
 }
 
 /// [`descend`] through packed nodes, as a part of kernels, so that the kernel for the other format stays short.
-struct PackedSteps<'p, 'o, 's, Q, C> {
+struct PackedSteps<'p, 'o, 's, G, C> {
     prepared: &'p PreparedRay,
     node_base: NodeBase<'o>,
     limits: [f32; 2],
     code: u32,
     stack: OpenSingleStack<'s>,
     count: &'p mut C,
-    query: PhantomData<Q>,
+    goal: G,
 }
 
-impl<'s, S: Simd, Q: Query, C: Count> Part<S> for PackedSteps<'_, '_, 's, Q, C> {
+impl<'s, S: Simd, G: Goal, C: Count> Part<S> for PackedSteps<'_, '_, 's, G, C> {
     type Output = (u32, OpenSingleStack<'s>);
     #[inline(always)]
     fn run(self, s: S) -> Self::Output {
-        let PackedSteps { prepared, node_base, limits, code, mut stack, count, .. } = self;
-        let code = descend::<S, Packed, Q, C>(s, prepared, node_base, limits, code, &mut stack, count);
+        let PackedSteps { prepared, node_base, limits, code, mut stack, count, goal } = self;
+        let code =
+            descend::<S, Packed, _, C>(s, prepared, node_base, limits, (code, goal), &mut stack, count);
         (code, stack)
     }
 }

@@ -2,7 +2,7 @@
 #![allow(unsafe_code)] // Initializing the whole stack would take longer than the traversal of most rays.
 
 use super::stack::BOTTOM;
-use crate::query::Query;
+use crate::query::Goal;
 use crate::simd::LANES;
 use bth_format::layout::WIDTH;
 use bth_format::limits::MAX_DEPTH;
@@ -90,10 +90,10 @@ impl OpenSingleStack<'_> {
 
     /// Pops the top, and the entries below it whose key exceeds `limit` up to the first that does not; returns the new top's code.
     #[inline(always)]
-    pub(crate) fn pop<Q: Query>(&mut self, limit: f32) -> u32 {
+    pub(crate) fn pop(&mut self, limit: f32, goal: impl Goal) -> u32 {
         self.top = self.top.saturating_sub(1);
         // Any-hit queries store no keys. The key of BOTTOM, negative infinity, exceeds no limit.
-        while !Q::ANY && limit < self.key(self.top) {
+        while !goal.is_any() && limit < self.key(self.top) {
             self.top = self.top.saturating_sub(1);
         }
         self.code(self.top)
@@ -118,11 +118,11 @@ impl FreeEntries<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::query::{Any, Nearest};
+    use crate::query::{AnyHit, EitherGoal, NearestHit};
     use bth_random::Rng;
 
     /// Random pushes and pops, compared with a vector of codes and keys.
-    fn steps<Q: Query>(rng: &mut Rng) {
+    fn steps(rng: &mut Rng, goal: impl Goal) {
         let mut stack = SingleStack::new();
         let mut stack = stack.start(7);
         let mut expected = vec![(BOTTOM, f32::NEG_INFINITY), (7, f32::NEG_INFINITY)];
@@ -144,22 +144,24 @@ mod tests {
             } else {
                 let limit = rng.below(100) as f32;
                 expected.pop();
-                while !Q::ANY && expected.last().is_some_and(|&(_, key)| key > limit) {
+                while !goal.is_any() && expected.last().is_some_and(|&(_, key)| key > limit) {
                     expected.pop();
                 }
-                assert_eq!(stack.pop::<Q>(limit), expected.last().expect("the bottom stays").0);
+                assert_eq!(stack.pop(limit, goal), expected.last().expect("the bottom stays").0);
             }
             assert_eq!(stack.is_empty(), expected.len() == 1);
         }
-        assert_eq!(stack.pop::<Q>(0.0), BOTTOM);
+        assert_eq!(stack.pop(0.0, goal), BOTTOM);
     }
 
     #[test]
     fn pops_return_entries_in_order_and_skip_those_beyond_the_limit() {
         let mut rng = Rng::new(3);
         for _ in 0..if cfg!(miri) { 3 } else { 200 } {
-            steps::<Any>(&mut rng);
-            steps::<Nearest>(&mut rng);
+            steps(&mut rng, AnyHit);
+            steps(&mut rng, NearestHit);
+            steps(&mut rng, EitherGoal { is_any: true });
+            steps(&mut rng, EitherGoal { is_any: false });
         }
     }
 

@@ -6,7 +6,7 @@ use crate::bvh::nodes::{UnpackedNode, indexed_leaf, node, prefetch, raw as raw_l
 use crate::bvh::single_stack::SingleStack;
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::point_lanes::{CornerLanes, LanePoint, PointLanes, TriangleLanes};
-use crate::query::Nearest;
+use crate::query::NearestHit;
 use crate::rays::PrimitiveRef;
 use crate::simd::{Isa, Kernel, LANES, Part, Simd};
 use bth_format::exact::is_zero_area;
@@ -75,7 +75,7 @@ impl Kernel for WalkKernel<'_> {
                 let (child, (bits, squared)) = (&node.child, point.children(s, node, limit));
                 if bits & bits.wrapping_sub(1) == 0 {
                     code = match bits {
-                        0 => stack.pop::<Nearest>(limit),
+                        0 => stack.pop(limit, NearestHit),
                         _ => child[bits.trailing_zeros() as usize % WIDTH],
                     };
                     continue;
@@ -110,7 +110,7 @@ impl Kernel for WalkKernel<'_> {
                 }
             }
             limit = walk.limit(search);
-            code = stack.pop::<Nearest>(limit);
+            code = stack.pop(limit, NearestHit);
         }
     }
 }

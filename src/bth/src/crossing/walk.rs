@@ -16,7 +16,7 @@ use crate::bvh::stack::BOTTOM;
 use crate::intersect::boxes::{ChildBoxes, FAR};
 use crate::intersect::crossing::crossing;
 use crate::intersect::filter::{TriangleBlock, TriangleFilter, cross};
-use crate::query::Any;
+use crate::query::AnyHit;
 use crate::rays::Ray;
 use crate::simd::{Isa, Kernel, Part, Simd};
 use bth_format::layout::{Child, NONE, TetLeaf, WIDTH, WideNode};
@@ -190,7 +190,7 @@ impl AxisRay {
                 let node = node(s, node_base, code, &mut unpacked_node);
                 let (bits, children) = (self.children(s, node), &node.child);
                 if bits == 0 {
-                    code = stack.pop::<Any>(0.0);
+                    code = stack.pop(0.0, AnyHit);
                     continue;
                 }
                 code = children[bits.trailing_zeros() as usize % WIDTH];
@@ -220,7 +220,7 @@ impl AxisRay {
                     _ => {}
                 }
             }
-            code = stack.pop::<Any>(0.0);
+            code = stack.pop(0.0, AnyHit);
         }
         winding
     }

@@ -13,7 +13,9 @@ use crate::SMALL;
 use crate::object::{self, HintUse, QueryKind, Scratch, Strategy};
 use crate::objects::Objects;
 use crate::query::sink::{SceneRays, Sink, Visit};
-use crate::query::{self, Query, Steps, better};
+use crate::query::{
+    AnswersOf, AnyQuery, Goal, NearestQuery, Query, Steps, any_answers, better, nearest_answers,
+};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use bth_format::layout::NONE;
@@ -290,10 +292,10 @@ fn trace_visits<Q: Query>(
     object: &ObjectView<'_>,
     (visits, object_rays): (&[Visit], &ObjectRays),
     scratch: &mut Scratch,
-    answers: &mut [Q::Answer],
+    mut answers: AnswersOf<'_, Q>,
 ) {
     let scene = SceneRays { rays: batch.rays, visits, t_scale: &object_rays.t_scale };
-    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, answers, scene);
+    let mut sink = Sink::<Q>::of_scene(object.triangle_ids, Q::Goal::reborrow(&mut answers), scene);
     object::trace_batch(object, &object_rays.rays, object_rays.hints(), scratch, &mut sink);
 }
 
@@ -322,7 +324,8 @@ impl SceneQuery for SceneNearest<'_> {
         }
         let tmax = |ray: usize| batch.rays[ray].tmax.min(self.hits[ray].t);
         self.object_rays.fill(batch, !object.tet_leaves.is_empty(), visits, tmax);
-        trace_visits::<query::Nearest>(batch, object, (visits, &self.object_rays), self.scratch, self.hits);
+        let answers = nearest_answers(self.hits);
+        trace_visits::<NearestQuery>(batch, object, (visits, &self.object_rays), self.scratch, answers);
     }
 }
 
@@ -348,7 +351,8 @@ impl SceneQuery for SceneAny<'_> {
         }
         let hinted = !object.tet_leaves.is_empty();
         self.object_rays.fill(batch, hinted, visits, |ray| batch.rays[ray].tmax);
-        trace_visits::<query::Any>(batch, object, (visits, &self.object_rays), self.scratch, self.found);
+        let answers = any_answers(self.found);
+        trace_visits::<AnyQuery>(batch, object, (visits, &self.object_rays), self.scratch, answers);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{AnswerLanes, Nearest, Query, Uncounted};
+use crate::query::{AnswerLanes, Goal, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
@@ -89,7 +89,7 @@ impl Kernel for MissKernel<'_> {
         let (blocks, rest) = self.0.as_chunks_mut();
         let none = AnswerLanes { lanes: 0, intersections: &Intersections::NONE, instance: NONE };
         for block in blocks {
-            Nearest::answers_of(s, &none, block);
+            <Nearest>::answers_of(s, &none, block);
         }
         rest.fill(Hit::MISS);
     }
@@ -112,13 +112,14 @@ pub(crate) fn trace_batch<Q: Query>(
         }
         let mut starts = rays.iter().zip(*from);
         !object.tet_leaves.is_empty()
-            && starts.any(|(ray, &triangle)| triangle != NONE && may_gain_by_walk::<Q>(object, ray))
+            && starts.any(|(ray, &triangle)| triangle != NONE && may_gain_by_walk(object, ray, sink.goal()))
     });
     // There is a choice of strategy only if the triangles of tet leaves are also in a BVH.
     if from.is_none() || !has_subtrees(object) {
         return trace_with(object, rays, from, scratch, sink);
     }
-    let key = (address_of(object), HintUse::Tets.kind(QueryKind::of(Q::ANY, rays, size_of(object))));
+    let key =
+        (address_of(object), HintUse::Tets.kind(QueryKind::of(sink.goal().is_any(), rays, size_of(object))));
     by_hint(key, rays.len(), Strategy::Bvh, scratch, |strategy, scratch| {
         trace_with(object, rays, from.filter(|_| strategy == Strategy::Hinted), scratch, sink);
     });
@@ -183,11 +184,11 @@ fn trace_hinted<Q: Query>(
         _ => scratch.packets.rest.clone(),
     };
     for &ray in &order {
-        if may_gain_by_walk::<Q>(object, &rays[ray as usize]) {
+        if may_gain_by_walk(object, &rays[ray as usize], sink.goal()) {
             faces[ray as usize] = face_of(ray as usize);
         }
     }
-    let mut queries: Vec<Q> = rays.iter().map(Q::new).collect();
+    let mut queries: Vec<Q> = rays.iter().map(|ray| Q::new(sink.goal(), ray)).collect();
     let mut walks = vec![WalkState::NotWalked; rays.len()];
     walk_tets(object, rays, &faces, &mut queries, &mut walks);
     let is_whole_object = matches!(Child::from_code(object.header.root), Some(Child::Tets(_)));
@@ -212,14 +213,14 @@ fn trace_hinted<Q: Query>(
 ///
 /// By measurement (docs/notes/tets.md), long any-hit rays and all rays in scalar code are not, and with 128 bits no walk is compiled;
 /// for other rays [`super::strategy`] chooses by measured time. No answer depends on this.
-fn may_gain_by_walk<Q: Query>(object: &ObjectView<'_>, ray: &Ray) -> bool {
+fn may_gain_by_walk(object: &ObjectView<'_>, ray: &Ray, goal: impl Goal) -> bool {
     if !has_subtrees(object) {
         return true;
     }
     if !Isa::chosen().walks_tets() {
         return false;
     }
-    if !Q::ANY {
+    if !goal.is_any() {
         return true;
     }
     is_short(ray, size_of(object))
@@ -283,7 +284,7 @@ fn one_by_one<Q: Query>(
 ) {
     let trace = |index: usize, sink: &mut Sink<'_, Q>| {
         let ray = &rays[index];
-        let mut query = remaining.queries.map_or_else(|| Q::new(ray), |queries| queries[index]);
+        let mut query = remaining.queries.map_or_else(|| Q::new(sink.goal(), ray), |queries| queries[index]);
         let walked = remaining.walked.map_or(NONE, |walked| walked[index]);
         single::through_bvh(object, ray, &mut query, walked, &mut Uncounted::default());
         sink.query(index, &query);

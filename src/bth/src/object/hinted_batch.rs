@@ -8,7 +8,7 @@ use crate::SMALL;
 use crate::bvh::interleaved::RemainingRays;
 use crate::free;
 use crate::query::sink::Sink;
-use crate::query::{Any, Nearest, Query};
+use crate::query::{Answers, AnswersOf, AnyQuery, Goal, NearestQuery, Query, any_answers, nearest_answers};
 use crate::rays::{Hit, PrimitiveRef, Ray};
 use bth_format::layout::NONE;
 use bth_format::object::ObjectView;
@@ -23,7 +23,7 @@ pub(crate) fn nearest_batch(
     scratch: &mut Scratch,
     hits: &mut [Hit],
 ) {
-    trace_from::<Nearest>(object, rays, from, instance, scratch, hits);
+    trace_from::<NearestQuery>(object, rays, from, instance, scratch, nearest_answers(hits));
 }
 
 /// Computes whether rays in object space hit anything; parameters as for [`nearest_batch`].
@@ -35,7 +35,7 @@ pub(crate) fn any_batch(
     scratch: &mut Scratch,
     found: &mut [bool],
 ) {
-    trace_from::<Any>(object, rays, from, instance, scratch, found);
+    trace_from::<AnyQuery>(object, rays, from, instance, scratch, any_answers(found));
 }
 
 /// Stores the answers of those rays that hit anything. Rays that leave their triangle in a free direction are not traced, where looking
@@ -46,9 +46,10 @@ fn trace_from<Q: Query>(
     from: Option<&[PrimitiveRef]>,
     instance: u32,
     scratch: &mut Scratch,
-    answers: &mut [Q::Answer],
+    mut answers: AnswersOf<'_, Q>,
 ) {
-    let trace = |from: Option<&[u32]>, scratch: &mut Scratch, answers: &mut [Q::Answer]| {
+    let trace = |from: Option<&[u32]>, scratch: &mut Scratch, mut answers: AnswersOf<'_, Q>| {
+        let answers = Q::Goal::reborrow(&mut answers);
         let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
         trace_batch(object, rays, from, scratch, &mut sink);
     };
@@ -60,8 +61,9 @@ fn trace_from<Q: Query>(
     if !free::is_known(object) {
         return with_hints(from, instance, scratch, |hints, scratch| trace(Some(hints), scratch, answers));
     }
+    let is_any = answers.goal().is_any();
     // Small batches come before measurements: then the look-up decides by how many of the first rays end.
-    let key = (address_of(object), HintUse::Free.kind(QueryKind::of(Q::ANY, rays, size_of(object))));
+    let key = (address_of(object), HintUse::Free.kind(QueryKind::of(is_any, rays, size_of(object))));
     by_hint(key, rays.len(), Strategy::Hinted, scratch, |strategy, scratch| {
         if strategy == Strategy::Bvh && !has_tets {
             return trace(None, scratch, answers);
@@ -72,10 +74,11 @@ fn trace_from<Q: Query>(
                 || !free::find_rest(object, rays, hints, Hinted::are_forced(), &mut rest)
             {
                 trace(Some(hints), scratch, answers);
-            } else if Q::ANY {
+            } else if is_any {
                 // Most shorter rays go in packets, also those that are left. Others are faster without moving them.
                 trace_gathered::<Q>(object, (rays, &rest), instance, scratch, answers);
             } else {
+                let answers = Q::Goal::reborrow(&mut answers);
                 let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
                 trace_rest(object, rays, &rest, scratch, &mut sink);
             }
@@ -105,13 +108,16 @@ fn trace_gathered<Q: Query>(
     (rays, rest): (&[Ray], &[u32]),
     instance: u32,
     scratch: &mut Scratch,
-    answers: &mut [Q::Answer],
+    mut answers: AnswersOf<'_, Q>,
 ) {
     let mut gathered = std::mem::take(&mut scratch.gathered);
     gathered.clear();
     gathered.extend(rest.iter().map(|ray| rays[*ray as usize]));
-    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
-    trace_batch(object, &gathered, None, scratch, &mut sink);
+    {
+        let answers = Q::Goal::reborrow(&mut answers);
+        let mut sink = Sink::<Q>::new(object.triangle_ids, answers, instance);
+        trace_batch(object, &gathered, None, scratch, &mut sink);
+    }
     // No ray is before its place among those that are left, so the last answers can move first.
     for (i, &ray) in rest.iter().enumerate().rev() {
         answers.swap(i, ray as usize);

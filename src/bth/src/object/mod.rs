@@ -14,7 +14,7 @@ pub(crate) use scratch::{Scratch, with_scratch};
 pub(crate) use strategy::{HintUse, QueryKind, Strategy};
 
 use self::single::trace;
-use crate::query::{Any, Nearest, Steps, Uncounted};
+use crate::query::{ANY, Answer, AnyQuery, NEAREST, NearestQuery, Steps, Uncounted};
 use crate::rays::{Hit, Ray};
 use bth_format::object::ObjectView;
 
@@ -31,20 +31,20 @@ pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u
 /// kernels of its own.
 #[inline(never)]
 pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
-    trace::<Nearest, Uncounted>(object, ray, from, instance, &mut Uncounted::default(), hit);
+    trace::<NearestQuery, Uncounted>((object, NEAREST), ray, from, instance, &mut Uncounted::default(), hit);
 }
 
 /// As [`nearest`], with the statistics of the traversal.
 pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> (Hit, Steps) {
     let (mut hit, mut steps) = (Hit::MISS, Steps::default());
-    trace::<Nearest, Steps>(object, ray, from, instance, &mut steps, &mut hit);
+    trace::<NearestQuery, Steps>((object, NEAREST), ray, from, instance, &mut steps, &mut hit);
     (hit, steps)
 }
 
 /// Whether a ray in object space hits anything; `from` as for [`nearest`]. Not inlined, as [`nearest_to`].
 #[inline(never)]
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
-    let mut found = false;
-    trace::<Any, Uncounted>(object, ray, from, 0, &mut Uncounted::default(), &mut found);
-    found
+    let mut found = Answer::MISS;
+    trace::<AnyQuery, Uncounted>((object, ANY), ray, from, 0, &mut Uncounted::default(), &mut found);
+    found.is_hit()
 }

@@ -15,7 +15,7 @@ use bth_format::object::ObjectView;
 /// hit.
 #[inline(always)]
 pub(crate) fn trace<Q: Query, C: Count>(
-    object: &ObjectView<'_>,
+    (object, goal): (&ObjectView<'_>, Q::Goal),
     ray: &Ray,
     from: u32,
     instance: u32,
@@ -23,25 +23,25 @@ pub(crate) fn trace<Q: Query, C: Count>(
     answer: &mut Q::Answer,
 ) {
     if SMALL || from == NONE || object.tet_leaves.is_empty() {
-        let mut query = Q::new(ray);
+        let mut query = Q::new(goal, ray);
         through_bvh(object, ray, &mut query, NONE, count);
         *answer = query.answer(object.triangle_ids, instance);
         return;
     }
-    trace_from::<Q, C>(object, ray, from, instance, count, answer);
+    trace_from::<Q, C>((object, goal), ray, from, instance, count, answer);
 }
 
 /// As [`trace`], from a triangle that may be a face of tetrahedra.
 #[inline(never)]
 fn trace_from<Q: Query, C: Count>(
-    object: &ObjectView<'_>,
+    (object, goal): (&ObjectView<'_>, Q::Goal),
     ray: &Ray,
     from: u32,
     instance: u32,
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    let mut query = Q::new(ray);
+    let mut query = Q::new(goal, ray);
     match start_in_tets(object, ray, from, &mut query, count) {
         TetStart::Done => {}
         TetStart::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}

@@ -1,6 +1,17 @@
 //! Queries over rays, nearest hit and any hit, and the statistics of their traversal.
 
+mod answers;
+mod goal;
 pub(crate) mod sink;
+
+pub(crate) use self::answers::Answers;
+#[cfg(test)]
+pub(crate) use self::answers::EitherAnswers;
+#[cfg(test)]
+pub(crate) use self::goal::EitherGoal;
+pub(crate) use self::goal::{
+    ANY, Answer, AnyHit, AnyQuery, Goal, NEAREST, NearestHit, NearestQuery, any_answers, nearest_answers,
+};
 
 use crate::intersect::exact::{Intersection, reported};
 use crate::intersect::exact_lanes::Intersections;
@@ -47,10 +58,10 @@ impl<'a> TriangleRef<'a> {
 
 /// State of a query over one ray: its range of t and the best hit so far. Values of t are in units of the ray's direction.
 pub(crate) trait Query: Copy {
-    /// Whether the query ends at the first hit found.
-    const ANY: bool;
+    /// What it looks for.
+    type Goal: Goal<Answer = Self::Answer>;
     /// Result of the query.
-    type Answer;
+    type Answer: Answer;
     /// The result of a traversal that has ended. `ids` are the ids of the object's triangles in leaf order, and `instance` is
     /// reported with a hit.
     fn answer(&self, ids: &[u32], instance: u32) -> Self::Answer;
@@ -58,11 +69,10 @@ pub(crate) trait Query: Copy {
     fn answer_of(primitive: PrimitiveRef, t: f32, u: f32, v: f32) -> Self::Answer;
     /// Writes the results of sixteen rays; rays whose bit is not set in `hits.lanes` are misses.
     fn answers_of<S: Simd>(s: S, hits: &AnswerLanes<'_>, answers: &mut [Self::Answer; LANES]);
-    /// Merges the answer of a ray in an object into the answer of its ray in the scene. `t_scale` is the factor from t in
-    /// object space to t in world space.
-    fn merge(best: &mut Self::Answer, found: Self::Answer, ray: &Ray, t_scale: f32);
     /// A query without hits over the range of `ray`.
-    fn new(ray: &Ray) -> Self;
+    fn new(goal: Self::Goal, ray: &Ray) -> Self;
+    /// What it looks for.
+    fn goal(&self) -> Self::Goal;
     /// Whether walks through tetrahedra keep track of depths, for queries whose rays are often short and that can be ended by
     /// [`Self::offer_bounds`].
     const KEEPS_DEPTHS: bool = false;
@@ -99,31 +109,43 @@ pub(crate) fn widened(t: f64) -> f64 {
     t + (t.abs() * SLACK + LEAST)
 }
 
-/// Query for the nearest hit: the least t, and among equal t the least triangle id. This order does not depend on the traversal.
+/// The answers to queries of a type.
+pub(crate) type AnswersOf<'a, Q> = <<Q as Query>::Goal as Goal>::Answers<'a>;
+
+/// Query for the nearest hit: the least t, and among equal t the least triangle id. This order does not depend on the traversal. Where
+/// its goal is any hit, it holds that in place of the nearest.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Nearest {
+pub(crate) struct Nearest<G = NearestHit> {
     tmin: f32,
     tmax: f32,
     /// The nearest triangle so far, by its id or by its index in leaf order ([`TriangleRef`]); `NONE` if nothing is hit.
     triangle: u32,
     is_index: bool,
+    goal: G,
     /// The nearest intersection so far. Its t is `tmax` if nothing is hit.
     best: Intersection,
 }
 
-impl Nearest {
+impl<G: Goal> Nearest<G> {
     /// The nearest triangle so far.
     fn best_triangle<'a>(&self, ids: &'a [u32]) -> TriangleRef<'a> {
         TriangleRef { value: self.triangle, is_index: self.is_index, ids }
     }
 }
 
-impl Query for Nearest {
-    const ANY: bool = false;
+impl<G: Goal<Answer = Hit>> Query for Nearest<G> {
+    type Goal = G;
     type Answer = Hit;
+    #[inline(always)]
+    fn goal(&self) -> G {
+        self.goal
+    }
     fn answer(&self, ids: &[u32], instance: u32) -> Hit {
         if self.triangle == NONE {
             return Hit::MISS;
+        }
+        if self.goal.is_any() {
+            return Hit { t: 0.0, ..Hit::MISS };
         }
         let primitive = PrimitiveRef { instance, triangle: self.best_triangle(ids).read() };
         let [u, v] = self.best.uv();
@@ -148,13 +170,9 @@ impl Query for Nearest {
             zerocopy::transmute_mut!(answers),
         );
     }
-    #[inline]
-    fn merge(best: &mut Hit, found: Hit, ray: &Ray, t_scale: f32) {
-        *best = better(ray, best, &found, t_scale).unwrap_or(*best);
-    }
-    fn new(ray: &Ray) -> Self {
+    fn new(goal: G, ray: &Ray) -> Self {
         let best = Intersection { t: f64::from(ray.tmax), weight: [0.0, 0.0, 1.0] };
-        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_index: false, best }
+        Nearest { tmin: ray.tmin, tmax: ray.tmax, triangle: NONE, is_index: false, goal, best }
     }
     #[inline(always)]
     fn offer(&mut self, triangle: TriangleRef<'_>, intersection: Intersection) -> bool {
@@ -165,7 +183,7 @@ impl Query for Nearest {
             (self.triangle, self.is_index) = (triangle.value, triangle.is_index);
             self.best = intersection;
         }
-        false
+        self.goal.is_any() && self.triangle != NONE
     }
     #[inline(always)]
     fn limit(&self) -> f64 {
@@ -175,9 +193,13 @@ impl Query for Nearest {
         may_be_in_range(t, self.tmin, self.limit())
     }
     fn found(&self) -> Option<f64> {
-        (self.triangle != NONE).then_some(self.best.t)
+        (self.triangle != NONE && !self.goal.is_any()).then_some(self.best.t)
     }
-    fn accept(&mut self) {}
+    fn accept(&mut self) {
+        if self.goal.is_any() {
+            (self.triangle, self.is_index) = (0, false);
+        }
+    }
 }
 
 /// The new hit of a ray in a scene, with its t in world space, if it is better than `best`: a lesser t, or an equal t and a
@@ -214,8 +236,12 @@ pub(crate) struct Any {
 }
 
 impl Query for Any {
-    const ANY: bool = true;
+    type Goal = AnyHit;
     type Answer = bool;
+    #[inline(always)]
+    fn goal(&self) -> AnyHit {
+        AnyHit
+    }
     fn answer(&self, _ids: &[u32], _instance: u32) -> bool {
         self.found
     }
@@ -227,11 +253,7 @@ impl Query for Any {
             *found = hits.lanes >> lane & 1 != 0;
         }
     }
-    #[inline]
-    fn merge(best: &mut bool, found: bool, _ray: &Ray, _t_scale: f32) {
-        *best |= found;
-    }
-    fn new(ray: &Ray) -> Self {
+    fn new(_goal: AnyHit, ray: &Ray) -> Self {
         Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
     }
     const KEEPS_DEPTHS: bool = true;

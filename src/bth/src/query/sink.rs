@@ -1,6 +1,6 @@
 //! Destination of the answers of a batch: one type for models and for scenes, so that every kernel is compiled once for both.
 
-use super::{AnswerLanes, Query};
+use super::{AnswerLanes, Answers, AnswersOf, Goal, Query};
 use crate::intersect::exact_lanes::Intersections;
 use crate::rays::{PrimitiveRef, Ray};
 use crate::simd::{LANES, Simd};
@@ -28,7 +28,7 @@ pub(crate) struct SceneRays<'a> {
 pub(crate) struct Sink<'a, Q: Query> {
     /// Ids of the object's triangles, in leaf order.
     ids: &'a [u32],
-    answers: &'a mut [Q::Answer],
+    answers: AnswersOf<'a, Q>,
     /// Instance that is reported with a hit if there is no `scene`.
     instance: u32,
     /// If set, answers are merged into those of the scene's rays.
@@ -39,20 +39,27 @@ pub(crate) struct Sink<'a, Q: Query> {
 
 impl<'a, Q: Query> Sink<'a, Q> {
     /// Stores the answer of ray i in `answers[i]`.
-    pub(crate) fn new(ids: &'a [u32], answers: &'a mut [Q::Answer], instance: u32) -> Self {
+    pub(crate) fn new(ids: &'a [u32], answers: AnswersOf<'a, Q>, instance: u32) -> Self {
         Sink { ids, answers, instance, scene: None, first: 0 }
     }
 
     /// Merges the answer of each visit into the answer of its ray; `answers` are those of the scene's batch.
-    pub(crate) fn of_scene(ids: &'a [u32], answers: &'a mut [Q::Answer], scene: SceneRays<'a>) -> Self {
+    pub(crate) fn of_scene(ids: &'a [u32], answers: AnswersOf<'a, Q>, scene: SceneRays<'a>) -> Self {
         Sink { ids, answers, instance: 0, scene: Some(scene), first: 0 }
+    }
+
+    /// What the answers are about.
+    #[inline(always)]
+    pub(crate) fn goal(&self) -> Q::Goal {
+        self.answers.goal()
     }
 
     /// A sink for the rays from `first` on, whose indices in calls begin at 0.
     #[inline(always)]
     pub(crate) fn part(&mut self, first: usize) -> Sink<'_, Q> {
-        let Sink { ids, instance, scene, .. } = *self;
-        Sink { ids, answers: self.answers, instance, scene, first: self.first + first }
+        let (ids, instance, scene) = (self.ids, self.instance, self.scene);
+        let answers = Q::Goal::reborrow(&mut self.answers);
+        Sink { ids, answers, instance, scene, first: self.first + first }
     }
 
     /// Stores the answer of a query that has ended.
@@ -60,7 +67,7 @@ impl<'a, Q: Query> Sink<'a, Q> {
     pub(crate) fn query(&mut self, ray: usize, query: &Q) {
         let index = self.first + ray;
         match &self.scene {
-            None => self.answers[index] = query.answer(self.ids, self.instance),
+            None => self.answers.put(index, query.answer(self.ids, self.instance)),
             Some(scene) => {
                 let answer = query.answer(self.ids, scene.visits[index].instance);
                 self.merge(index, answer);
@@ -75,8 +82,8 @@ impl<'a, Q: Query> Sink<'a, Q> {
         let index = self.first + ray;
         match &self.scene {
             None => {
-                self.answers[index] =
-                    Q::answer_of(PrimitiveRef { instance: self.instance, triangle }, t, u, v);
+                let primitive = PrimitiveRef { instance: self.instance, triangle };
+                self.answers.put(index, Q::answer_of(primitive, t, u, v));
             }
             Some(scene) => {
                 let instance = scene.visits[index].instance;
@@ -90,7 +97,7 @@ impl<'a, Q: Query> Sink<'a, Q> {
     #[inline(always)]
     pub(crate) fn hits<S: Simd>(&mut self, s: S, ray: usize, mut lanes: u32, found: &Intersections) {
         if self.scene.is_none()
-            && let Some(answers) = self.answers[self.first + ray..].first_chunk_mut()
+            && let Some(answers) = self.answers.lanes(self.first + ray)
         {
             let hits = AnswerLanes { lanes, intersections: found, instance: self.instance };
             return Q::answers_of(s, &hits, answers);
@@ -107,6 +114,6 @@ impl<'a, Q: Query> Sink<'a, Q> {
     fn merge(&mut self, visit: usize, answer: Q::Answer) {
         let Some(SceneRays { rays, visits, t_scale }) = &self.scene else { return };
         let ray = visits[visit].ray as usize;
-        Q::merge(&mut self.answers[ray], answer, &rays[ray], t_scale[visit]);
+        self.answers.merge(ray, answer, &rays[ray], t_scale[visit]);
     }
 }

@@ -1,5 +1,6 @@
 //! Bounds of all rays of a packet, which are tested before the rays themselves.
 
+use crate::query::Goal;
 use crate::simd::Simd;
 use bth_format::layout::WideNode;
 
@@ -9,6 +10,13 @@ pub(crate) trait PacketBounds<S: Simd> {
     const MIXED_OCTANTS: bool;
     /// Whether the rays have the same origin, and corners of boxes are given relative to it.
     const COMMON_ORIGIN: bool;
+    /// Where packets with such bounds are made for one goal only: whether that is any hit.
+    const IS_ANY: Option<bool>;
+    /// Whether a query with this goal, in a packet with such bounds, ends at the first hit found.
+    #[inline(always)]
+    fn is_any(goal: impl Goal) -> bool {
+        Self::IS_ANY.unwrap_or(goal.is_any())
+    }
     /// The view from that origin, if `COMMON_ORIGIN`.
     fn view(&self) -> Option<&FrustumView>;
     /// The children of a node that any ray may meet before the depth `limit`, a bit each, and lower bounds of the depths at which any of

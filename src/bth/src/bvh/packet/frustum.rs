@@ -143,6 +143,7 @@ impl<S: Simd, const POINT: bool> Part<S> for FrustumOf<'_, S, POINT> {
 impl<S: Simd, const POINT: bool> PacketBounds<S> for Frustum<S, POINT> {
     const MIXED_OCTANTS: bool = false;
     const COMMON_ORIGIN: bool = POINT;
+    const IS_ANY: Option<bool> = if POINT { Some(false) } else { None };
 
     #[inline(always)]
     fn view(&self) -> Option<&FrustumView> {

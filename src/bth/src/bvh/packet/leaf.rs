@@ -16,7 +16,7 @@ use super::single_rays::{FEW_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
-use crate::query::Query;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::{NONE, WIDTH};
@@ -26,9 +26,10 @@ use bth_format::object::ObjectView;
 const NOT_CACHED_YET: u8 = u8::MAX;
 
 /// The rays of a packet with their queries and decided hits.
-pub(crate) struct PacketRays<'a, Q> {
+pub(crate) struct PacketRays<'a, Q: Query> {
     pub(crate) object: &'a ObjectView<'a>,
     pub(crate) rays: &'a [Ray],
+    pub(crate) goal: Q::Goal,
     /// Queries of the rays whose bit is set in `queried`.
     pub(crate) queries: &'a mut [Q],
     /// A bit for each ray with a decision in f64.
@@ -151,7 +152,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         mut rays: u64,
     ) -> bool {
         // In packets for nearest hits, whose rays are coherent, few rays are rarely left.
-        if Q::ANY {
+        if H::is_any(self.goal) {
             for (i, group) in groups.iter().enumerate() {
                 let active = (rays >> (i * LANES)) as u32 & 0xffff;
                 if active.count_ones() <= FEW_OF_GROUP {
@@ -245,7 +246,7 @@ impl<Q: Query> PacketRays<'_, Q> {
             let [size, depth] = spread;
             let error = filter::error(s, s.splat(size + size), s.splat(depth), floor);
             let corners = ProjectedOnDemand { rows, projection: group.projection.relative(s) };
-            return self.test_triangles(
+            return self.test_triangles::<S, H, B>(
                 s,
                 group,
                 at,
@@ -272,7 +273,7 @@ impl<Q: Query> PacketRays<'_, Q> {
         }
         let size = s.add(greatest.coordinate, greatest.coordinate);
         let error = filter::error(s, size, greatest.depth, floor);
-        self.test_triangles(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
+        self.test_triangles::<S, H, B>(s, group, at, &*points, error, leaf, cache_indices, triangles, active)
     }
 
     /// Intersects the active rays of a group with triangles, a bit each, given the projections of their corners. `error` bounds the errors
@@ -280,7 +281,7 @@ impl<Q: Query> PacketRays<'_, Q> {
     /// separate.
     #[inline(always)]
     #[expect(clippy::too_many_arguments)]
-    fn test_triangles<S: Simd, B: LeafMesh>(
+    fn test_triangles<S: Simd, H: PacketBounds<S>, B: LeafMesh>(
         &mut self,
         s: S,
         group: &mut RayGroup<S>,
@@ -313,7 +314,7 @@ impl<Q: Query> PacketRays<'_, Q> {
                 continue;
             }
             let candidate = Candidate { leaf: leaf.code, triangle };
-            let clear = if Q::ANY {
+            let clear = if H::is_any(self.goal) {
                 self.alive &= !(u64::from(sure) << (at * LANES));
                 active &= !sure;
                 sure
@@ -402,7 +403,7 @@ impl<Q: Query> PacketRays<'_, Q> {
     #[inline(always)]
     fn settle_one(&mut self, ray: usize, pending: Candidate, of_leaf: (u32, u32)) -> bool {
         if self.queried >> ray & 1 == 0 {
-            self.queries[ray] = Q::new(&self.rays[ray]);
+            self.queries[ray] = Q::new(self.goal, &self.rays[ray]);
             self.queried |= 1 << ray;
         }
         settle(self.object, &self.rays[ray], pending, of_leaf, &mut self.queries[ray])

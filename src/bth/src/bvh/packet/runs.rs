@@ -8,8 +8,8 @@ use super::frustum::{Frustum, FrustumOf};
 use super::ray_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{Kernel, LANES, Part, Simd};
 use bth_format::layout::NONE;
@@ -90,7 +90,7 @@ fn trace<S: Simd, Q: Query>(
     {
         return count;
     }
-    let bounds = object.bounds;
+    let (bounds, goal) = (object.bounds, sink.goal());
     let PacketScratch { groups, buffers, rest } = scratch;
     rest.clear();
     let mut runs = Runs {
@@ -102,8 +102,8 @@ fn trace<S: Simd, Q: Query>(
         rest,
     };
     // The first run is found before the loop, so that `packets` is made in its final place, and only if there are any.
-    let Some(mut run) = runs.next::<S, Q>(s) else { return count };
-    let mut packets = PacketTracer::<S, Q>::new(object, groups.of(s), buffers, &rays[0]);
+    let Some(mut run) = runs.next(s, goal) else { return count };
+    let mut packets = PacketTracer::<S, Q>::new(object, groups.of(s), buffers, Q::new(goal, &rays[0]));
     loop {
         let (first, rays) = (run.first, run.rays);
         // The next rays are in the cache when this packet is done.
@@ -115,7 +115,7 @@ fn trace<S: Simd, Q: Query>(
         let (outcome, backoff, least_use, kind) = match run.kind {
             Kind::Coherent(span) => {
                 // Any-hit rays with the same origin are rare, so that kernel is compiled for nearest hits only.
-                let outcome = if !Q::ANY && span.is_from_point() {
+                let outcome = if !goal.is_any() && span.is_from_point() {
                     frustum::<S, Q, true>(s, object, &bounds, &span, &mut packets, rays, sink)
                 } else {
                     frustum::<S, Q, false>(s, object, &bounds, &span, &mut packets, rays, sink)
@@ -123,7 +123,7 @@ fn trace<S: Simd, Q: Query>(
                 (outcome, &mut runs.coherent, least.coherent, &mut count.coherent)
             }
             // Runs of short rays are found for any-hit queries only, so no kernel is compiled for others.
-            Kind::Short(_) if !Q::ANY => {
+            Kind::Short(_) if !goal.is_any() => {
                 (PacketOutcome::Refused, &mut runs.short, least.short, &mut count.short)
             }
             Kind::Short(segments) => {
@@ -144,7 +144,7 @@ fn trace<S: Simd, Q: Query>(
                 count.poor += usize::from(share < least_use);
             }
         }
-        let Some(next) = runs.next::<S, Q>(s) else { break };
+        let Some(next) = runs.next(s, goal) else { break };
         run = next;
     }
     count
@@ -181,12 +181,12 @@ struct Runs<'a, 'b> {
 impl<'a> Runs<'a, '_> {
     /// The next run. The rays before it are added to `rest`.
     #[inline(always)]
-    fn next<S: Simd, Q: Query>(&mut self, s: S) -> Option<Run<'a>> {
+    fn next(&mut self, s: impl Simd, goal: impl Goal) -> Option<Run<'a>> {
         while self.next < self.rays.len() {
             let first = self.next;
             let rays = &self.rays[first..self.rays.len().min(first + PACKET)];
             self.next = first + PACKET;
-            if let Some(kind) = choose::<S, Q>(s, self.bounds, rays, &mut self.coherent, &mut self.short) {
+            if let Some(kind) = choose(s, goal, self.bounds, rays, [&mut self.coherent, &mut self.short]) {
                 return Some(Run { first, rays, kind });
             }
             self.skip(first, rays.len());
@@ -202,18 +202,18 @@ impl<'a> Runs<'a, '_> {
 
 /// The kind of packet that rays may make, if any.
 #[inline(always)]
-fn choose<S: Simd, Q: Query>(
-    s: S,
+fn choose(
+    s: impl Simd,
+    goal: impl Goal,
     bounds: &ObjectBounds,
     rays: &[Ray],
-    coherent: &mut PacketBackoff,
-    short: &mut PacketBackoff,
+    [coherent, short]: [&mut PacketBackoff; 2],
 ) -> Option<Kind> {
     if rays.len() < MIN_RAYS {
         return None;
     }
     let try_coherent = coherent.may_try() && is_same_octant(&rays[0], &rays[rays.len() - 1]);
-    let try_short = Q::ANY && short.may_try();
+    let try_short = goal.is_any() && short.may_try();
     if !try_coherent && !try_short {
         return None;
     }

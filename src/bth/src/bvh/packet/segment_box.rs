@@ -23,6 +23,7 @@ impl<S: Simd> SegmentBox<S> {
 impl<S: Simd> PacketBounds<S> for SegmentBox<S> {
     const MIXED_OCTANTS: bool = true;
     const COMMON_ORIGIN: bool = false;
+    const IS_ANY: Option<bool> = Some(true);
 
     #[inline(always)]
     fn view(&self) -> Option<&FrustumView> {

@@ -16,8 +16,8 @@ use super::single_rays::{FEW_OF_PACKET, SingleRays};
 use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
-use crate::query::Query;
 use crate::query::sink::Sink;
+use crate::query::{Goal, Query};
 use crate::rays::Ray;
 use crate::simd::{LANES, Part, Simd, lanes_of_piece};
 use bth_format::layout::{Child, NONE, WIDTH, WideNode};
@@ -91,19 +91,17 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
         object: &ObjectView<'_>,
         groups: &'a mut [RayGroup<S>; GROUPS],
         buffers: &'a mut PacketBuffers,
-        ray: &Ray,
+        query: Q,
     ) -> Self {
         // At every level all children but the entered one are stacked.
         let entries = (object.header.depth as usize).min(MAX_DEPTH) * (WIDTH - 1) + 1 + WIDTH;
         if buffers.stack.len() < entries {
             buffers.stack.resize(entries, StackEntry::default());
         }
-        PacketTracer { groups, queries: [Q::new(ray); PACKET], buffers }
+        PacketTracer { groups, queries: [query; PACKET], buffers }
     }
 
     /// Traces the rays for which the groups have been prepared, and stores the answers of those that hit something.
-    ///
-    /// This is one kernel, longer than other functions: all steps share code, mask, limit and the top of the stack.
     #[inline(always)]
     pub(crate) fn trace<H: PacketBounds<S>>(
         &mut self,
@@ -113,13 +111,30 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
         rays: &[Ray],
         sink: &mut Sink<'_, Q>,
     ) -> PacketOutcome {
+        TracePacket { packets: self, object, bounds, rays, sink }.inline_or_call(s)
+    }
+
+    /// Implements [`Self::trace`].
+    ///
+    /// This is one kernel, longer than other functions: all steps share code, mask, limit and the top of the stack.
+    #[inline(always)]
+    fn steps<H: PacketBounds<S>>(
+        &mut self,
+        s: S,
+        object: &ObjectView<'_>,
+        bounds: &H,
+        rays: &[Ray],
+        sink: &mut Sink<'_, Q>,
+    ) -> PacketOutcome {
         let PacketTracer { groups, queries, buffers } = self;
+        let goal = sink.goal();
         let PacketBuffers { stack, points, relative, single_rays, hit_cache, origin_terms, intersections } =
             &mut **buffers;
         let groups = &mut groups[..rays.len().div_ceil(LANES)];
         let all = u64::MAX >> (PACKET - rays.len());
         single_rays.clear();
-        let mut rays = PacketRays { object, rays, queries, single_rays, hit_cache, queried: 0, alive: all };
+        let mut rays =
+            PacketRays { object, rays, goal, queries, single_rays, hit_cache, queried: 0, alive: all };
         if let Some(group) = groups.last_mut() {
             // Lanes without a ray get the least limit, so that they never keep a child or a triangle.
             let valid = s.mask((all >> ((rays.rays.len() - 1) / LANES * LANES)) as u32);
@@ -139,21 +154,23 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
                     top += if H::MIXED_OCTANTS && mask.count_ones() <= FEW_OF_PACKET {
                         rays.single_rays.children(s, groups, mask, (line, node), entries)
                     } else {
-                        let (rays, node, query) = (mask, (line, node), PhantomData::<Q>);
-                        Children { bounds, groups, rays, node, limit, entries, query }.inline_or_call(s)
+                        let (rays, node) = (mask, (line, node));
+                        Children { bounds, groups, rays, node, limit, entries, goal }.inline_or_call(s)
                     };
                 }
                 Some(Child::Indexed(line)) => {
                     let mut unpacked = None;
                     let leaf = Leaf { block: nodes::indexed(s, object, line, &mut unpacked), code };
-                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
+                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !H::is_any(goal)
+                    {
                         limit = farthest_limit(s, groups);
                     }
                 }
                 Some(Child::Raw(line)) => {
                     let mut unpacked = None;
                     let leaf = Leaf { block: nodes::raw(s, object, line, &mut unpacked), code };
-                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !Q::ANY {
+                    if rays.enter_leaf(s, bounds, groups, (points, relative), &leaf, mask) && !H::is_any(goal)
+                    {
                         limit = farthest_limit(s, groups);
                     }
                 }
@@ -177,7 +194,7 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
                 top -= 1;
                 let entry = stack[top];
                 mask = entry.rays & rays.alive;
-                if mask == 0 || (!Q::ANY && entry.key > limit + limit.abs() * KEY_SLACK) {
+                if mask == 0 || (!H::is_any(goal) && entry.key > limit + limit.abs() * KEY_SLACK) {
                     continue;
                 }
                 let node = object.node(entry.parent);
@@ -198,13 +215,31 @@ impl<'a, S: Simd, Q: Query> PacketTracer<'a, S, Q> {
     }
 }
 
+/// [`PacketTracer::trace`] as a part of kernels, so that the variables of packets with one kind of bounds are not in the way of others.
+struct TracePacket<'p, 'a, 's, S: Simd, Q: Query, H> {
+    packets: &'p mut PacketTracer<'a, S, Q>,
+    object: &'p ObjectView<'p>,
+    bounds: &'p H,
+    rays: &'p [Ray],
+    sink: &'p mut Sink<'s, Q>,
+}
+
+impl<S: Simd, Q: Query, H: PacketBounds<S>> Part<S> for TracePacket<'_, '_, '_, S, Q, H> {
+    type Output = PacketOutcome;
+    #[inline(always)]
+    fn run(self, s: S) -> PacketOutcome {
+        let TracePacket { packets, object, bounds, rays, sink } = self;
+        packets.steps(s, object, bounds, rays, sink)
+    }
+}
+
 /// Writes the stack entries of the children of a node that the bounds of the packet meet before the depth `limit`, the nearest last;
 /// returns their number. Where directions lie in different octants, each entry gets only the rays that may meet its box. The
 /// parameters are separate, because this is a part of the kernel [`PacketTracer::trace`].
 #[inline(always)]
-fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
+fn children<S: Simd, H: PacketBounds<S>, G: Goal>(
     s: S,
-    bounds: &H,
+    (bounds, goal): (&H, G),
     groups: &[RayGroup<S>],
     rays: u64,
     (parent, node): (u32, &WideNode),
@@ -214,7 +249,7 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
     let slots = s.load_u(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
     let (bits, keys) = bounds.children(s, node, limit);
     let (mut slot, mut key) = ([0; LANES], [0.0; LANES]);
-    let count = if Q::ANY {
+    let count = if H::is_any(goal) {
         s.compress(bits, slots, &mut slot)
     } else {
         s.compress_far_to_near(bits, keys, slots, &mut slot, &mut key)
@@ -230,22 +265,22 @@ fn children<S: Simd, H: PacketBounds<S>, Q: Query>(
 }
 
 /// [`children`] as a part of kernels.
-struct Children<'a, S: Simd, H, Q> {
+struct Children<'a, S: Simd, H, G> {
     bounds: &'a H,
     groups: &'a [RayGroup<S>],
     rays: u64,
     node: (u32, &'a WideNode),
     limit: f32,
     entries: &'a mut [StackEntry; WIDTH],
-    query: PhantomData<Q>,
+    goal: G,
 }
 
-impl<S: Simd, H: PacketBounds<S>, Q: Query> Part<S> for Children<'_, S, H, Q> {
+impl<S: Simd, H: PacketBounds<S>, G: Goal> Part<S> for Children<'_, S, H, G> {
     type Output = usize;
     #[inline(always)]
     fn run(self, s: S) -> usize {
-        let Children { bounds, groups, rays, node, limit, entries, .. } = self;
-        children::<S, H, Q>(s, bounds, groups, rays, node, limit, entries)
+        let Children { bounds, groups, rays, node, limit, entries, goal } = self;
+        children::<S, H, G>(s, (bounds, goal), groups, rays, node, limit, entries)
     }
 }
 
@@ -314,9 +349,9 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
     all: u64,
     sink: &mut Sink<'_, Q>,
 ) {
-    if Q::ANY {
+    if H::is_any(rays.goal) {
         let mut hit = all & !rays.alive;
-        let mut query = Q::new(&rays.rays[0]);
+        let mut query = Q::new(rays.goal, &rays.rays[0]);
         query.accept();
         while hit != 0 {
             sink.query(hit.trailing_zeros() as usize, &query);

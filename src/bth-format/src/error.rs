@@ -213,8 +213,12 @@ pub struct Section {
 }
 
 /// Why a file cannot be used: the code, the place, what is expected there and what was found.
+// A pointer, since functions that return errors are many, and each would have to move all of this.
 #[derive(Debug)]
-pub struct Error {
+pub struct Error(Box<Details>);
+
+#[derive(Debug)]
+struct Details {
     code: Code,
     section: Option<Section>,
     offset: Option<u64>,
@@ -227,8 +231,7 @@ pub struct Error {
 impl Error {
     /// An error outside of sections, at a byte of the file.
     pub(crate) fn at(code: Code, offset: u64, expected: impl Into<String>, found: impl Into<String>) -> Self {
-        let (expected, found) = (expected.into(), found.into());
-        Self { code, section: None, offset: Some(offset), expected, found, path: None, source: None }
+        Self::new(code, None, Some(offset), (expected.into(), found.into()))
     }
     /// An error within a section of object 0; `offset` counts from the section's start. [`crate::File::locate`] turns it into
     /// an error of the right object with an offset from the start of the file.
@@ -240,7 +243,7 @@ impl Error {
         found: impl Into<String>,
     ) -> Self {
         let section = Some(Section { kind, object: 0 });
-        Self { section, ..Self::at(code, offset, expected, found) }
+        Self::new(code, section, Some(offset), (expected.into(), found.into()))
     }
     /// An error within a section of the whole file; `offset` counts from the section's start, until
     /// [`crate::File::locate`] turns it into an offset from the start of the file.
@@ -255,87 +258,94 @@ impl Error {
     }
     /// An error of a call, which is about no file.
     pub fn of_call(code: Code, expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Self { offset: None, ..Self::at(code, 0, expected, found) }
+        Self::new(code, None, None, (expected.into(), found.into()))
     }
     /// An error of the operating system.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
-        let found = source.to_string();
-        Self {
-            offset: None,
-            path: Some(path.to_owned()),
-            source: Some(source),
-            ..Self::at(Code::Read, 0, "a readable file", found)
-        }
+        let mut error = Self::new(Code::Read, None, None, ("a readable file".into(), source.to_string()));
+        (error.0.path, error.0.source) = (Some(path.to_owned()), Some(source));
+        error
+    }
+    #[cold]
+    #[inline(never)]
+    fn new(
+        code: Code,
+        section: Option<Section>,
+        offset: Option<u64>,
+        (expected, found): (String, String),
+    ) -> Self {
+        Error(Box::new(Details { code, section, offset, expected, found, path: None, source: None }))
     }
     /// The same error with the object that its section belongs to.
     pub(crate) fn in_object(mut self, object: u32) -> Self {
-        if let Some(section) = &mut self.section {
+        if let Some(section) = &mut self.0.section {
             section.object = object;
         }
         self
     }
     /// The same error with its offset moved from the section's start to the file's.
     pub(crate) fn move_by(mut self, start: u64) -> Self {
-        self.offset = self.offset.map(|o| o.saturating_add(start));
+        self.0.offset = self.0.offset.map(|o| o.saturating_add(start));
         self
     }
     /// The same error with the path of its file.
     pub fn in_file(mut self, path: &Path) -> Self {
-        self.path.get_or_insert_with(|| path.to_owned());
+        self.0.path.get_or_insert_with(|| path.to_owned());
         self
     }
 
     /// What was violated.
     pub fn code(&self) -> Code {
-        self.code
+        self.0.code
     }
     /// The section, where the error is about one.
     pub fn section(&self) -> Option<Section> {
-        self.section
+        self.0.section
     }
     /// Byte of the file, from 0, where the error is about one.
     pub fn offset(&self) -> Option<u64> {
-        self.offset
+        self.0.offset
     }
     /// What should be there.
     pub fn expected(&self) -> &str {
-        &self.expected
+        &self.0.expected
     }
     /// What is there.
     pub fn found(&self) -> &str {
-        &self.found
+        &self.0.found
     }
     /// What the user can do about it.
     pub fn hint(&self) -> &'static str {
-        self.code.hint()
+        self.0.code.hint()
     }
     /// The file, where it is known.
     pub fn path(&self) -> Option<&Path> {
-        self.path.as_deref()
+        self.0.path.as_deref()
     }
 }
 
 impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some(path) = &self.path {
+        let Details { code, section, offset, expected, found, path, .. } = &*self.0;
+        if let Some(path) = path {
             write!(f, "{}: ", path.display())?;
         }
-        write!(f, "{}: ", self.code)?;
-        if let Some(Section { kind, object }) = self.section {
+        write!(f, "{code}: ")?;
+        if let Some(Section { kind, object }) = *section {
             write!(f, "{}", kind_name(kind))?;
             if object != NONE {
                 write!(f, " of object {object}")?;
             }
             write!(f, ", ")?;
         }
-        if let Some(offset) = self.offset {
+        if let Some(offset) = offset {
             write!(f, "byte {offset}: ")?;
         }
         // With the feature `brief` some texts are empty.
-        match (self.expected.is_empty(), self.found.is_empty()) {
-            (false, false) => write!(f, "expected {}, found {} ", self.expected, self.found)?,
-            (false, true) => write!(f, "expected {} ", self.expected)?,
-            (true, false) => write!(f, "found {} ", self.found)?,
+        match (expected.is_empty(), found.is_empty()) {
+            (false, false) => write!(f, "expected {expected}, found {found} ")?,
+            (false, true) => write!(f, "expected {expected} ")?,
+            (true, false) => write!(f, "found {found} ")?,
             (true, true) => {}
         }
         write!(f, "(hint: {})", self.hint())
@@ -344,7 +354,7 @@ impl std::fmt::Display for Error {
 
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        self.source.as_ref().map(|e| e as _)
+        self.0.source.as_ref().map(|e| e as _)
     }
 }
 

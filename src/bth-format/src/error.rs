@@ -1,6 +1,7 @@
 //! Why a file was refused: a stable code for each numbered invariant of the specification, with place, expected and found.
 
 use crate::layout::{NONE, kind};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// What opening and checking return.
@@ -203,6 +204,13 @@ impl std::fmt::Display for Code {
     }
 }
 
+/// What `text!` makes.
+#[cfg(not(feature = "brief"))]
+pub(crate) type Text = String;
+
+#[cfg(feature = "brief")]
+pub(crate) type Text = &'static str;
+
 /// The section that an error is about. Specification: "Kinds".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Section {
@@ -222,15 +230,20 @@ struct Details {
     code: Code,
     section: Option<Section>,
     offset: Option<u64>,
-    expected: String,
-    found: String,
+    expected: Cow<'static, str>,
+    found: Cow<'static, str>,
     path: Option<PathBuf>,
     source: Option<std::io::Error>,
 }
 
 impl Error {
     /// An error outside of sections, at a byte of the file.
-    pub(crate) fn at(code: Code, offset: u64, expected: impl Into<String>, found: impl Into<String>) -> Self {
+    pub(crate) fn at(
+        code: Code,
+        offset: u64,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
+    ) -> Self {
         Self::new(code, None, Some(offset), (expected.into(), found.into()))
     }
     /// An error within a section of object 0; `offset` counts from the section's start. [`crate::File::locate`] turns it into
@@ -239,8 +252,8 @@ impl Error {
         code: Code,
         kind: u32,
         offset: u64,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
     ) -> Self {
         let section = Some(Section { kind, object: 0 });
         Self::new(code, section, Some(offset), (expected.into(), found.into()))
@@ -251,18 +264,23 @@ impl Error {
         code: Code,
         kind: u32,
         offset: u64,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
     ) -> Self {
         Self::within(code, kind, offset, expected, found).in_object(NONE)
     }
     /// An error of a call, which is about no file.
-    pub fn of_call(code: Code, expected: impl Into<String>, found: impl Into<String>) -> Self {
+    pub fn of_call(
+        code: Code,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
+    ) -> Self {
         Self::new(code, None, None, (expected.into(), found.into()))
     }
     /// An error of the operating system.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
-        let mut error = Self::new(Code::Read, None, None, ("a readable file".into(), source.to_string()));
+        let mut error =
+            Self::new(Code::Read, None, None, ("a readable file".into(), text!("{source}").into()));
         (error.0.path, error.0.source) = (Some(path.to_owned()), Some(source));
         error
     }
@@ -272,7 +290,7 @@ impl Error {
         code: Code,
         section: Option<Section>,
         offset: Option<u64>,
-        (expected, found): (String, String),
+        (expected, found): (Cow<'static, str>, Cow<'static, str>),
     ) -> Self {
         Error(Box::new(Details { code, section, offset, expected, found, path: None, source: None }))
     }
@@ -286,6 +304,11 @@ impl Error {
     /// The same error with its offset moved from the section's start to the file's.
     pub(crate) fn move_by(mut self, start: u64) -> Self {
         self.0.offset = self.0.offset.map(|o| o.saturating_add(start));
+        self
+    }
+    /// The same error at another byte of its section.
+    pub(crate) fn moved_to(mut self, offset: u64) -> Self {
+        self.0.offset = Some(offset);
         self
     }
     /// The same error with the path of its file.

@@ -20,10 +20,22 @@
 const SMALL: bool = cfg!(feature = "small");
 
 /// Text that is made for an error: as `format!`, and empty with the feature `small`.
+#[cfg(not(feature = "small"))]
 macro_rules! text {
     ($($arguments:tt)*) => {
-        if crate::SMALL { String::new() } else { format!($($arguments)*) }
+        format!($($arguments)*)
     };
+}
+
+#[cfg(feature = "small")]
+macro_rules! text {
+    ($($arguments:tt)*) => {{
+        // The arguments count as used, and are not evaluated.
+        if false {
+            let _ = format_args!($($arguments)*);
+        }
+        ""
+    }};
 }
 
 mod batch;

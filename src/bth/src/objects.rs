@@ -179,7 +179,7 @@ impl Objects {
         let count = self.count();
         let Some((file, row)) = self.locate(object) else {
             let expected = text!("an object below {count}");
-            return Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()));
+            return Err(Error::of_call(Code::NoSuchObject, expected, text!("{object}")));
         };
         let index = object as usize;
         if !self.is_deforming(object) {

@@ -5,9 +5,10 @@
 //! [`super::tet_faces`] then compares every record, hull face and constrained face with the result, so that no traversal,
 //! wherever it starts, can derive anything else. Specification: "Records" and the text below the table of "Index check".
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::object::{ObjectView, Records};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// The vertices and links of one leaf's tetrahedra. Tetrahedra, vertices and faces are named by their rows in the file.
@@ -157,7 +158,7 @@ impl<'a> TetAdjacency<'a> {
             return Err(self.error(Code::Link, tet, "a constrained face of the leaf", text!("face {row}")));
         }
         let named = &self.view.tet_faces[row as usize];
-        let error = |expected: String, found: String| {
+        let error = |expected: Text, found: Text| {
             let at = u64::from(row) * size_of::<TetFace>() as u64;
             Error::within(Code::TetFace, kind::TET_FACES, at, expected, found)
         };
@@ -195,8 +196,8 @@ impl<'a> TetAdjacency<'a> {
         &self,
         code: Code,
         tet: u32,
-        expected: impl Into<String>,
-        found: impl Into<String>,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
     ) -> Error {
         let stride = RecordKind::from_code(self.view.header.record).map_or(0, RecordKind::stride);
         Error::within(code, kind::TETS, u64::from(tet) * stride as u64, expected, found)

@@ -4,6 +4,7 @@ use crate::deformation_view::DeformationView;
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::object::ObjectView;
+use std::borrow::Cow;
 use std::fmt::Debug;
 
 /// Checks the deformation sections of an object.
@@ -49,13 +50,13 @@ fn influences(view: &DeformationView<'_>, counts: Deformation, positions: usize)
     let rows = positions as u64 * sets as u64;
     for (kind, found) in [(kind::JOINTS, view.joints.len()), (kind::JOINT_WEIGHTS, view.weights.len())] {
         if found as u64 != rows {
-            return error(Code::InfluenceRows, kind, 0, &text!("{rows} rows"), &found);
+            return error(Code::InfluenceRows, kind, 0, text!("{rows} rows"), &found);
         }
     }
     let beyond = |joints: &[u16; 4]| joints.iter().any(|joint| u32::from(*joint) >= counts.joints);
     if let Some(row) = view.joints.iter().position(beyond) {
         let expected = text!("joints below {}", counts.joints);
-        return error(Code::Influences, kind::JOINTS, 8 * row, &expected, &view.joints[row]);
+        return error(Code::Influences, kind::JOINTS, 8 * row, expected, &view.joints[row]);
     }
     let unusable = |weights: &[[f32; 4]]| {
         let all = weights.as_flattened();
@@ -76,7 +77,7 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
     let (targets, found) = (counts.targets as usize, view.morphs.len());
     if found != targets && found as u64 != 2 * targets as u64 {
         let expected = text!("{targets} rows or twice as many");
-        return error(Code::MorphRows, kind::MORPHS, 0, &expected, &found);
+        return error(Code::MorphRows, kind::MORPHS, 0, expected, &found);
     }
     let (mut delta, mut row) = (0u64, 0u64);
     for (i, morph) in view.morphs.iter().enumerate() {
@@ -91,13 +92,13 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
         let ends = delta <= view.deltas.len() as u64 && row <= view.morph_rows.len() as u64;
         if !starts || !ends || dense && morph.deltas as usize != all {
             let expected = text!("a range behind those before within its sections; if dense, of {all} rows");
-            return error(Code::MorphRanges, kind::MORPHS, at, &expected, morph);
+            return error(Code::MorphRanges, kind::MORPHS, at, expected, morph);
         }
         let (Some(rows), first) = (view.morph(i).rows, morph.first_row as usize) else { continue };
         let wrong = |k: usize| rows[k] as usize >= all || k > 0 && rows[k - 1] >= rows[k];
         if let Some(k) = (0..rows.len()).find(|k| wrong(*k)) {
             let expected = text!("ascending rows below {all}");
-            return error(Code::MorphOrder, kind::MORPH_ROWS, 4 * (first + k), &expected, &rows[k]);
+            return error(Code::MorphOrder, kind::MORPH_ROWS, 4 * (first + k), expected, &rows[k]);
         }
     }
     for (kind, stride, used, there) in [
@@ -106,7 +107,7 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
     ] {
         if used != there as u64 {
             let expected = text!("{used} rows, as the morphs have");
-            return error(Code::MorphRanges, kind, stride * used as usize, &expected, &there);
+            return error(Code::MorphRanges, kind, stride * used as usize, expected, &there);
         }
     }
     match view.deltas.iter().position(|delta| !delta.iter().all(|x| x.is_finite())) {
@@ -115,6 +116,12 @@ fn morphs(view: &DeformationView<'_>, counts: Deformation, rows: [usize; 2]) -> 
     }
 }
 
-fn error<T>(code: Code, kind: u32, at: usize, expected: &str, found: &dyn Debug) -> Result<T> {
+fn error<T>(
+    code: Code,
+    kind: u32,
+    at: usize,
+    expected: impl Into<Cow<'static, str>>,
+    found: &dyn Debug,
+) -> Result<T> {
     Err(Error::within(code, kind, at as u64, expected, text!("{found:?}")))
 }

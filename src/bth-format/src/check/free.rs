@@ -1,7 +1,7 @@
 //! The free directions of triangles: BTH-F168 to BTH-F171.
 
 use super::bit_set::BitSet;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::{Child, FREE_REACH_RANGE, FreeBins, FreeDirections, FreePlace, NONE, kind};
 use crate::object::ObjectView;
 use std::mem::offset_of;
@@ -15,7 +15,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     let triangles = if view.is_deformable() { 0 } else { view.header.triangles as usize };
     if rows != 0 && rows != triangles {
         let expected =
-            if view.is_deformable() { "none".to_owned() } else { text!("{triangles} rows or none") };
+            if view.is_deformable() { Text::from("none") } else { text!("{triangles} rows or none") };
         return Err(Error::within(Code::FreeRows, kind::FREE_DIRECTIONS, 0, expected, text!("{rows}")));
     }
     if reach.len() != usize::from(rows != 0) {

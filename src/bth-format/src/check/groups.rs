@@ -1,6 +1,6 @@
 //! Groups of triangles, their materials and names: BTH-F142 to BTH-F144.
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::{Group, GroupRun, Material, NONE, kind};
 use crate::names::is_name;
 use crate::object::ObjectView;
@@ -36,7 +36,7 @@ fn runs(view: &ObjectView) -> Result<()> {
             Code::GroupRuns,
             kind::GROUP_RUNS,
             0,
-            expected.to_owned(),
+            Text::from(expected),
             text!("{} rows", runs.len()),
         );
     }
@@ -62,7 +62,7 @@ fn zero(kind: u32, at: usize, is_zero: bool) -> Result<()> {
     if is_zero {
         return Ok(());
     }
-    error(Code::Group, kind, at, "zeros".to_owned(), "other numbers".to_owned())
+    error(Code::Group, kind, at, "zeros".into(), "other numbers".into())
 }
 
 /// BTH-F144.
@@ -70,10 +70,10 @@ fn label(view: &ObjectView, kind: u32, at: usize, (first, length): (u32, u32)) -
     if is_name(view.labels, first, length) {
         return Ok(());
     }
-    let expected = "a name of at most 4096 bytes within LABELS".to_owned();
+    let expected = Text::from("a name of at most 4096 bytes within LABELS");
     error(Code::Label, kind, at, expected, text!("{:?}", (first, length)))
 }
 
-fn error(code: Code, kind: u32, at: usize, expected: String, found: String) -> Result<()> {
+fn error(code: Code, kind: u32, at: usize, expected: Text, found: Text) -> Result<()> {
     Err(Error::within(code, kind, at as u64, expected, found))
 }

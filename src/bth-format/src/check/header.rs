@@ -1,7 +1,7 @@
 //! The OBJECT row: BTH-F101 to BTH-F103, and the limits of counts and depth (BTH-F022, BTH-F110).
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::limits::{MAX_DEPTH, MAX_TRIANGLES};
 use crate::object::{ObjectView, Records};
@@ -13,7 +13,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
     bounds(view.header)
 }
 
-fn fail(code: Code, offset: usize, expected: String, found: String) -> Result<()> {
+fn fail(code: Code, offset: usize, expected: Text, found: Text) -> Result<()> {
     Err(Error::within(code, kind::OBJECT, offset as u64, expected, found))
 }
 

@@ -1,6 +1,6 @@
 //! Triangle leaves and the ids that they refer to: BTH-F113 to BTH-F118.
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
@@ -17,8 +17,7 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
         return checked;
     }
     // Offsets within the unpacked leaf do not exist in the file: the error names the leaf's first byte instead.
-    let at_start = |e: Error| Error::within(e.code(), kind::LINES, start, e.expected(), e.found());
-    checked.map_err(at_start)?;
+    checked.map_err(|error| error.moved_to(start))?;
     match view.unused_bits(child) {
         0 => Ok(()),
         found => Err(Error::within(Code::LeafUnused, kind::LINES, start, "0", text!("{found:#x}"))),
@@ -27,7 +26,7 @@ pub(super) fn check(view: &ObjectView, child: Child, start: u64) -> Result<()> {
 
 /// Checks an indexed leaf; `start` is its first byte in LINES, `rows` the number of rows of TRIANGLE_IDS.
 fn indexed(leaf: &IndexedLeaf, start: u64, rows: usize) -> Result<()> {
-    let fail = |code, offset: usize, expected: &str, found: String| {
+    let fail = |code, offset: usize, expected: &'static str, found: Text| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     counts(leaf.triangles, start + offset_of!(IndexedLeaf, triangles) as u64)?;

@@ -4,6 +4,7 @@
 use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::materials_view::{ImagesView, MaterialsView};
+use std::borrow::Cow;
 use std::fmt::Debug;
 use std::mem::offset_of;
 
@@ -12,7 +13,7 @@ pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u
     let rows = view.parameters.len();
     if rows != 0 && rows != materials {
         let expected = text!("{materials} rows or none");
-        return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, 0, &expected, &rows);
+        return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, 0, expected, &rows);
     }
     for (row, parameters) in view.parameters.iter().enumerate() {
         self::parameters(parameters, view.textures.len(), row * size_of::<MaterialParameters>())?;
@@ -26,7 +27,7 @@ pub(crate) fn materials(view: &MaterialsView<'_>, materials: usize, triangles: u
 
 /// BTH-F149 of a row.
 fn parameters(p: &MaterialParameters, textures: usize, at: usize) -> Result<()> {
-    let wrong = |field: usize, expected: &str, found: &dyn Debug| {
+    let wrong = |field: usize, expected: &'static str, found: &dyn Debug| {
         error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, at + field, expected, found)
     };
     let amount = |x: &f32| x.is_finite() && *x >= 0.0;
@@ -52,7 +53,8 @@ fn parameters(p: &MaterialParameters, textures: usize, at: usize) -> Result<()> 
         (offset_of!(MaterialParameters, emissive_texture), p.emissive_texture),
     ] {
         if row != NONE && row as usize >= textures {
-            return wrong(field, &text!("a row below {textures} or NONE"), &row);
+            let expected = text!("a row below {textures} or NONE");
+            return error(Code::MaterialParameters, kind::MATERIAL_PARAMETERS, at + field, expected, &row);
         }
     }
     if p.reserved != [0; 4] {
@@ -63,7 +65,7 @@ fn parameters(p: &MaterialParameters, textures: usize, at: usize) -> Result<()> 
 
 /// BTH-F160 of a row.
 fn texture(t: &Texture, at: usize) -> Result<()> {
-    let wrong = |field: usize, expected: &str, found: &dyn Debug| {
+    let wrong = |field: usize, expected: &'static str, found: &dyn Debug| {
         error(Code::Texture, kind::TEXTURES, at + field, expected, found)
     };
     if t.wrap.iter().any(|wrap| *wrap > WRAP_CLAMP) {
@@ -108,13 +110,13 @@ fn corners(
 ) -> Result<()> {
     if !corners.is_empty() && corners.len() != triangles {
         let expected = text!("{triangles} rows or none");
-        return error(code, section, 0, &expected, &corners.len());
+        return error(code, section, 0, expected, &corners.len());
     }
     match corners.as_flattened().iter().position(|row| *row as usize >= rows) {
         None => Ok(()),
         Some(i) => {
             let expected = text!("a row below {rows}");
-            error(code, section, 4 * i, &expected, &corners.as_flattened()[i])
+            error(code, section, 4 * i, expected, &corners.as_flattened()[i])
         }
     }
 }
@@ -129,12 +131,12 @@ pub(crate) fn images(view: &ImagesView<'_>) -> Result<()> {
             Some(behind) => behind,
             None => {
                 let expected = text!("a greater name, and bytes from {end} within {}", view.bytes.len());
-                return within_file(row * size_of::<Image>(), &expected, image);
+                return within_file(row * size_of::<Image>(), expected, image);
             }
         };
     }
     if end != view.bytes.len() as u64 {
-        return within_file(0, &text!("images of all {} bytes", view.bytes.len()), &end);
+        return within_file(0, text!("images of all {} bytes", view.bytes.len()), &end);
     }
     Ok(())
 }
@@ -150,10 +152,16 @@ pub(crate) fn image_names(view: &MaterialsView<'_>, images: &ImagesView<'_>) -> 
     }
 }
 
-fn within_file(at: usize, expected: &str, found: &dyn Debug) -> Result<()> {
+fn within_file(at: usize, expected: impl Into<Cow<'static, str>>, found: &dyn Debug) -> Result<()> {
     Err(Error::within_file(Code::Images, kind::IMAGES, at as u64, expected, text!("{found:?}")))
 }
 
-fn error(code: Code, kind: u32, at: usize, expected: &str, found: &dyn Debug) -> Result<()> {
+fn error(
+    code: Code,
+    kind: u32,
+    at: usize,
+    expected: impl Into<Cow<'static, str>>,
+    found: &dyn Debug,
+) -> Result<()> {
     Err(Error::within(code, kind, at as u64, expected, text!("{found:?}")))
 }

@@ -1,13 +1,13 @@
 //! One node: its slots and boxes.
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use std::mem::offset_of;
 
 /// BTH-F112 and BTH-F111 of a packed node: its boxes can be unpacked without rounding, and its reserved fields are zero.
 pub(super) fn check_packed(node: &PackedNode, start: u64) -> Result<()> {
-    let fail = |code, offset: usize, expected: &str, found: String| {
+    let fail = |code, offset: usize, expected: &'static str, found: Text| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if !node.step.iter().all(|step| step.is_normal() && *step > 0.0 && step.to_bits() << 9 == 0) {
@@ -34,7 +34,7 @@ pub(super) fn check_packed(node: &PackedNode, start: u64) -> Result<()> {
 /// byte in LINES, `codes` the offset of its child codes in the stored node.
 pub(super) fn check_slots(node: &WideNode, start: u64, codes: usize) -> Result<()> {
     let used = node.child.iter().take_while(|c| **c != NONE).count();
-    let fail = |code, offset: usize, expected: &str, found: String| {
+    let fail = |code, offset: usize, expected: &'static str, found: Text| {
         Err(Error::within(code, kind::LINES, start + offset as u64, expected, found))
     };
     if used == 0 {

@@ -1,6 +1,6 @@
 //! The opacity of triangles: BTH-F145 to BTH-F147.
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::{Opacity, TriangleOpacity, kind, opacity_words};
 use crate::object::ObjectView;
 
@@ -22,7 +22,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         ));
     }
     for (triangle, row) in rows.iter().enumerate() {
-        let wrong = |expected: String| {
+        let wrong = |expected: Text| {
             Error::within(Code::Opacity, kind::OPACITY, 4 * triangle as u64, expected, text!("{row:#x}"))
         };
         match TriangleOpacity::from_code(*row) {
@@ -36,7 +36,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
                     return Err(micro(first, words[first]));
                 }
             }
-            None => return Err(wrong("a state, or a level and a word".to_owned())),
+            None => return Err(wrong("a state, or a level and a word".into())),
         }
     }
     let has_no_state = |word: &u32| (0..16).any(|k| Opacity::from_code(word >> (2 * k) & 3).is_none());

@@ -1,6 +1,6 @@
 //! Rows of scene sections, each checked by itself.
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use std::fmt::Debug;
 
 /// What a row violates.
@@ -9,7 +9,7 @@ pub(super) struct Violation {
     /// Byte of the row.
     pub(super) offset: usize,
     pub(super) expected: &'static str,
-    pub(super) found: String,
+    pub(super) found: Text,
 }
 
 /// What the check of one row returns.

@@ -23,7 +23,7 @@ pub(crate) fn sequence(view: &ObjectView, sequence: &SequenceView) -> Result<()>
         let expected = "finite times that ascend strictly";
         return Err(Error::within(Code::SequenceTimes, kind::SEQUENCE_TIMES, at, expected, found));
     }
-    let wrong = |row: usize, expected: &str| {
+    let wrong = |row: usize, expected: &'static str| {
         let (at, found) = (12 * row as u64, text!("{:?}", positions[row]));
         Err(Error::within(Code::SequencePositions, kind::SEQUENCE_POSITIONS, at, expected, found))
     };
@@ -57,7 +57,7 @@ pub(crate) fn segments<'a>(
         if segments.is_empty() {
             continue;
         }
-        let fail = |code: Code, row: usize, expected: &str| {
+        let fail = |code: Code, row: usize, expected: &'static str| {
             let (at, found) = ((size_of::<Segment>() * row) as u64, text!("{:?}", segments.get(row)));
             Err(Error::within(code, kind::SEGMENTS, at, expected, found).in_object(number))
         };

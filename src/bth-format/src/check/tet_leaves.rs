@@ -1,7 +1,7 @@
 //! Tet leaves, their vertices, and the map from triangles to constrained faces.
 
 use super::boxes::is_box;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::object::ObjectView;
 use std::mem::offset_of;
@@ -19,7 +19,7 @@ fn ranges(view: &ObjectView) -> Result<()> {
     let mut end = [0u64; 4];
     for (i, leaf) in view.tet_leaves.iter().enumerate() {
         let start = (i * size_of::<TetLeaf>()) as u64;
-        let fail = |code, offset: usize, expected: String, found: String| {
+        let fail = |code, offset: usize, expected: Text, found: Text| {
             Err(Error::within(code, kind::TET_LEAVES, start + offset as u64, expected, found))
         };
         if !is_box(leaf.lower, leaf.upper) || (0..3).any(|a| leaf.lower[a] >= leaf.upper[a]) {
@@ -72,7 +72,7 @@ fn vertices(view: &ObjectView) -> Result<()> {
 
 /// BTH-F131: TRIANGLE_FACES and the triangles of TET_FACES are inverse to each other.
 fn triangle_faces(view: &ObjectView) -> Result<()> {
-    let fail = |section, at: usize, expected: String, found: String| {
+    let fail = |section, at: usize, expected: Text, found: Text| {
         Err(Error::within(Code::TriangleFaces, section, at as u64, expected, found))
     };
     let expected = if view.tet_leaves.is_empty() { 0 } else { view.header.triangles as usize };

@@ -9,6 +9,7 @@ use crate::error::{Code, Error, Result};
 use crate::layout::*;
 use crate::limits::MAX_DEPTH;
 use crate::object::ObjectView;
+use std::borrow::Cow;
 use std::mem::offset_of;
 
 /// A child code that is still to be followed, and where it stands.
@@ -27,7 +28,12 @@ struct Reference {
 }
 
 impl Reference {
-    fn error(&self, code: Code, expected: impl Into<String>, found: impl Into<String>) -> Error {
+    fn error(
+        &self,
+        code: Code,
+        expected: impl Into<Cow<'static, str>>,
+        found: impl Into<Cow<'static, str>>,
+    ) -> Error {
         Error::within(code, self.section, self.at, expected, found)
     }
 }

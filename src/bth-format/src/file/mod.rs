@@ -12,7 +12,7 @@ pub use deformed::{DeformedObject, Normals, RefitParts};
 pub use table::{content_id, hash128, kind_stride};
 
 use crate::check;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::object::{ObjectBounds, ObjectView, Records};
 use buffer::{Buffer, no_memory};
@@ -282,11 +282,11 @@ impl File {
     /// BTH-F104: the grid of an object, and that the header announces grids and packed nodes.
     fn grid(&self, object: &Object) -> Result<Option<Grid>> {
         let at = std::mem::offset_of!(Object, coordinates) as u64;
-        let wrong = |expected: &str, found: String| {
-            Error::within(Code::Coordinates, kind::OBJECT, at, expected.to_owned(), found)
+        let wrong = |expected: &'static str, found: Text| {
+            Error::within(Code::Coordinates, kind::OBJECT, at, expected, found)
         };
         let expected = "coordinates that are f32, with zeros, or a grid of points that are f32";
-        let grid = Grid::from_object(object).map_err(|what| wrong(expected, what.to_owned()))?;
+        let grid = Grid::from_object(object).map_err(|what| wrong(expected, Text::from(what)))?;
         let features = self.header().required_features;
         if grid.is_some() && features & FEATURE_GRID == 0 {
             return Err(wrong("f32, as the header announces no grid", text!("{:#x}", object.coordinates)));

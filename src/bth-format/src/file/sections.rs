@@ -4,7 +4,7 @@
 use super::File;
 use crate::check;
 use crate::deformation_view::DeformationView;
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::materials_view::{ImagesView, MaterialsView};
 use crate::names;
@@ -96,7 +96,7 @@ impl File {
     pub fn check_object_names(&self) -> Result<()> {
         let rows: &[ObjectName] = self.slice(NONE, kind::OBJECT_NAMES);
         let text: &[u8] = self.slice(NONE, kind::OBJECT_LABELS);
-        let error = |offset: usize, expected: String, found: String| {
+        let error = |offset: usize, expected: Text, found: Text| {
             let error =
                 Error::within_file(Code::ObjectName, kind::OBJECT_NAMES, offset as u64, expected, found);
             Err(self.locate(error, NONE))
@@ -107,7 +107,7 @@ impl File {
         match rows.iter().position(|n| !names::is_name(text, n.name, n.name_length)) {
             None => Ok(()),
             Some(row) => {
-                let expected = "a name of at most 4096 bytes within OBJECT_LABELS".to_owned();
+                let expected = Text::from("a name of at most 4096 bytes within OBJECT_LABELS");
                 error(size_of::<ObjectName>() * row, expected, text!("{:?}", rows[row]))
             }
         }

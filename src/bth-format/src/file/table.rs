@@ -1,7 +1,7 @@
 //! Checks of the header and the section table: BTH-F001 to BTH-F019 and BTH-F022. Costs O(sections).
 //! Specification: "Opening".
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::layout::*;
 use crate::limits;
 use std::mem::offset_of;
@@ -120,7 +120,7 @@ fn max_count(kind: u32) -> u64 {
 /// BTH-F001 to BTH-F008 of the header. `bytes` are the file's first 128, or all where there are fewer or more; `length` is
 /// the number of bytes of the file.
 pub(super) fn check_header(bytes: &[u8], length: u64) -> Result<&Header> {
-    let fail = |code, offset: usize, expected: String, found: String| {
+    let fail = |code, offset: usize, expected: Text, found: Text| {
         Err(Error::at(code, offset as u64, expected, found))
     };
     let Ok((header, _)) = Header::ref_from_prefix(bytes) else {
@@ -211,7 +211,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<u32> {
 }
 
 /// A violation in an entry: the code, the field's offset in the entry, what is expected and what was found.
-type Mismatch = (Code, usize, String, String);
+type Mismatch = (Code, usize, Text, Text);
 
 /// BTH-F006, BTH-F010 to BTH-F016 and BTH-F022 of an entry. `end` is where the section before ends, `length` that of the
 /// file; returns where this section ends.
@@ -310,10 +310,10 @@ fn check_objects(entries: &[SectionEntry]) -> Result<u32> {
     Ok(objects)
 }
 
-fn version(v: u32) -> String {
+fn version(v: u32) -> Text {
     text!("{}.{}", v >> 16, v & 0xffff)
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| text!("{b:02x}")).collect()
+fn hex(bytes: &[u8]) -> Text {
+    text!("{}", bytes.iter().map(|b| format!("{b:02x}")).collect::<String>())
 }

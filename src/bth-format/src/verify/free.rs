@@ -3,7 +3,7 @@
 //! All pairs of triangles would take quadratic time. Of evenly spaced triangles rays from the corners to points of all other triangles
 //! are decided, exactly: a wrong bin is found as soon as one of the points lies in the bin.
 
-use crate::error::{Code, Error, Result};
+use crate::error::{Code, Error, Result, Text};
 use crate::exact::side;
 use crate::layout::{Child, FreeBins, FreeDirections, FreePlace, free_axes, free_bin, kind};
 use crate::object::ObjectView;
@@ -25,7 +25,7 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let Some(corners) = corners else { continue };
         if free_axes(*corners).is_none() {
             let expected = "no free bins of a triangle without axes";
-            let found = format!("{corners:?}");
+            let found = text!("{corners:?}");
             return Err(Error::within(Code::FreeAxes, kind::FREE_DIRECTIONS, at(triangle), expected, found));
         }
     }
@@ -36,8 +36,8 @@ pub(super) fn check(view: &ObjectView) -> Result<()> {
         let of_start = Start { axes, bins: view.free[start].bins(), reach };
         for &(other, target) in all.iter().filter(|(other, _)| *other != start as u32) {
             if let Some(corner) = start_corners.iter().find(|corner| of_start.meets(**corner, target)) {
-                let expected = "nothing in free directions".to_owned();
-                let found = format!("triangle {other} from {corner:?}");
+                let expected = Text::from("nothing in free directions");
+                let found = text!("triangle {other} from {corner:?}");
                 return Err(Error::within(Code::FreeMet, kind::FREE_DIRECTIONS, at(start), expected, found));
             }
         }

@@ -128,7 +128,7 @@ impl SceneBuilder {
     pub(super) fn staged(&self, instance: u32) -> Result<&StagedInstance, Error> {
         let staged = self.instances.get(instance as usize).filter(|staged| staged.object != NONE);
         staged.ok_or_else(|| {
-            let found = instance.to_string();
+            let found = text!("{instance}");
             Error::of_call(Code::NoSuchInstance, "an instance that was added and not removed", found)
         })
     }
@@ -152,7 +152,7 @@ impl SceneBuilder {
             return Ok(());
         }
         let expected = format!("at most {MAX_INSTANCES} instances");
-        Err(Error::of_call(Code::TooManyInstances, expected, total.to_string()))
+        Err(Error::of_call(Code::TooManyInstances, expected, text!("{total}")))
     }
 
     /// Adds an instance; returns its id.

@@ -119,7 +119,7 @@ impl SceneBuilder {
         let count = self.scene.group_count(object);
         if group >= count {
             let expected = format!("a group of object {object} below {count}");
-            return Err(Error::of_call(Code::NoSuchObject, expected, group.to_string()));
+            return Err(Error::of_call(Code::NoSuchObject, expected, text!("{group}")));
         }
         self.scene.masks_mut().set_group(object, group, mask);
         Ok(())
@@ -184,7 +184,7 @@ impl SceneBuilder {
             return Ok(());
         }
         let expected = format!("an object below {count}, the number of those that were added");
-        Err(Error::of_call(Code::NoSuchObject, expected, object.to_string()))
+        Err(Error::of_call(Code::NoSuchObject, expected, text!("{object}")))
     }
 }
 

@@ -99,5 +99,5 @@ impl SceneBuilder {
 
 fn no_subscene(subscene: u32) -> Error {
     let expected = "a subscene that was added and not removed";
-    Error::of_call(Code::NoSuchInstance, expected, subscene.to_string())
+    Error::of_call(Code::NoSuchInstance, expected, text!("{subscene}"))
 }

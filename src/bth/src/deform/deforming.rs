@@ -76,7 +76,7 @@ impl Deforming {
     #[cold]
     pub(crate) fn stage_between(&mut self, ends: [&[[f32; 3]]; 2], share: f64) -> Result<(), Error> {
         if !(0.0..=1.0).contains(&share) {
-            return Err(Error::of_call(Code::NewPositions, "a share from 0 to 1", share.to_string()));
+            return Err(Error::of_call(Code::NewPositions, "a share from 0 to 1", text!("{share}")));
         }
         self.check(ends[1])?;
         self.stage(ends[0])?;
@@ -88,7 +88,7 @@ impl Deforming {
     fn check(&self, positions: &[[f32; 3]]) -> Result<(), Error> {
         if positions.len() != self.staged.len() {
             let expected = text!("{} positions", self.staged.len());
-            return Err(Error::of_call(Code::NewPositions, expected, positions.len().to_string()));
+            return Err(Error::of_call(Code::NewPositions, expected, text!("{}", positions.len())));
         }
         check_finite(positions)
     }

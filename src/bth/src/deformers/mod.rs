@@ -6,7 +6,8 @@
 //! All is computed in f64, in an order that is fixed: results have the same bits
 //! with any instruction set and number of threads.
 
-pub(crate) mod evaluate;
+pub(crate) mod by_object;
+mod evaluate;
 pub(crate) mod normals;
 pub(crate) mod pose;
 mod poses;

@@ -2,11 +2,11 @@
 //!
 //! Format: "Sequences". A coordinate between two frames is computed in f64 and rounded once, so it has the same bits on every machine.
 
+use super::by_object::ByObject;
 use crate::deform::Deforming;
 use crate::objects::Objects;
 use bth_format::error::Result;
 use bth_format::{File, FramePosition};
-use std::collections::BTreeMap;
 
 /// From this number of positions on, several threads compute them.
 #[cfg(feature = "rayon")]
@@ -38,7 +38,7 @@ impl State {
 #[derive(Debug, Default)]
 pub(super) struct Sequences {
     /// The objects with frames or segments, by their index, and their states.
-    objects: BTreeMap<u32, State>,
+    objects: ByObject<State>,
 }
 
 /// Objects that are brought to other states: their positions are staged, their hierarchies replaced.
@@ -88,12 +88,12 @@ impl Sequences {
 
     /// Whether no vertices move by themselves.
     pub(super) fn is_empty(&self) -> bool {
-        self.objects.is_empty()
+        self.objects.rows().is_empty()
     }
 
     /// Bytes of the states.
     pub(super) fn bytes(&self) -> usize {
-        self.objects.len() * size_of::<(u32, State)>()
+        size_of_val(self.objects.rows())
     }
 
     /// Brings the objects of a file to their states at a time: stages their positions and replaces their hierarchies. The objects of
@@ -110,7 +110,7 @@ impl Sequences {
         skips: &dyn Fn(u32) -> bool,
     ) -> Result<Moved> {
         let mut moved = Moved::default();
-        for (&object, &before) in self.objects.range(first_object..first_object + file.object_count()) {
+        for &(object, before) in self.objects.range(first_object, first_object + file.object_count()) {
             let state = State::at(file, object - first_object, seconds);
             if state == before || skips(object) {
                 continue;

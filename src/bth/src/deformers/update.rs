@@ -1,5 +1,6 @@
 //! The objects that deform, brought to a time: of a file's scene, or of the subscenes of a scene builder.
 
+use super::by_object::ByObject;
 use super::evaluate::{self, Vertices};
 use super::pose::Pose;
 use super::sequences::{Moved, Sequences};
@@ -9,16 +10,16 @@ use crate::objects::Objects;
 use bth_format::File;
 use bth_format::error::{Code, Error, Result};
 use bth_format::layout::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::time::Duration;
 
 /// What deforms the objects of a scene, by their index.
 #[derive(Debug, Default)]
 pub(crate) struct Deformers {
     /// For each object that a deformer deforms whether a skin does, so that its vertices are in world space.
-    skinned: HashMap<u32, bool>,
+    skinned: ByObject<bool>,
     /// The poses of the last update.
-    poses: HashMap<u32, Pose>,
+    poses: ByObject<Pose>,
     /// The objects whose vertices move by themselves.
     sequences: Sequences,
 }
@@ -67,29 +68,29 @@ impl Deformers {
 
     /// Whether no object deforms.
     pub(crate) fn is_empty(&self) -> bool {
-        self.skinned.is_empty() && self.sequences.is_empty()
+        self.skinned.rows().is_empty() && self.sequences.is_empty()
     }
 
     /// Whether the vertices of an object are in world space, since a skin moves them.
     pub(crate) fn is_skinned(&self, object: u32) -> bool {
-        !self.skinned.is_empty() && self.skinned.get(&object).copied().unwrap_or(false)
+        self.skinned.get(object).copied().unwrap_or(false)
     }
 
     /// The objects whose vertices are in world space.
     pub(crate) fn skinned_objects(&self) -> HashSet<u32> {
-        self.skinned.iter().filter(|(_, skinned)| **skinned).map(|(object, _)| *object).collect()
+        self.skinned.rows().iter().filter(|row| row.1).map(|row| row.0).collect()
     }
 
     /// The pose of an object; `None` if none deforms it.
     pub(crate) fn pose_of(&self, object: u32) -> Option<&Pose> {
-        self.poses.get(&object)
+        self.poses.get(object)
     }
 
     /// Bytes on the heap.
     pub(crate) fn bytes(&self) -> usize {
-        let rows =
-            size_of::<(u32, Pose)>() * self.poses.len() + size_of::<(u32, bool)>() * self.skinned.len();
-        rows + self.poses.values().map(Pose::bytes).sum::<usize>() + self.sequences.bytes()
+        let (skinned, poses) = (self.skinned.rows(), self.poses.rows());
+        let of_poses: usize = poses.iter().map(|(_, pose)| pose.bytes()).sum();
+        size_of_val(skinned) + size_of_val(poses) + of_poses + self.sequences.bytes()
     }
 
     /// Stages new positions of the objects of a file that have others than at the last update, and gives them the hierarchies of
@@ -111,7 +112,7 @@ impl Deformers {
         for (row, deformer) in view.deformers.iter().enumerate() {
             let object = first_object + deformer.object;
             let pose = Pose::of(&view, deformer, hierarchy, seconds);
-            let differs = self.poses.get(&object) != Some(&pose) || posed.moved.is_replaced(object);
+            let differs = self.poses.get(object) != Some(&pose) || posed.moved.is_replaced(object);
             let can_be_hit = file.object_header(deformer.object).root != NONE;
             if !differs || !can_be_hit || skips(object) {
                 continue;
@@ -122,8 +123,8 @@ impl Deformers {
                     return Err(error);
                 }
                 let at = size_of::<Deformer>() as u64 * row as u64;
-                let name = view.node_name(deformer.node).escape_debug();
-                let found = text!("others: node \"{name}\" at {seconds} s");
+                let name = view.node_name(deformer.node);
+                let found = text!("others: node \"{}\" at {seconds} s", name.escape_debug());
                 let error =
                     Error::within_file(Code::NotFinite, kind::DEFORMERS, at, "finite positions", found);
                 return Err(file.locate(error, NONE));

@@ -133,8 +133,8 @@ impl World {
             let parts = self.parts_of(objects, instance.object);
             let placement = Placement::new(&world, instance.object, object, &parts).map_err(|error| {
                 let (code, expected, found) = error.words();
-                let name = view.node_name(instance.node).escape_debug();
-                let found = text!("{found}: node \"{name}\" at {seconds} s");
+                let name = view.node_name(instance.node);
+                let found = text!("{found}: node \"{}\" at {seconds} s", name.escape_debug());
                 let offset = u64::from(instance.node) * size_of::<Node>() as u64;
                 let error = Error::within_file(code, kind::NODES, offset, expected, found);
                 objects.sole_file().expect("a file with nodes").locate(error, NONE)

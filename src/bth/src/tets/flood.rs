@@ -11,7 +11,7 @@ use super::walk::{TetWalker, WalkOutcome};
 use crate::intersect::line::{Projected, Sign};
 use crate::query::{Count, Query};
 use bth_format::layout::{FACE_BIT, NONE, TetFace};
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 /// The tetrahedra that a flood has visited, or the faces. Around most vertices these are about ten, around the center of a fan as
 /// many as the leaf holds.
@@ -21,12 +21,12 @@ pub(crate) struct VisitedSet {
     /// Number of elements of `first` that are set.
     len: usize,
     /// The elements that were inserted after `first` was full.
-    rest: HashSet<u32>,
+    rest: BTreeSet<u32>,
 }
 
 impl VisitedSet {
     pub(crate) fn new() -> Self {
-        VisitedSet { first: [0; 48], len: 0, rest: HashSet::new() }
+        VisitedSet { first: [0; 48], len: 0, rest: BTreeSet::new() }
     }
 
     /// Adds an element; returns false if it was already in the set.

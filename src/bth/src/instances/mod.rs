@@ -10,6 +10,7 @@
 //! hits goes through the top level alone ([`enumerate`]).
 
 mod affine;
+mod arc;
 mod batch;
 mod caller;
 mod deformed;

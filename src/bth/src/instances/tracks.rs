@@ -1,6 +1,7 @@
 //! Interpolation of animation tracks, as of glTF animation samplers (glTF 2.0 specification, appendix C). A track holds the keys
 //! of one property of one node.
 
+use super::arc::{arc_cosine, sine};
 use bth_format::SceneView;
 use bth_format::layout::*;
 
@@ -104,12 +105,12 @@ fn slerp(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     if cosine < 0.0 {
         (b, cosine) = (b.map(|x| -x), -cosine);
     }
-    let angle = cosine.min(1.0).acos();
-    let sine = angle.sin();
-    if sine == 0.0 {
+    let angle = arc_cosine(cosine.min(1.0));
+    let whole = sine(angle);
+    if whole == 0.0 {
         return lerp(a, b, part);
     }
-    let (weight_a, weight_b) = (((1.0 - part) * angle).sin() / sine, (part * angle).sin() / sine);
+    let (weight_a, weight_b) = (sine((1.0 - part) * angle) / whole, sine(part * angle) / whole);
     std::array::from_fn(|i| weight_a * a[i] + weight_b * b[i])
 }
 

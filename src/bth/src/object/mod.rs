@@ -46,5 +46,5 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = Answer::MISS;
     trace::<AnyQuery, Uncounted>((object, ANY), ray, from, 0, &mut Uncounted::default(), &mut found);
-    found.is_hit()
+    Answer::is_hit(&found)
 }

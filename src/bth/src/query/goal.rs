@@ -1,8 +1,10 @@
 //! What queries look for. A goal is a value, which kernels ask for at run time: with the feature `small` one kernel serves both goals,
 //! otherwise the goals are types of no size, and each has a kernel of its own.
 
+#[cfg(not(feature = "small"))]
+use super::Any;
+use super::Nearest;
 use super::answers::Answers;
-use super::{Any, Nearest};
 use crate::rays::Hit;
 
 /// What a query looks for: the nearest hit, or any.

@@ -1,12 +1,16 @@
 //! Queries over rays, nearest hit and any hit, and the statistics of their traversal.
 
 mod answers;
+#[cfg(any(test, not(feature = "small")))]
+mod any;
 mod goal;
 pub(crate) mod sink;
 
 pub(crate) use self::answers::Answers;
 #[cfg(test)]
 pub(crate) use self::answers::EitherAnswers;
+#[cfg(any(test, not(feature = "small")))]
+use self::any::Any;
 #[cfg(test)]
 pub(crate) use self::goal::EitherGoal;
 pub(crate) use self::goal::{
@@ -225,60 +229,6 @@ pub(crate) fn may_be_in_range(t: [f64; 2], tmin: f32, limit: f64) -> bool {
 #[inline(always)]
 pub(crate) fn in_range(t: f32, tmin: f32, tmax: f32) -> bool {
     tmin <= t && t <= tmax && t < f32::INFINITY
-}
-
-/// Query for any hit: it is complete at the first intersection in the ray's range.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Any {
-    tmin: f32,
-    tmax: f32,
-    found: bool,
-}
-
-impl Query for Any {
-    type Goal = AnyHit;
-    type Answer = bool;
-    #[inline(always)]
-    fn goal(&self) -> AnyHit {
-        AnyHit
-    }
-    fn answer(&self, _ids: &[u32], _instance: u32) -> bool {
-        self.found
-    }
-    fn answer_of(_surface: PrimitiveRef, _t: f32, _u: f32, _v: f32) -> bool {
-        true
-    }
-    fn answers_of<S: Simd>(_s: S, hits: &AnswerLanes<'_>, answers: &mut [bool; LANES]) {
-        for (lane, found) in answers.iter_mut().enumerate() {
-            *found = hits.lanes >> lane & 1 != 0;
-        }
-    }
-    fn new(_goal: AnyHit, ray: &Ray) -> Self {
-        Any { tmin: ray.tmin, tmax: ray.tmax, found: false }
-    }
-    const KEEPS_DEPTHS: bool = true;
-    #[inline(always)]
-    fn offer(&mut self, _triangle: TriangleRef<'_>, intersection: Intersection) -> bool {
-        self.found |= in_range(intersection.t as f32, self.tmin, self.tmax);
-        self.found
-    }
-    fn offer_bounds(&mut self, t: (f64, f64)) -> bool {
-        self.found |= f64::from(self.tmin) <= t.0 && t.1 <= f64::from(self.tmax.min(f32::MAX));
-        self.found
-    }
-    #[inline(always)]
-    fn limit(&self) -> f64 {
-        widened(f64::from(self.tmax))
-    }
-    fn may_matter(&self, t: [f64; 2]) -> bool {
-        may_be_in_range(t, self.tmin, self.limit())
-    }
-    fn found(&self) -> Option<f64> {
-        None
-    }
-    fn accept(&mut self) {
-        self.found = true;
-    }
 }
 
 /// Receiver of the statistics of a traversal; `()` counts nothing.

@@ -16,7 +16,7 @@ use super::single_rays::{FEW_OF_GROUP, SingleRays};
 use crate::bvh::candidate::{Candidate, settle};
 use crate::intersect::filter::{self, Corners, FilteredTriangles};
 use crate::intersect::prepare::{Axes, CommonAxis};
-use crate::query::{Goal, Query};
+use crate::query::Query;
 use crate::rays::Ray;
 use crate::simd::{LANES, Lanewise, Part, Simd, lanes_of_piece};
 use bth_format::layout::{NONE, WIDTH};

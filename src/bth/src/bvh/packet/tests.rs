@@ -6,7 +6,10 @@ use self::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
 use crate::object::single;
 use crate::query::sink::Sink;
-use crate::query::{Any, Nearest, Query};
+use crate::query::{
+    ANY, Answer, AnswersOf, AnyQuery, EitherAnswers, EitherGoal, Goal, NEAREST, Nearest, NearestQuery, Query,
+    any_answers, nearest_answers,
+};
 use crate::rays::{Hit, Ray};
 use crate::simd::Isa;
 use bth_format::layout::NONE;
@@ -26,7 +29,7 @@ fn packed<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     least: MinimumUse,
-    answers: &mut [Q::Answer],
+    answers: AnswersOf<'_, Q>,
 ) -> (PacketCount, Vec<u32>) {
     let mut scratch = PacketScratch::default();
     let count = packed_in::<Q>(isa, &mut scratch, object, rays, least, answers);
@@ -40,9 +43,9 @@ fn packed_in<Q: Query>(
     object: &ObjectView<'_>,
     rays: &[Ray],
     least: MinimumUse,
-    answers: &mut [Q::Answer],
+    mut answers: AnswersOf<'_, Q>,
 ) -> PacketCount {
-    let mut sink = Sink::<Q>::new(object.triangle_ids, answers, 0);
+    let mut sink = Sink::<Q>::new(object.triangle_ids, Q::Goal::reborrow(&mut answers), 0);
     let kernel = Packets { object, rays, scratch, least, sink: &mut sink };
     let Ok(count) = isa.run_wide(kernel) else { panic!("{isa} has packets") };
     assert_eq!(count.rays + scratch.rest.len(), rays.len(), "each ray goes one way");
@@ -55,10 +58,39 @@ fn bits(hit: &Hit) -> [u32; 4] {
 
 /// The answers of a single ray.
 fn alone(object: &ObjectView<'_>, ray: &Ray) -> (Hit, bool) {
-    let (mut hit, mut found) = (Hit::MISS, false);
-    single::trace::<Nearest, ()>(object, ray, NONE, 0, &mut (), &mut hit);
-    single::trace::<Any, ()>(object, ray, NONE, 0, &mut (), &mut found);
-    (hit, found)
+    let (mut hit, mut found) = (Hit::MISS, Answer::MISS);
+    single::trace::<NearestQuery, ()>((object, NEAREST), ray, NONE, 0, &mut (), &mut hit);
+    single::trace::<AnyQuery, ()>((object, ANY), ray, NONE, 0, &mut (), &mut found);
+    for is_any in [false, true] {
+        let (goal, mut either) = (EitherGoal { is_any }, Hit::MISS);
+        single::trace::<Nearest<EitherGoal>, ()>((object, goal), ray, NONE, 0, &mut (), &mut either);
+        match is_any {
+            true => assert_eq!(either.is_hit(), Answer::is_hit(&found), "{ray:?}"),
+            false => assert_eq!(bits(&either), bits(&hit), "{ray:?}"),
+        }
+    }
+    (hit, Answer::is_hit(&found))
+}
+
+/// Rays traced in packets: their statistics, the rest, and the answers.
+type Packed<'a, A> = (&'a PacketCount, &'a Vec<u32>, &'a Vec<A>);
+
+/// Checks that queries whose goal is known at run time only give the same as those whose goal is a type.
+fn check_either(
+    isa: Isa,
+    object: &ObjectView<'_>,
+    (rays, least): (&[Ray], MinimumUse),
+    (nearest, any): (Packed<'_, Hit>, Packed<'_, bool>),
+) {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    let answers = EitherAnswers::Nearest(&mut hits);
+    let (count, rest) = packed::<Nearest<EitherGoal>>(isa, object, rays, least, answers);
+    assert_eq!((&count, &rest), (nearest.0, nearest.1), "{isa}");
+    assert!(hits.iter().map(bits).eq(nearest.2.iter().map(bits)), "{isa}");
+    let mut found = vec![false; rays.len()];
+    let answers = EitherAnswers::Any(&mut found);
+    let (count, rest) = packed::<Nearest<EitherGoal>>(isa, object, rays, least, answers);
+    assert_eq!((&count, &rest, &found), any, "{isa}");
 }
 
 /// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
@@ -68,9 +100,10 @@ fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCoun
     let expected: Vec<(Hit, bool)> = rays.iter().map(|ray| alone(&object, ray)).collect();
     for isa in isas() {
         let mut hits = vec![Hit::MISS; rays.len()];
-        let (count, rest) = packed::<Nearest>(isa, &object, rays, least, &mut hits);
+        let (count, rest) = packed::<NearestQuery>(isa, &object, rays, least, nearest_answers(&mut hits));
         let mut found = vec![false; rays.len()];
-        let (count_any, rest_any) = packed::<Any>(isa, &object, rays, least, &mut found);
+        let (count_any, rest_any) = packed::<AnyQuery>(isa, &object, rays, least, any_answers(&mut found));
+        check_either(isa, &object, (rays, least), ((&count, &rest, &hits), (&count_any, &rest_any, &found)));
         for (i, (ray, (hit, is_hit))) in rays.iter().zip(&expected).enumerate() {
             if !rest.contains(&(i as u32)) {
                 assert_eq!(bits(&hits[i]), bits(hit), "{isa}, ray {i}, {ray:?}: {:?}, {hit:?}", hits[i]);
@@ -262,10 +295,12 @@ fn nothing_of_a_batch_is_left_for_the_next() {
     for isa in isas() {
         let mut scratch = PacketScratch::default();
         let mut hits = vec![Hit::MISS; before.len()];
-        packed_in::<Nearest>(isa, &mut scratch, &surface.view(), &before, ALWAYS, &mut hits);
+        let answers = nearest_answers(&mut hits);
+        packed_in::<NearestQuery>(isa, &mut scratch, &surface.view(), &before, ALWAYS, answers);
         assert!(hits.iter().filter(|hit| hit.is_hit()).count() > 500);
         let mut found = vec![false; rays.len()];
-        let count = packed_in::<Any>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, &mut found);
+        let count =
+            packed_in::<AnyQuery>(isa, &mut scratch, &leaf.view(), &rays, ALWAYS, any_answers(&mut found));
         assert!(count.short == 2 && found.iter().all(|&found| found), "{isa}: {count:?}");
     }
 }

@@ -350,7 +350,9 @@ impl Error {
 impl std::fmt::Display for Error {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Details { code, section, offset, expected, found, path, .. } = &*self.0;
-        if let Some(path) = path {
+        // Where there are no files, the formatting of paths would be in the way.
+        const HAS_FILES: bool = !cfg!(all(target_family = "wasm", target_os = "unknown"));
+        if let Some(path) = path.as_ref().filter(|_| HAS_FILES) {
             write!(f, "{}: ", path.display())?;
         }
         write!(f, "{code}: ")?;

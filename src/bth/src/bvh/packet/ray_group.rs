@@ -8,6 +8,7 @@ use super::bounds::PacketBounds;
 use super::hit_cache::{CachedHits, UNCACHED};
 use super::leaf_mesh::Leaf;
 use super::projection::Projection;
+use crate::SMALL;
 use crate::intersect::exact_lanes::{Intersections, Pairs};
 use crate::intersect::filter::TriangleBlock;
 use crate::intersect::prepare::{self, Axes, CommonAxis, MixedAxes};
@@ -191,7 +192,8 @@ impl<S: Simd> RayGroup<S> {
             for k in 0..3 {
                 field[k] = s.splat(rays[0].origin[k]);
             }
-        } else if !H::MIXED_OCTANTS {
+        }
+        if !H::MIXED_OCTANTS && (SMALL || !H::COMMON_ORIGIN) {
             self.origin = [field[0], field[1], field[2]];
         }
         if !H::MIXED_OCTANTS {

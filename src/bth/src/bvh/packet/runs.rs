@@ -8,6 +8,7 @@ use super::frustum::{Frustum, FrustumOf};
 use super::ray_group::PrepareGroup;
 use super::segment_box::SegmentBox;
 use super::traverse::{GroupStorage, PacketBuffers, PacketOutcome, PacketTracer};
+use crate::SMALL;
 use crate::query::sink::Sink;
 use crate::query::{Goal, Query};
 use crate::rays::Ray;
@@ -127,7 +128,13 @@ fn trace<S: Simd, Q: Query>(
                 (PacketOutcome::Refused, &mut runs.short, least.short, &mut count.short)
             }
             Kind::Short(segments) => {
-                let outcome = if prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays) {
+                let ready = if SMALL {
+                    // It prepares more than is needed here.
+                    prepare::<S, Q, Frustum<S, false>>(s, &bounds, &mut packets, rays)
+                } else {
+                    prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays)
+                };
+                let outcome = if ready {
                     packets.trace(s, object, &SegmentBox::new(s, segments), rays, sink)
                 } else {
                     PacketOutcome::Refused

@@ -7,12 +7,14 @@
 
 use super::bounds::PacketBounds;
 use super::entry::{GROUPS, PACKET, StackEntry};
+use super::frustum::Frustum;
 use super::hit_cache::{CachedHits, HitCache};
 use super::leaf::PacketRays;
 use super::leaf_mesh::Leaf;
 use super::points::{ProjectedPoints, RelativePoints};
 use super::ray_group::{IntersectGroup, RayGroup};
 use super::single_rays::{FEW_OF_PACKET, SingleRays};
+use crate::SMALL;
 use crate::bvh::nodes::{self, prefetch};
 use crate::bvh::ray_state::KEY_SLACK;
 use crate::intersect::exact_lanes::{Intersections, OriginTermsLanes};
@@ -367,8 +369,15 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
         origin_terms,
     };
     for (group, intersections) in groups.iter().zip(&mut *intersections) {
-        let (cached, packet) = (&mut cached, PhantomData::<H>);
-        IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
+        let cached = &mut cached;
+        if SMALL {
+            // Every ray has its origin, so one part serves all packets.
+            let packet = PhantomData::<Frustum<S, false>>;
+            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
+        } else {
+            let packet = PhantomData::<H>;
+            IntersectGroup { group, cached, intersections, packet }.inline_or_call(s);
+        }
     }
     for (i, (group, intersections)) in groups.iter().zip(intersections.iter()).enumerate() {
         let queried = (rays.queried >> (i * LANES)) as u32 & 0xffff;

@@ -4,7 +4,7 @@ mod height_field;
 
 use self::height_field::HeightField;
 use crate::bvh::packet::runs::{MINIMUM_USE, MinimumUse, PacketCount, PacketScratch, Packets};
-use crate::object::single;
+use crate::object::{self, Scratch, single};
 use crate::query::sink::Sink;
 use crate::query::{
     ANY, Answer, AnswersOf, AnyQuery, EitherAnswers, EitherGoal, Goal, NEAREST, Nearest, NearestQuery, Query,
@@ -93,11 +93,25 @@ fn check_either(
     assert_eq!((&count, &rest, &found), any, "{isa}");
 }
 
+/// The answers of a batch whose goal is known at run time only: in packets, the rest interleaved.
+fn batch_of_either(object: &ObjectView<'_>, rays: &[Ray]) -> Vec<(Hit, bool)> {
+    let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    for answers in [EitherAnswers::Nearest(&mut hits), EitherAnswers::Any(&mut found)] {
+        let mut sink = Sink::<Nearest<EitherGoal>>::new(object.triangle_ids, answers, 0);
+        object::trace_batch(object, rays, None, &mut Scratch::default(), &mut sink);
+    }
+    hits.into_iter().zip(found).collect()
+}
+
 /// Compares packets with single rays; returns the statistics and the number of hits, for nearest and for any-hit queries.
 fn check(surface: &HeightField, rays: &[Ray], least: MinimumUse) -> [(PacketCount, usize); 2] {
     let object = surface.view();
     let (mut nearest, mut any) = Default::default();
     let expected: Vec<(Hit, bool)> = rays.iter().map(|ray| alone(&object, ray)).collect();
+    let batch = batch_of_either(&object, rays);
+    for ((ray, (hit, is_hit)), (in_batch, found)) in rays.iter().zip(&expected).zip(&batch) {
+        assert_eq!((bits(in_batch), found), (bits(hit), is_hit), "{ray:?}");
+    }
     for isa in isas() {
         let mut hits = vec![Hit::MISS; rays.len()];
         let (count, rest) = packed::<NearestQuery>(isa, &object, rays, least, nearest_answers(&mut hits));

@@ -19,6 +19,8 @@
 #![warn(missing_docs)]
 // What zerocopy tells about bytes that do not fit says less than the message, and its texts would be part of every program.
 #![allow(clippy::ok_expect)]
+// `Text` is `&str` with the feature, which `into` leaves as it is.
+#![cfg_attr(feature = "brief", allow(clippy::useless_conversion))]
 
 /// Text that is made for an error: as `format!`, and empty with the feature `brief`.
 #[cfg(not(feature = "brief"))]

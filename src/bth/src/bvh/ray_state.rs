@@ -81,13 +81,7 @@ impl<Q: Query> RayState<Q> {
     pub(crate) fn report(&self, sink: &mut Sink<'_, Q>) {
         match self.prepared.progress.decided {
             HitProgress::UNDECIDED => {}
-            HitProgress::ACCEPTED => {
-                let goal = self.query.goal();
-                let mut query =
-                    Q::new(goal, &Ray { origin: [0.0; 3], tmin: 0.0, direction: [0.0; 3], tmax: 0.0 });
-                query.accept();
-                sink.query(self.ray(), &query);
-            }
+            HitProgress::ACCEPTED => sink.accepted(self.ray()),
             _ => sink.query(self.ray(), &self.query),
         }
     }

@@ -58,4 +58,5 @@ impl Query for Any {
     fn accept(&mut self) {
         self.found = true;
     }
+    const ACCEPTED: bool = true;
 }

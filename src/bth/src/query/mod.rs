@@ -103,6 +103,8 @@ pub(crate) trait Query: Copy {
     }
     /// Notes that a triangle is certainly hit within the ray's range, which completes an any-hit query.
     fn accept(&mut self);
+    /// The result of an any-hit query after [`Self::accept`].
+    const ACCEPTED: Self::Answer;
 }
 
 /// Upper bound of all t that cannot be distinguished from `t`: t is rounded to f32 before it is compared with the ray's range,
@@ -149,7 +151,7 @@ impl<G: Goal<Answer = Hit>> Query for Nearest<G> {
             return Hit::MISS;
         }
         if self.goal.is_any() {
-            return Hit { t: 0.0, ..Hit::MISS };
+            return Self::ACCEPTED;
         }
         let primitive = PrimitiveRef { instance, triangle: self.best_triangle(ids).read() };
         let [u, v] = self.best.uv();
@@ -204,6 +206,7 @@ impl<G: Goal<Answer = Hit>> Query for Nearest<G> {
             (self.triangle, self.is_index) = (0, false);
         }
     }
+    const ACCEPTED: Hit = Hit { t: 0.0, ..Hit::MISS };
 }
 
 /// The new hit of a ray in a scene, with its t in world space, if it is better than `best`: a lesser t, or an equal t and a

@@ -75,6 +75,16 @@ impl<'a, Q: Query> Sink<'a, Q> {
         }
     }
 
+    /// Stores the answer of an any-hit query of which some triangle is certainly hit.
+    #[inline(always)]
+    pub(crate) fn accepted(&mut self, ray: usize) {
+        let index = self.first + ray;
+        match &self.scene {
+            None => self.answers.put(index, Q::ACCEPTED),
+            Some(_) => self.merge(index, Q::ACCEPTED),
+        }
+    }
+
     /// Stores the nearest hit of a ray; t, u and v are already rounded. They are separate parameters, because an aggregate
     /// would be passed through memory and stall the load that follows.
     #[inline(always)]

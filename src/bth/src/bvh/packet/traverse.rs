@@ -353,10 +353,8 @@ fn finish<S: Simd, H: PacketBounds<S>, Q: Query>(
 ) {
     if H::is_any(rays.goal) {
         let mut hit = all & !rays.alive;
-        let mut query = Q::new(rays.goal, &rays.rays[0]);
-        query.accept();
         while hit != 0 {
-            sink.query(hit.trailing_zeros() as usize, &query);
+            sink.accepted(hit.trailing_zeros() as usize);
             hit &= hit - 1;
         }
         return;

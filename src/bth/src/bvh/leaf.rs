@@ -63,7 +63,7 @@ pub(crate) trait Progress<Q: Query> {
 #[inline(always)]
 pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     s: S,
-    object: &ObjectView<'_>,
+    (object, goal): (&ObjectView<'_>, Q::Goal),
     ray: impl FnOnce() -> &'r Ray,
     progress: &mut impl Progress<Q>,
     (block, code): (&B, u32),
@@ -73,7 +73,7 @@ pub(crate) fn enter_leaf<'r, S: Simd, Q: Query, B: TriangleBlock>(
     if found.maybe == 0 {
         return LeafOutcome::Nothing;
     }
-    if progress.goal().is_any() {
+    if goal.is_any() {
         if found.sure != 0 {
             progress.accept();
             return LeafOutcome::Done;

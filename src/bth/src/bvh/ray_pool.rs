@@ -226,20 +226,20 @@ impl<'a, Q: Query> RayPool<'a, Q> {
         mut tets: impl FnMut(u32, &mut RayState<Q>, StackPosition, &mut Stacks) -> LeafOutcome,
     ) {
         let RayPool { slots, tops, lists, stacks, bottoms, goal, .. } = self;
-        let (mut counts, node_base) = (self.counts, object.node_base());
+        let (mut counts, node_base, goal) = (self.counts, object.node_base(), *goal);
         for i in 0..counts.take(StepCounts::LEAF) {
             let slot = usize::from(lists.leaf[i]) % POOL_SIZE;
             let state = &mut slots[slot].0;
             let (code, top) = (tops.code[slot], tops.position[slot]);
             let (ray, mut unpacked) = (state.ray(), None);
             let found = if let Some(leaf) = indexed_leaf(s, object, node_base, code, &mut unpacked) {
-                enter_leaf(s, object, || &rays[ray], state, (leaf, code))
+                enter_leaf(s, (object, goal), || &rays[ray], state, (leaf, code))
             } else {
                 let mut unpacked = None;
                 match Child::from_code(code) {
                     Some(Child::Raw(index)) => {
                         let leaf = raw_leaf(s, object, index, &mut unpacked);
-                        enter_leaf(s, object, || &rays[ray], state, (leaf, code))
+                        enter_leaf(s, (object, goal), || &rays[ray], state, (leaf, code))
                     }
                     Some(Child::Tets(row)) => tets(row, state, top, stacks),
                     _ => LeafOutcome::Nothing,

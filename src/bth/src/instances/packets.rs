@@ -138,7 +138,7 @@ impl TopLevelPackets {
         for (i, group) in groups.iter_mut().enumerate() {
             let end = rays.len().min((i + 1) * LANES);
             let rays = &rays[i * LANES..end];
-            if !PrepareGroup::<S, Frustum<S, false>>::of(group, bounds, rays).inline_or_call(s) {
+            if !PrepareGroup::<S, Frustum<S, false>>::of(group, bounds, rays, true).inline_or_call(s) {
                 return Listed::Incoherent;
             }
         }

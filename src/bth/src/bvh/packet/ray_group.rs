@@ -176,7 +176,13 @@ impl<S: Simd> RayGroup<S> {
 
     /// Prepares the first sixteen of the rays; unused lanes repeat the last ray. Returns false if a ray cannot be prepared in f32.
     #[inline(always)]
-    fn prepare<H: PacketBounds<S>>(&mut self, s: S, bounds: &ObjectBounds, rays: &[Ray]) -> bool {
+    fn prepare<H: PacketBounds<S>>(
+        &mut self,
+        s: S,
+        bounds: &ObjectBounds,
+        rays: &[Ray],
+        keeps_lines: bool,
+    ) -> bool {
         let mut field = match rays.first_chunk() {
             Some(rays) => prepare::load_rays(s, rays),
             None => {
@@ -193,10 +199,11 @@ impl<S: Simd> RayGroup<S> {
                 field[k] = s.splat(rays[0].origin[k]);
             }
         }
-        if !H::MIXED_OCTANTS && (SMALL || !H::COMMON_ORIGIN) {
+        let keeps_lines = keeps_lines && !H::MIXED_OCTANTS;
+        if keeps_lines && (SMALL || !H::COMMON_ORIGIN) {
             self.origin = [field[0], field[1], field[2]];
         }
-        if !H::MIXED_OCTANTS {
+        if keeps_lines {
             self.direction = [field[4], field[5], field[6]];
         }
         // Groups are kept from one batch to the next, so hits of an earlier batch are removed here.
@@ -381,13 +388,20 @@ pub(crate) struct PrepareGroup<'a, S: Simd, H> {
     group: &'a mut RayGroup<S>,
     bounds: &'a ObjectBounds,
     rays: &'a [Ray],
+    /// Whether origins and directions are needed later on.
+    keeps_lines: bool,
     packet: PhantomData<H>,
 }
 
 impl<'a, S: Simd, H> PrepareGroup<'a, S, H> {
     #[inline(always)]
-    pub(crate) fn of(group: &'a mut RayGroup<S>, bounds: &'a ObjectBounds, rays: &'a [Ray]) -> Self {
-        PrepareGroup { group, bounds, rays, packet: PhantomData }
+    pub(crate) fn of(
+        group: &'a mut RayGroup<S>,
+        bounds: &'a ObjectBounds,
+        rays: &'a [Ray],
+        keeps_lines: bool,
+    ) -> Self {
+        PrepareGroup { group, bounds, rays, keeps_lines, packet: PhantomData }
     }
 }
 
@@ -395,7 +409,7 @@ impl<S: Simd, H: PacketBounds<S>> Part<S> for PrepareGroup<'_, S, H> {
     type Output = bool;
     #[inline(always)]
     fn run(self, s: S) -> bool {
-        self.group.prepare::<H>(s, self.bounds, self.rays)
+        self.group.prepare::<H>(s, self.bounds, self.rays, self.keeps_lines)
     }
 }
 

@@ -129,10 +129,10 @@ fn trace<S: Simd, Q: Query>(
             }
             Kind::Short(segments) => {
                 let ready = if SMALL {
-                    // It prepares more than is needed here.
-                    prepare::<S, Q, Frustum<S, false>>(s, &bounds, &mut packets, rays)
+                    // One part prepares both kinds.
+                    prepare::<S, Q, Frustum<S, false>>(s, &bounds, &mut packets, rays, false)
                 } else {
-                    prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays)
+                    prepare::<S, Q, SegmentBox<S>>(s, &bounds, &mut packets, rays, false)
                 };
                 let outcome = if ready {
                     packets.trace(s, object, &SegmentBox::new(s, segments), rays, sink)
@@ -245,7 +245,7 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     rays: &[Ray],
     sink: &mut Sink<'_, Q>,
 ) -> PacketOutcome {
-    if !prepare::<S, Q, Frustum<S, POINT>>(s, bounds, packets, rays) {
+    if !prepare::<S, Q, Frustum<S, POINT>>(s, bounds, packets, rays, true) {
         return PacketOutcome::Refused;
     }
     let groups = &packets.groups[..rays.len().div_ceil(LANES)];
@@ -254,17 +254,18 @@ fn frustum<S: Simd, Q: Query, const POINT: bool>(
     packets.trace(s, object, &frustum, rays, sink)
 }
 
-/// Prepares the groups of a packet; false if a ray cannot be prepared in f32.
+/// Prepares the groups of a packet, with the lines of their rays where these are needed later on; false if a ray cannot be prepared in f32.
 #[inline(always)]
 fn prepare<S: Simd, Q: Query, H: PacketBounds<S>>(
     s: S,
     bounds: &ObjectBounds,
     packets: &mut PacketTracer<'_, S, Q>,
     rays: &[Ray],
+    keeps_lines: bool,
 ) -> bool {
     let mut ready = true;
     for (group, rays) in packets.groups.iter_mut().zip(rays.chunks(LANES)) {
-        ready &= PrepareGroup::<S, H>::of(group, bounds, rays).inline_or_call(s);
+        ready &= PrepareGroup::<S, H>::of(group, bounds, rays, keeps_lines).inline_or_call(s);
     }
     ready
 }

@@ -160,7 +160,10 @@ mod tests {
             let Children(rays, node, tested) = self;
             let mut groups = [RayGroup::vacant(s); GROUPS];
             for (group, rays) in groups.iter_mut().zip(rays.chunks(LANES)) {
-                assert!(PrepareGroup::<S, SegmentBox<S>>::of(group, &ObjectBounds::around(8.0), rays).run(s));
+                assert!(
+                    PrepareGroup::<S, SegmentBox<S>>::of(group, &ObjectBounds::around(8.0), rays, false)
+                        .run(s)
+                );
             }
             let groups = &groups[..rays.len().div_ceil(LANES)];
             let (mut single_rays, mut entries) = (SingleRays::NONE, [StackEntry::default(); WIDTH]);

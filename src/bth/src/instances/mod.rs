@@ -10,7 +10,6 @@
 //! hits goes through the top level alone ([`enumerate`]).
 
 mod affine;
-mod arc;
 mod batch;
 mod caller;
 mod deformed;

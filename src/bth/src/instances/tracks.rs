@@ -1,7 +1,6 @@
 //! Interpolation of animation tracks, as of glTF animation samplers (glTF 2.0 specification, appendix C). A track holds the keys
 //! of one property of one node.
 
-use super::arc::{arc_cosine, sine};
 use bth_format::SceneView;
 use bth_format::layout::*;
 
@@ -105,12 +104,12 @@ fn slerp(a: [f64; 4], b: [f64; 4], part: f64) -> [f64; 4] {
     if cosine < 0.0 {
         (b, cosine) = (b.map(|x| -x), -cosine);
     }
-    let angle = arc_cosine(cosine.min(1.0));
-    let whole = sine(angle);
+    let angle = libm::acos(cosine.min(1.0));
+    let whole = libm::sin(angle);
     if whole == 0.0 {
         return lerp(a, b, part);
     }
-    let (weight_a, weight_b) = (sine((1.0 - part) * angle) / whole, sine(part * angle) / whole);
+    let (weight_a, weight_b) = (libm::sin((1.0 - part) * angle) / whole, libm::sin(part * angle) / whole);
     std::array::from_fn(|i| weight_a * a[i] + weight_b * b[i])
 }
 

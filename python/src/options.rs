@@ -90,6 +90,7 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         ));
     }
     let materials = keywords.value::<bool>("materials")?.unwrap_or(false);
+    let deformable = keywords.value::<bool>("deformable")?.unwrap_or(false);
     let attributes = keywords
         .choice("attributes", &[("none", Keep::None), ("normals", Keep::Normals), ("all", Keep::All)])?
         .unwrap_or_default();
@@ -98,7 +99,7 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         attributes: if materials { Keep::All } else { attributes },
         record: if compact { RecordKind::Tet16 } else { record.unwrap_or(RecordKind::Link32) },
         coordinates: coordinates(keywords)?,
-        keep_subtrees: subtrees.unwrap_or(structure == Structure::Bth && !compact),
+        keep_subtrees: subtrees.unwrap_or(!compact && (deformable || structure == Structure::Bth)),
         alpha: keywords
             .choice(
                 "alpha",
@@ -108,7 +109,8 @@ pub(crate) fn options(keywords: &Keywords<'_, '_>) -> PyResult<CompileOptions> {
         geometry: keywords.value("geometry")?.unwrap_or(true),
         names: materials || keywords.value("names")?.unwrap_or(false),
         materials,
-        deformable: keywords.value("deformable")?.unwrap_or(false),
+        deformable,
+        deformable_tets: deformable && structure == Structure::Bth,
         ..CompileOptions::default()
     };
     motion_and_free(keywords, &mut options)?;

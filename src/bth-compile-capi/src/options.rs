@@ -69,12 +69,13 @@ impl Options {
             2 => Structure::Tets,
             other => return unknown("structure", other),
         };
+        let deformable = self.flags & DEFORMABLE != 0;
         let mut options = CompileOptions {
             structure,
             // As the program does by default.
-            keep_subtrees: structure == Structure::Bth,
+            keep_subtrees: structure == Structure::Bth || deformable,
             geometry: self.flags & NO_GEOMETRY == 0,
-            deformable: self.flags & DEFORMABLE != 0,
+            deformable,
             ..CompileOptions::default()
         };
         options.bvh.quality = match self.quality {

@@ -51,9 +51,12 @@ pub struct CompileOptions {
     /// Whether to store the positions and triangles of the source.
     pub geometry: bool,
     /// Whether to keep what new positions at run time need (`bth::Scene::set_positions`). All vertices of the source are kept in its
-    /// order, triangles of zero area are not dropped, and nothing is tetrahedralized, whatever `structure` says. Excludes
-    /// `Structure::Tets`, `coordinates` other than f32, and leaving out the geometry.
+    /// order, and triangles of zero area are not dropped. Excludes `coordinates` other than f32, leaving out the geometry, and
+    /// tetrahedralizations without a BVH beside them. `Structure::Bth` stands for a BVH unless `deformable_tets` is set.
     pub deformable: bool,
+    /// Whether `Structure::Bth` has its meaning for deformable objects, too. New positions then move tetrahedra, which takes longer than
+    /// moving the BVH, and rays use them only where none is turned over.
+    pub deformable_tets: bool,
     /// How objects whose vertices move by themselves are compiled.
     pub motion: MotionOptions,
     /// Limit on the estimated bytes of memory of the objects of a scene that are compiled at the same time; a single object
@@ -80,6 +83,7 @@ impl Default for CompileOptions {
             keep_subtrees: true,
             geometry: true,
             deformable: false,
+            deformable_tets: false,
             motion: MotionOptions::default(),
             objects_memory: u64::MAX,
         }
@@ -104,6 +108,7 @@ impl CompileOptions {
         Self {
             structure: Structure::Bvh,
             deformable: true,
+            deformable_tets: false,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             free: free::FreeOptions::default(),
@@ -116,9 +121,12 @@ impl CompileOptions {
         mesh::Looks { alpha: self.alpha, materials: self.materials }
     }
 
-    /// What is built: a BVH only for deformable objects.
+    /// What is built: see `deformable_tets`.
     pub(crate) fn built_structure(&self) -> Structure {
-        if self.deformable { Structure::Bvh } else { self.structure }
+        match self.structure {
+            Structure::Bth if self.deformable && !self.deformable_tets => Structure::Bvh,
+            structure => structure,
+        }
     }
 
     /// Checks that the options do not exclude each other.
@@ -132,8 +140,8 @@ impl CompileOptions {
             "coordinates or boxes of fewer bits"
         } else if !self.geometry {
             "leaving out the geometry of the source"
-        } else if self.structure == Structure::Tets {
-            "tetrahedralizations"
+        } else if self.built_structure() != Structure::Bvh && !self.keep_subtrees {
+            "tetrahedralizations without a BVH beside them"
         } else if self.free.keep != free::KeepFree::None {
             "free directions"
         } else {

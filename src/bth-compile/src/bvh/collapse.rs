@@ -15,7 +15,8 @@ use serde::Serialize;
 pub struct CollapseOptions {
     /// Whether the BVH below each tet leaf is kept beside it.
     pub keep_subtrees: bool,
-    /// Whether the vertices of leaves are recorded. Excludes cut nodes.
+    /// Whether the vertices of leaves are recorded, and subtrees of tet leaves lie where these are in depth-first order. Demands kept
+    /// subtrees where nodes are cut.
     pub leaf_vertices: bool,
     /// Costs by which the tree is chosen.
     pub costs: Costs,
@@ -26,7 +27,8 @@ pub struct CollapseOptions {
 /// The wide BVH, ready for the `LINES` and `TRIANGLE_IDS` sections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wide {
-    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept subtree.
+    /// Nodes in depth-first order, then leaves; after them the nodes and leaves of each kept subtree, which lie among the others where
+    /// the vertices of leaves are recorded.
     pub lines: Vec<CacheLine>,
     /// Ids of the leaves' triangles, in order of the leaves' lines.
     pub triangle_ids: Vec<u32>,
@@ -87,7 +89,7 @@ impl CollapseReport {
 ///
 /// # Errors
 /// [`Error::Limit`] when the lines exceed what a child code can address or the tree is too deep,
-/// [`Error::Internal`] when `cut` is not as described, [`Error::Cancelled`].
+/// [`Error::Internal`] when `cut` is not as described or its subtrees are to be recorded and not kept, [`Error::Cancelled`].
 pub fn collapse<'a>(
     mesh: &Mesh,
     bvh: impl Into<Weighed<'a>>,
@@ -116,6 +118,10 @@ pub fn collapse_by<'a>(
     let weighed = bvh.into();
     let bvh = weighed.bvh;
     check_cut(bvh, cut)?;
+    if options.leaf_vertices && !options.keep_subtrees && !cut.is_empty() {
+        let message = "tet leaves of a deformable object without subtrees".to_owned();
+        return Err(Error::Internal { code: "BTH-X203", message });
+    }
     monitor.stage("collapse", None);
     let mut wide = Wide { root: NONE, subtrees: vec![NONE; cut.len()], ..Wide::default() };
     let mut report = CollapseReport::default();
@@ -139,7 +145,7 @@ pub fn collapse_by<'a>(
         report: &mut report,
     };
     let (root, tets) = writer.tree(0, 0, true)?;
-    if options.keep_subtrees {
+    if options.keep_subtrees && !options.leaf_vertices {
         for (at, level) in tets {
             let (code, _) = writer.tree(at, level, false)?;
             let row = cut.binary_search(&at).expect("tet leaves are cut nodes");
@@ -206,6 +212,15 @@ struct Inner {
     count: usize,
 }
 
+/// A slot that is not decided yet.
+struct Pending {
+    slot: usize,
+    /// Wide nodes above it.
+    level: u32,
+    /// Whether it lies in no subtree of a tet leaf.
+    outer: bool,
+}
+
 /// A slot of a wide node.
 struct Slot {
     /// Node of the binary BVH.
@@ -229,16 +244,19 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     /// Appends the tree below a node, nodes before leaves. `level` wide nodes lie above; `outer` is
-    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each.
+    /// false for the subtree of a tet leaf. Returns the root's code and the tet leaves with the wide nodes above each. Where the vertices
+    /// of leaves are recorded, the subtrees of tet leaves are part of the tree.
     fn tree(&mut self, root: u32, level: u32, outer: bool) -> Result<(u32, Vec<(u32, u32)>)> {
         let base = self.wide.lines.len();
         // First the shape is determined: slot 0 holds the root, every other slot belongs to a node.
         let mut slots = vec![Slot { node: root, code: NONE }];
         let mut inner: Vec<Inner> = Vec::new();
-        let mut leaves: Vec<usize> = Vec::new();
+        let mut leaves: Vec<(usize, bool)> = Vec::new();
         let mut tets = Vec::new();
-        let mut pending = vec![(0usize, level)];
-        while let Some((slot, level)) = pending.pop() {
+        // Slots of the roots of subtrees, which belong to no node, and the tet leaves.
+        let mut subtrees: Vec<(usize, usize)> = Vec::new();
+        let mut pending = vec![Pending { slot: 0, level, outer }];
+        while let Some(Pending { slot, level, outer }) = pending.pop() {
             let at = slots[slot].node;
             let decision = self.decisions[at as usize];
             if outer && decision.is_cut() {
@@ -246,10 +264,15 @@ impl Writer<'_> {
                 slots[slot].code = Child::Tets(row as u32).code();
                 self.report.tet_leaves += 1;
                 tets.push((at, level));
+                if self.leaf_vertices {
+                    subtrees.push((slots.len(), row));
+                    pending.push(Pending { slot: slots.len(), level, outer: false });
+                    slots.push(Slot { node: at, code: NONE });
+                }
                 continue;
             }
             if decision.role() != Role::Node {
-                leaves.push(slot);
+                leaves.push((slot, outer));
                 continue;
             }
             slots[slot].code = Child::Node((base + inner.len() * NODE_LINES) as u32).code();
@@ -264,12 +287,12 @@ impl Writer<'_> {
             if outer {
                 self.report.node_visits += self.area(at);
             }
-            pending.extend((first..slots.len()).rev().map(|slot| (slot, level + 1)));
+            pending.extend((first..slots.len()).rev().map(|slot| Pending { slot, level: level + 1, outer }));
         }
 
         // Leaves follow the nodes.
         let mut next = base + inner.len() * NODE_LINES;
-        for &slot in &leaves {
+        for &(slot, _) in &leaves {
             let role = self.decisions[slots[slot].node as usize].role();
             let (child, lines) = match role {
                 Role::Raw => (Child::Raw(next as u32), RAW_LINES),
@@ -287,14 +310,17 @@ impl Writer<'_> {
                 slots[*first..first + count].iter().map(|s| (&self.bvh.nodes[s.node as usize], s.code));
             put(&mut self.wide.lines, base + i * NODE_LINES, &wide_node(slots));
         }
-        for (done, &slot) in leaves.iter().enumerate() {
+        for (done, &(slot, outer)) in leaves.iter().enumerate() {
             if done % 4096 == 0 {
                 self.monitor.check()?;
             }
             self.leaf(&slots[slot], outer);
         }
+        for &(slot, row) in &subtrees {
+            self.wide.subtrees[row] = slots[slot].code;
+        }
         self.report.nodes += inner.len() as u64;
-        self.report.children += slots.len() as u64 - 1;
+        self.report.children += (slots.len() - subtrees.len()) as u64 - 1;
         Ok((slots[0].code, tets))
     }
 

@@ -4,6 +4,7 @@
 //! through the trait `Stages`, which a cache implements outside of this module.
 
 mod clock;
+mod deformable;
 mod limit;
 mod moving;
 pub(crate) mod object;
@@ -31,6 +32,7 @@ use crate::source::{Model, SourceDigest, changed};
 use crate::{bvh, coordinates, free, tets};
 use bth_import::{self as mesh, Mesh};
 use report::TetReports;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -117,10 +119,11 @@ pub(crate) fn compile_mesh(
         true => (mesh, None),
         false => clock.time("coordinates", || stages.coordinates(source, mesh, &options.coordinates))?,
     };
+    let options = &CompileOptions { structure: options.built_structure(), ..options.clone() };
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
     let (tree, bvh) = clock.time("bvh", || stages.bvh(&mesh, &bvh_options, monitor))?;
     let traced = TracedMesh { mesh, on_grid, tree, probabilities: None };
-    let (leaves, tets) = match options.built_structure() {
+    let (leaves, tets) = match options.structure {
         Structure::Bvh => (Vec::new(), TetReports::default()),
         Structure::Bth | Structure::Tets => tet_leaves(source, &traced, options, stages, clock, monitor)?,
     };
@@ -160,9 +163,17 @@ fn tet_leaves(
     clock: &mut Clock,
     monitor: &dyn Monitor,
 ) -> Result<(Vec<tets::Leaf>, TetReports)> {
-    let TracedMesh { mesh, tree, .. } = traced;
-    let (marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &options.bvh, monitor))?;
-    let (choice, costs) = clock.time("costs", || select::choose(source, traced, &marks, options, monitor))?;
+    let tree = &traced.tree;
+    let welded = if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
+    let mesh: &Mesh = &welded;
+    let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
+    let (mut marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
+    if options.deformable {
+        let flat = deformable::exclude_flat(mesh, tree, &mut marks);
+        select::check_flat(source, flat, options)?;
+    }
+    let (choice, costs) =
+        clock.time("costs", || select::choose(source, (traced, mesh), &marks, options, monitor))?;
     let (built, tets) =
         clock.time("tets", || stages.tets(mesh, tree, &choice.chosen, &options.tets, monitor))?;
     select::check_built(source, tree, &built, options)?;

@@ -10,15 +10,15 @@ use crate::{bvh, costs, marks, tets};
 use bth_import::Mesh;
 use std::path::Path;
 
-/// The nodes to tetrahedralize, in ascending order.
+/// The nodes to tetrahedralize, in ascending order. `mesh` is what is tetrahedralized of the traced mesh.
 pub(super) fn choose(
     source: &Path,
-    traced: &TracedMesh,
+    (traced, mesh): (&TracedMesh, &Mesh),
     marks: &marks::Marks,
     options: &CompileOptions,
     monitor: &dyn Monitor,
 ) -> Result<(costs::Choice, Option<costs::CostReport>)> {
-    let TracedMesh { mesh, tree, .. } = traced;
+    let tree = &traced.tree;
     match (options.structure, marks.suitable.first()) {
         (Structure::Bvh, _) | (Structure::Tets, None) => Ok((costs::Choice::default(), None)),
         (Structure::Tets, Some(true)) => Ok((costs::Choice { chosen: vec![0], verdicts: Vec::new() }, None)),
@@ -74,6 +74,15 @@ pub(super) fn check_built(
             message,
             "is the worker bth-tetgen installed? Else use --structure bth",
         ));
+    }
+    Ok(())
+}
+
+/// Fails where the whole model has to be tetrahedralized and has triangles without area.
+pub(super) fn check_flat(source: &Path, flat: u64, options: &CompileOptions) -> Result<()> {
+    if options.structure == Structure::Tets && flat > 0 {
+        let message = format!("the model cannot be tetrahedralized whole: {flat} of its triangles have no area");
+        return Err(unusable(source, message, "leave these out of the model, or use --structure bth"));
     }
     Ok(())
 }

@@ -62,6 +62,8 @@ pub(super) struct RefitPlan {
     pub(super) nodes: Vec<u32>,
     /// Leaves of these nodes.
     pub(super) leaves: Vec<TopLeaf>,
+    /// For each tet leaf the code of its subtree.
+    pub(super) subtrees: Vec<u32>,
 }
 
 /// Size of a subtree.
@@ -88,6 +90,15 @@ impl Size {
     }
 }
 
+/// The code that is followed at a child: that of its subtree for a tet leaf.
+#[inline(always)]
+pub(super) fn entered(code: u32, subtrees: &[u32]) -> u32 {
+    match Child::from_code(code) {
+        Some(Child::Tets(row)) => subtrees[row as usize],
+        _ => code,
+    }
+}
+
 /// The lines and the rows of LEAF_VERTICES of a leaf; `None` for codes of nodes.
 #[inline(always)]
 pub(super) fn leaf_size(code: u32) -> Option<(u32, u32)> {
@@ -101,14 +112,15 @@ pub(super) fn leaf_size(code: u32) -> Option<(u32, u32)> {
 impl RefitPlan {
     /// The plan for a deformable object.
     pub(super) fn new(view: &ObjectView<'_>) -> RefitPlan {
-        let root = view.header.root;
+        let subtrees: Vec<u32> = view.tet_leaves.iter().map(|leaf| leaf.subtree).collect();
+        let root = view.entered(view.header.root);
         if Size::of_leaf(root).is_some() {
-            let leaf = TopLeaf { parent: None, code: root, row: 0 };
-            return RefitPlan { leaves: vec![leaf], ..RefitPlan::default() };
+            let leaves = vec![TopLeaf { parent: None, code: root, row: 0 }];
+            return RefitPlan { leaves, subtrees, ..RefitPlan::default() };
         }
         let sizes = sizes(view);
         let node_lines = (sizes.len() * NODE_LINES) as u32;
-        let mut plan = RefitPlan { node_lines, ..RefitPlan::default() };
+        let mut plan = RefitPlan { node_lines, subtrees, ..RefitPlan::default() };
         // Nodes that are still to be divided, with their parent's slot and their first leaf.
         let mut stack = vec![(None, root, node_lines, 0)];
         while let Some((parent, node, line, row)) = stack.pop() {
@@ -120,7 +132,7 @@ impl RefitPlan {
             }
             plan.nodes.push(node);
             let (first, mut line, mut row) = (stack.len(), line, row);
-            for (slot, &code) in children(view, node).iter().enumerate() {
+            for (slot, code) in children(view, node).enumerate() {
                 let parent = Some(Slot { node, slot: slot as u32 });
                 let size = Size::of_leaf(code).unwrap_or_else(|| {
                     stack.push((parent, code, line, row));
@@ -139,25 +151,26 @@ impl RefitPlan {
     }
 }
 
-/// The codes of a node's children.
-fn children<'a>(view: &ObjectView<'a>, node: u32) -> &'a [u32] {
+/// The codes of a node's children, for tet leaves those of their subtrees.
+fn children<'a>(view: &'a ObjectView<'_>, node: u32) -> impl DoubleEndedIterator<Item = u32> + 'a {
     let codes = &view.node(node).child;
-    &codes[..codes.iter().position(|code| *code == NONE).unwrap_or(WIDTH)]
+    let used = codes.iter().position(|code| *code == NONE).unwrap_or(WIDTH);
+    codes[..used].iter().map(|code| view.entered(*code))
 }
 
 /// The sizes of the subtrees of all nodes.
 fn sizes(view: &ObjectView<'_>) -> Vec<Size> {
     let mut count = 0;
-    let mut stack = vec![view.header.root];
+    let mut stack = vec![view.entered(view.header.root)];
     // The nodes are the first ones of the lines. The last one in depth-first order has the greatest line.
     while let Some(node) = stack.pop() {
         count = count.max(node as usize / NODE_LINES + 1);
-        stack.extend(children(view, node).iter().rev().find(|code| leaf_size(**code).is_none()));
+        stack.extend(children(view, node).rev().find(|code| leaf_size(*code).is_none()));
     }
     let mut sizes = vec![Size::default(); count];
     for node in (0..count).rev() {
         let mut size = Size { node_lines: NODE_LINES as u32, ..Size::default() };
-        for &code in children(view, (node * NODE_LINES) as u32) {
+        for code in children(view, (node * NODE_LINES) as u32) {
             size.add(Size::of_leaf(code).unwrap_or_else(|| sizes[code as usize / NODE_LINES]));
         }
         sizes[node] = size;

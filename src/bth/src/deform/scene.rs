@@ -67,13 +67,14 @@ impl Scene {
         let deforming = self.objects_mut().deforming(object)?;
         deforming.refit_staged();
         let (refit, deformed_cost_ratio) = (clock::elapsed(start), deforming.cost_ratio());
+        let tet_use = deforming.tet_use();
         let (objects, world) = self.objects_and_world_mut();
         let placed = match world {
             Some(world) => world.place_again(objects, &[object]),
             None => Ok(Update { visible: objects.count() as usize, ..Update::default() }),
         };
         match placed {
-            Ok(update) => Ok(Update { deformed: 1, deformed_cost_ratio, refit, ..update }),
+            Ok(update) => Ok(tet_use.of(Update { deformed: 1, deformed_cost_ratio, refit, ..update })),
             Err(failed) => {
                 self.objects_mut().deforming(object)?.undo();
                 let (code, expected, found) = failed.error.words();

@@ -29,9 +29,9 @@ pub(crate) struct Compile {
     pub(crate) flatten: bool,
     #[command(flatten)]
     pub(crate) gltf: Gltf,
-    /// What to build.
-    #[arg(long, value_enum, default_value_t = Structure::Bth)]
-    pub(crate) structure: Structure,
+    /// What to build. By default bth, with --deformable bvh.
+    #[arg(long, value_enum)]
+    pub(crate) structure: Option<Structure>,
     #[command(flatten)]
     pub(crate) selection: Selection,
     /// Record that stores a tetrahedron.
@@ -71,7 +71,7 @@ pub(crate) struct Compile {
     #[arg(long, value_enum, default_value_t = Alpha::None, value_name = "MATERIALS")]
     pub(crate) alpha: Alpha,
     /// The BVH under each tet leaf: rays that do not start on a known surface take it, and are much faster so.
-    /// By default kept with `--structure bth` and pruned with `tets`.
+    /// By default kept with `--structure bth` and `--deformable`, and pruned with `tets`.
     #[arg(long, value_enum)]
     pub(crate) subtrees: Option<Subtrees>,
     /// The smallest tetrahedralizations: short for `--tets tet16 --subtrees prune`. Some 100 bytes a triangle where all
@@ -79,7 +79,7 @@ pub(crate) struct Compile {
     #[arg(long, conflicts_with_all = ["tets", "subtrees"])]
     pub(crate) compact: bool,
     /// Keep what new positions at run time need, for objects that deform: see docs/deforming.md. All vertices keep the order of the
-    /// source, and the object is a BVH.
+    /// source. The object is a BVH unless --structure says otherwise.
     #[arg(long, conflicts_with_all = ["coordinates", "max_error", "no_geometry", "compact", "rigid_parts"])]
     pub(crate) deformable: bool,
     /// Poses over which the tree of an object is built whose vertices move by themselves, 1 to 16; more take longer. 1 builds it for
@@ -212,12 +212,12 @@ impl Compile {
     /// # Errors
     /// If the profile cannot be used.
     pub(crate) fn options(&self) -> bth_compile::Result<bth_compile::pipeline::CompileOptions> {
+        let structure = self.structure.unwrap_or(match self.deformable {
+            true => Structure::Bvh,
+            false => Structure::Bth,
+        });
         let mut options = bth_compile::pipeline::CompileOptions {
-            structure: match self.structure {
-                // A tetrahedralization would not stay one.
-                Structure::Bth if self.deformable => bth_compile::pipeline::Structure::Bvh,
-                structure => structure.into(),
-            },
+            structure: structure.into(),
             attributes: if self.materials { Keep::All } else { self.attributes.into() },
             names: self.names || self.materials,
             materials: self.materials,
@@ -230,10 +230,12 @@ impl Compile {
             },
             keep_subtrees: match self.subtrees {
                 Some(subtrees) => subtrees == Subtrees::Keep,
-                None => self.structure == Structure::Bth && !self.compact,
+                // Where tetrahedra are turned over, rays of deformable objects take the BVH beside them.
+                None => !self.compact && (self.deformable || structure == Structure::Bth),
             },
             geometry: !self.no_geometry,
             deformable: self.deformable,
+            deformable_tets: self.deformable && structure == Structure::Bth,
             motion: bth_compile::pipeline::MotionOptions { poses: self.poses, segments: self.segments },
             ..Default::default()
         };

@@ -13,6 +13,7 @@ pub fn invalid() -> Vec<Case> {
     cases.extend(tets());
     cases.extend(geometry());
     cases.extend(super::deformable::invalid());
+    cases.extend(super::deformable_tets::invalid());
     cases.extend(super::deformers::invalid());
     cases.extend(super::deformable::invalid_sequences());
     cases.extend(groups());

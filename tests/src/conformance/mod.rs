@@ -4,6 +4,7 @@
 //! compares the committed files with what is made here.
 
 mod deformable;
+mod deformable_tets;
 mod deformers;
 mod edit;
 mod invalid;

@@ -31,6 +31,7 @@ pub fn valid() -> Vec<Case> {
         Case::new("unknown-optional-section", unknown_section()),
     ];
     cases.extend(super::scenes::valid());
+    cases.extend(super::deformable_tets::valid());
     cases.extend(RecordKind::ALL.map(|r| Case::new(&format!("tets-{}", r.name()), tets(r))));
     cases
 }
@@ -314,9 +315,9 @@ fn unknown_section() -> Vec<u8> {
 }
 
 /// Vertices of the five tetrahedra that fill a cube whose corner i is at (i & 1, i >> 1 & 1, i >> 2).
-const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7], [1, 4, 5, 7], [2, 4, 6, 7]];
+pub(super) const CUBE: [[u32; 4]; 5] = [[0, 1, 2, 4], [1, 2, 3, 7], [1, 2, 4, 7], [1, 4, 5, 7], [2, 4, 6, 7]];
 /// Two faces of the middle tetrahedron.
-const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
+pub(super) const FACES: [[u32; 3]; 2] = [[1, 2, 7], [1, 4, 2]];
 
 /// Two cubes as tet leaves, each around two triangles, the first with a subtree; a triangle leaf; and a triangle without
 /// area.
@@ -375,13 +376,14 @@ fn tets(record: RecordKind) -> Vec<u8> {
     })
 }
 
+/// The sections of tet leaves.
 #[derive(Default)]
-struct TetParts {
-    leaves: Vec<TetLeaf>,
-    records: Vec<u8>,
-    vertices: Vec<TetVertex>,
-    faces: Vec<TetFace>,
-    hulls: Vec<HullFace>,
+pub(super) struct TetParts {
+    pub(super) leaves: Vec<TetLeaf>,
+    pub(super) records: Vec<u8>,
+    pub(super) vertices: Vec<TetVertex>,
+    pub(super) faces: Vec<TetFace>,
+    pub(super) hulls: Vec<HullFace>,
 }
 
 /// Whether a vertex lies on the side of a face from which its corners are counter-clockwise.
@@ -410,7 +412,7 @@ impl TetParts {
     }
 
     /// Adds a leaf of tetrahedra (ascending vertices) with constrained faces, whose triangles number from `ids`.
-    fn add(
+    pub(super) fn add(
         &mut self,
         record: RecordKind,
         points: &[[f32; 3]],

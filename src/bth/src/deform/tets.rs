@@ -139,6 +139,11 @@ impl LeafPlan {
         seams.dedup();
         let used = of_vertex.iter().filter(|row| **row != NONE);
         let surface = bounds(used.map(|row| view.positions[*row as usize]));
+        // So that no corner of a constrained face is one of the box.
+        let contains = (0..3).all(|k| leaf.lower[k] < surface[0][k] && surface[1][k] < leaf.upper[k]);
+        if !contains {
+            return None;
+        }
         let diagonal = diagonal(&surface);
         let margin = |a: f32, b: f32| (f64::from(a) - f64::from(b)) / diagonal;
         let margins = [

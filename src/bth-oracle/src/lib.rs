@@ -17,6 +17,7 @@ mod crossing;
 mod geometry;
 mod intersection;
 mod nearest;
+mod orientation;
 mod overlap;
 mod world;
 
@@ -25,5 +26,6 @@ pub use crossing::{crossings, winding};
 pub use geometry::{Triangle, triangles};
 pub use intersection::{Intersection, intersection, is_front, to_f64};
 pub use nearest::{ExactHit, any, nearest};
+pub use orientation::orientation;
 pub use overlap::overlaps_box;
 pub use world::World;

@@ -5,6 +5,7 @@
 //! determined once ([`plan`]). The tree remains that of the pose for which it was compiled; [`cost`] tells how much worse it is
 //! for the new one. Tetrahedra follow with their vertices, and are used where none of a tet leaf inverts ([`tets`]).
 
+mod bound_vertices;
 mod cost;
 mod deforming;
 mod orientation;

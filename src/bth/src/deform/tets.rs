@@ -4,7 +4,7 @@
 //!
 //! - the corners of constrained faces to the new positions of their triangles' corners, bit for bit;
 //! - the corners of the leaf's box to those of a new box, whose distance from the surface is the same share of the surface's diagonal;
-//! - all other vertices with the box, axis by axis.
+//! - all others with the box, axis by axis, and with the corners of faces around them ([`BoundVertices`]).
 //!
 //! A leaf is *in use* if every tetrahedron then has strictly positive orientation, by the exact test, and no two triangles that share a
 //! vertex of the tetrahedralization have moved apart there. That the tetrahedra fill the new box, each point once, follows from it as
@@ -15,7 +15,8 @@
 //! A leaf that is not in use *stands aside*: rays do not start in it, since its triangles are faces of nothing, and the BVH over the
 //! same triangles answers for it.
 
-use super::orientation::all_positive;
+use super::bound_vertices::{BoundVertices, VertexKind};
+use super::orientation::Tetrahedra;
 use crate::instances::Update;
 use bth_format::file::TetParts;
 use bth_format::layout::{NONE, TetFace, TetLeaf, TetVertex};
@@ -57,10 +58,14 @@ impl TetUse {
 /// How a tet leaf follows new positions.
 #[derive(Debug)]
 struct LeafPlan {
-    /// Vertices of each tetrahedron, counted from the leaf's first, in the order of positive orientation.
-    tets: Vec<[u32; 4]>,
+    /// The tetrahedra, their vertices counted from the leaf's first, in the order of positive orientation.
+    tets: Tetrahedra,
     /// For each vertex its row of POSITIONS; `NONE` for those of no constrained face.
     rows: Vec<u32>,
+    /// The vertices at the corners of the box.
+    corners: Vec<u32>,
+    /// The vertices that are neither.
+    bound: BoundVertices,
     /// Pairs of rows of POSITIONS that are one vertex here.
     seams: Vec<[u32; 2]>,
     /// Bounds of the surface as it was compiled.
@@ -137,6 +142,13 @@ impl LeafPlan {
         }
         seams.sort_unstable();
         seams.dedup();
+        let vertices = &view.tet_vertices[rows(leaf.first_vertex, leaf.vertices)];
+        let kind = |(row, vertex): (&u32, &TetVertex)| match is_corner(leaf, vertex.position) {
+            _ if *row != NONE => VertexKind::Surface,
+            true => VertexKind::Corner,
+            false => VertexKind::Bound,
+        };
+        let kinds: Vec<VertexKind> = of_vertex.iter().zip(vertices).map(kind).collect();
         let used = of_vertex.iter().filter(|row| **row != NONE);
         let surface = bounds(used.map(|row| view.positions[*row as usize]));
         // So that no corner of a constrained face is one of the box.
@@ -150,7 +162,16 @@ impl LeafPlan {
             [0, 1, 2].map(|k| margin(surface[0][k], leaf.lower[k])),
             [0, 1, 2].map(|k| margin(leaf.upper[k], surface[1][k])),
         ];
-        Some(LeafPlan { tets, rows: of_vertex, seams, surface, margins })
+        let corners = (0..).zip(&kinds).filter(|(_, kind)| **kind == VertexKind::Corner).map(|(v, _)| v);
+        Some(LeafPlan {
+            corners: corners.collect(),
+            bound: BoundVertices::new(&kinds, &tets, vertices),
+            tets: Tetrahedra::new(&tets),
+            rows: of_vertex,
+            seams,
+            surface,
+            margins,
+        })
     }
 
     /// Moves the leaf and its vertices to new positions. Returns whether it is in use.
@@ -169,7 +190,8 @@ impl LeafPlan {
         let map = BoxMap::new(compiled.leaf, [lower, upper]);
         self.place_others(&map, compiled.vertices, vertices);
         (leaf.lower, leaf.upper) = (lower, upper);
-        all_positive(&self.tets, vertices)
+        let length = (0..3).map(|k| upper[k] - lower[k]).fold(0.0, f32::max);
+        self.tets.all_positive(vertices, length)
     }
 
     /// Moves the corners of constrained faces; returns their bounds.
@@ -194,23 +216,27 @@ impl LeafPlan {
         place((&self.rows, vertices))
     }
 
-    /// Moves the vertices of no constrained face.
+    /// Moves the vertices of no constrained face: with the box, and by what the surface moves beyond that.
     fn place_others(&self, map: &BoxMap, compiled: &[TetVertex], vertices: &mut [TetVertex]) {
-        let place = |((rows, compiled), vertices): ((&[u32], &[TetVertex]), &mut [TetVertex])| {
-            for ((row, compiled), vertex) in rows.iter().zip(compiled).zip(vertices) {
-                if *row == NONE {
-                    vertex.position = map.of(compiled.position);
-                }
-            }
-        };
-        #[cfg(feature = "rayon")]
-        if vertices.len() > TASK {
-            use rayon::iter::{IndexedParallelIterator, ParallelIterator};
-            use rayon::slice::{ParallelSlice, ParallelSliceMut};
-            let tasks = self.rows.par_chunks(TASK).zip(compiled.par_chunks(TASK));
-            return tasks.zip(vertices.par_chunks_mut(TASK)).for_each(place);
+        for corner in &self.corners {
+            vertices[*corner as usize].position = map.of_corner(compiled[*corner as usize].position);
         }
-        place(((&self.rows, compiled), vertices));
+        let surface: &[TetVertex] = vertices;
+        let moved = |vertex: u32| {
+            let from = map.of_inner(compiled[vertex as usize].position);
+            let to = surface[vertex as usize].position;
+            [0, 1, 2].map(|k| f64::from(to[k]) - from[k])
+        };
+        let placed = self.bound.map(moved, |vertex, by| {
+            let with_box = map.of_inner(compiled[vertex as usize].position);
+            [0, 1, 2].map(|k| {
+                let [lower, upper] = map.to.map(|end| end[k]);
+                ((with_box[k] + by[k]) as f32).clamp(lower, upper) + 0.0
+            })
+        });
+        for (vertex, at) in placed {
+            vertices[vertex as usize].position = at;
+        }
     }
 
     /// The box around a surface with given bounds; `None` if it leaves the range of `f32`.
@@ -240,30 +266,34 @@ struct BoxMap {
     to: Ends,
     /// Length of the new box relative to that of the compiled one.
     scale: [f64; 3],
+    /// Where 0 goes.
+    shift: [f64; 3],
 }
 
 impl BoxMap {
     fn new(compiled: &TetLeaf, to: Ends) -> BoxMap {
         let from = [compiled.lower, compiled.upper];
         let length = |ends: &Ends, k: usize| f64::from(ends[1][k]) - f64::from(ends[0][k]);
-        BoxMap { scale: [0, 1, 2].map(|k| length(&to, k) / length(&from, k)), from, to }
+        let scale = [0, 1, 2].map(|k| length(&to, k) / length(&from, k));
+        let shift = [0, 1, 2].map(|k| f64::from(to[0][k]) - f64::from(from[0][k]) * scale[k]);
+        BoxMap { from, to, scale, shift }
     }
 
-    /// Where a point of the compiled box goes: ends of the box to ends, and all others nowhere where the axis has the same ends.
-    fn of(&self, point: [f32; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|k| {
-            let ([from, from_end], [to, to_end]) = (self.from.map(|p| p[k]), self.to.map(|p| p[k]));
-            match point[k] {
-                x if [from, from_end] == [to, to_end] => x,
-                x if x == from => to,
-                x if x == from_end => to_end,
-                x => {
-                    let moved = f64::from(to) + (f64::from(x) - f64::from(from)) * self.scale[k];
-                    (moved as f32).clamp(to, to_end) + 0.0
-                }
-            }
-        })
+    /// Where a point goes; nowhere on an axis that has the same ends.
+    #[inline]
+    fn of_inner(&self, point: [f32; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|k| f64::from(point[k]) * self.scale[k] + self.shift[k])
     }
+
+    /// Where a corner of the box goes.
+    fn of_corner(&self, corner: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|k| self.to[usize::from(corner[k] != self.from[0][k])][k])
+    }
+}
+
+/// Whether a point is a corner of the box of a leaf.
+fn is_corner(leaf: &TetLeaf, point: [f32; 3]) -> bool {
+    (0..3).all(|k| point[k] == leaf.lower[k] || point[k] == leaf.upper[k])
 }
 
 const EMPTY: Ends = [[f32::MAX; 3], [-f32::MAX; 3]];

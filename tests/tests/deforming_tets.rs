@@ -1,0 +1,403 @@
+//! Tetrahedra under objects that deform: a tet leaf is in use exactly where no tetrahedron is turned over, and rays that start in it
+//! have the answers of the BVH, whatever the positions.
+
+use bth::rays::{Hit, PrimitiveRef, Ray};
+use bth::{Code, Hinted, Isa, Scene, SceneBuilder, Update};
+use bth_compile::Silent;
+use bth_compile::memory::{TriangleMesh, compile};
+use bth_compile::pipeline::{CompileOptions, Structure};
+use bth_format::layout::{NONE, RecordKind, TetLeaf};
+use bth_format::object::{ObjectView, Records};
+use bth_random::Rng;
+use bth_tests::oracle::{World, orientation};
+use bth_tests::rays::assorted;
+use bth_tests::structures::{bits, options};
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+type Positions = Vec<[f32; 3]>;
+type Triangles = Vec<[u32; 3]>;
+
+/// The choices of how to trace are those of the process.
+static CHOICE: Mutex<()> = Mutex::new(());
+
+const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+
+fn compiled(mesh: &(Positions, Triangles), structure: Structure, record: RecordKind) -> Vec<u8> {
+    let options =
+        CompileOptions { deformable: true, deformable_tets: true, ..options(structure, record, true) };
+    let mesh = TriangleMesh { positions: &mesh.0, triangles: &mesh.1 };
+    let (compiled, _) = compile(mesh, &options, &Silent).unwrap();
+    let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
+    bth_format::verify::verify(&file).unwrap_or_else(|e| panic!("{}", e[0]));
+    compiled.bytes
+}
+
+/// Closed surfaces, each beside the one before, in which every third triangle has vertices of its own at the places of others. Where
+/// `crossing`, a triangle crosses each of them, so that the whole cannot be tetrahedralized.
+fn mesh(triangles: u32, knots: u32, crossing: bool) -> (Positions, Triangles) {
+    let knot = bth_scenes::knot::torus_knot(triangles);
+    let (mut positions, mut rows) = (Positions::new(), Triangles::new());
+    for at in 0..knots {
+        let first = positions.len() as u32;
+        positions.extend(knot.positions.iter().map(|p| [p[0] + 8.0 * at as f32, p[1], p[2]]));
+        for (row, corners) in knot.triangles.iter().enumerate() {
+            let corners = corners.map(|v| first + v);
+            rows.push(match row % 3 {
+                0 => corners.map(|v| {
+                    positions.push(positions[v as usize]);
+                    positions.len() as u32 - 1
+                }),
+                _ => corners,
+            });
+        }
+        if crossing {
+            let p = positions[first as usize];
+            let last = positions.len() as u32;
+            positions.extend([p.map(|x| x - 0.5), p.map(|x| x + 0.5), [p[0] + 0.7, p[1], p[2] - 0.4]]);
+            rows.push([last, last + 1, last + 2]);
+        }
+    }
+    (positions, rows)
+}
+
+/// Deformations of many kinds; of small ones more than of large ones. Vertices at one place stay at one place but for the last kinds.
+fn deformed(rest: &[[f32; 3]], kind: usize, rng: &mut Rng) -> Positions {
+    let seed = rng.next();
+    let twist = (rng.unit_f32() * 2.0 - 1.0) * [0.003, 0.01, 1.0][kind / 7 % 3];
+    let noise_of = |p: &[f32; 3]| {
+        let place = p.iter().fold(seed, |hash, x| hash.rotate_left(17) ^ u64::from((x + 0.0).to_bits()));
+        let mut own = Rng::new(place);
+        [0; 3].map(|_| own.unit_f32() * 2.0 - 1.0)
+    };
+    let mut moved: Positions = rest.to_vec();
+    for p in &mut moved {
+        let ([x, y, z], noise) = (*p, noise_of(p));
+        *p = match kind {
+            0 => [x, y, z],
+            1 => [x * 2.0 + 3.0, y * 0.3 - 70.0, z * 1.7],
+            2 => [x * 1e-20, y * 1e-22, z * 1e-20],
+            3 => [x * 1e30, y * 1e31, z * 1e30],
+            4 => [-x, y, z],
+            5 => [x.abs(), y, z],
+            6 => [x, y, z].map(|x| x.round()),
+            7 | 14 | 21 => {
+                let (sin, cos) = (twist * y).sin_cos();
+                [x * cos - z * sin, y, x * sin + z * cos]
+            }
+            8 | 15 | 22 => {
+                let size = [1e-6, 1e-4, 0.1][kind / 7 - 1];
+                [0, 1, 2].map(|k| [x, y, z][k] + size * noise[k])
+            }
+            9 => [x, y, 0.0],
+            10 => [0.0; 3],
+            11 => noise.map(|x| 5.0 * x),
+            // Turned as a whole, about the middle: the box does not turn.
+            12 => [0.9998 * x - 0.02 * z, y, 0.02 * x + 0.9998 * z],
+            _ => [x, y, z],
+        };
+    }
+    match kind {
+        // One vertex of several at a place, or all of one triangle, by one unit in the last place.
+        13 => {
+            let last = moved.len() - 1;
+            moved[last][1] = moved[last][1].next_up();
+        }
+        16 => {
+            let at = rng.below(moved.len() as u64) as usize;
+            moved[at] = moved[at].map(|x| x + 0.01);
+        }
+        _ => {}
+    }
+    moved
+}
+
+const KINDS: usize = 23;
+
+/// The tet leaves that may be used, by an oracle: every tetrahedron, by the vertices that Tet32 stores, has the exact orientation that
+/// it has in the file; corners of faces are those of their triangles; the hull's vertices are the corners of the box, which holds all.
+fn usable(file: &ObjectView<'_>, view: &ObjectView<'_>) -> Vec<bool> {
+    let Records::Tet32(records) = file.records else { panic!("Tet32") };
+    let at = |view: &ObjectView<'_>, v: u32| view.tet_vertices[v as usize].position;
+    let is_usable = |leaf: &TetLeaf| {
+        let same_side = |row: u32| {
+            let record = records[row as usize];
+            let [a, b, c] = record.vertex;
+            let four = [a, b, c, record.xor ^ a ^ b ^ c];
+            let [before, now] = [file, view].map(|view| orientation(four.map(|v| at(view, v))));
+            before != Ordering::Equal && before == now
+        };
+        let is_of_triangle = |row: u32| {
+            let face = &view.tet_faces[row as usize];
+            let corners = view.triangles[face.triangle as usize].map(|v| view.positions[v as usize]);
+            let bits = |corners: [[f32; 3]; 3]| corners.map(|p| p.map(f32::to_bits));
+            bits(corners) == bits(face.vertex.map(|v| at(view, v)))
+        };
+        let is_corner = |v: u32| {
+            let p = at(view, v);
+            (0..3).all(|k| p[k] == leaf.lower[k] || p[k] == leaf.upper[k])
+        };
+        let is_inside = |v: u32| (0..3).all(|k| (leaf.lower[k]..=leaf.upper[k]).contains(&at(view, v)[k]));
+        let hull = leaf.first_hull..leaf.first_hull + leaf.hulls;
+        (leaf.first_face..leaf.first_face + leaf.faces).all(is_of_triangle)
+            && (leaf.first_tet..leaf.first_tet + leaf.tets).all(same_side)
+            && (leaf.first_vertex..leaf.first_vertex + leaf.vertices).all(is_inside)
+            && hull.flat_map(|row| view.hull_faces[row as usize].vertex).all(is_corner)
+    };
+    view.tet_leaves.iter().map(is_usable).collect()
+}
+
+/// The tet leaves that rays may start in, after checking that this is all of their triangles or none.
+fn in_use(file: &ObjectView<'_>, view: &ObjectView<'_>) -> Vec<bool> {
+    let of = |leaf: &TetLeaf| {
+        let rows = leaf.first_face..leaf.first_face + leaf.faces;
+        let faces: BTreeSet<bool> = rows
+            .map(|row| {
+                let triangle = view.tet_faces[row as usize].triangle as usize;
+                assert!([file.triangle_faces[triangle], NONE].contains(&view.triangle_faces[triangle]));
+                view.triangle_faces[triangle] == row
+            })
+            .collect();
+        assert_eq!(faces.len(), 1);
+        faces.contains(&true)
+    };
+    view.tet_leaves.iter().map(of).collect()
+}
+
+/// Rays of every kind, and rays that start on the surface, with the triangles on which they start or others.
+fn hinted_rays(scene: &Scene, rng: &mut Rng) -> (Vec<Ray>, Vec<PrimitiveRef>) {
+    let view = scene.object(0);
+    let corners: Vec<[[f32; 3]; 3]> =
+        view.triangles.iter().map(|t| t.map(|v| view.positions[v as usize])).collect();
+    let mut rays = assorted(&corners, 500, rng.next());
+    let count = corners.len() as u64;
+    let mut from: Vec<PrimitiveRef> = (0..rays.len())
+        .map(|_| PrimitiveRef { instance: 0, triangle: rng.below(count) as u32 })
+        .collect();
+    let size = (0..3).map(|k| view.header.upper[k] - view.header.lower[k]).fold(0.0, f32::max);
+    for i in 0..1500 {
+        let triangle = rng.below(count) as u32;
+        let [a, b, c] = corners[triangle as usize];
+        let (u, v) = (0.5 * rng.unit_f32(), 0.5 * rng.unit_f32());
+        let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
+        let direction = rng.point_in_ball().map(|x| x as f32 * size);
+        // Short rays of any hit and long ones of the nearest are those that walk.
+        let tmax = if i % 2 == 0 { f32::INFINITY } else { 0.05 };
+        rays.push(Ray { tmin: 1e-6, tmax, ..Ray::new(origin, direction) });
+        from.push(PrimitiveRef { instance: 0, triangle });
+    }
+    (rays, from)
+}
+
+/// Compares rays through the scene, which use tetrahedra wherever they can, with those through another without any; returns the hits.
+fn compare(scene: &Scene, plain: &Scene, rng: &mut Rng, isas: &[Isa]) -> usize {
+    let (rays, from) = hinted_rays(plain, rng);
+    let (mut expected, mut any) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+    plain.batch(&rays).nearest(&mut expected);
+    plain.batch(&rays).any(&mut any);
+    let chosen = Isa::chosen();
+    for isa in isas {
+        isa.choose().unwrap();
+        for hinted in [Hinted::Tets, Hinted::Bvh] {
+            hinted.choose();
+            let (mut hits, mut found) = (vec![Hit::MISS; rays.len()], vec![false; rays.len()]);
+            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
+            scene.batch(&rays).from(&from[..]).any(&mut found);
+            for (row, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
+                assert_eq!(bits(hit), bits(expected), "{isa}, {hinted:?}: {:?} from {:?}", rays[row], from[row]);
+            }
+            assert!(found == any, "{isa}, {hinted:?}");
+        }
+        for ((ray, from), hit) in rays.iter().zip(&from).zip(&expected).step_by(29) {
+            assert_eq!(bits(&scene.nearest_from(ray, *from).unwrap_or(Hit::MISS)), bits(hit));
+        }
+    }
+    chosen.choose().unwrap();
+    Hinted::default().choose();
+    let exact = World::new(scene);
+    for (ray, hit) in rays.iter().zip(&expected).step_by(97) {
+        assert_eq!(exact.hit(ray).t, hit.t, "{ray:?}");
+    }
+    expected.iter().filter(|hit| hit.is_hit()).count()
+}
+
+fn available() -> Vec<Isa> {
+    Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect()
+}
+
+fn used(update: &Update) -> (usize, usize) {
+    (update.tet_leaves_in_use, update.tet_leaves_aside)
+}
+
+/// Deforms a mesh in every way; returns how often a leaf was in use and how often not.
+fn check(mesh: &(Positions, Triangles), structure: Structure, seed: u64) -> (usize, usize) {
+    let _choice = CHOICE.lock();
+    let plain = compiled(mesh, Structure::Bvh, RecordKind::Link32);
+    let mut plain = bth::from_bytes(&plain).unwrap();
+    let mut scenes: Vec<Scene> = RecordKind::ALL
+        .map(|record| bth::from_bytes(&compiled(mesh, structure, record)).unwrap())
+        .into();
+    let file = bth::from_bytes(&compiled(mesh, structure, RecordKind::Tet32)).unwrap();
+    let file = file.object(0);
+    assert!(!file.tet_leaves.is_empty());
+    let rng = &mut Rng::new(seed);
+    let (mut in_all, mut aside, mut hits) = (0, 0, 0);
+    for kind in 0..KINDS {
+        let positions = deformed(&mesh.0, kind, rng);
+        plain.set_positions(0, &positions).unwrap();
+        let updates: Vec<Update> =
+            scenes.iter_mut().map(|scene| scene.set_positions(0, &positions).unwrap()).collect();
+        let expected = usable(&file, &scenes[1].object(0));
+        let count = expected.iter().filter(|usable| **usable).count();
+        for (record, (scene, update)) in scenes.iter().zip(&updates).enumerate() {
+            assert_eq!(in_use(&file, &scene.object(0)), expected, "kind {kind}, record {record}");
+            assert_eq!(used(update), (count, expected.len() - count), "kind {kind}");
+        }
+        in_all += count;
+        aside += expected.len() - count;
+        let isas = available();
+        for (record, scene) in scenes.iter().enumerate() {
+            // One record with all instruction sets, the others with the best one.
+            let isas = if record == kind % 4 { &isas[..] } else { &isas[isas.len() - 1..] };
+            hits += compare(scene, &plain, &mut Rng::new(seed + kind as u64), isas);
+        }
+        if kind == 0 {
+            assert_eq!(aside, 0, "the compiled positions");
+            let bytes = |view: &ObjectView<'_>| view.tet_vertices.iter().map(|v| v.position).collect::<Vec<_>>();
+            assert!(bytes(&scenes[1].object(0)) == bytes(&file), "have the compiled tetrahedra");
+        }
+    }
+    assert!(hits > 20_000, "{hits}");
+    (in_all, aside)
+}
+
+#[test]
+fn a_whole_tetrahedralization_is_used_where_no_tetrahedron_is_turned_over() {
+    if bth_tests::worker().is_some() {
+        let (in_use, aside) = check(&mesh(700, 1, false), Structure::Tets, 1);
+        assert!(in_use >= 6 && aside >= 6, "{in_use} in use, {aside} aside");
+    }
+}
+
+#[test]
+fn of_several_tet_leaves_some_are_used_and_others_not() {
+    if bth_tests::worker().is_some() {
+        let (in_use, aside) = check(&mesh(500, 3, true), Structure::Bth, 2);
+        assert!(in_use >= 18 && aside >= 18, "{in_use} in use, {aside} aside");
+    }
+}
+
+/// The positions of the file give its tetrahedra again, after any others, and the same ones with any number of threads and instruction
+/// set; a failed change leaves all as it was.
+#[test]
+fn tetrahedra_depend_on_the_positions_alone() {
+    if bth_tests::worker().is_none() {
+        return;
+    }
+    let _choice = CHOICE.lock();
+    let mesh = mesh(30_000, 2, true);
+    let file = compiled(&mesh, Structure::Bth, RecordKind::Link32);
+    let mut scene = bth::from_bytes(&file).unwrap();
+    let leaves = scene.object(0).tet_leaves.len();
+    assert!(leaves > 1);
+    type State = (Vec<[f32; 3]>, Vec<[[f32; 3]; 2]>, Vec<u32>);
+    let state = |scene: &Scene| -> State {
+        let view = scene.object(0);
+        let boxes = view.tet_leaves.iter().map(|leaf| [leaf.lower, leaf.upper]);
+        (view.tet_vertices.iter().map(|v| v.position).collect(), boxes.collect(), view.triangle_faces.to_vec())
+    };
+    let rest = state(&scene);
+    let rng = &mut Rng::new(4);
+    let chosen = Isa::chosen();
+    let mut numbers = BTreeSet::new();
+    for kind in [7, 22, 1, 8, 14] {
+        let positions = deformed(&mesh.0, kind, rng);
+        let mut expected: Option<(State, (usize, usize))> = None;
+        for isa in available() {
+            isa.choose().unwrap();
+            for threads in [1, 2] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let update = pool.install(|| scene.set_positions(0, &positions)).unwrap();
+                let found = (state(&scene), used(&update));
+                assert!(expected.get_or_insert_with(|| found.clone()) == &found, "{isa}, {threads} threads");
+            }
+            let update = scene.set_positions(0, &mesh.0).unwrap();
+            assert_eq!(used(&update), (leaves, 0));
+            assert!(state(&scene) == rest, "kind {kind}: the positions of the file");
+        }
+        numbers.insert(expected.unwrap().1.0);
+    }
+    chosen.choose().unwrap();
+    assert!(numbers.len() > 1, "{numbers:?}");
+
+    // A builder of two objects of the file, each with positions of its own, and a commit that fails.
+    let mut builder = SceneBuilder::new();
+    let objects = [builder.add(&scene), builder.add(&scene)];
+    for object in objects {
+        builder.instance(object, &IDENTITY).unwrap();
+    }
+    builder.commit().unwrap();
+    let small = deformed(&mesh.0, 8, rng);
+    builder.set_positions(objects[0], &small).unwrap();
+    builder.set_positions(objects[1], &deformed(&mesh.0, 4, rng)).unwrap();
+    assert_eq!(used(&builder.commit().unwrap()), (leaves, leaves));
+    scene.set_positions(0, &small).unwrap();
+    assert!(state(builder.scene()) == state(&scene));
+    let huge: Positions = mesh.0.iter().map(|_| [3e38, 0.0, 0.0]).collect();
+    builder.instance(objects[0], &IDENTITY.map(|x| x * 4.0)).unwrap();
+    builder.set_positions(objects[0], &huge).unwrap();
+    assert_eq!(builder.commit().unwrap_err().code(), Code::NotFinite);
+    assert!(state(builder.scene()) == state(&scene), "the commit changed nothing");
+    builder.set_positions_between(objects[0], [&mesh.0, &small], 0.5).unwrap();
+    assert_eq!(used(&builder.commit().unwrap()), (leaves, 0));
+}
+
+/// Instances of an object whose tetrahedra are in use, or stand aside, have the answers of those without any.
+#[test]
+fn instances_of_an_object_with_tetrahedra_have_the_answers_of_the_bvh() {
+    if bth_tests::worker().is_none() {
+        return;
+    }
+    let _choice = CHOICE.lock();
+    let mesh = mesh(700, 1, false);
+    let placed = |structure| {
+        let scene = bth::from_bytes(&compiled(&mesh, structure, RecordKind::Link32)).unwrap();
+        let mut builder = SceneBuilder::new();
+        let object = builder.add(&scene);
+        for at in 0..3 {
+            let mut transform = IDENTITY.map(|x| x * 0.5);
+            transform[3] = 0.9 * at as f32;
+            builder.instance(object, &transform).unwrap();
+        }
+        builder.commit().unwrap();
+        builder
+    };
+    let (mut tets, mut bvh) = (placed(Structure::Tets), placed(Structure::Bvh));
+    let rng = &mut Rng::new(6);
+    let mut numbers = BTreeSet::new();
+    for kind in [0, 7, 8, 22] {
+        let positions = deformed(&mesh.0, kind, rng);
+        for builder in [&mut tets, &mut bvh] {
+            builder.set_positions(0, &positions).unwrap();
+            numbers.insert(builder.commit().unwrap().tet_leaves_in_use);
+        }
+        let (rays, mut from) = hinted_rays(bvh.scene(), rng);
+        let half = |x: [f32; 3]| x.map(|x| 0.5 * x);
+        let rays: Vec<Ray> =
+            rays.iter().map(|ray| Ray { origin: half(ray.origin), direction: half(ray.direction), ..*ray }).collect();
+        from.iter_mut().enumerate().for_each(|(row, from)| from.instance = row as u32 / 5 % 3);
+        let [mut expected, mut hits] = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
+        bvh.scene().batch(&rays).nearest(&mut expected);
+        for isa in available() {
+            isa.choose().unwrap();
+            Hinted::Tets.choose();
+            tets.scene().batch(&rays).from(&from[..]).nearest(&mut hits);
+            assert!(hits.iter().zip(&expected).all(|(a, b)| bits(a) == bits(b)), "kind {kind}, {isa}");
+        }
+        Hinted::default().choose();
+        assert!(expected.iter().filter(|hit| hit.is_hit()).count() > 300);
+    }
+    Isa::best().choose().unwrap();
+    assert_eq!(numbers, BTreeSet::from([0, 1]));
+}

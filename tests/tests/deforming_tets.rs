@@ -401,3 +401,41 @@ fn instances_of_an_object_with_tetrahedra_have_the_answers_of_the_bvh() {
     Isa::best().choose().unwrap();
     assert_eq!(numbers, BTreeSet::from([0, 1]));
 }
+
+/// The conformance file: a leaf around a doubled vertex, and one whose surface touches its box, which is never in use.
+#[test]
+fn doubled_vertices_that_move_apart_and_surfaces_that_touch_the_box_set_a_leaf_aside() {
+    let _choice = CHOICE.lock();
+    for record in ["link32", "tet16"] {
+        let name = format!("deformable-tets-{record}");
+        let case = bth_tests::conformance::valid().into_iter().find(|case| case.name == name).unwrap();
+        let mut scene = bth::from_bytes(&case.bytes).unwrap();
+        let rest = scene.object(0).positions.to_vec();
+        let moved = |rows: &[usize], by: f32| {
+            let mut positions = rest.clone();
+            rows.iter().for_each(|row| positions[*row][2] += by);
+            positions
+        };
+        for (positions, in_use) in [
+            (rest.clone(), 1),
+            (moved(&[0, 4], 0.25), 1),
+            (moved(&[4], f32::EPSILON), 0),
+            (moved(&[0], 0.25), 0),
+            (moved(&[3], -3.0), 0),
+            (moved(&[1, 2], 0.125), 1),
+            (moved(&[8, 11], 0.125), 1),
+        ] {
+            let update = scene.set_positions(0, &positions).unwrap();
+            assert_eq!(used(&update), (in_use, 2 - in_use), "{positions:?}");
+            let (rays, from) = hinted_rays(&scene, &mut Rng::new(9));
+            let mut hits = vec![Hit::MISS; rays.len()];
+            Hinted::Tets.choose();
+            scene.batch(&rays).from(&from[..]).nearest(&mut hits);
+            Hinted::default().choose();
+            let exact = World::new(&scene);
+            for (ray, hit) in rays.iter().zip(&hits) {
+                assert_eq!(exact.hit(ray).t, hit.t, "{ray:?}");
+            }
+        }
+    }
+}

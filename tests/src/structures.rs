@@ -93,6 +93,29 @@ pub fn deformed(model: &Model, seed: u64) -> Traced {
     Traced { name: "deformed bvh".into(), scene }
 }
 
+/// The model as deformable objects with tetrahedra, which were compiled twice as long on one axis and four times on another, and then given
+/// the positions of the model: no tetrahedron of the surface's corners is turned over. None without the worker; a tetrahedralization of the
+/// whole model where `whole` is set.
+///
+/// # Panics
+/// If one does not compile or open.
+pub fn deformed_tets(model: &Model, whole: bool) -> Vec<Traced> {
+    if crate::worker().is_none() {
+        return Vec::new();
+    }
+    let positions = model.positions.iter().map(|[x, y, z]| [2.0 * x, 4.0 * y, *z]).collect();
+    let shape = Model { positions, triangles: model.triangles.clone() };
+    let structure = if whole { Structure::Tets } else { Structure::Bth };
+    let of = |record: RecordKind| {
+        let options =
+            CompileOptions { deformable: true, deformable_tets: true, ..options(structure, record, true) };
+        let mut scene = compiled(&shape, &options);
+        scene.set_positions(0, &model.positions).unwrap_or_else(|e| panic!("{e}"));
+        Traced { name: format!("deformed tets {}", record.name()), scene }
+    };
+    vec![of(RecordKind::Link32), of(RecordKind::Tet16)]
+}
+
 /// All bits of a hit.
 pub fn bits(hit: &bth::rays::Hit) -> [u32; 5] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.primitive.instance, hit.primitive.triangle]

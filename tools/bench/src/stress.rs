@@ -6,7 +6,7 @@ use crate::output::{Head, Record};
 use crate::progress::Progress;
 use anyhow::{Result, ensure};
 use bth_tests::stress::{Shape, Statistics, run as trace, shapes};
-use bth_tests::structures::{Traced, deformed, every_structure};
+use bth_tests::structures::{Traced, deformed, deformed_tets, every_structure};
 use serde_json::{Value, json};
 
 /// Rays of a shape in a round: a number of batches that the instruction sets divide.
@@ -34,6 +34,7 @@ pub fn run(arguments: &Stress) -> Result<()> {
         let model = shape.grid.model();
         let mut structures = every_structure(&model, shape.whole);
         structures.push(deformed(&model, arguments.seed));
+        structures.extend(deformed_tets(&model, shape.whole));
         structures.retain(|traced| traced.name.contains(&arguments.structure));
         ShapeRun { shape, structures, statistics: Statistics::default() }
     });
@@ -121,7 +122,7 @@ fn body(rows: &[Vec<String>]) -> String {
     format!(
         "Every ray goes through every structure (BVH; BTH with each record; where the shape has one, one \
          tetrahedralization with each record; a deformable object that was compiled in another shape and given these \
-         positions), as nearest and any hit, a part also with hints and alone: *traced* \
+         positions, and two with tetrahedra that were compiled longer), as nearest and any hit, a part also with hints and alone: *traced* \
          counts all of these. Each tenth of the rays is of a kind: exactly at vertices; at middles of edges; along \
          edges; in planes of faces; along axes with zeros of either sign; with directions of 2^±60 and 2^-149; with \
          ranges that end at, just before and just behind a vertex; from the surface; from inside; from anywhere. \

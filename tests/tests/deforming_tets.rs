@@ -172,9 +172,8 @@ fn hinted_rays(scene: &Scene, rng: &mut Rng) -> (Vec<Ray>, Vec<PrimitiveRef>) {
         view.triangles.iter().map(|t| t.map(|v| view.positions[v as usize])).collect();
     let mut rays = assorted(&corners, 500, rng.next());
     let count = corners.len() as u64;
-    let mut from: Vec<PrimitiveRef> = (0..rays.len())
-        .map(|_| PrimitiveRef { instance: 0, triangle: rng.below(count) as u32 })
-        .collect();
+    let mut from: Vec<PrimitiveRef> =
+        (0..rays.len()).map(|_| PrimitiveRef { instance: 0, triangle: rng.below(count) as u32 }).collect();
     let size = (0..3).map(|k| view.header.upper[k] - view.header.lower[k]).fold(0.0, f32::max);
     for i in 0..1500 {
         let triangle = rng.below(count) as u32;
@@ -205,7 +204,13 @@ fn compare(scene: &Scene, plain: &Scene, rng: &mut Rng, isas: &[Isa]) -> usize {
             scene.batch(&rays).from(&from[..]).nearest(&mut hits);
             scene.batch(&rays).from(&from[..]).any(&mut found);
             for (row, (hit, expected)) in hits.iter().zip(&expected).enumerate() {
-                assert_eq!(bits(hit), bits(expected), "{isa}, {hinted:?}: {:?} from {:?}", rays[row], from[row]);
+                assert_eq!(
+                    bits(hit),
+                    bits(expected),
+                    "{isa}, {hinted:?}: {:?} from {:?}",
+                    rays[row],
+                    from[row]
+                );
             }
             assert!(found == any, "{isa}, {hinted:?}");
         }
@@ -235,9 +240,8 @@ fn check(mesh: &(Positions, Triangles), structure: Structure, seed: u64) -> (usi
     let _choice = CHOICE.lock();
     let plain = compiled(mesh, Structure::Bvh, RecordKind::Link32);
     let mut plain = bth::from_bytes(&plain).unwrap();
-    let mut scenes: Vec<Scene> = RecordKind::ALL
-        .map(|record| bth::from_bytes(&compiled(mesh, structure, record)).unwrap())
-        .into();
+    let mut scenes: Vec<Scene> =
+        RecordKind::ALL.map(|record| bth::from_bytes(&compiled(mesh, structure, record)).unwrap()).into();
     let file = bth::from_bytes(&compiled(mesh, structure, RecordKind::Tet32)).unwrap();
     let file = file.object(0);
     assert!(!file.tet_leaves.is_empty());
@@ -264,7 +268,8 @@ fn check(mesh: &(Positions, Triangles), structure: Structure, seed: u64) -> (usi
         }
         if kind == 0 {
             assert_eq!(aside, 0, "the compiled positions");
-            let bytes = |view: &ObjectView<'_>| view.tet_vertices.iter().map(|v| v.position).collect::<Vec<_>>();
+            let bytes =
+                |view: &ObjectView<'_>| view.tet_vertices.iter().map(|v| v.position).collect::<Vec<_>>();
             assert!(bytes(&scenes[1].object(0)) == bytes(&file), "have the compiled tetrahedra");
         }
     }
@@ -305,7 +310,11 @@ fn tetrahedra_depend_on_the_positions_alone() {
     let state = |scene: &Scene| -> State {
         let view = scene.object(0);
         let boxes = view.tet_leaves.iter().map(|leaf| [leaf.lower, leaf.upper]);
-        (view.tet_vertices.iter().map(|v| v.position).collect(), boxes.collect(), view.triangle_faces.to_vec())
+        (
+            view.tet_vertices.iter().map(|v| v.position).collect(),
+            boxes.collect(),
+            view.triangle_faces.to_vec(),
+        )
     };
     let rest = state(&scene);
     let rng = &mut Rng::new(4);
@@ -384,8 +393,10 @@ fn instances_of_an_object_with_tetrahedra_have_the_answers_of_the_bvh() {
         }
         let (rays, mut from) = hinted_rays(bvh.scene(), rng);
         let half = |x: [f32; 3]| x.map(|x| 0.5 * x);
-        let rays: Vec<Ray> =
-            rays.iter().map(|ray| Ray { origin: half(ray.origin), direction: half(ray.direction), ..*ray }).collect();
+        let rays: Vec<Ray> = rays
+            .iter()
+            .map(|ray| Ray { origin: half(ray.origin), direction: half(ray.direction), ..*ray })
+            .collect();
         from.iter_mut().enumerate().for_each(|(row, from)| from.instance = row as u32 / 5 % 3);
         let [mut expected, mut hits] = [vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]];
         bvh.scene().batch(&rays).nearest(&mut expected);

@@ -39,7 +39,9 @@ enum Layout {
 
 pub(super) fn valid() -> Vec<Case> {
     [RecordKind::Link32, RecordKind::Tet16]
-        .map(|record| Case::new(&format!("deformable-tets-{}", record.name()), object(record, Layout::InPlace)))
+        .map(|record| {
+            Case::new(&format!("deformable-tets-{}", record.name()), object(record, Layout::InPlace))
+        })
         .into()
 }
 
@@ -113,9 +115,8 @@ fn object(record: RecordKind, layout: Layout) -> Vec<u8> {
     };
     let alone_at =
         |row| -> Block { (lines(indexed(&alone, row).as_bytes()), vec![2], vec![rows(&[5, 6, 7])]) };
-    let second = || -> Block {
-        (lines(indexed(&second, 3).as_bytes()), vec![3, 4], vec![rows(&[8, 9, 11, 10])])
-    };
+    let second =
+        || -> Block { (lines(indexed(&second, 3).as_bytes()), vec![3, 4], vec![rows(&[8, 9, 11, 10])]) };
     let mut blocks = if in_place { vec![raw_at(0), alone_at(2)] } else { vec![alone_at(0), raw_at(1)] };
     match layout {
         Layout::Pruned => tets.leaves[1].subtree = NONE,

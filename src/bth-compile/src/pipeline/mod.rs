@@ -164,10 +164,12 @@ fn tet_leaves(
     monitor: &dyn Monitor,
 ) -> Result<(Vec<tets::Leaf>, TetReports)> {
     let tree = &traced.tree;
-    let welded = if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
+    let welded =
+        if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
     let mesh: &Mesh = &welded;
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
-    let (mut marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
+    let (mut marks, marks_report) =
+        clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
     if options.deformable {
         let flat = deformable::exclude_flat(mesh, tree, &mut marks);
         select::check_flat(source, flat, options)?;

@@ -81,7 +81,8 @@ pub(super) fn check_built(
 /// Fails where the whole model has to be tetrahedralized and has triangles without area.
 pub(super) fn check_flat(source: &Path, flat: u64, options: &CompileOptions) -> Result<()> {
     if options.structure == Structure::Tets && flat > 0 {
-        let message = format!("the model cannot be tetrahedralized whole: {flat} of its triangles have no area");
+        let message =
+            format!("the model cannot be tetrahedralized whole: {flat} of its triangles have no area");
         return Err(unusable(source, message, "leave these out of the model, or use --structure bth"));
     }
     Ok(())

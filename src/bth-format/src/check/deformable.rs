@@ -31,7 +31,8 @@ fn prerequisites(view: &ObjectView, features: u64) -> Result<()> {
     } else {
         return Ok(());
     };
-    let expected = "POSITIONS and TRIANGLES beside LEAF_VERTICES, f32, subtrees of tet leaves, no dropped triangle";
+    let expected =
+        "POSITIONS and TRIANGLES beside LEAF_VERTICES, f32, subtrees of tet leaves, no dropped triangle";
     Err(Error::within(Code::Deformable, kind::LEAF_VERTICES, 0, expected, found))
 }
 

@@ -28,7 +28,8 @@ pub fn filling_tets(view: &ObjectView, row: u32) -> Option<Vec<[u32; 4]>> {
     let faces = view.tet_faces.get(first..first + leaf.faces as usize)?;
     let position = |vertex: u32| view.tet_vertices[vertex as usize].position;
     let is_of_source = |face: &TetFace| {
-        let source = view.triangles.get(face.triangle as usize).map(|t| t.map(|v| view.positions[v as usize]));
+        let source =
+            view.triangles.get(face.triangle as usize).map(|t| t.map(|v| view.positions[v as usize]));
         let bits = |corners: [[f32; 3]; 3]| corners.map(|p| p.map(f32::to_bits));
         source.is_some_and(|source| bits(source) == bits(face.vertex.map(position)))
     };

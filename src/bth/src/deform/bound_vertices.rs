@@ -45,11 +45,13 @@ impl BoundVertices {
     /// Binds the vertices of [`VertexKind::Bound`] of a leaf with given tetrahedra.
     pub(super) fn new(kinds: &[VertexKind], tets: &[[u32; 4]], vertices: &[TetVertex]) -> BoundVertices {
         let neighbours = Neighbours::new(kinds, tets);
-        let mut search = Search { kinds, vertices, neighbours: &neighbours, seen: vec![0; kinds.len()], round: 0 };
+        let mut search =
+            Search { kinds, vertices, neighbours: &neighbours, seen: vec![0; kinds.len()], round: 0 };
         let mut bound = BoundVertices::default();
         for vertex in (0..kinds.len() as u32).filter(|v| kinds[*v as usize] == VertexKind::Bound) {
             let near = search.near(vertex);
-            let weights = weights(point(vertices, vertex), near.iter().map(|v| point(vertices, *v)).collect());
+            let weights =
+                weights(point(vertices, vertex), near.iter().map(|v| point(vertices, *v)).collect());
             let terms = near.iter().zip(weights).map(|(v, weight)| (*v, weight));
             bound.terms.extend(terms.filter(|(v, _)| kinds[*v as usize] == VertexKind::Surface));
             bound.rows.push((vertex, bound.terms.len() as u32));
@@ -185,8 +187,11 @@ fn weights(x: [f64; 3], points: Vec<[f64; 3]>) -> Vec<f64> {
         }
     }
     let Some(solution) = first_column_of_inverse(moments) else { return near };
-    let fitted: Vec<f64> =
-        rows.iter().zip(&near).map(|(row, w)| w * (0..4).map(|k| solution[k] * row[k]).sum::<f64>()).collect();
+    let fitted: Vec<f64> = rows
+        .iter()
+        .zip(&near)
+        .map(|(row, w)| w * (0..4).map(|k| solution[k] * row[k]).sum::<f64>())
+        .collect();
     let is_usable = fitted.iter().map(|w| w.abs()).sum::<f64>() <= LARGEST_SUM;
     if is_usable { fitted } else { near }
 }

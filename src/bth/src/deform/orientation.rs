@@ -139,7 +139,8 @@ mod tests {
             let length = vertices.iter().flat_map(|v| v.position).fold(0.0, f32::max);
             let blocks = Tetrahedra::new(&tets);
             for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-                let kernel = Positive { blocks: &blocks.blocks, vertices: &vertices, least: (length + 1.0) * 2e-44 };
+                let kernel =
+                    Positive { blocks: &blocks.blocks, vertices: &vertices, least: (length + 1.0) * 2e-44 };
                 assert_eq!(isa.run(kernel), expected, "round {round}, {isa:?}");
             }
             assert_eq!(blocks.all_positive(&vertices, length), expected);
@@ -151,9 +152,10 @@ mod tests {
 
     #[test]
     fn every_tetrahedron_counts() {
-        let vertices: Vec<TetVertex> = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]]
-            .map(|position| TetVertex { position, reserved: 0 })
-            .into();
+        let vertices: Vec<TetVertex> =
+            [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]]
+                .map(|position| TetVertex { position, reserved: 0 })
+                .into();
         for count in 1..70 {
             let tets = vec![[0, 1, 2, 3]; count];
             assert!(Tetrahedra::new(&tets).all_positive(&vertices, 1.0));
@@ -161,7 +163,10 @@ mod tests {
                 for wrong in [[1, 0, 2, 3], [0, 1, 2, 4]] {
                     let mut tets = tets.clone();
                     tets[at] = wrong;
-                    assert!(!Tetrahedra::new(&tets).all_positive(&vertices, 1.0), "{wrong:?} at {at} of {count}");
+                    assert!(
+                        !Tetrahedra::new(&tets).all_positive(&vertices, 1.0),
+                        "{wrong:?} at {at} of {count}"
+                    );
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! What the fuzz targets share.
 
 use bth::rays::{Hit, PrimitiveRef, Ray};
-use bth::{Isa, Scene};
+use bth::{Hinted, Isa, Scene};
 use bth_compile::Silent;
 use bth_import::gltf::Chosen;
 use bth_import::gltf::scene::{self, ImportOptions};
@@ -26,6 +26,7 @@ pub fn open_and_trace(bytes: &[u8]) {
     let mut rng = seeded_by(bytes);
     let available: Vec<Isa> = Isa::ALL.into_iter().filter(|isa| isa.is_available()).collect();
     available[rng.below(available.len() as u64) as usize].choose().expect("it is available");
+    if rng.below(2) == 0 { Hinted::Tets } else { Hinted::default() }.choose();
     trace(&scene, &mut rng);
     if scene.description().is_some() {
         for seconds in [0.3, -1.0, 1.5, 1e300, f64::NAN] {
@@ -36,11 +37,16 @@ pub fn open_and_trace(bytes: &[u8]) {
     }
     for object in 0..scene.object_count() {
         let Some(count) = scene.vertex_count(object) else { continue };
+        // Scaled along axes, tetrahedra stay as they are, and any others turn some over.
+        let scaled = scene.positions(object).iter().map(|[x, y, z]| [1.5 * x, y + 3.0, 0.5 * z]).collect();
         let mut number = || (rng.below(1 << 20) as f32 / (1u32 << 19) as f32 - 1.0) * 1e3;
-        let positions: Vec<[f32; 3]> = (0..count).map(|_| [number(), number(), number()]).collect();
-        if scene.set_positions(object, &positions).is_ok() {
-            assert_eq!(scene.positions(object), positions);
-            trace(&scene, &mut rng);
+        let positions = (0..count).map(|_| [number(), number(), number()]).collect();
+        for positions in [scaled, positions] {
+            let positions: Vec<[f32; 3]> = positions;
+            if scene.set_positions(object, &positions).is_ok() {
+                assert_eq!(scene.positions(object), positions);
+                trace(&scene, &mut rng);
+            }
         }
     }
 }

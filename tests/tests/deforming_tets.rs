@@ -34,6 +34,14 @@ fn compiled(mesh: &(Positions, Triangles), structure: Structure, record: RecordK
     compiled.bytes
 }
 
+/// Adds triangles without area, which other positions may give one.
+fn with_flat(mut mesh: (Positions, Triangles)) -> (Positions, Triangles) {
+    let first = mesh.0.len() as u32;
+    mesh.0.extend([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    mesh.1.extend([[first, first + 1, first + 2], [0, 0, 1]]);
+    mesh
+}
+
 /// Closed surfaces, each beside the one before, in which every third triangle has vertices of its own at the places of others. Where
 /// `crossing`, a triangle crosses each of them, so that the whole cannot be tetrahedralized.
 fn mesh(triangles: u32, knots: u32, crossing: bool) -> (Positions, Triangles) {
@@ -288,7 +296,7 @@ fn a_whole_tetrahedralization_is_used_where_no_tetrahedron_is_turned_over() {
 #[test]
 fn of_several_tet_leaves_some_are_used_and_others_not() {
     if bth_tests::worker().is_some() {
-        let (in_use, aside) = check(&mesh(500, 3, true), Structure::Bth, 2);
+        let (in_use, aside) = check(&with_flat(mesh(500, 3, true)), Structure::Bth, 2);
         assert!(in_use >= 18 && aside >= 18, "{in_use} in use, {aside} aside");
     }
 }

@@ -5,6 +5,7 @@ use super::triangle_contact::{Triangle, in_bad_contact};
 use crate::bvh::{BinaryBvh, Node};
 use crate::error::Result;
 use crate::monitor::Monitor;
+use bth_format::exact::is_zero_area;
 use bth_import::Mesh;
 use rayon::prelude::*;
 
@@ -43,6 +44,11 @@ pub(super) enum After {
 }
 
 impl<'a> Gathered<'a> {
+    /// Whether a triangle has zero area, given its row of the BVH's order.
+    pub(super) fn is_flat(&self, row: u32) -> bool {
+        is_zero_area(self.triangles[row as usize].corners)
+    }
+
     pub(super) fn new(mesh: &Mesh, bvh: &'a BinaryBvh) -> Self {
         let triangles = bvh
             .order

@@ -45,7 +45,7 @@ pub struct Coverage {
 }
 
 /// Marks the nodes whose triangles are free of bad contacts, children before parents. A node is suitable when both children
-/// are and no triangle of one is in bad contact with one of the other.
+/// are and no triangle of one is in bad contact with one of the other; a triangle of zero area, as deformable objects may have, is not.
 ///
 /// # Errors
 /// Only [`crate::Error::Cancelled`].
@@ -153,7 +153,7 @@ fn mark_inner(
 ) -> Result<(bool, Contacts)> {
     let node = &gathered.bvh.nodes[i as usize];
     if node.is_leaf() {
-        return Ok((true, Contacts::default()));
+        return Ok((!gathered.is_flat(node.first), Contacts::default()));
     }
     let (left, right) = (i + 1, node.right);
     if !suitable(left) || !suitable(right) {

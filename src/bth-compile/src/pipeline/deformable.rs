@@ -4,7 +4,6 @@
 //! no faces without area; where such vertices move apart at run time, the BVH beside it answers.
 
 use crate::bvh::BinaryBvh;
-use crate::marks::Marks;
 use bth_format::exact::is_zero_area;
 use bth_import::Mesh;
 use std::borrow::Cow;
@@ -29,20 +28,9 @@ pub(super) fn welded(mesh: &Mesh) -> Cow<'_, Mesh> {
     Cow::Owned(Mesh { positions, triangles, ..Mesh::default() })
 }
 
-/// Marks all nodes as not suitable that hold a triangle without area. Returns the number of these triangles.
-pub(super) fn exclude_flat(mesh: &Mesh, tree: &BinaryBvh, marks: &mut Marks) -> u64 {
-    let mut count = 0;
-    // Nodes come before those below them.
-    for (at, node) in tree.nodes.iter().enumerate().rev() {
-        if node.is_leaf() {
-            let is_flat = is_zero_area(mesh.corners(tree.order[node.first as usize]));
-            marks.suitable[at] &= !is_flat;
-            count += u64::from(is_flat);
-        } else {
-            marks.suitable[at] &= marks.suitable[at + 1] && marks.suitable[node.right as usize];
-        }
-    }
-    count
+/// The number of triangles without area in a tree. No node with one is marked as suitable.
+pub(super) fn flat_triangles(mesh: &Mesh, tree: &BinaryBvh) -> usize {
+    tree.order.iter().filter(|id| is_zero_area(mesh.corners(**id))).count()
 }
 
 #[cfg(test)]
@@ -75,19 +63,19 @@ mod tests {
     }
 
     #[test]
-    fn nodes_with_a_flat_triangle_are_not_suitable_and_all_others_as_they_were() {
+    fn nodes_with_a_flat_triangle_are_not_suitable() {
         let mut mesh = welded(&squares(30)).into_owned();
-        mesh.triangles.extend([[0, 1, 1], [4, 4, 4]]);
         let options = BvhOptions { keep_zero_area: true, ..BvhOptions::default() };
-        let (tree, _) = build(&mesh, &options, &Silent).unwrap();
-        let (mut marks, _) = mark(&mesh, &tree, &Silent).unwrap();
-        let before = marks.clone();
-        assert_eq!(exclude_flat(&mesh, &tree, &mut marks), 2);
+        let tree = |mesh: &Mesh| build(mesh, &options, &Silent).unwrap().0;
+        assert_eq!(flat_triangles(&mesh, &tree(&mesh)), 0);
+        assert!(mark(&mesh, &tree(&mesh), &Silent).unwrap().0.suitable.iter().all(|suitable| *suitable));
+        mesh.triangles.extend([[0, 1, 1], [4, 4, 4]]);
+        let tree = tree(&mesh);
+        assert_eq!(flat_triangles(&mesh, &tree), 2);
+        let marks = mark(&mesh, &tree, &Silent).unwrap().0;
         for (at, node) in tree.nodes.iter().enumerate() {
             let ids = &tree.order[node.first as usize..][..node.count as usize];
-            let expected = before.suitable[at] && ids.iter().all(|id| *id < 60);
-            assert_eq!(marks.suitable[at], expected, "node {at}");
+            assert_eq!(marks.suitable[at], ids.iter().all(|id| *id < 60), "node {at}");
         }
-        assert!(marks.suitable.iter().any(|suitable| *suitable));
     }
 }

@@ -168,11 +168,9 @@ fn tet_leaves(
         if options.deformable { deformable::welded(&traced.mesh) } else { Cow::Borrowed(&traced.mesh) };
     let mesh: &Mesh = &welded;
     let bvh_options = bvh::BvhOptions { keep_zero_area: options.deformable, ..options.bvh };
-    let (mut marks, marks_report) =
-        clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
+    let (marks, marks_report) = clock.time("marks", || stages.marks(mesh, tree, &bvh_options, monitor))?;
     if options.deformable {
-        let flat = deformable::exclude_flat(mesh, tree, &mut marks);
-        select::check_flat(source, flat, options)?;
+        select::check_flat(source, deformable::flat_triangles(mesh, tree), options)?;
     }
     let (choice, costs) =
         clock.time("costs", || select::choose(source, (traced, mesh), &marks, options, monitor))?;

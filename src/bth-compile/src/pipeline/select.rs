@@ -79,7 +79,7 @@ pub(super) fn check_built(
 }
 
 /// Fails where the whole model has to be tetrahedralized and has triangles without area.
-pub(super) fn check_flat(source: &Path, flat: u64, options: &CompileOptions) -> Result<()> {
+pub(super) fn check_flat(source: &Path, flat: usize, options: &CompileOptions) -> Result<()> {
     if options.structure == Structure::Tets && flat > 0 {
         let message =
             format!("the model cannot be tetrahedralized whole: {flat} of its triangles have no area");

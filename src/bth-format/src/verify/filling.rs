@@ -1,7 +1,6 @@
 //! The tetrahedra of a tet leaf of which it is certain that they fill its box, for objects whose vertices move.
 
 use super::tet_leaf;
-use crate::check::TetAdjacency;
 use crate::exact::side;
 use crate::layout::*;
 use crate::object::ObjectView;
@@ -33,13 +32,10 @@ pub fn filling_tets(view: &ObjectView, row: u32) -> Option<Vec<[u32; 4]>> {
         let bits = |corners: [[f32; 3]; 3]| corners.map(|p| p.map(f32::to_bits));
         source.is_some_and(|source| bits(source) == bits(face.vertex.map(position)))
     };
-    if tet_leaf::check(view, row as usize, leaf).is_err() || !faces.iter().all(is_of_source) {
+    if !hull_is_box(view, leaf) || !faces.iter().all(is_of_source) {
         return None;
     }
-    if !hull_is_box(view, leaf) {
-        return None;
-    }
-    let adjacency = TetAdjacency::derive(view, leaf).ok()?;
+    let adjacency = tet_leaf::check(view, row as usize, leaf).ok()?;
     let positive = |tet: u32| {
         let [a, b, c, d] = adjacency.vertices(tet);
         match side(position(a), position(b), position(c), position(d)) {

@@ -8,12 +8,14 @@ use crate::layout::*;
 use crate::object::ObjectView;
 use std::cmp::Ordering;
 
-/// Checks BTH-F205 and BTH-F206 of the tet leaf of a row, whose indices have been checked.
-pub(super) fn check(view: &ObjectView, row: usize, leaf: &TetLeaf) -> Result<()> {
+/// Checks BTH-F205 and BTH-F206 of the tet leaf of a row, whose indices have been checked. Returns the vertices of its tetrahedra.
+pub(super) fn check<'a>(view: &'a ObjectView<'a>, row: usize, leaf: &TetLeaf) -> Result<TetAdjacency<'a>> {
     check_box(view, row, leaf)?;
-    check_tetrahedra(view, leaf)?;
+    let adjacency = TetAdjacency::derive(view, leaf)?;
+    check_tetrahedra(view, leaf, &adjacency)?;
     check_constrained_faces(view, leaf)?;
-    check_hull_faces(view, leaf)
+    check_hull_faces(view, leaf)?;
+    Ok(adjacency)
 }
 
 fn point(view: &ObjectView, vertex: u32) -> [f32; 3] {
@@ -41,8 +43,7 @@ fn check_box(view: &ObjectView, row: usize, leaf: &TetLeaf) -> Result<()> {
 }
 
 /// BTH-F206: tetrahedra have volume, and neighbours lie on either side of their common face.
-fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf) -> Result<()> {
-    let adjacency = TetAdjacency::derive(view, leaf)?;
+fn check_tetrahedra(view: &ObjectView, leaf: &TetLeaf, adjacency: &TetAdjacency<'_>) -> Result<()> {
     let rows = leaf.first_tet..leaf.first_tet + leaf.tets;
     let stride = RecordKind::from_code(view.header.record).map_or(0, RecordKind::stride) as u64;
     // One exact sign per tetrahedron, of its vertices in ascending order. On which side of a face the opposite vertex lies

@@ -24,7 +24,8 @@ impl Scene {
     /// of the scene's own; the file is not touched, and other scenes with the same file are not either. All queries of this scene
     /// then answer for the new positions, as exactly as before. Triangles of zero area are not hit and are no part of the
     /// surface, as in a file that is compiled with these positions. The tree remains that of the pose that was compiled:
-    /// [`Update::deformed_cost_ratio`] tells how much worse it is for the new one.
+    /// [`Update::deformed_cost_ratio`] tells how much worse it is for the new one. Tet leaves move with their triangles and are in use as long
+    /// as no tetrahedron is turned over or flat: [`Update::tet_leaves_in_use`].
     ///
     /// # Errors
     /// `BTH-O003` if there is no such object, `BTH-S006` if it was not compiled with `--deformable`, `BTH-S007` if the number of

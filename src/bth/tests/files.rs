@@ -9,8 +9,10 @@ macro_rules! files {
     };
 }
 
-const VALID: [(&str, &[u8]); 26] = files![
+const VALID: [(&str, &[u8]); 28] = files![
     "deformable",
+    "deformable-tets-link32",
+    "deformable-tets-tet16",
     "deformers",
     "free-directions",
     "grid-16",
@@ -195,4 +197,25 @@ fn new_positions_move_what_is_hit() {
     assert_eq!(scene.nearest(&Ray::new([1.0, 0.5, 9.0], [0.0, 0.0, -1.0])).unwrap().primitive.triangle, 1);
     assert_eq!(scene.closest([2.0, 0.5, 0.0], 9.0).map(|found| found.primitive.triangle), Some(1));
     assert!(scene.nearest(&Ray::new([1.5, 0.5, 9.0], [0.0, 0.0, -1.0])).is_none());
+}
+
+#[test]
+fn tetrahedra_move_with_the_surface_or_stand_aside() {
+    for name in ["deformable-tets-link32", "deformable-tets-tet16"] {
+        let (_, bytes) = VALID.into_iter().find(|(valid, _)| *valid == name).unwrap();
+        let mut scene = bth::from_bytes(bytes).unwrap();
+        let rest = scene.object(0).positions.to_vec();
+        for (z, in_use) in [(0.0, 1), (0.5, 1), (-6.0, 0)] {
+            // One vertex of the surface: a little, and so far that a tetrahedron is turned over.
+            let moved = |(row, p): (usize, &[f32; 3])| [p[0], p[1], p[2] + if row == 3 { z } else { 0.0 }];
+            let moved: Vec<_> = rest.iter().enumerate().map(moved).collect();
+            let update = scene.set_positions(0, &moved).unwrap();
+            assert_eq!(
+                (update.tet_leaves_in_use, update.tet_leaves_aside),
+                (in_use, 2 - in_use),
+                "{name}, {z}"
+            );
+            trace(&scene);
+        }
+    }
 }

@@ -7,7 +7,7 @@ use bth::rays::Ray;
 use bth::{Code, Isa, Scene, SceneBuilder};
 use bth_compile::Silent;
 use bth_compile::memory::{TriangleMesh, compile};
-use bth_compile::pipeline::CompileOptions;
+use bth_compile::pipeline::{CompileOptions, Structure};
 use bth_random::Rng;
 use bth_tests::oracle::World;
 
@@ -297,7 +297,8 @@ fn instances_follow_objects_that_deform_and_a_failed_commit_changes_nothing() {
 #[test]
 fn options_that_exclude_each_other_are_an_error() {
     let (positions, triangles) = mesh(600);
-    let tets = CompileOptions { structure: bth_compile::pipeline::Structure::Tets, ..deformable() };
+    let whole = CompileOptions { structure: Structure::Tets, ..deformable() };
+    let tets = CompileOptions { keep_subtrees: false, ..whole.clone() };
     let no_geometry = CompileOptions { geometry: false, ..deformable() };
     let mut boxes = deformable();
     boxes.coordinates.boxes = bth_compile::coordinates::Boxes::Bytes;
@@ -308,7 +309,13 @@ fn options_that_exclude_each_other_are_an_error() {
         let error = compile(mesh, &options, &Silent).unwrap_err().to_string();
         assert!(error.contains("BTH-L033"), "{error}");
     }
+    // Triangles without area, which the mesh has, are no faces of tetrahedra.
+    let mesh = TriangleMesh { positions: &positions, triangles: &triangles };
+    let error = compile(mesh, &whole, &Silent).unwrap_err().to_string();
+    assert!(error.contains("BTH-I080") && error.contains("3 of its triangles have no area"), "{error}");
     // Tetrahedralizations are left out where they would be a choice.
     let default = CompileOptions { structure: Default::default(), ..deformable() };
-    assert!(bytes(&positions, &triangles, &default) != bytes(&positions, &triangles, &options()));
+    let file = bytes(&positions, &triangles, &default);
+    assert!(file != bytes(&positions, &triangles, &options()));
+    assert!(bth::from_bytes(&file).unwrap().object(0).tet_leaves.is_empty());
 }

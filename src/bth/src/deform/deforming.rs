@@ -129,7 +129,10 @@ impl Deforming {
         let (positions, normals) = (&mut self.staged, &mut self.staged_normals);
         let refitted = self.object.refit(positions, normals, |mut parts| {
             let ends = refit(plan, &mut parts);
-            let tet_use = tet_plan.refit(&mut parts.tets, parts.positions);
+            let tet_use = match SMALL {
+                true => TetUse::default(),
+                false => tet_plan.refit(&mut parts.tets, parts.positions),
+            };
             (ends, (cost(&parts.lines[..plan.node_lines as usize]), tet_use))
         });
         (self.cost, self.tet_use) = refitted.unwrap_or((self.cost, self.tet_use));

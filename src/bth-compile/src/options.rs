@@ -102,13 +102,15 @@ impl CompileOptions {
         }
     }
 
-    /// The options of an object whose vertices move: a BVH over coordinates that stay as they are, which keeps the source's
-    /// positions and triangles.
+    /// The options of an object whose vertices move by themselves: a BVH over coordinates that stay as they are, which keeps the
+    /// source's positions and triangles. Tetrahedra are made only where they are asked for of deformable objects.
     pub fn of_deforming(&self) -> Self {
+        let structure = if self.deformable { self.built_structure() } else { Structure::Bvh };
         Self {
-            structure: Structure::Bvh,
+            structure,
             deformable: true,
-            deformable_tets: false,
+            deformable_tets: structure == Structure::Bth,
+            keep_subtrees: true,
             coordinates: coordinates::CoordinateOptions::default(),
             geometry: true,
             free: free::FreeOptions::default(),

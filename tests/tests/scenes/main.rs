@@ -7,6 +7,7 @@ mod deformers;
 mod flattened;
 mod import;
 mod motion;
+mod moving_tets;
 mod poses;
 mod rigid_parts;
 mod sequences;

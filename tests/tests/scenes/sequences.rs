@@ -11,10 +11,10 @@ use bth_random::Rng;
 use serde_json::json;
 use std::path::Path;
 
-type Positions = Vec<[f32; 3]>;
+pub(crate) type Positions = Vec<[f32; 3]>;
 
 /// A knot that is twisted about the y axis, the more the later, by up to `turns` from end to end.
-fn frames(count: usize, turns: f32) -> (Vec<Positions>, Vec<[u32; 3]>) {
+pub(crate) fn frames(count: usize, turns: f32) -> (Vec<Positions>, Vec<[u32; 3]>) {
     let knot = bth_scenes::knot::torus_knot(1200);
     let frame = |frame: usize| {
         let angle = std::f32::consts::TAU * turns * frame as f32 / (count - 1).max(1) as f32;
@@ -28,7 +28,7 @@ fn frames(count: usize, turns: f32) -> (Vec<Positions>, Vec<[u32; 3]>) {
 }
 
 /// Small squares on a grid of `side` times `side` places, which exchange their places between the second and the third of four frames.
-fn exchanging(side: usize) -> (Vec<Positions>, Vec<[u32; 3]>) {
+pub(crate) fn exchanging(side: usize) -> (Vec<Positions>, Vec<[u32; 3]>) {
     let count = side * side;
     let place = |number: usize| [(number % side) as f32, 0.0, (number / side) as f32];
     let frame = |stride: usize| -> Positions {
@@ -69,7 +69,7 @@ fn pc2(frames: &[Positions]) -> Vec<u8> {
 }
 
 /// A folder with the frames as numbered OBJ files and as a PC2 file of the first one.
-fn folder(frames: &[Positions], triangles: &[[u32; 3]]) -> tempfile::TempDir {
+pub(crate) fn folder(frames: &[Positions], triangles: &[[u32; 3]]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (number, frame) in frames.iter().enumerate() {
         std::fs::write(folder.path().join(format!("knot_{number:03}.obj")), obj(frame, triangles)).unwrap();
@@ -78,7 +78,7 @@ fn folder(frames: &[Positions], triangles: &[[u32; 3]]) -> tempfile::TempDir {
     folder
 }
 
-fn built(text: &str, folder: &Path, options: &CompileOptions) -> (bth_format::File, SceneReport) {
+pub(crate) fn built(text: &str, folder: &Path, options: &CompileOptions) -> (bth_format::File, SceneReport) {
     let (compiled, report) = scene::compile(&manifest(text), folder, Path::new("x"), options, &Silent)
         .unwrap_or_else(|e| panic!("{e}"));
     let file = bth_format::File::from_bytes(&compiled.bytes).unwrap();
@@ -87,7 +87,7 @@ fn built(text: &str, folder: &Path, options: &CompileOptions) -> (bth_format::Fi
 }
 
 /// The positions at a share of the way from one frame to the next, from the definition.
-fn between(frames: &[Positions], at: f64) -> Positions {
+pub(crate) fn between(frames: &[Positions], at: f64) -> Positions {
     let at = at.clamp(0.0, (frames.len() - 1) as f64);
     let (frame, share) = (at.floor() as usize, at.fract());
     let next = &frames[(frame + 1).min(frames.len() - 1)];
@@ -105,7 +105,7 @@ fn check_at(scene: &Scene, positions: &[[f32; 3]], triangles: &[[u32; 3]], rng: 
     assert!(compare(&fresh, scene, 0, rng) > 100);
 }
 
-const NODE: &str = "nodes = [{ name = \"n\", object = \"knot\" }]\n";
+pub(crate) const NODE: &str = "nodes = [{ name = \"n\", object = \"knot\" }]\n";
 
 #[test]
 fn sequences_have_the_answers_of_their_frames_and_of_what_lies_between() {

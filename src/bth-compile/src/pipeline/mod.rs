@@ -113,7 +113,7 @@ pub(crate) fn compile_mesh(
     options.check()?;
     if let Some(sequence) = mesh.sequence.clone() {
         warn_of_options(&source.display().to_string(), options, monitor);
-        return compile_moving(mesh, &sequence, &options.of_deforming(), clock, monitor);
+        return compile_moving(source, (mesh, &sequence), &options.of_deforming(), clock, monitor);
     }
     let (mesh, on_grid) = match options.coordinates == coordinates::CoordinateOptions::default() {
         true => (mesh, None),

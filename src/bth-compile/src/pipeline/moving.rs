@@ -3,7 +3,7 @@
 use super::clock::timed;
 use super::object::{self, Object, TracedMesh};
 use super::report::TetReports;
-use super::{Clock, StageReports};
+use super::{Clock, Direct, StageReports, tet_leaves};
 use crate::bvh::{self, Costs, PoseOptions, Poses};
 use crate::error::Result;
 use crate::free;
@@ -13,6 +13,7 @@ use bth_format::SequenceView;
 use bth_format::layout::Segment;
 use bth_import::{Mesh, Sequence};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// How objects whose vertices move by themselves are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -87,7 +88,10 @@ impl PoseSource for Sequence {
 /// Warns of options that have no effect on an object whose vertices move.
 pub(crate) fn warn_of_options(name: &str, options: &CompileOptions, monitor: &dyn Monitor) {
     let without_effect = [
-        (options.structure == Structure::Tets, "nothing is tetrahedralized"),
+        (
+            options.structure == Structure::Tets && !options.deformable,
+            "nothing is tetrahedralized without --deformable",
+        ),
         (options.coordinates != Default::default(), "coordinates and boxes stay f32"),
         (!options.geometry, "the geometry of the source stays"),
         (options.free.keep != free::KeepFree::None, "no free directions are kept"),
@@ -125,10 +129,10 @@ struct Compiler<'a> {
 }
 
 /// Compiles a mesh whose vertices move into an object, with objects of its segments behind it. `options` are those of deformable
-/// objects ([`CompileOptions::of_deforming`]).
+/// objects ([`CompileOptions::of_deforming`]); `path` names the model in messages.
 pub(crate) fn compile_moving(
-    mesh: Mesh,
-    source: &dyn PoseSource,
+    path: &Path,
+    (mesh, source): (Mesh, &dyn PoseSource),
     options: &CompileOptions,
     clock: &mut Clock,
     monitor: &dyn Monitor,
@@ -148,9 +152,14 @@ pub(crate) fn compile_moving(
     let mut reports = None;
     for range in ranges {
         let Range { traced, bvh, .. } = range;
+        // Trees over poses depend on all frames, which keys of cached stages do not name.
+        let (leaves, tets) = match options.structure {
+            Structure::Bvh => (Vec::new(), TetReports::default()),
+            _ => tet_leaves(path, &traced, options, &mut Direct, clock, monitor)?,
+        };
         let (object, collapse) =
-            clock.time("collapse", || object::join(traced, Vec::new(), None, options, monitor))?;
-        reports.get_or_insert((bvh, collapse));
+            clock.time("collapse", || object::join(traced, leaves, None, options, monitor))?;
+        reports.get_or_insert((bvh, tets, collapse));
         objects.push(object);
     }
     let mut first = objects.remove(0);
@@ -159,8 +168,8 @@ pub(crate) fn compile_moving(
         first.segment_objects = objects;
     }
     first.motion = Some(report);
-    let (bvh, collapse) = reports.unwrap_or_default();
-    Ok((first, StageReports::new(None, (bvh, None), TetReports::default(), collapse)))
+    let (bvh, tets, collapse) = reports.unwrap_or_default();
+    Ok((first, StageReports::new(None, (bvh, None), tets, collapse)))
 }
 
 fn segment(first: f64, object: u32) -> Segment {

@@ -20,7 +20,7 @@ fn rays_from_the_surface(
         let (u, v) = (0.5 * rng.unit_f32(), 0.5 * rng.unit_f32());
         let origin = [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
         let direction = rng.point_in_ball().map(|x| x as f32);
-        let hint = if i % 7 == 0 { triangle / 2 } else { triangle };
+        let hint = if i.is_multiple_of(7) { triangle / 2 } else { triangle };
         (Ray { tmin: 1e-5, ..Ray::new(origin, direction) }, PrimitiveRef { instance: 0, triangle: hint })
     };
     (0..4000).map(ray).unzip()

@@ -99,20 +99,22 @@ struct Neighbours {
 impl Neighbours {
     fn new(kinds: &[VertexKind], tets: &[[u32; 4]]) -> Neighbours {
         let is_bound = |v: u32| kinds[v as usize] == VertexKind::Bound;
-        let mut pairs: Vec<(u32, u32)> = Vec::new();
+        // Pairs as numbers: all sorts of the library share one.
+        let mut pairs: Vec<u64> = Vec::new();
         for tet in tets {
             for &v in tet.iter().filter(|v| is_bound(**v)) {
-                pairs.extend(tet.iter().filter(|other| **other != v).map(|other| (v, *other)));
+                let others = tet.iter().filter(|other| **other != v);
+                pairs.extend(others.map(|other| u64::from(v) << 32 | u64::from(*other)));
             }
         }
         pairs.sort_unstable();
         pairs.dedup();
         let mut starts = vec![0; kinds.len() + 1];
-        pairs.iter().for_each(|(v, _)| starts[*v as usize + 1] += 1);
+        pairs.iter().for_each(|pair| starts[(pair >> 32) as usize + 1] += 1);
         for v in 0..kinds.len() {
             starts[v + 1] += starts[v];
         }
-        Neighbours { starts, all: pairs.into_iter().map(|(_, other)| other).collect() }
+        Neighbours { starts, all: pairs.into_iter().map(|pair| pair as u32).collect() }
     }
 
     fn of(&self, vertex: u32) -> &[u32] {
@@ -152,9 +154,12 @@ impl Search<'_> {
         }
         if found.len() > MOST {
             let x = point(self.vertices, vertex);
-            let distance = |v: &u32| square_distance(x, point(self.vertices, *v));
-            found.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
-            found.truncate(MOST);
+            // The bits of numbers from 0 on are in their order.
+            let distance = |v: u32| square_distance(x, point(self.vertices, v)) as f32;
+            let mut keys: Vec<u64> =
+                found.iter().map(|v| u64::from(distance(*v).to_bits()) << 32 | u64::from(*v)).collect();
+            keys.sort_unstable();
+            found = keys.into_iter().take(MOST).map(|key| key as u32).collect();
         }
         found
     }

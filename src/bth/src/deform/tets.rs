@@ -66,8 +66,8 @@ struct LeafPlan {
     corners: Vec<u32>,
     /// The vertices that are neither.
     bound: BoundVertices,
-    /// Pairs of rows of POSITIONS that are one vertex here.
-    seams: Vec<[u32; 2]>,
+    /// Pairs of rows of POSITIONS that are one vertex here, the first in the upper half of the number.
+    seams: Vec<u64>,
     /// Bounds of the surface as it was compiled.
     surface: Ends,
     /// For each end of the box, its distance from the surface relative to the diagonal of the surface.
@@ -135,7 +135,7 @@ impl LeafPlan {
                 let known = &mut of_vertex[(vertex - leaf.first_vertex) as usize];
                 match *known {
                     NONE => *known = row,
-                    other if other != row => seams.push([other, row]),
+                    other if other != row => seams.push(u64::from(other) << 32 | u64::from(row)),
                     _ => {}
                 }
             }
@@ -182,7 +182,7 @@ impl LeafPlan {
         (leaf, vertices): (&mut TetLeaf, &mut [TetVertex]),
     ) -> bool {
         let bits = |row: u32| positions[row as usize].map(f32::to_bits);
-        if self.seams.iter().any(|[a, b]| bits(*a) != bits(*b)) {
+        if self.seams.iter().any(|seam| bits((seam >> 32) as u32) != bits(*seam as u32)) {
             return false;
         }
         let surface = self.place_surface(positions, vertices);

@@ -2,11 +2,14 @@
 
 use crate::built::CHOICE;
 use crate::sequences::{NODE, between, built, exchanging, folder, frames};
-use crate::support::options;
+use crate::support::{animated, imported, options};
 use bth::rays::{Hit, PrimitiveRef, Ray};
 use bth::{Hinted, Isa, Scene};
+use bth_compile::Silent;
 use bth_compile::pipeline::{CompileOptions, MotionOptions, Structure};
+use bth_compile::scene;
 use bth_random::Rng;
+use std::path::{Path, PathBuf};
 
 /// Rays that start on the surface of a scene of one instance, most of them on the triangle that the hint names.
 fn rays_from_the_surface(
@@ -88,6 +91,41 @@ fn each_tree_of_a_divided_clip_has_tetrahedra_of_its_own() {
     }
     let used = used_at(&exchanging(24), 4, &[0.5, 3.0, 1.0, 2.5, 1.4, 0.25]);
     assert_eq!(used, [(1, 0), (0, 1), (1, 0), (0, 1), (0, 1), (1, 0)]);
+}
+
+/// The skinned models beside the checkout: a figure that walks and a cylinder that bends.
+#[test]
+fn skinned_models_with_tetrahedra_have_the_answers_of_the_bvh() {
+    if bth_tests::worker().is_none() {
+        return;
+    }
+    let is_skinned = |path: &&PathBuf| {
+        path.file_stem().is_some_and(|name| name == "khr_CesiumMan" || name == "khr_RiggedSimple")
+    };
+    for path in animated().iter().filter(is_skinned) {
+        let (manifest, _) = imported(path);
+        let of = |structure| {
+            let mut options = CompileOptions { structure, deformable: true, ..options() };
+            options.tets.worker = bth_tests::worker().map(Into::into);
+            let (compiled, report) =
+                scene::compile(&manifest, path.parent().unwrap(), Path::new("x"), &options, &Silent)
+                    .unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+            (bth::from_bytes(&compiled.bytes).unwrap(), report.objects[0].tet_leaves)
+        };
+        let ((mut tets, leaves), (mut bvh, _)) = (of(Structure::Tets), of(Structure::Bvh));
+        assert_eq!(leaves, 1, "{}", path.display());
+        let triangles = tets.object(0).triangles.to_vec();
+        let rng = &mut Rng::new(9);
+        for seconds in [0.0, 0.4, 1.1] {
+            let update = tets.set_seconds(seconds).unwrap();
+            // The first time is the one at which the scene was opened.
+            let (used, aside) = (update.tet_leaves_in_use, update.tet_leaves_aside);
+            assert_eq!((update.deformed, used + aside), (usize::from(seconds > 0.0), update.deformed));
+            bvh.set_seconds(seconds).unwrap();
+            let positions = bvh.positions(0).to_vec();
+            compare(&bvh, &tets, &rays_from_the_surface(&positions, &triangles, rng));
+        }
+    }
 }
 
 /// Without `deformable` nothing is tetrahedralized under vertices that move.

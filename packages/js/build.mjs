@@ -10,7 +10,7 @@ import { fileURLToPath } from "node:url";
 const here = dirname(fileURLToPath(import.meta.url)), root = resolve(here, "../..");
 const out = resolve(process.argv[2] ?? join(here, "dist"));
 /** Bytes at most. */
-const MOST_WASM = 398_000, MOST_PAGE = 1_000_000;
+const MOST_WASM = 400_000, MOST_PAGE = 1_000_000;
 
 /** Compiles the module; returns its path. Artifacts with these flags have a folder of their own. */
 function compileModule() {

@@ -80,16 +80,13 @@ impl<'a> RayBatch<'a> {
     ///
     /// # Panics
     /// If there are not as many hits, and hints if there are any, as rays.
-    #[inline]
+    // What a single ray needs is inlined into the caller: what is not asked for, such as conditions, then takes no time.
+    #[inline(always)]
     pub fn nearest(self, hits: &mut [Hit]) {
         self.check_lengths(hits.len());
-        #[cfg(feature = "rayon")]
-        if self.parallel {
-            return self.in_tasks(hits, |part, hits| part.nearest(hits));
-        }
-        match self.conditions() {
-            None => self.scene.nearest_hits_of(self.rays, self.from, hits),
-            Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
+        match (self.rays, &mut *hits, self.accept) {
+            ([ray], [hit], None) => self.scene.nearest_of_ray(ray, self.first_start(), hit),
+            _ => self.nearest_of_many(hits),
         }
     }
 
@@ -97,12 +94,34 @@ impl<'a> RayBatch<'a> {
     ///
     /// # Panics
     /// As [`Self::nearest`].
-    #[inline]
+    #[inline(always)]
     pub fn any(self, found: &mut [bool]) {
         self.check_lengths(found.len());
+        match (self.rays, &mut *found, self.accept) {
+            ([ray], [found], None) => *found = self.scene.any_of_ray(ray, self.first_start()),
+            _ => self.any_of_many(found),
+        }
+    }
+
+    /// As [`Self::nearest`], for any number of rays and any conditions.
+    #[inline(never)]
+    fn nearest_of_many(self, hits: &mut [Hit]) {
         #[cfg(feature = "rayon")]
         if self.parallel {
-            return self.in_tasks(found, |part, found| part.any(found));
+            return self.in_tasks(hits, |part, hits| part.nearest_of_many(hits));
+        }
+        match self.conditions() {
+            None => self.scene.nearest_hits_of(self.rays, self.from, hits),
+            Some(accept) => self.scene.nearest_accepted_batch(self.rays, accept, hits),
+        }
+    }
+
+    /// As [`Self::any`], for any number of rays and any conditions.
+    #[inline(never)]
+    fn any_of_many(self, found: &mut [bool]) {
+        #[cfg(feature = "rayon")]
+        if self.parallel {
+            return self.in_tasks(found, |part, found| part.any_of_many(found));
         }
         match self.conditions() {
             None => self.scene.any_hits_of(self.rays, self.from, found),
@@ -110,13 +129,18 @@ impl<'a> RayBatch<'a> {
         }
     }
 
+    /// The triangle on which the first ray starts, or [`PrimitiveRef::NONE`].
+    #[inline(always)]
+    fn first_start(&self) -> PrimitiveRef {
+        self.from.and_then(|from| from.first()).map_or(PrimitiveRef::NONE, |&first| first)
+    }
+
     /// What the rays are allowed to hit; `None` if that is everything.
-    #[inline]
     fn conditions(&self) -> Option<&'a Accept<'a>> {
         self.accept.filter(|accept| !self.scene.accepts_everything(accept))
     }
 
-    #[inline]
+    #[inline(always)]
     fn check_lengths(&self, results: usize) {
         assert_eq!(self.rays.len(), results, "as many results as rays");
         assert!(self.from.is_none_or(|from| from.len() == results), "as many hints as rays");

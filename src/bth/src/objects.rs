@@ -112,6 +112,15 @@ impl Objects {
         }
     }
 
+    /// The sections of the only object of a file that was given no new positions; `None` elsewhere, and before the first [`Self::view`].
+    #[inline(always)]
+    pub(crate) fn sole_view(&self) -> Option<&ObjectView<'_>> {
+        match &self.files {
+            Files::One(file) if self.deforming.is_empty() => file.sole_view(),
+            _ => None,
+        }
+    }
+
     /// As [`Self::view`], of an object that may not have been checked; `None` if its sections do not fit each other.
     pub(crate) fn unchecked_view(&self, object: u32) -> Option<&ObjectView<'_>> {
         if self.is_deforming(object) {

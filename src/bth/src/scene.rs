@@ -242,7 +242,7 @@ impl Scene {
     /// traversal of tetrahedra may begin, and never changes the result.
     pub fn nearest_from(&self, ray: &Ray, triangle: PrimitiveRef) -> Option<Hit> {
         let mut hit = Hit::MISS;
-        self.nearest_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut hit));
+        self.nearest_of_ray(ray, triangle, &mut hit);
         hit.is_hit().then_some(hit)
     }
 
@@ -253,9 +253,7 @@ impl Scene {
 
     /// As [`Self::any`], with a hint as for [`Self::nearest_from`].
     pub fn any_from(&self, ray: &Ray, triangle: PrimitiveRef) -> bool {
-        let mut found = false;
-        self.any_hits_of(std::slice::from_ref(ray), Some(&[triangle]), std::slice::from_mut(&mut found));
-        found
+        self.any_of_ray(ray, triangle)
     }
 
     /// As [`Self::nearest_from`], with statistics of the traversal. A miss is [`Hit::MISS`].
@@ -284,8 +282,37 @@ impl Scene {
         (best, steps)
     }
 
+    /// Stores the nearest hit of a ray, or [`Hit::MISS`]. `from` is the triangle on which it starts, or [`PrimitiveRef::NONE`].
+    ///
+    /// Not inlined: every crate that traces single rays would hold kernels of its own.
+    #[inline(never)]
+    pub(crate) fn nearest_of_ray(&self, ray: &Ray, from: PrimitiveRef, hit: &mut Hit) {
+        match self.opaque_model() {
+            Some(object) => object::trace_nearest(object, ray, hint(from, 0), 0, hit),
+            None => self.nearest_hits_of(std::slice::from_ref(ray), Some(&[from]), std::slice::from_mut(hit)),
+        }
+    }
+
+    /// Whether a ray hits anything; `from` as for [`Self::nearest_of_ray`].
+    #[inline(never)]
+    pub(crate) fn any_of_ray(&self, ray: &Ray, from: PrimitiveRef) -> bool {
+        if let Some(object) = self.opaque_model() {
+            return object::trace_any(object, ray, hint(from, 0));
+        }
+        let mut found = [false];
+        self.any_hits_of(std::slice::from_ref(ray), Some(&[from]), &mut found);
+        found[0]
+    }
+
+    /// The object of a scene that is a model: a file of one opaque object without scene sections. A single ray in it needs no more
+    /// than this test.
+    #[inline(always)]
+    fn opaque_model(&self) -> Option<&ObjectView<'_>> {
+        if self.world.is_some() || self.has_opacity { None } else { self.objects.sole_view() }
+    }
+
     /// Stores the nearest hit of each ray, or [`Hit::MISS`]. `hits`, and `from` if it is given, are as long as `rays`.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn nearest_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
         if self.has_opacity {
             return self.nearest_not_transparent(rays, from, hits);
@@ -294,27 +321,9 @@ impl Scene {
     }
 
     /// As [`Self::nearest_hits_of`], as if every triangle were opaque.
-    #[inline(always)]
     pub(crate) fn nearest_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, hits: &mut [Hit]) {
-        match (self.sole(), rays, &mut *hits) {
-            (Some((object, instance)), [ray], [hit]) => {
-                object::nearest_to(object, ray, hint(start_primitive(from, 0), instance), instance, hit);
-            }
-            (sole, ..) => self.nearest_general(sole, rays, from, hits),
-        }
-    }
-
-    /// As [`Self::nearest_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
-    #[inline(never)]
-    fn nearest_general(
-        &self,
-        sole: Option<(&ObjectView<'_>, u32)>,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        hits: &mut [Hit],
-    ) {
         object::fill_misses(hits);
-        if let Some((object, instance)) = sole {
+        if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
                     *hit = object::nearest(object, ray, hint(start_primitive(from, i), instance), instance);
@@ -343,7 +352,7 @@ impl Scene {
     }
 
     /// Stores for each ray whether it hits anything. `found`, and `from` if it is given, are as long as `rays`.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn any_hits_of(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
         if self.has_opacity {
             return self.any_not_transparent(rays, from, found);
@@ -352,27 +361,9 @@ impl Scene {
     }
 
     /// As [`Self::any_hits_of`], as if every triangle were opaque.
-    #[inline(always)]
     pub(crate) fn any_of_all(&self, rays: &[Ray], from: Option<&[PrimitiveRef]>, found: &mut [bool]) {
-        match (self.sole(), rays, &mut *found) {
-            (Some((object, instance)), [ray], [found]) => {
-                *found = object::any(object, ray, hint(start_primitive(from, 0), instance));
-            }
-            (sole, ..) => self.any_general(sole, rays, from, found),
-        }
-    }
-
-    /// As [`Self::any_hits_of`], for any number of rays and instances. `sole` is the result of [`Self::sole`].
-    #[inline(never)]
-    fn any_general(
-        &self,
-        sole: Option<(&ObjectView<'_>, u32)>,
-        rays: &[Ray],
-        from: Option<&[PrimitiveRef]>,
-        found: &mut [bool],
-    ) {
         found.fill(false);
-        if let Some((object, instance)) = sole {
+        if let Some((object, instance)) = self.sole() {
             if rays.len() < object::MIN_BATCH {
                 for (i, (ray, found)) in rays.iter().zip(found).enumerate() {
                     *found = object::any(object, ray, hint(start_primitive(from, i), instance));

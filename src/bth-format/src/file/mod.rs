@@ -210,6 +210,15 @@ impl File {
         }
     }
 
+    /// The view of the only object, if the file has only one and [`Self::view`] has made its view before.
+    #[inline(always)]
+    pub fn sole_view(&self) -> Option<&ObjectView<'_>> {
+        match &*self.views {
+            [view] => view.get(),
+            _ => None,
+        }
+    }
+
     #[cold]
     #[inline(never)]
     #[allow(unsafe_code)]

@@ -158,6 +158,22 @@ impl<S: Simd> RaySlabLanes<S> {
         }
     }
 
+    /// [`Self::children`] for one ray at a time, which waits for the result: comparisons follow each other twice, not three times.
+    #[inline(always)]
+    pub(crate) fn children_soon<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {
+        if !S::HAS_VECTORS {
+            return self.children_called(s, node, limit);
+        }
+        let depth = |k: usize, side: u32, addend: [S::F; 3]| {
+            s.fma(node.planes(s, k, self.near[k] ^ side), self.reciprocal[k], addend[k])
+        };
+        let enter = |k| depth(k, 0, self.near_addend);
+        let leave = |k| depth(k, FAR, self.far_addend);
+        let enter = s.max(s.max(enter(1), enter(2)), s.max(enter(0), self.first));
+        let leave = s.min(s.min(leave(1), leave(2)), s.min(leave(0), s.splat(limit)));
+        (s.mask_bits(s.le(enter, leave)), enter)
+    }
+
     /// [`Self::children`] as a function of its own, because unrolled in every scalar kernel it would take much code.
     #[inline(never)]
     fn children_called<B: ChildBoxes>(&self, s: S, node: &B, limit: f32) -> (u32, S::F) {

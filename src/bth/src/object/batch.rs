@@ -12,7 +12,7 @@ use crate::bvh::single::TetOutcome;
 use crate::clock;
 use crate::intersect::exact_lanes::Intersections;
 use crate::query::sink::Sink;
-use crate::query::{AnswerLanes, Goal, Nearest, Query, Uncounted};
+use crate::query::{Answer, AnswerLanes, Goal, Nearest, Query, Uncounted};
 use crate::rays::{Hit, Ray};
 use crate::simd::{Isa, Kernel, Simd};
 use crate::tets::batch::{WalkBatch, WalkRays, WalkState};
@@ -282,12 +282,12 @@ fn one_by_one<Q: Query>(
     remaining: &RemainingRays<'_, Q>,
     sink: &mut Sink<'_, Q>,
 ) {
+    // Without vectors no walk is compiled, so no ray has been walked before.
     let trace = |index: usize, sink: &mut Sink<'_, Q>| {
-        let ray = &rays[index];
-        let mut query = remaining.queries.map_or_else(|| Q::new(sink.goal(), ray), |queries| queries[index]);
-        let walked = remaining.walked.map_or(NONE, |walked| walked[index]);
-        single::through_bvh(object, ray, &mut query, walked, &mut Uncounted::default());
-        sink.query(index, &query);
+        let (goal, instance, mut answer) = (sink.goal(), sink.instance_of(index), Answer::MISS);
+        let count = &mut Uncounted::default();
+        single::trace::<Q, _>((object, goal), &rays[index], NONE, instance, count, &mut answer);
+        sink.answer(index, answer);
     };
     match remaining.order {
         Some(order) => order.iter().for_each(|&index| trace(index as usize, sink)),

@@ -20,17 +20,15 @@ use bth_format::object::ObjectView;
 
 /// Nearest hit of a ray in object space; `from` is the triangle on which it starts, or `NONE`, and `instance` is reported with a
 /// hit.
-#[inline(always)]
 pub(crate) fn nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32) -> Hit {
     let mut hit = Hit::MISS;
-    nearest_to(object, ray, from, instance, &mut hit);
+    trace_nearest(object, ray, from, instance, &mut hit);
     hit
 }
 
-/// As [`nearest`], but stores the hit in `hit`, which avoids a copy. Not inlined: every crate that traces single rays would hold
-/// kernels of its own.
-#[inline(never)]
-pub(crate) fn nearest_to(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
+/// As [`nearest`], but stores the hit in `hit`, which avoids a copy.
+#[inline(always)]
+pub(crate) fn trace_nearest(object: &ObjectView<'_>, ray: &Ray, from: u32, instance: u32, hit: &mut Hit) {
     trace::<NearestQuery, Uncounted>((object, NEAREST), ray, from, instance, &mut Uncounted::default(), hit);
 }
 
@@ -41,9 +39,14 @@ pub(crate) fn nearest_counted(object: &ObjectView<'_>, ray: &Ray, from: u32, ins
     (hit, steps)
 }
 
-/// Whether a ray in object space hits anything; `from` as for [`nearest`]. Not inlined, as [`nearest_to`].
-#[inline(never)]
+/// Whether a ray in object space hits anything; `from` as for [`nearest`].
 pub(crate) fn any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
+    trace_any(object, ray, from)
+}
+
+/// As [`any`], inlined.
+#[inline(always)]
+pub(crate) fn trace_any(object: &ObjectView<'_>, ray: &Ray, from: u32) -> bool {
     let mut found = Answer::MISS;
     trace::<AnyQuery, Uncounted>((object, ANY), ray, from, 0, &mut Uncounted::default(), &mut found);
     Answer::is_hit(&found)

@@ -22,75 +22,75 @@ pub(crate) fn trace<Q: Query, C: Count>(
     count: &mut C,
     answer: &mut Q::Answer,
 ) {
-    if SMALL || from == NONE || object.tet_leaves.is_empty() {
-        let mut query = Q::new(goal, ray);
-        through_bvh(object, ray, &mut query, NONE, count);
-        *answer = query.answer(object.triangle_ids, instance);
-        return;
-    }
-    trace_from::<Q, C>((object, goal), ray, from, instance, count, answer);
+    // The kernel is passed by reference, because a copy of fields that were just written would stall.
+    Isa::chosen().run(&mut SingleKernel::<Q, C> { object, goal, ray, from, instance, count, answer });
 }
 
-/// As [`trace`], from a triangle that may be a face of tetrahedra.
-#[inline(never)]
-fn trace_from<Q: Query, C: Count>(
-    (object, goal): (&ObjectView<'_>, Q::Goal),
-    ray: &Ray,
-    from: u32,
-    instance: u32,
-    count: &mut C,
-    answer: &mut Q::Answer,
-) {
-    let mut query = Q::new(goal, ray);
-    match start_in_tets(object, ray, from, &mut query, count) {
-        TetStart::Done => {}
-        TetStart::Walked(leaf) if leaf != NONE && object.header.root == Child::Tets(leaf).code() => {}
-        TetStart::Walked(leaf) => through_bvh(object, ray, &mut query, leaf, count),
-    }
-    *answer = query.answer(object.triangle_ids, instance);
-}
-
-/// Traces a ray through the BVH. `walked` is a tet leaf that is skipped, because the query already holds the ray's hits in it, or
-/// `NONE`.
-#[inline(always)]
-pub(crate) fn through_bvh<Q: Query, C: Count>(
-    object: &ObjectView<'_>,
-    ray: &Ray,
-    query: &mut Q,
-    walked: u32,
-    count: &mut C,
-) {
-    if object.header.root != NONE {
-        let stack = &mut SingleStack::new();
-        Isa::chosen().run(&mut SingleKernel { object, ray, query, walked, count, stack });
-    }
-}
-
-/// The kernel of [`through_bvh`]; the result is left in the query.
+/// The kernel of [`trace`]: all that is done for a ray, so that little is passed through memory.
 struct SingleKernel<'a, Q: Query, C> {
     object: &'a ObjectView<'a>,
+    goal: Q::Goal,
     ray: &'a Ray,
-    query: &'a mut Q,
-    walked: u32,
+    from: u32,
+    instance: u32,
     count: &'a mut C,
-    stack: &'a mut SingleStack,
+    answer: &'a mut Q::Answer,
 }
 
-// The kernel is passed by reference, because a copy of fields that were just written would stall.
 impl<Q: Query, C: Count> Kernel for &mut SingleKernel<'_, Q, C> {
     type Output = ();
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let SingleKernel { object, ray, query, walked, count, stack } = self;
+        let SingleKernel { object, goal, ray, from, instance, count, answer } = self;
         let (object, ray) = (*object, *ray);
-        let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
-        let prepared = match PreparedRay::of(&object.bounds, ray) {
-            Some(prepared) => prepared,
-            None => match PreparedRay::in_f64(object.header, ray) {
-                Some(prepared) => prepared,
-                None => return,
-            },
+        let mut query = Q::new(*goal, ray);
+        let (from_tets, walked) = if SMALL || *from == NONE || object.tet_leaves.is_empty() {
+            (object.header.root == NONE, NONE)
+        } else {
+            from_tets(object, ray, *from, &mut query, *count)
         };
-        trace_single(s, (object, ray), &prepared, *walked, *query, stack, *count, tets);
+        if !from_tets {
+            through_bvh(s, (object, ray), walked, &mut query, *count);
+        }
+        **answer = query.answer(object.triangle_ids, *instance);
+    }
+}
+
+/// Traces a ray through the BVH, except for the tet leaf `walked`, whose hits the query already holds; `NONE` for no leaf.
+#[inline(always)]
+fn through_bvh<S: Simd, Q: Query, C: Count>(
+    s: S,
+    (object, ray): (&ObjectView<'_>, &Ray),
+    walked: u32,
+    query: &mut Q,
+    count: &mut C,
+) {
+    let prepared = match PreparedRay::of(&object.bounds, ray) {
+        Some(prepared) => prepared,
+        None => match PreparedRay::in_f64(object.header, ray) {
+            Some(prepared) => prepared,
+            None => return,
+        },
+    };
+    let tets = |leaf, query: &mut Q, count: &mut C| enter_tets(object, leaf, ray, query, count);
+    trace_single(s, (object, ray), &prepared, walked, query, &mut SingleStack::new(), count, tets);
+}
+
+/// Walks the ray from a triangle through the tetrahedra of which that is a face. Returns whether the query is complete, and the tet
+/// leaf whose hits the query holds, or `NONE`.
+#[inline(never)]
+fn from_tets<Q: Query, C: Count>(
+    object: &ObjectView<'_>,
+    ray: &Ray,
+    from: u32,
+    query: &mut Q,
+    count: &mut C,
+) -> (bool, u32) {
+    match start_in_tets(object, ray, from, query, count) {
+        TetStart::Done => (true, NONE),
+        TetStart::Walked(leaf) => {
+            let root = object.header.root;
+            (root == NONE || leaf != NONE && root == Child::Tets(leaf).code(), leaf)
+        }
     }
 }

@@ -62,6 +62,20 @@ impl<'a, Q: Query> Sink<'a, Q> {
         Sink { ids, answers, instance, scene, first: self.first + first }
     }
 
+    /// The instance that is reported with a hit of a ray.
+    pub(crate) fn instance_of(&self, ray: usize) -> u32 {
+        self.scene.as_ref().map_or(self.instance, |scene| scene.visits[self.first + ray].instance)
+    }
+
+    /// Stores the answer of a ray, which reports the instance of [`Self::instance_of`].
+    pub(crate) fn answer(&mut self, ray: usize, answer: Q::Answer) {
+        let index = self.first + ray;
+        match &self.scene {
+            None => self.answers.put(index, answer),
+            Some(_) => self.merge(index, answer),
+        }
+    }
+
     /// Stores the answer of a query that has ended.
     #[inline(always)]
     pub(crate) fn query(&mut self, ray: usize, query: &Q) {

@@ -296,7 +296,7 @@ impl Simd for Avx512 {
         keys: &mut [f32; LANES],
     ) -> usize {
         // SAFETY: `self` proves the features.
-        unsafe { store_far_to_near(bits as u16, keys_with_lanes(key), a, to, keys) }
+        unsafe { store_far_to_near::<false>(bits as u16, keys_with_lanes(key), a, to, keys) }
     }
     #[inline(always)]
     fn sort_far_to_near(
@@ -310,7 +310,7 @@ impl Simd for Avx512 {
         // SAFETY: `self` proves the features.
         unsafe {
             let key = keys_with_lanes(key);
-            let count = store_far_to_near(bits as u16, key, a, to, keys);
+            let count = store_far_to_near::<true>(bits as u16, key, a, to, keys);
             // The traversal of a single ray depends on the latency of the nearest: a minimum is faster than the sorted keys.
             let nearest =
                 if count <= 4 { nearest_of_four(bits as u16, key) } else { keys[count - 1].to_bits() };

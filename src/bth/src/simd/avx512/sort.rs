@@ -90,12 +90,12 @@ pub(super) unsafe fn keys_with_lanes(key: __m512) -> __m512i {
 }
 
 /// Stores the keys of `lanes` and their values `a` in descending order of the keys, which come from [`keys_with_lanes`];
-/// returns their number.
+/// returns their number. `WHOLE` stores all sixteen entries of both arrays, so that no store before needs to initialize them.
 ///
 /// # Safety
 /// The machine must have the features of [`super::Avx512`].
 #[inline(always)]
-pub(super) unsafe fn store_far_to_near(
+pub(super) unsafe fn store_far_to_near<const WHOLE: bool>(
     lanes: u16,
     key: __m512i,
     a: __m512i,
@@ -109,13 +109,23 @@ pub(super) unsafe fn store_far_to_near(
         if count <= 4 {
             let key = sort4(_mm512_castsi512_si128(_mm512_mask_compress_epi32(least, lanes, key)));
             let a = _mm512_permutexvar_epi32(_mm512_castsi128_si512(key), a);
-            _mm_storeu_ps(keys.as_mut_ptr(), _mm_castsi128_ps(key));
-            _mm_storeu_si128(to.as_mut_ptr().cast(), _mm512_castsi512_si128(a));
+            if WHOLE {
+                _mm512_storeu_si512(keys.as_mut_ptr().cast(), _mm512_zextsi128_si512(key));
+                _mm512_storeu_si512(to.as_mut_ptr().cast(), a);
+            } else {
+                _mm_storeu_ps(keys.as_mut_ptr(), _mm_castsi128_ps(key));
+                _mm_storeu_si128(to.as_mut_ptr().cast(), _mm512_castsi512_si128(a));
+            }
         } else if count <= 8 {
             let key = sort8(_mm512_castsi512_si256(_mm512_mask_compress_epi32(least, lanes, key)));
             let a = _mm512_permutexvar_epi32(_mm512_castsi256_si512(key), a);
-            _mm256_storeu_ps(keys.as_mut_ptr(), _mm256_castsi256_ps(key));
-            _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm512_castsi512_si256(a));
+            if WHOLE {
+                _mm512_storeu_si512(keys.as_mut_ptr().cast(), _mm512_zextsi256_si512(key));
+                _mm512_storeu_si512(to.as_mut_ptr().cast(), a);
+            } else {
+                _mm256_storeu_ps(keys.as_mut_ptr(), _mm256_castsi256_ps(key));
+                _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm512_castsi512_si256(a));
+            }
         } else {
             let key = sort16(_mm512_mask_mov_epi32(least, lanes, key));
             let a = _mm512_permutexvar_epi32(key, a);
